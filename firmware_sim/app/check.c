@@ -145,7 +145,7 @@ static int print_time(const struct config *cfg, FILE *out, struct sh_err *err)
     struct head_clock clock;
     struct utc_time utc;
     char now[UTC_TEXT_LEN], end[UTC_TEXT_LEN];
-    int rc = head_clock_create(cfg, &clock, err);
+    int rc = head_clock_create(&cfg->time, &clock, err);
     if (rc != SH_OK || clock.source == EPOCH_NONE) return rc;
     utc_from_tai(&clock.table, clock.tai0_ns, &utc);
     utc_format(&utc, 0, now);

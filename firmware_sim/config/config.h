@@ -23,6 +23,7 @@
 #include "core/surface.h"
 #include "drivers/link/link.h"
 #include "firmware_sim/command/head.h"
+#include "firmware_sim/config/epoch.h"
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/config/profile.h"
@@ -30,12 +31,6 @@
 
 enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
-
-/* Time of day (head_clock.h). */
-struct config_time {
-    char epoch[40]; /* of power-up: none, utc, tai, or a date as 2026-01-01T00:00:00Z */
-    double offset_s, drift_ppm, jump_s, jump_at_s;
-};
 
 /* The GNSS receiver (gnss.h). */
 struct config_gnss {

@@ -13,63 +13,36 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    LINE = 1 << EMITTER_LINE,
-    PLANAR = 1 << EMITTER_PLANAR,
-    BEAMS = 1 << EMITTER_BEAMS,
-    SPHERE = 1 << EMITTER_SPHERE,
-    DIRECTIONS = 1 << EMITTER_DIRECTIONS
-};
-
-static const struct owned_key {
-    const char *path;
-    int emitters, needed;
-} owned[] = {
-    {"prr_min_hz", LINE, 1},    {"prr_max_hz", LINE, 1},
-    {"pan_max_deg_s", LINE, 1}, {"fov_min_deg", LINE, 1},
-    {"fov_max_deg", LINE, 1},   {"pan_min_deg", LINE, 1},
-    {"pan_max_deg", LINE, 1},   {"facets", LINE, 1},
-    {"optical_gain", LINE, 1},  {"steps_per_turn", PLANAR, 1},
-    {"first_step", PLANAR, 1},  {"last_step", PLANAR, 1},
-    {"front_step", PLANAR, 1},  {"firing_ns", BEAMS, 1},
-    {"beams", BEAMS, 1},        {"step_direction", PLANAR | BEAMS, 0},
-    {"step_deg", SPHERE, 1},    {"directions", DIRECTIONS, 1},
-    {"programs", LINE, 0},      {"geometries", PLANAR, 0},
-};
-
 static const double PRR_MOST_HZ = 1e7;
 
 /* "planar, beams" */
-static const char *words_of(int emitters, char *buf, size_t len)
+static const char *words_of(unsigned emitters, char *buf, size_t len)
 {
     const char *const *names = cfg_find(&cfg_profile_table, "emitter")->names;
     size_t used = 0;
     buf[0] = '\0';
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS && used < len; kind++)
-        if (emitters & 1 << kind)
+        if (emitters & CFG_KIND(kind))
             used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", names[kind]);
     return buf;
 }
 
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len)
 {
-    for (size_t i = 0; i < CFG_LEN(owned); i++)
-        if (owned[i].needed && strcmp(owned[i].path, key->path) == 0) {
-            words_of(owned[i].emitters, words, len);
-            return 1;
-        }
-    return 0;
+    if (key->needed) words_of(key->of, words, len);
+    return key->needed;
 }
 
-static void check_owners(struct cfg_reader *rd, int emitter)
+static void check_owners(struct cfg_reader *rd, unsigned emitter)
 {
     char words[64];
-    for (size_t i = 0; i < CFG_LEN(owned); i++) {
-        const struct owned_key *key = &owned[i];
-        const int given = cfg_is_given(rd, key->path, 0), has = (key->emitters & emitter) != 0;
+    for (size_t i = 0; i < cfg_profile_table.n; i++) {
+        const struct cfg_key *key = &cfg_profile_table.keys[i];
+        if (key->of == 0) continue;
+        const int given = cfg_is_given(rd, key->path, 0), has = (key->of & emitter) != 0;
         if (given && !has)
             cfg_fail_key(rd, key->path, 0, "no key of this emitter; allowed only with emitter: %s",
-                         words_of(key->emitters, words, sizeof words));
+                         words_of(key->of, words, sizeof words));
         else if (!given && has && key->needed)
             cfg_fail_missing(rd, key->path, 0);
     }
@@ -166,7 +139,7 @@ void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *p)
 {
     const enum emitter_kind kind = p->arrangement.kind;
     if (!CFG_SOUND(rd, 0, "emitter")) return;
-    check_owners(rd, 1 << kind);
+    check_owners(rd, CFG_KIND(kind));
     if (kind == EMITTER_LINE) return;
     p->facets = 1;
     p->optical_gain = 1.0;

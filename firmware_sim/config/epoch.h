@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The key time.epoch, which gives the time of day at power-up.
+/* The section `time`, and its key epoch, which gives the time of day at power-up.
  *
  * In: the key's text and a table of leap seconds. Out: where the time comes from and, for a date, TAI in ns
  * (core/utc.h). */
@@ -7,6 +7,12 @@
 #define FIRMWARE_SIM_CONFIG_EPOCH_H
 
 #include "core/utc.h"
+
+/* Time of day (head_clock.h). */
+struct config_time {
+    char epoch[40]; /* of power-up: none, utc, tai, or a date as 2026-01-01T00:00:00Z */
+    double offset_s, drift_ppm, jump_s, jump_at_s;
+};
 
 enum epoch_source {
     EPOCH_NONE, /* the head does not know the time */

@@ -34,6 +34,12 @@
 /* Limits of a setting: two figures of the profile. */
 #define WITHIN(low, high) .min = -9e12, .max = 9e12, .min_key = low, .max_key = high
 
+/* The links that have an address and a port, and the back ends of USB that have them. */
+#define NETWORK (CFG_KIND(LINK_TCP) | CFG_KIND(LINK_USB) | CFG_KIND(LINK_UDP) | CFG_KIND(LINK_WEB))
+#define SOCKETS (CFG_KIND(USB_BACKEND_USBIP) | CFG_KIND(USB_BACKEND_USBREDIR))
+/* The platforms with a trajectory. */
+#define ON_PATH (CFG_KIND(PLATFORM_TRAJECTORY) | CFG_KIND(PLATFORM_STOPS))
+
 /* clang-format off */
 #define FAULT_LIST_AT(member) offsetof(struct config, faults.member)
 static const struct cfg_key config_keys[] = {
@@ -147,29 +153,32 @@ static const struct cfg_key config_keys[] = {
              "Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, velodyne-position: position "
              "packets, velodyne-http: settings, as a VLP-16."},
     {LINK(path), CFG_PATH, .def = "", .flags = CFG_WRITTEN, .example = "port",
+     .of = CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_USB), .of_backend = CFG_KIND(USB_BACKEND_USBREDIR),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
+     .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 when "
              "not given."},
     {LINK(port), CFG_COUNT, NULL, "0", 0, 65535,
+     .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
-    {LINK(interface), CFG_TEXT, .def = "", .example = "eth1",
+    {LINK(interface), CFG_TEXT, .def = "", .example = "eth1", .of = CFG_KIND(LINK_UDP),
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
              "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still say where packets to other addresses go: "
              "to bind a socket to an interface takes a privilege."},
-    {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201",
+    {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP),
      .help = "udp: numeric address of this machine that packets come from, so that receivers tell heads apart. When not "
              "given: the interface's, or as the system chooses; but the address after the receiver's where that is on "
              "the loopback and has the source's port."},
-    {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535,
+    {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP),
      .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position "
              "8308, as the device's, or another with a warning where these can't be had; but without source and interface "
              "the system chooses for a receiver on this machine. One that listens on the same port at all addresses "
              "must share it (SO_REUSEADDR)."},
-    {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4",
+    {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4", .of = CFG_KIND(LINK_UDP),
      .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the system's."},
-    {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS,
+    {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, .of = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_WEB),
      .help = "tcp, web: clients at a time; scip, when not given: 1."},
     {LINK(waits), CFG_ENUM, .def = "by-type",
      WORDS([LINK_WAITS_BY_TYPE] = "by-type", [LINK_WAITS_YES] = "yes", [LINK_WAITS_NO] = "no"),
@@ -177,20 +186,26 @@ static const struct cfg_key config_keys[] = {
              "time. by-type: those of web links lose, all others hold back."},
     {LINK(backend), CFG_ENUM, .def = "usbip",
      WORDS([USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs"),
+     .of = CFG_KIND(LINK_USB),
      .help = "usb: how the device reaches a host."},
     {LINK(attach), CFG_BOOL, .def = "off",
+     .of = CFG_KIND(LINK_USB), .of_backend = SOCKETS,
      .help = "usbip: plugs into this machine's vhci_hcd; usbredir: connects to the guest's socket instead of "
              "listening. Both do so again whenever the host disconnects."},
-    {LINK(udc), CFG_TEXT, .def = "", .example = "dummy_udc.0", .help = "functionfs: USB device controller; when not given, the first free one."},
+    {LINK(udc), CFG_TEXT, .def = "", .example = "dummy_udc.0",
+     .of = CFG_KIND(LINK_USB), .of_backend = CFG_KIND(USB_BACKEND_FUNCTIONFS),
+     .help = "functionfs: USB device controller; when not given, the first free one."},
     {LINK(speed), CFG_ENUM, .def = "high",
-     WORDS([USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super"),
+     WORDS([USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super"), .of = CFG_KIND(LINK_USB),
      .help = "usb: full (12 Mbit/s), high (480) or super (5000): the fastest that the device offers."},
     {LINK(vid), CFG_COUNT, NULL, "0x1209", 1, 65535, .flags = CFG_HEX, .allowed = "0x0001 to 0xffff",
+     .of = CFG_KIND(LINK_USB),
      .help = "usb: vendor id. When not given, that of the device whose protocol it is: native 0x1209 (with pid 0x0001 "
              "set aside for private tests), scip 0x15d1, cola 0x19a2."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
+     .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
-    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002",
+    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB),
      .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
              "are this head's own on this machine; with scip none, as the device. Only the USB device has them, not *IDN?."},
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Keys that only some kinds of link, back end or platform have, and what a link of a kind needs. */
+/* Keys that only some kinds of link, back end or platform have (their rows say so), and what a link of a kind needs. */
 #include <stdio.h>
 #include <string.h>
 
@@ -8,44 +8,33 @@
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
-
-struct owned_key {
-    const char *path;
-    unsigned kinds; /* bit per kind that has it */
-};
 
 /* A link, back end or platform, and what errors say of it. */
 struct owner {
-    int kind;
+    int is_backend, kind;
     uint32_t item;
     const char *name, *allowed;
 };
 
-/* Reports each of these keys that is given although the kind does not have it. Returns whether there is none. */
-static int check_owned(struct cfg_reader *rd, const struct owned_key *key, size_t n, const struct owner *owner)
+/* Reports each key of the section that is given although the kind does not have it. Returns whether there is none. */
+static int check_owned(struct cfg_reader *rd, const char *section, const struct owner *owner)
 {
     int fits = 1;
-    for (size_t i = 0; i < n; i++) {
-        if (!cfg_is_given(rd, key[i].path, owner->item) || (key[i].kinds & 1u << owner->kind)) continue;
-        cfg_fail_key(rd, key[i].path, owner->item, "%s has no such key; allowed %s", owner->name, owner->allowed);
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const struct cfg_key *key = &rd->table.keys[i];
+        const unsigned kinds = owner->is_backend ? key->of_backend : key->of;
+        if (kinds == 0 || (kinds & CFG_KIND(owner->kind)) || cfg_word_below(key->path, section) == NULL) continue;
+        if (!cfg_is_given(rd, key->path, owner->item)) continue;
+        cfg_fail_key(rd, key->path, owner->item, "%s has no such key; allowed %s", owner->name, owner->allowed);
         fits = 0;
     }
     return fits;
 }
 
-enum { OF_USBIP = 1u << USB_BACKEND_USBIP, OF_USBREDIR = 1u << USB_BACKEND_USBREDIR };
-enum { OF_FUNCTIONFS = 1u << USB_BACKEND_FUNCTIONFS };
-
 static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
 {
-    static const struct owned_key keys[] = {
-        {"links[].path", OF_USBREDIR},
-        {"links[].address", OF_USBIP | OF_USBREDIR},
-        {"links[].port", OF_USBIP | OF_USBREDIR},
-        {"links[].attach", OF_USBIP | OF_USBREDIR},
-        {"links[].udc", OF_FUNCTIONFS},
-    };
     char owner[64];
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
     const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_given(rd, "links[].path", i);
@@ -54,7 +43,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
-    if (!check_owned(rd, keys, CFG_LEN(keys), &(struct owner){link->backend, i, owner, "without it"})) return;
+    if (!check_owned(rd, "links[]", &(struct owner){1, link->backend, i, owner, "without it"})) return;
     if (has_path && (has_port || has_address))
         cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
     else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
@@ -68,23 +57,6 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
 
 static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
-    static const struct owned_key keys[] = {
-        {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
-        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP | 1u << LINK_WEB},
-        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP | 1u << LINK_WEB},
-        {"links[].interface", 1u << LINK_UDP},
-        {"links[].source", 1u << LINK_UDP},
-        {"links[].source_port", 1u << LINK_UDP},
-        {"links[].ttl", 1u << LINK_UDP},
-        {"links[].max_sessions", 1u << LINK_TCP | 1u << LINK_WEB},
-        {"links[].backend", 1u << LINK_USB},
-        {"links[].attach", 1u << LINK_USB},
-        {"links[].udc", 1u << LINK_USB},
-        {"links[].speed", 1u << LINK_USB},
-        {"links[].vid", 1u << LINK_USB},
-        {"links[].pid", 1u << LINK_USB},
-        {"links[].serial", 1u << LINK_USB},
-    };
     static const char *const has[] = {
         [LINK_NULL] = "type, waits, protocol",
         [LINK_FILE] = "type, path, waits, protocol",
@@ -98,7 +70,7 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
     snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
-    if (!check_owned(rd, keys, CFG_LEN(keys), &(struct owner){(int)link->type, i, owner, has[link->type]})) return;
+    if (!check_owned(rd, "links[]", &(struct owner){0, (int)link->type, i, owner, has[link->type]})) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
         cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
@@ -118,26 +90,6 @@ void cfg_check_links(struct cfg_reader *rd, struct config *cfg)
 
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *p)
 {
-    static const struct owned_key keys[] = {
-        {"platform.file", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
-        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
-        {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
-        {"platform.end_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
-        {"platform.step_s", 1u << PLATFORM_STOPS},
-        {"platform.frames_per_s", 1u << PLATFORM_STOPS},
-        {"platform.first_frame", 1u << PLATFORM_STOPS},
-        {"platform.last_frame", 1u << PLATFORM_STOPS},
-        {"platform.frame_step", 1u << PLATFORM_STOPS},
-        {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
-        {"platform.reach_m", 1u << PLATFORM_LIVE},
-        {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
-        {"platform.address", 1u << PLATFORM_LIVE},
-        {"platform.port", 1u << PLATFORM_LIVE},
-        {"platform.mount_m", ~1u},
-        {"platform.mount_heading_deg", ~1u},
-        {"platform.mount_pitch_deg", ~1u},
-        {"platform.mount_roll_deg", ~1u},
-    };
     static const char *const has[] = {
         [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
         [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, end_s, at_end, mount_...",
@@ -147,5 +99,5 @@ int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform 
     };
     char owner[64];
     snprintf(owner, sizeof owner, "a %s platform", cfg_word(rd, "platform.kind", (int)p->kind));
-    return check_owned(rd, keys, CFG_LEN(keys), &(struct owner){(int)p->kind, 0, owner, has[p->kind]});
+    return check_owned(rd, "platform", &(struct owner){0, (int)p->kind, 0, owner, has[p->kind]});
 }

@@ -10,8 +10,9 @@
 #include <string.h>
 
 #include "core/angle.h"
-#include "firmware_sim/config/config.h"
-#include "firmware_sim/device/device_state.h"
+#include "firmware_sim/config/profile.h"
+#include "firmware_sim/device/beam_faults.h"
+#include "firmware_sim/device/head_faults.h"
 
 static const double TURN_DEG = 360.0;
 
@@ -20,12 +21,12 @@ static int is_of_beam(enum fault_kind kind)
     return (HEAD_FAULT(kind) & HEAD_FAULTS_BEAM) != 0;
 }
 
-static void note(struct device *device, const struct device_beam_fault *f, uint64_t pulse, int64_t t_ns)
+static void note(const struct device_beam *beam, const struct device_beam_fault *f, uint64_t pulse, int64_t t_ns)
 {
-    const struct device_scan *scan = &device->scan;
+    const struct device_scan *scan = beam->scan;
     struct fault_note note = {.fault = f->entry.number,
                               .kind = f->entry.fault.kind,
-                              .t_ns = (int64_t)scan->tick0 * device->tick_ns + t_ns,
+                              .t_ns = (int64_t)scan->tick0 * beam->tick_ns + t_ns,
                               .has_pulse = 1,
                               .pulse = pulse,
                               .byte = -1,
@@ -37,17 +38,17 @@ static void note(struct device *device, const struct device_beam_fault *f, uint6
         snprintf(note.text, sizeof note.text, "scan %u, at %.6f deg", scan->number, TURN_DEG * f->turn);
     else
         snprintf(note.text, sizeof note.text, "scan %u", scan->number);
-    fault_board_note(device->faults, &note);
+    fault_board_note(beam->board, &note);
 }
 
 /* ---- when faults strike */
 
 /* Pulses begin .. end of the scan, without end, by the segment's times; pulses before the segment don't matter. */
-static void find_window(const struct device *device, const struct fault_entry *entry, uint64_t *begin, uint64_t *end)
+static void find_window(const struct device_beam *beam, const struct fault_entry *entry, uint64_t *begin, uint64_t *end)
 {
     const struct fault *f = &entry->fault;
-    const struct schedule_segment *seg = &device->scan.segment;
-    const int64_t zero_ns = entry->since_ns - (int64_t)device->scan.tick0 * device->tick_ns;
+    const struct schedule_segment *seg = &beam->scan->segment;
+    const int64_t zero_ns = entry->since_ns - (int64_t)beam->scan->tick0 * beam->tick_ns;
     *begin = schedule_pulse_at(seg, zero_ns + llround(1e9 * f->from_s));
     if (*begin < f->from_pulse) *begin = f->from_pulse;
     *end = f->until_s > 0.0 ? schedule_pulse_at(seg, zero_ns + llround(1e9 * f->until_s)) : UINT64_MAX;
@@ -55,15 +56,14 @@ static void find_window(const struct device *device, const struct fault_entry *e
 }
 
 /* Takes over the present list. A fault that was taken out while it struck ends at this pulse. */
-static void renew(struct device *device, uint64_t pulse, int64_t t_ns)
+static void renew(struct device_beam *beam, uint64_t pulse, int64_t t_ns)
 {
-    struct device_beam *beam = &device->beam;
     struct fault_entry entry[FAULT_MAX];
     struct device_beam_fault was[FAULT_MAX];
     const uint32_t n_was = beam->n;
     uint32_t n;
     memcpy(was, beam->fault, n_was * sizeof was[0]);
-    beam->version = fault_board_copy(device->faults, entry, &n);
+    beam->version = fault_board_copy(beam->board, entry, &n);
     beam->n = 0;
     for (uint32_t i = 0; i < n; i++) {
         if (!is_of_beam(entry[i].fault.kind)) continue;
@@ -73,7 +73,7 @@ static void renew(struct device *device, uint64_t pulse, int64_t t_ns)
     for (uint32_t k = 0; k < n_was; k++) {
         if (!was[k].strikes || fault_find(beam->fault, beam->n, sizeof *was, was[k].entry.number) != NULL) continue;
         was[k].strikes = 0;
-        note(device, &was[k], pulse, t_ns);
+        note(beam, &was[k], pulse, t_ns);
     }
 }
 
@@ -89,11 +89,11 @@ static double slowness(const struct device_beam *beam)
 }
 
 /* A head whose lines have a fixed number of pulses fires at steps of its mirror, so its pulse rate falls, too. */
-static void slow_down(const struct device *device, const struct site *site, struct schedule_spec *spec)
+static void slow_down(const struct device_beam *beam, const struct site *site, struct schedule_spec *spec)
 {
-    const int64_t most = site->cfg->profile.lines_max_uhz;
-    const uint32_t steps = emitter_line_pulses(&site->cfg->profile.emitter);
-    const double factor = slowness(&device->beam);
+    const int64_t most = site_profile(site)->lines_max_uhz;
+    const uint32_t steps = emitter_line_pulses(&site_profile(site)->emitter);
+    const double factor = slowness(beam);
     if (factor == 1.0) return;
     spec->lines_uhz = llround((double)spec->lines_uhz * factor);
     if (spec->lines_uhz < 1) spec->lines_uhz = 1;
@@ -104,28 +104,28 @@ static void slow_down(const struct device *device, const struct site *site, stru
         spec->lines_uhz = spec->prr_uhz;
 }
 
-void device_fill_spec(struct device *device, const struct site *site, struct schedule_spec *spec)
+void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec)
 {
-    site_fill_spec(site, &device->cmd.settings, spec);
-    device->scan.prr_uhz = spec->prr_uhz;
-    device->scan.lines_uhz = spec->lines_uhz;
-    slow_down(device, site, spec);
+    site_fill_spec(site, beam->settings, spec);
+    beam->scan->prr_uhz = spec->prr_uhz;
+    beam->scan->lines_uhz = spec->lines_uhz;
+    slow_down(beam, site, spec);
 }
 
-static void set_rates(struct device *device, uint64_t pulse)
+static void set_rates(struct device_beam *beam, uint64_t pulse)
 {
-    struct schedule_segment *seg = &device->scan.segment;
+    struct schedule_segment *seg = &beam->scan->segment;
     struct schedule_spec spec;
-    device_fill_spec(device, device->scan.site, &spec);
+    device_fill_spec(beam, beam->scan->site, &spec);
     if (spec.lines_uhz == seg->spec.lines_uhz && spec.prr_uhz == seg->spec.prr_uhz) return;
     schedule_change(seg, seg, &spec, pulse);
 }
 
-static void add_wobble(const struct device *device, const struct device_beam_fault *f, struct cast_upset *to)
+static void add_wobble(const struct device_beam *beam, const struct device_beam_fault *f, struct cast_upset *to)
 {
     _Static_assert((int)FAULT_MAX <= (int)CAST_MAX_WOBBLES, "room for all");
     const double turn = f->entry.fault.deg / TURN_DEG;
-    const int is_rotor = device->site->cfg->profile.emitter.kind == EMITTER_BEAMS;
+    const int is_rotor = site_profile(beam->scan->site)->emitter.kind == EMITTER_BEAMS;
     to->wobble[to->n_wobbles++] = (struct cast_wobble){.mirror_turn = is_rotor ? 0.0 : turn,
                                                        .pan_turn = is_rotor ? turn : 0.0,
                                                        .hz = f->entry.fault.hz,
@@ -133,19 +133,19 @@ static void add_wobble(const struct device *device, const struct device_beam_fau
 }
 
 /* Adds up the faults that strike. A stuck mirror does not wobble. Of several stuck faults the first one counts. */
-static void add_up(struct device *device)
+static void add_up(struct device_beam *beam)
 {
-    struct device_upset *now = &device->beam.now;
+    struct device_upset *now = &beam->now;
     struct cast_upset *cast = &now->cast;
     *now = (struct device_upset){.cast.share = 1.0};
-    for (uint32_t i = 0; i < device->beam.n; i++) {
-        const struct device_beam_fault *f = &device->beam.fault[i];
+    for (uint32_t i = 0; i < beam->n; i++) {
+        const struct device_beam_fault *f = &beam->fault[i];
         if (!f->strikes) continue;
         now->on = 1;
         if (f->entry.fault.kind == FAULT_LASER_OFF) cast->dark = 1;
         if (f->entry.fault.kind == FAULT_PAN_SLIP) cast->slip_turn += f->entry.fault.deg / TURN_DEG;
         if (f->entry.fault.kind == FAULT_WINDOW_SOILED) cast->share *= pow(10.0, -0.1 * f->entry.fault.loss_db);
-        if (f->entry.fault.kind == FAULT_MIRROR_WOBBLE) add_wobble(device, f, cast);
+        if (f->entry.fault.kind == FAULT_MIRROR_WOBBLE) add_wobble(beam, f, cast);
         if (f->entry.fault.kind != FAULT_MIRROR_STUCK || now->stuck) continue;
         now->stuck = 1;
         now->stuck_turn = f->turn;
@@ -154,43 +154,42 @@ static void add_up(struct device *device)
 }
 
 /* The turn of the mirror, or of the rotor, at a pulse. */
-static double find_turn(const struct device *device, uint64_t pulse, int64_t t_ns)
+static double find_turn(const struct device_beam *beam, uint64_t pulse, int64_t t_ns)
 {
-    const struct device_upset *now = &device->beam.now;
+    const struct device_upset *now = &beam->now;
     double mirror_turn = 0.0, pan_turn = 0.0;
     if (now->on && now->stuck) return now->stuck_turn;
     if (now->on) cast_wobble(&now->cast, t_ns, &mirror_turn, &pan_turn);
-    return schedule_sweep_turn(&device->scan.segment, pulse) + mirror_turn + pan_turn;
+    return schedule_sweep_turn(&beam->scan->segment, pulse) + mirror_turn + pan_turn;
 }
 
 /* ---- a pulse */
 
-static void begin_or_end(struct device *device, uint64_t pulse, int64_t t_ns)
+static void begin_or_end(struct device_beam *beam, uint64_t pulse, int64_t t_ns)
 {
-    struct device_beam *beam = &device->beam;
     int turned[FAULT_MAX] = {0};
     for (uint32_t i = 0; i < beam->n; i++) {
         struct device_beam_fault *f = &beam->fault[i];
         uint64_t begin, end;
-        find_window(device, &f->entry, &begin, &end);
+        find_window(beam, &f->entry, &begin, &end);
         turned[i] = (begin <= pulse && pulse < end) != f->strikes;
         if (!turned[i]) continue;
         f->strikes = !f->strikes;
         f->begin_ns = t_ns;
-        if (f->strikes) f->turn = find_turn(device, pulse, t_ns);
+        if (f->strikes) f->turn = find_turn(beam, pulse, t_ns);
     }
-    set_rates(device, pulse);
-    add_up(device);
+    set_rates(beam, pulse);
+    add_up(beam);
     for (uint32_t i = 0; i < beam->n; i++)
-        if (turned[i]) note(device, &beam->fault[i], pulse, t_ns);
+        if (turned[i]) note(beam, &beam->fault[i], pulse, t_ns);
 }
 
-static uint64_t find_edge(const struct device *device, uint64_t pulse)
+static uint64_t find_edge(const struct device_beam *beam, uint64_t pulse)
 {
     uint64_t edge = UINT64_MAX;
-    for (uint32_t i = 0; i < device->beam.n; i++) {
+    for (uint32_t i = 0; i < beam->n; i++) {
         uint64_t begin, end;
-        find_window(device, &device->beam.fault[i].entry, &begin, &end);
+        find_window(beam, &beam->fault[i].entry, &begin, &end);
         if (begin >= end) continue;
         if (begin > pulse && begin < edge) edge = begin;
         if (end > pulse && end < edge) edge = end;
@@ -198,27 +197,25 @@ static uint64_t find_edge(const struct device *device, uint64_t pulse)
     return edge;
 }
 
-void device_turn_beam(struct device *device, int64_t until_ns)
+void device_turn_beam(struct device_beam *beam, int64_t until_ns)
 {
-    struct device_beam *beam = &device->beam;
-    const uint32_t version = fault_board_version(device->faults);
+    const uint32_t version = fault_board_version(beam->board);
     if (version == beam->version && beam->n == 0) return;
-    const uint64_t pulse = device->scan.pulse_next;
-    const int64_t t_ns = schedule_time_ns(&device->scan.segment, pulse);
+    const uint64_t pulse = beam->scan->pulse_next;
+    const int64_t t_ns = schedule_time_ns(&beam->scan->segment, pulse);
     beam->edge = UINT64_MAX;
-    if (pulse >= device->scan.segment.end_pulse || t_ns >= until_ns) return;
-    if (version != beam->version) renew(device, pulse, t_ns);
-    begin_or_end(device, pulse, t_ns);
-    beam->edge = find_edge(device, pulse);
+    if (pulse >= beam->scan->segment.end_pulse || t_ns >= until_ns) return;
+    if (version != beam->version) renew(beam, pulse, t_ns);
+    begin_or_end(beam, pulse, t_ns);
+    beam->edge = find_edge(beam, pulse);
 }
 
-void device_end_beam(struct device *device, int64_t t_ns)
+void device_end_beam(struct device_beam *beam, int64_t t_ns)
 {
-    struct device_beam *beam = &device->beam;
     for (uint32_t i = 0; i < beam->n; i++) {
         if (!beam->fault[i].strikes) continue;
         beam->fault[i].strikes = 0;
-        note(device, &beam->fault[i], device->scan.pulse_next, t_ns);
+        note(beam, &beam->fault[i], beam->scan->pulse_next, t_ns);
     }
     beam->now.on = 0;
     beam->edge = UINT64_MAX;

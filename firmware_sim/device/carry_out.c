@@ -10,10 +10,10 @@ static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
     struct schedule_spec spec;
-    device_fill_spec(device, device->scan.site, &spec);
+    device_fill_spec(&device->beam, device->scan.site, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;
-    device_push_event(device, NATIVE_EV_SETTINGS, device->scan.pulse_next, 0, 0, "");
+    device_push_event(&device->events, NATIVE_EV_SETTINGS, device->scan.pulse_next, 0, 0, "");
 }
 
 static void stop(struct device *device, enum head_event event, uint64_t tick)
@@ -44,7 +44,7 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
         device->power.reboots = 1;
         break;
     case COMMAND_RELEASE:
-        device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "released");
+        device_push_event(&device->events, NATIVE_EV_CONTROL, 0, 0, 0, "released");
         break;
     case COMMAND_STEP:
     case COMMAND_FAULTS:
@@ -81,7 +81,7 @@ static void do_dead(struct device *device, uint32_t session, const char *line, u
 static void push_control(struct device *device, uint32_t session)
 {
     const char *peer = command_peer(&device->cmd, session);
-    device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, peer[0] != '\0' ? peer : "taken");
+    device_push_event(&device->events, NATIVE_EV_CONTROL, session, 0, 0, peer[0] != '\0' ? peer : "taken");
 }
 
 /* once: the session does not keep control. */
@@ -106,7 +106,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     else if (out->took_control)
         push_control(device, session);
     if (out->error != 0)
-        device_push_error(device, session, out->error, command_error_text(out->error));
+        device_push_error(&device->events, session, out->error, command_error_text(out->error));
     else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP && out->effect != COMMAND_MOVE)
         journal_write(device->journal.out, device->next_tick, cmd->t_ns, session, line);
     if (out->error == 0) carry_out(device, out->effect, released);
@@ -133,7 +133,7 @@ static void report(struct device *device, uint32_t session, int number, const ch
 {
     pthread_mutex_lock(&device->lock);
     command_queue_push(&device->cmd.queue, number, text);
-    device_push_error(device, session, number, text);
+    device_push_error(&device->events, session, number, text);
     pthread_mutex_unlock(&device->lock);
 }
 
@@ -166,7 +166,7 @@ void device_session_closed(struct device *device, uint32_t session, const char *
     int in_control = device->cmd.control == session;
     if (in_control) {
         device->cmd.control = 0;
-        device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "client gone");
+        device_push_event(&device->events, NATIVE_EV_CONTROL, 0, 0, 0, "client gone");
     }
     int scanning = device->scan.on;
     pthread_mutex_unlock(&device->lock);

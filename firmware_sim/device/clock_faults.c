@@ -4,58 +4,61 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/clock_faults.h"
+#include "firmware_sim/device/events.h"
+#include "firmware_sim/device/head_clock.h"
 
-static void add_leap(struct device *device, const struct head_fault *f)
+static void add_leap(struct head_clock *clock, struct device_events *events, const struct head_fault *f)
 {
     char text[UTC_TEXT_LEN], said[96];
     int64_t posix_s;
     struct utc_time utc;
-    const int added = head_clock_add_leap(&device->clock, f->begin_ns, &posix_s);
-    utc_from_tai(&device->clock.table, utc_tai_from_posix(&device->clock.table, (posix_s - 1) * UTC_SECOND_NS), &utc);
+    const int added = head_clock_add_leap(clock, f->begin_ns, &posix_s);
+    utc_from_tai(&clock->table, utc_tai_from_posix(&clock->table, (posix_s - 1) * UTC_SECOND_NS), &utc);
     utc.second += added;
     utc_format(&utc, 0, text);
     snprintf(said, sizeof said, added ? "leap second %s" : "no room for a leap second after %s", text);
-    if (!added) device_push_error(device, 0, CMD_E_SETTINGS, said);
+    if (!added) device_push_error(events, 0, CMD_E_SETTINGS, said);
 }
 
 /* Changes the clock from the fault's begin on (sign 1), or undoes that from its end on (-1). */
-static void change(struct device *device, const struct head_fault *f, int64_t t_ns, int sign)
+static void change(struct head_clock *clock, const struct head_fault *f, int64_t t_ns, int sign)
 {
     struct head_clock_change change = {0};
     if (f->fault.kind == FAULT_CLOCK_DRIFT) change.gain_ppt = sign * llround(1e6 * f->fault.ppm);
     if (f->fault.kind == FAULT_CLOCK_STOP) change.stands = sign;
     if (f->fault.kind == FAULT_CLOCK_JUMP) change.jump_ns = llround(1e9 * f->fault.jump_s);
-    head_clock_change(&device->clock, t_ns, &change);
+    head_clock_change(clock, t_ns, &change);
 }
 
-static void run(struct device *device, struct head_fault *f, int64_t end_ns)
+/* The tick ends at end_ns and takes tick_ns. */
+static void run(struct head_clock *clock, struct head_fault *f, int64_t end_ns, int64_t tick_ns)
 {
     const int lasts = f->fault.kind == FAULT_CLOCK_DRIFT || f->fault.kind == FAULT_CLOCK_STOP;
-    if (f->begins && f->fault.kind == FAULT_LEAP_SECOND) add_leap(device, f);
-    if (f->begins && (lasts || f->fault.kind == FAULT_CLOCK_JUMP)) change(device, f, f->begin_ns, 1);
+    if (f->begins && (lasts || f->fault.kind == FAULT_CLOCK_JUMP)) change(clock, f, f->begin_ns, 1);
     if (!lasts || f->undone) return;
     if (f->active && f->until_ns < end_ns) { /* within this tick */
-        change(device, f, f->until_ns, -1);
+        change(clock, f, f->until_ns, -1);
         f->undone = 1;
     } else if (f->ends) {
-        change(device, f, end_ns - device->tick_ns, -1);
+        change(clock, f, end_ns - tick_ns, -1);
     }
 }
 
-void device_run_clock_faults(struct device *device, uint64_t tick)
+void device_run_clock_faults(struct head_faults *faults, struct head_clock *clock, struct device_events *events,
+                             uint64_t tick)
 {
-    const int64_t end_ns = (int64_t)(tick + 1) * device->tick_ns;
-    struct head_faults *faults = &device->head_faults;
+    const int64_t end_ns = (int64_t)(tick + 1) * faults->tick_ns;
     for (uint32_t i = 0; i < faults->n; i++) {
         struct head_fault *f = &faults->fault[i];
-        if ((HEAD_FAULT(f->fault.kind) & HEAD_FAULTS_CLOCK) != 0 && (f->active || f->ends)) run(device, f, end_ns);
+        if ((HEAD_FAULT(f->fault.kind) & HEAD_FAULTS_CLOCK) == 0 || (!f->active && !f->ends)) continue;
+        if (f->begins && f->fault.kind == FAULT_LEAP_SECOND) add_leap(clock, events, f);
+        run(clock, f, end_ns, faults->tick_ns);
     }
 }
 
-int device_has_no_pps(const struct device *device, int64_t t_ns)
+int device_has_no_pps(const struct head_faults *faults, int64_t t_ns)
 {
-    const struct head_faults *faults = &device->head_faults;
     int lost = 0;
     for (uint32_t i = 0; i < faults->n; i++)
         lost |= faults->fault[i].fault.kind == FAULT_PPS_LOST && t_ns >= faults->fault[i].from_ns &&
@@ -63,12 +66,12 @@ int device_has_no_pps(const struct device *device, int64_t t_ns)
     return lost;
 }
 
-int device_loses_pps(struct device *device, int64_t edge_ns)
+int device_loses_pps(struct head_faults *faults, int64_t edge_ns)
 {
     struct head_fault *f = NULL;
     int lost = 0;
-    if (fault_board_version(device->faults) == 0) return 0;
-    while ((f = head_faults_next(&device->head_faults, FAULT_PPS_LOST, f)) != NULL) {
+    if (fault_board_version(faults->board) == 0) return 0;
+    while ((f = head_faults_next(faults, FAULT_PPS_LOST, f)) != NULL) {
         if (edge_ns < f->from_ns || edge_ns >= f->until_ns) continue;
         f->n++;
         lost = 1;

@@ -7,7 +7,10 @@
 #include <string.h>
 
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/device/clock_faults.h"
 #include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/fault_desk.h"
+#include "firmware_sim/device/limits.h"
 #include "firmware_sim/site/plan_rows.h"
 
 /* A live head needs a pose for the first pulse of a tick, which may be 15 periods old. */
@@ -20,87 +23,13 @@ static int check_live(const struct device *device, struct sh_err *err)
                    cfg->file, cfg->profile.name, SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0));
 }
 
-static int64_t to_nm(double m)
-{
-    return llround(1e9 * m);
-}
-
-/* Whether commands may only narrow the ranges of power-up. Methods that were chosen by trying them on the scene, and
- * the outlines of an adaptive beam, hold for these ranges. */
-static int was_tried(const struct site *site)
-{
-    const struct config *cfg = site->cfg;
-    const int beam = config_has_footprint(cfg) && (cfg->beam.mode == BEAM_AUTO || cfg->beam.mode == BEAM_ADAPTIVE);
-    return beam || (site->detect.surfaces.has_optics && !cfg->optics.depth_given);
-}
-
-/* Sets the limits for commands that set ranges: within the profile, and with some range left at each pulse rate. */
-static void set_range_limits(const struct site *site, struct head_limits *l)
-{
-    const struct config *cfg = site->cfg;
-    const struct config_profile *p = &cfg->profile;
-    double near_most_m = INFINITY, far_least_m = 0.0;
-    for (uint32_t i = 0; i < (p->n_programs > 0 ? p->n_programs : 1); i++) {
-        near_most_m = fmin(near_most_m, p->program[i].own_max_m);
-        far_least_m = fmax(far_least_m, p->program[i].own_min_m);
-    }
-    const int tried = was_tried(site);
-    l->range_min_nm = tried ? cfg->head.settings.range_min_nm : to_nm(cfg->head.profile_min_m);
-    l->range_max_nm = tried ? cfg->head.settings.range_max_nm : to_nm(cfg->head.profile_max_m);
-    l->near_most_nm = to_nm(near_most_m) - 1;
-    l->far_least_nm = to_nm(far_least_m) + 1;
-}
-
-static void set_noise_limits(const struct config *cfg, struct head_limits *l)
-{
-    static const double BALL_MOST_M = 100.0; /* as noise.ball.radius_m */
-    const int may_move = cfg->platform.kind == PLATFORM_STATIC || cfg->noise.ball.local;
-    l->noise_most = cfg->signal.on ? RANGE_NOISE_SIGNAL : RANGE_NOISE_ON;
-    l->angle_most = cfg->profile.mirror_sigma_deg > 0.0 || cfg->profile.pan_sigma_deg > 0.0;
-    l->sigma_min_nm = cfg->signal.on ? to_nm(cfg->profile.range_sigma_floor_m) : 0;
-    l->ball_max_nm = may_move ? to_nm(BALL_MOST_M) : 0;
-}
-
-static void set_pattern(const struct config *cfg, struct head_limits *l)
-{
-    const struct config_profile *p = &cfg->profile;
-    l->emitter = p->emitter.kind;
-    l->line_pulses = emitter_line_pulses(&p->emitter);
-    l->round = p->emitter.kind == EMITTER_SPHERE;
-    l->step_fixed = config_head_moves(&cfg->platform);
-    for (uint32_t i = 0; i < p->arrangement.n_geometries; i++) {
-        const struct config_geometry *g = &p->arrangement.geometry[i];
-        if (l->step_fixed && g->steps_per_turn != p->emitter.steps) continue;
-        l->geometry[l->n_geometries++] = (struct head_geometry){g->lines_uhz, g->steps_per_turn};
-    }
-    l->sweep_udeg = l->emitter == EMITTER_LINE ? llround(360e6 * p->optical_gain / p->facets) : 0;
-    l->sequence_ps = p->arrangement.firing_fs / 1000;
-}
-
-static int set_limits(struct device *device, struct sh_err *err)
+static int set_up_commands(struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
     const struct config_profile *p = &cfg->profile;
-    device->cmd.limits = (struct head_limits){.prr_min_uhz = p->prr_min_uhz,
-                                              .prr_max_uhz = p->prr_max_uhz,
-                                              .lines_min_uhz = p->lines_min_uhz,
-                                              .lines_max_uhz = p->lines_max_uhz,
-                                              .pan_max_udeg_s = p->pan_max_udeg_s,
-                                              .fov_min_udeg = p->fov_min_udeg,
-                                              .fov_max_udeg = p->fov_max_udeg,
-                                              .pan_min_udeg = p->pan_min_udeg,
-                                              .pan_max_udeg = p->pan_max_udeg,
-                                              .n_rates = p->n_programs,
-                                              .n_stations = device->site->n_stations};
-    set_pattern(cfg, &device->cmd.limits);
-    set_range_limits(device->site, &device->cmd.limits);
-    set_noise_limits(cfg, &device->cmd.limits);
+    device_set_limits(device->site, &device->cmd.limits);
     device->cmd.can_plan = device_can_plan;
-    device->cmd.owner = device;
-    for (uint32_t i = 0; i < p->n_programs; i++)
-        device->cmd.limits.rate_uhz[i] = p->program[i].prr_uhz;
-    for (uint32_t i = 0; i < device->site->n_stations && i < 64; i++)
-        if (!config_serves(cfg, i)) device->cmd.limits.elsewhere |= (uint64_t)1 << i;
+    device->cmd.owner = &device->variants;
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
     int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
                        cfg->head.serial, NATIVE_VERSION);
@@ -154,6 +83,41 @@ static int open_journals(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
+/* Parts that know nothing of the whole point to what they need of it. */
+static void set_parts(struct device *device)
+{
+    device->events.tick_hz = device->overrun.tick_hz = device->tick_hz;
+    device->events.next_tick = &device->next_tick;
+    device->overrun.counters = &device->counters;
+    device->overrun.events = &device->events;
+    device->overrun.queue = &device->cmd.queue;
+    device->variants.moves = &device->moves;
+    device->variants.scan = &device->scan;
+}
+
+static void write_note(void *ctx, const struct fault_note *note)
+{
+    const struct device *device = ctx;
+    char text[TRUTH_TEXT_LEN];
+    truth_text(note, text);
+    if (device->journal.out != NULL) journal_note(device->journal.out, text);
+}
+
+static int open_faults(struct device *device, struct sh_err *err)
+{
+    const int rc = fault_board_create(&device->site->cfg->faults, device->options.truth,
+                                      &device->counters.lost_truth_lines, &device->faults, err);
+    if (rc != SH_OK) return rc;
+    fault_board_listen(device->faults, write_note, device);
+    head_faults_init(&device->head_faults, device->faults, device->tick_ns);
+    device->beam = (struct device_beam){
+        .scan = &device->scan, .board = device->faults, .settings = &device->cmd.settings, .tick_ns = device->tick_ns};
+    device->desk = (struct fault_desk){.cfg = device->site->cfg, .board = device->faults};
+    device->cmd.faults = &fault_desk_commands;
+    device->cmd.faults_owner = &device->desk;
+    return SH_OK;
+}
+
 int device_create(const struct site *site, const struct device_options *options, struct device **out,
                   struct sh_err *err)
 {
@@ -165,18 +129,19 @@ int device_create(const struct site *site, const struct device_options *options,
     device->options = *options;
     device->tick_hz = (uint64_t)llround(site->cfg->loop.tick_hz);
     device->tick_ns = 1000000000 / (int64_t)device->tick_hz;
+    set_parts(device);
     device->machine.due_tick = device->end_tick = device->overrun.first = UINT64_MAX;
     if (options->duration_s > 0.0 && !options->start)
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
     device->station_scans = calloc(site->n_stations, sizeof *device->station_scans);
     int rc = device->station_scans != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
-    if (rc == SH_OK) rc = device_open_moves(device, err);
-    if (rc == SH_OK) rc = set_limits(device, err);
+    if (rc == SH_OK) rc = device_open_moves(&device->moves, device->site, err);
+    if (rc == SH_OK) rc = set_up_commands(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
-    if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
+    if (rc == SH_OK) rc = head_clock_create(&site->cfg->time, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
     if (rc == SH_OK) rc = open_journals(device, err);
-    if (rc == SH_OK) rc = device_open_faults(device, err);
+    if (rc == SH_OK) rc = open_faults(device, err);
     if (rc != SH_OK) {
         device_free(device);
         return rc;
@@ -215,12 +180,44 @@ void device_free(struct device *device)
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
     fault_board_free(device->faults);
-    device_free_variants(device);
+    device_free_variants(&device->variants);
     free(device->journal.replay);
     free(device->station_scans);
-    device_close_moves(device);
+    device_close_moves(&device->moves);
     pthread_mutex_destroy(&device->lock);
     free(device);
+}
+
+static void run_faults(struct device *device, uint64_t tick, struct device_work *work)
+{
+    const struct head_faults_tick at = {.t_ns = (int64_t)tick * device->tick_ns,
+                                        .has_pulses = device->scan.on,
+                                        .pulse0 = device->scan.pulse_next,
+                                        .n_pulses =
+                                            1}; /* from the tick on that begins with the fault's pulse or later */
+    if (head_faults_step(&device->head_faults, HEAD_FAULTS_CLOCK | HEAD_FAULT(FAULT_POWER_CYCLE), &at))
+        device_run_clock_faults(&device->head_faults, &device->clock, &device->events, tick);
+    device_run_power(device, tick, work);
+}
+
+/* Pulses, echoes and lines are filled in at release (stream.c), since they count what was released. Here both counts of
+ * lost pulses are set to the pulses cast; the release subtracts those delivered. */
+static void fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
+{
+    const struct device_counters *c = &device->counters;
+    memset(t, 0, sizeof *t);
+    t->state = (uint32_t)device->machine.state;
+    t->scan = device->scan.number;
+    t->lost_pulses = atomic_load(&c->cast);
+    t->scan_fired = device->scan.pulse_next;
+    t->scan_cast = t->scan_lost = device->scan.cast;
+    t->late_blocks = atomic_load(&c->late_blocks);
+    t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
+    t->errors_queued = device->cmd.queue.count;
+    t->lost_lines = atomic_load(&c->lost_journal_lines) + atomic_load(&c->lost_truth_lines);
+    if (device->clock.source != EPOCH_NONE)
+        t->utc_ns =
+            utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
 }
 
 static int ends_scan(const struct device_work *work)
@@ -250,7 +247,7 @@ static int has_said_all(const struct device *device)
 {
     if (device->events.n != 0) return 0;
     if (device->machine.state == HEAD_OFF) return 1;
-    return device->held == 0 && device->overrun.ticks_said == atomic_load(&device->counters.lost_ticks);
+    return device->events.held == 0 && device->overrun.ticks_said == atomic_load(&device->counters.lost_ticks);
 }
 
 int device_claim(struct device *device, struct device_work *work)
@@ -269,26 +266,26 @@ int device_claim(struct device *device, struct device_work *work)
     work->tick = tick;
     work->t_ns = (int64_t)tick * device->tick_ns;
     replay(device, tick);
-    device_run_faults(device, tick, work);
-    device_use_site(device, work);
+    run_faults(device, tick, work);
+    device_use_site(&device->moves, work);
     device_run_timers(device, tick);
     const int off = device->machine.state == HEAD_OFF;
     if (!off) {
-        device_say_overrun(device, tick);
-        device_say_held(device, tick);
-        device_say_lost_lines(device, tick);
+        device_say_overrun(&device->overrun, device->scan.pulse_next, tick);
+        device_say_held(&device->events, tick, device->over);
+        device_say_lost_lines(&device->overrun, tick);
         device_say_pps(device, tick);
     }
     const int repeated = device_is_repeated(device, tick);
     if (repeated) device_say_time(device, tick); /* a reader that joins gets the time before the first point */
-    device_take_events(device, work);
+    device_take_events(&device->events, work);
     work->n_events_before = work->n_events;
     if (device->scan.on)
         device_claim_scan(device, tick, work);
     else if (repeated)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
-    if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
+    if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
     int told = device->ending || tick >= device->end_tick; /* 1: told to end; 0: at most its one scan is over */
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;
@@ -297,12 +294,24 @@ int device_claim(struct device *device, struct device_work *work)
     return 0;
 }
 
+void device_lost(struct device *device, const struct device_work *work)
+{
+    pthread_mutex_lock(&device->lock);
+    device_count_lost(&device->overrun, work);
+    if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
+    if (work->scanning && work->stretch != device->scan.stretch)
+        device->scan.anchor_lost = 1; /* the anchor may be in this tick, or in another */
+    if (work->describe && work->describe_flags != 0)
+        device->scan.anchor_lost = 1; /* this may have been the repetition of a lost one */
+    pthread_mutex_unlock(&device->lock);
+}
+
 int device_is_idle(struct device *device)
 {
     pthread_mutex_lock(&device->lock);
     int still =
         device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
-    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && device->held == 0 &&
+    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && device->events.held == 0 &&
                !device->ending && !device->over && device->journal.at == device->journal.n_replay &&
                device->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&device->lock);
@@ -343,4 +352,9 @@ int64_t device_scan_ns(struct device *device)
 int64_t device_tick_ns(const struct device *device)
 {
     return device->tick_ns;
+}
+
+struct fault_board *device_faults(const struct device *device)
+{
+    return device->faults;
 }

@@ -1,28 +1,31 @@
 /* SPDX-License-Identifier: MIT */
-/* Fills the frames in which the device describes itself: descriptor, anchor, telemetry. */
+/* Fills the frames in which the device describes itself: descriptor, anchor. */
 #include <math.h>
 #include <string.h>
 
+#include "drivers/protocol/native.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/device/frames.h"
+#include "firmware_sim/site/site.h"
 
-void device_fill_descriptor(const struct device *device, struct native_descriptor *d)
+void device_fill_descriptor(const struct device_scan *scan, const char *idn, struct native_descriptor *d)
 {
-    const struct site *site = device->scan.site;
+    const struct site *site = scan->site;
     const struct config *cfg = site->cfg;
-    const struct schedule_spec *spec = &device->scan.segment.spec;
+    const struct schedule_spec *spec = &scan->segment.spec;
     struct cast_setup setup;
     struct bvh_info info;
-    site_cast_setup(site, device->scan.station, &setup);
-    site_set_program(site, device->scan.prr_uhz, &setup);
+    site_cast_setup(site, scan->station, &setup);
+    site_set_program(site, scan->prr_uhz, &setup);
     bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
-    memcpy(d->idn, device->idn, sizeof d->idn);
+    memcpy(d->idn, idn, sizeof d->idn);
     memcpy(d->profile, cfg->profile.name, sizeof d->profile);
     d->layout = cfg->output.layout == LINE_GEO ? NATIVE_GEO : NATIVE_POLAR;
     d->isa = info.packet;
-    d->prr_uhz = (uint64_t)device->scan.prr_uhz;
-    d->lines_uhz = (uint64_t)device->scan.lines_uhz;
+    d->prr_uhz = (uint64_t)scan->prr_uhz;
+    d->lines_uhz = (uint64_t)scan->lines_uhz;
     d->pan_udeg_s = (uint64_t)spec->pan_udeg_s;
     d->fov_min_udeg = spec->fov_min_udeg;
     d->sweep_udeg = spec->sweep_udeg;
@@ -38,7 +41,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->max_echoes = setup.max_echoes;
     d->n_surfaces = site->n_surfaces;
     d->frames = spec->frames;
-    d->scan = device->scan.number;
+    d->scan = scan->number;
     d->seed = cfg->noise.seed;
     d->content = cfg->output.attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
     if (cfg->output.colour != COLOUR_NONE) d->content |= NATIVE_HAS_COLOURS;
@@ -55,19 +58,20 @@ static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
                                        [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
 
 /* Uses the rate that is set: with a slow mirror the segment has another one. */
-static void set_sequence(const struct device *device, struct native_emitter *e)
+static void set_sequence(const struct device_scan *scan, struct native_emitter *e)
 {
-    struct schedule_spec spec = device->scan.segment.spec;
+    struct schedule_spec spec = scan->segment.spec;
     struct schedule_segment seg;
-    spec.prr_uhz = device->scan.prr_uhz;
-    spec.lines_uhz = device->scan.lines_uhz;
+    spec.prr_uhz = scan->prr_uhz;
+    spec.lines_uhz = scan->lines_uhz;
     schedule_start(&seg, &spec);
     schedule_sequence_ns(&seg, &e->sequence_ns_num, &e->sequence_ns_den);
 }
 
-void device_fill_emitter(const struct device *device, struct native_emitter *e, struct native_beam *beam)
+void device_fill_emitter(const struct device_scan *scan, uint32_t echoes, struct native_emitter *e,
+                         struct native_beam *beam)
 {
-    const struct emitter *from = device->scan.segment.spec.emitter;
+    const struct emitter *from = scan->segment.spec.emitter;
     memset(e, 0, sizeof *e);
     if (from == NULL) return;
     *e = (struct native_emitter){.kind = emit[from->kind],
@@ -75,11 +79,11 @@ void device_fill_emitter(const struct device *device, struct native_emitter *e, 
                                  .steps = from->steps,
                                  .first_step = (int32_t)from->first_step,
                                  .last_step = (int32_t)from->last_step,
-                                 .front_step = (int32_t)device->scan.segment.front_step,
+                                 .front_step = (int32_t)scan->segment.front_step,
                                  .turn = from->turn,
                                  .rings = from->rings,
-                                 .echoes = echoes_sent[device->cmd.settings.echoes]};
-    set_sequence(device, e);
+                                 .echoes = echoes_sent[echoes]};
+    set_sequence(scan, e);
     if (from->kind == EMITTER_SPHERE) {
         e->first_ring_udeg = llround(360e6 * emitter_ring_turn(from, 0));
         e->gaps = from->rings != from->gaps + 1 ? from->gaps : 0;
@@ -116,24 +120,4 @@ void device_fill_anchor(const struct site *site, uint32_t station, size_t stretc
     if (s->leg != NULL && site->stretch[stretch].until_ns != INT64_MAX)
         a->until_ms = (uint32_t)(site->stretch[stretch].until_ns / 1000000);
     a->heights = georef_has_geoid(georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
-}
-
-/* Pulses, echoes and lines are filled in at release (stream.c), since they count what was released. Here both counts of
- * lost pulses are set to the pulses cast; the release subtracts those delivered. */
-void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
-{
-    const struct device_counters *c = &device->counters;
-    memset(t, 0, sizeof *t);
-    t->state = (uint32_t)device->machine.state;
-    t->scan = device->scan.number;
-    t->lost_pulses = atomic_load(&c->cast);
-    t->scan_fired = device->scan.pulse_next;
-    t->scan_cast = t->scan_lost = device->scan.cast;
-    t->late_blocks = atomic_load(&c->late_blocks);
-    t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
-    t->errors_queued = device->cmd.queue.count;
-    t->lost_lines = atomic_load(&c->lost_journal_lines) + atomic_load(&c->lost_truth_lines);
-    if (device->clock.source != EPOCH_NONE)
-        t->utc_ns =
-            utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
 }

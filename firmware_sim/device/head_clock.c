@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/config/config.h"
 
 static const char LEAP_FILE[] = "/usr/share/zoneinfo/leap-seconds.list";
 static const int64_t PPT = 1000000000000;
@@ -77,16 +76,16 @@ void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head
     renew_pieces(clock, i);
 }
 
-int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err)
+int head_clock_create(const struct config_time *time, struct head_clock *clock, struct sh_err *err)
 {
-    const struct head_clock_change from_start = {.jump_ns = llround(cfg->time.offset_s * 1e9),
-                                                 .gain_ppt = llround(cfg->time.drift_ppm * 1e6)};
-    const struct head_clock_change later = {.jump_ns = llround(cfg->time.jump_s * 1e9)};
+    const struct head_clock_change from_start = {.jump_ns = llround(time->offset_s * 1e9),
+                                                 .gain_ppt = llround(time->drift_ppm * 1e6)};
+    const struct head_clock_change later = {.jump_ns = llround(time->jump_s * 1e9)};
     memset(clock, 0, sizeof *clock);
     choose_table(clock);
-    int rc = epoch_parse(cfg->time.epoch, &clock->table, &clock->source, &clock->tai0_ns, err);
+    int rc = epoch_parse(time->epoch, &clock->table, &clock->source, &clock->tai0_ns, err);
     head_clock_change(clock, 0, &from_start);
-    if (later.jump_ns != 0) head_clock_change(clock, llround(cfg->time.jump_at_s * 1e9), &later);
+    if (later.jump_ns != 0) head_clock_change(clock, llround(time->jump_at_s * 1e9), &later);
     return rc == SH_OK ? head_clock_power_up(clock, clock_now_ns(), err) : rc;
 }
 

@@ -28,8 +28,6 @@
 #include "core/utc.h"
 #include "firmware_sim/config/epoch.h"
 
-struct config;
-
 enum { HEAD_CLOCK_CHANGES = 64 }; /* the last ones are kept; nobody asks for times before the first of these */
 
 /* A change of the clock at a device time. */
@@ -63,7 +61,7 @@ struct head_clock {
 };
 
 /* Takes the table of leap seconds that reaches further: the built-in one, or the system's. */
-int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err);
+int head_clock_create(const struct config_time *time, struct head_clock *clock, struct sh_err *err);
 /* Device time 0 is at this time of clock_now_ns(): sets the true time by the system's clock where that is the
  * source.
  */

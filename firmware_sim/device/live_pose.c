@@ -149,7 +149,7 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
         snprintf(text, sizeof text,
                  live->n == 0 ? "no pose yet: the head is taken to be at the station"
                               : "no pose in time: the platform is taken to stand");
-        device_push_event(device, NATIVE_EV_POSE_LATE, n, 0, (uint64_t)since_ns, text);
+        device_push_event(&device->events, NATIVE_EV_POSE_LATE, n, 0, (uint64_t)since_ns, text);
     }
     live->said_tick = work->tick;
 }

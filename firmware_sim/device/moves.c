@@ -146,10 +146,10 @@ static void refuse(struct device *device, const char *why, struct command_result
     char text[160];
     snprintf(text, sizeof text, "SITE:POSE: %.140s", why);
     command_refuse(&device->cmd, CMD_E_SETTINGS, text, out);
-    device_push_error(device, plan->session, out->error, command_error_text(out->error));
+    device_push_error(&device->events, plan->session, out->error, command_error_text(out->error));
     if (!plan->took_control || device->cmd.control != plan->session) return;
     device->cmd.control = 0; /* a refused command changes nothing */
-    device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "released");
+    device_push_event(&device->events, NATIVE_EV_CONTROL, 0, 0, 0, "released");
 }
 
 static void use(struct device *device, struct device_version *version)
@@ -165,7 +165,7 @@ static void move_last_scan(struct device *device)
     struct device_variant *variant = NULL;
     struct sh_err err;
     if (scan->variant != NULL &&
-        device_find_variant(device, &scan->variant->settings, scan->station, &variant, &err) != SH_OK)
+        device_find_variant(&device->variants, &scan->variant->settings, scan->station, &variant, &err) != SH_OK)
         variant = NULL;
     scan->variant = variant;
     scan->site = variant != NULL ? variant->site : device->site;
@@ -182,7 +182,7 @@ static int swap(struct device *device, struct sh_err *err)
     const struct head_settings *now = &device->cmd.settings;
     struct device_variant *variant;
     use(device, moves->made);
-    int rc = device_find_variant(device, now, now->station - 1, &variant, err);
+    int rc = device_find_variant(&device->variants, now, now->station - 1, &variant, err);
     if (rc != SH_OK) {
         use(device, was);
         return rc;
@@ -192,7 +192,7 @@ static int swap(struct device *device, struct sh_err *err)
     moves->old = was;
     device_set_places(device->site, moves->place);
     move_last_scan(device);
-    device_free_unused_variants(device); /* these hold the earlier site */
+    device_free_unused_variants(&device->variants); /* these hold the earlier site */
     return SH_OK;
 }
 
@@ -232,7 +232,7 @@ void device_take_move(struct device *device, int64_t t_ns, struct command_result
     write_journal(device, t_ns);
     out->changes = 1;
     snprintf(out->reply, sizeof out->reply, "OK");
-    device_push_event(device, NATIVE_EV_SITE, plan->station + 1, device->site->said.n_new, 0,
+    device_push_event(&device->events, NATIVE_EV_SITE, plan->station + 1, device->site->said.n_new, 0,
                       device->site->station[plan->station].station->name);
 }
 
@@ -250,4 +250,58 @@ void device_finish_move(struct device *device, uint64_t released, struct command
     device_take_move(device, (int64_t)released * device->tick_ns, out);
     pthread_mutex_unlock(&device->lock);
     device_end_move(device);
+}
+
+/* ---- sites that others hold */
+
+const struct site *device_hold_site(struct device *device, struct device_version **version)
+{
+    pthread_mutex_lock(&device->lock);
+    *version = device->moves.current;
+    atomic_fetch_add(&(*version)->users, 1);
+    pthread_mutex_unlock(&device->lock);
+    return (*version)->site;
+}
+
+const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_held *held)
+{
+    const struct site *site = NULL;
+    *held = (struct device_held){NULL, NULL};
+    pthread_mutex_lock(&device->lock);
+    struct device_version *now = device->moves.current;
+    if (device->scan.number == number) {
+        held->variant = device->scan.variant;
+        if (held->variant == NULL && device->scan.site == now->site) held->version = now;
+    }
+    if (held->variant != NULL) {
+        atomic_fetch_add(&held->variant->users, 1);
+        site = held->variant->site;
+    }
+    if (held->version != NULL) {
+        atomic_fetch_add(&held->version->users, 1);
+        site = held->version->site;
+    }
+    pthread_mutex_unlock(&device->lock);
+    return site;
+}
+
+void device_get_station(struct device *device, uint32_t station, struct device_station *out)
+{
+    struct device_version *version;
+    const struct site *site = device_hold_site(device, &version);
+    const struct site_tripod *t = &site->station[station].tripod;
+    memset(out, 0, sizeof *out);
+    memcpy(out->name, site->station[station].station->name, sizeof out->name);
+    site_get_place(site, station, &out->place);
+    out->served = site_serves(site, station);
+    out->has_tripod = t->from != NULL && out->served;
+    if (out->has_tripod) {
+        out->leg_m = t->from->leg_m;
+        out->height_m = isnan(t->head_m) ? (double)NAN : t->height_m;
+        out->opening_rad = t->opening_rad;
+        out->head_above_m = t->from->head_above_m;
+        out->legs_heading_deg = t->from->legs_heading_deg;
+        out->foot_radius_m = t->from->leg_m * sin(t->opening_rad);
+    }
+    device_give_back(version);
 }

@@ -28,13 +28,13 @@ static void end_slow_boots(struct device *device, uint64_t tick)
 static void turn_off(struct device *device, uint64_t tick, uint64_t until_tick)
 {
     struct device_scan *scan = &device->scan;
-    if (scan->on) device_end_beam(device, time_of(device, tick - scan->tick0));
+    if (scan->on) device_end_beam(&device->beam, time_of(device, tick - scan->tick0));
     if (scan->on) scan->end_tick = tick;
     scan->on = scan->stop_requested = scan->describe = scan->anchor_lost = 0;
     end_slow_boots(device, tick);
     device->events.n = device->events.dropped = 0;
-    device->held = 0;
-    memset(device->errors, 0, sizeof device->errors);
+    device->events.held = 0;
+    memset(device->events.errors, 0, sizeof device->events.errors);
     device_transition(device, HEAD_EV_POWER_OFF, tick);
     device->power.off_tick = tick;
     device->machine.due_tick = device->power.on_tick = until_tick;
@@ -101,7 +101,7 @@ int device_end_boot(struct device *device, uint64_t tick)
     }
     if (!failed) return 0;
     command_queue_push(&device->cmd.queue, CMD_E_SELF_TEST, "at the end of boot; *RST goes on without it");
-    device_push_error(device, 0, CMD_E_SELF_TEST, command_error_text(CMD_E_SELF_TEST));
+    device_push_error(&device->events, 0, CMD_E_SELF_TEST, command_error_text(CMD_E_SELF_TEST));
     device_transition(device, HEAD_EV_FAIL, tick);
     device->cmd.why_fault = "the self-test failed; *RST goes on without it";
     if (device->options.start && device->options.one_scan) device->over = 1; /* there will be no scan to wait for */

@@ -5,6 +5,7 @@
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/frames.h"
 
 /* Plans the site for the settings. It was possible when the command tried it; it fails without memory, or at this
  * station. */
@@ -12,9 +13,9 @@ static int plan_scan(struct device *device, struct device_variant **variant, uin
 {
     const struct head_settings *settings = &device->cmd.settings;
     struct sh_err err;
-    if (device_find_variant(device, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
+    if (device_find_variant(&device->variants, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
     command_queue_push(&device->cmd.queue, CMD_E_SETTINGS, err.text);
-    device_push_error(device, 0, CMD_E_SETTINGS, err.text);
+    device_push_error(&device->events, 0, CMD_E_SETTINGS, err.text);
     device_transition(device, HEAD_EV_FAIL, tick);
     return 0;
 }
@@ -34,11 +35,11 @@ void device_begin_scan(struct device *device, uint64_t tick)
                                         .station_scan = ++device->station_scans[device->cmd.settings.station - 1],
                                         .stretch = site_stretch_at(device->site, 0),
                                         .describe = 1};
-    device_fill_spec(device, site, &spec);
+    device_fill_spec(&device->beam, site, &spec);
     schedule_start(&device->scan.segment, &spec);
     device->cmd.frames_done = 0;
     device->live.next = 0;
-    device_push_event(device, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,
+    device_push_event(&device->events, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,
                       (uint64_t)device_gps_ns(device, (int64_t)tick * device->tick_ns), "");
     if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1) {
         uint64_t end_tick = tick + device_ticks_of(device, device->options.duration_s);
@@ -124,7 +125,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     int64_t end_ns = scan_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
     int ends = end_ns <= until_ns; /* within this tick */
     if (ends) until_ns = end_ns;
-    device_turn_beam(device, until_ns);
+    device_turn_beam(&device->beam, until_ns);
     work->segment = *seg;
     work->prr_uhz = device->scan.prr_uhz;
     work->upset.on = device->beam.now.on;
@@ -162,8 +163,8 @@ int device_is_repeated(const struct device *device, uint64_t tick)
 void device_before_scans(struct device *device)
 {
     struct schedule_spec spec;
-    device_end_beam(device, 0);
-    device_fill_spec(device, device->site, &spec);
+    device_end_beam(&device->beam, 0);
+    device_fill_spec(&device->beam, device->site, &spec);
     schedule_start(&device->scan.segment, &spec);
     device->scan.site = device->site;
     device->scan.station = device->cmd.settings.station - 1;
@@ -174,8 +175,8 @@ void device_describe(struct device *device, struct device_work *work)
 {
     work->describe = 1;
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
-    device_fill_descriptor(device, &work->descriptor);
-    device_fill_emitter(device, &work->emitter, work->beam);
+    device_fill_descriptor(&device->scan, device->idn, &work->descriptor);
+    device_fill_emitter(&device->scan, device->cmd.settings.echoes, &work->emitter, work->beam);
     device_fill_anchor(device->scan.site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;
 }
@@ -214,11 +215,12 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
 static void end_scan(struct device *device, uint64_t tick)
 {
     int stopped = device->scan.stop_requested;
-    device_end_beam(device, (int64_t)(tick - device->scan.tick0) * device->tick_ns);
+    device_end_beam(&device->beam, (int64_t)(tick - device->scan.tick0) * device->tick_ns);
     device->scan.on = 0;
     device->scan.end_tick = tick;
     device->scan.stop_requested = 0;
-    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next, device->scan.cast, "");
+    device_push_event(&device->events, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next,
+                      device->scan.cast, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
     if (device->options.one_scan) device->over = 1;
 }
@@ -228,5 +230,5 @@ void device_claim_scan(struct device *device, uint64_t tick, struct device_work 
     describe(device, tick, work);
     if (!claim_pulses(device, tick, work)) return;
     end_scan(device, tick + 1);
-    device_take_events(device, work);
+    device_take_events(&device->events, work);
 }

@@ -2,7 +2,7 @@
 /* The states of the head, and when each one ends. */
 #include <math.h>
 
-#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/profile.h"
 #include "firmware_sim/device/device_state.h"
 
 enum head_state device_visible_state(const struct device *device, uint64_t released)
@@ -33,7 +33,7 @@ uint64_t device_ticks_of(const struct device *device, double s)
 
 void device_transition(struct device *device, enum head_event event, uint64_t tick)
 {
-    const struct config_profile *profile = &device->site->cfg->profile;
+    const struct config_profile *profile = site_profile(device->site);
     int next = head_next_state(device->machine.state, event);
     if (next < 0 || (enum head_state)next == device->machine.state) return;
     enum head_state before = device->machine.state;
@@ -41,7 +41,7 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
     device->machine.state = (enum head_state)next;
     device->machine.change[device->machine.n_changes++ % DEVICE_MAX_CHANGES] =
         (struct device_state_change){tick, device->machine.state};
-    device_push_event(device, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
+    device_push_event(&device->events, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
                       head_state_name(device->machine.state));
     uint64_t from = tick > device->next_tick ? tick : device->next_tick;
     switch (device->machine.state) {

@@ -2,6 +2,7 @@
 /* The device's time of day: PPS, the answers to TIME: queries, and the GNSS receiver. */
 #include <stdio.h>
 
+#include "firmware_sim/device/clock_faults.h"
 #include "firmware_sim/device/device_state.h"
 
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err)
@@ -23,24 +24,25 @@ void device_say_pps(struct device *device, uint64_t tick)
     const struct head_clock *clock = &device->clock;
     int64_t t_ns = (int64_t)tick * device->tick_ns, edge_ns, tai_s;
     if (device->pps.n == 0 || device->power.on_tick == tick)
-        pps_power_up(&device->pps, t_ns, device_has_no_pps(device, t_ns));
+        pps_power_up(&device->pps, t_ns, device_has_no_pps(&device->head_faults, t_ns));
     if (clock->source == EPOCH_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s)) return;
-    if (device_loses_pps(device, edge_ns)) return;
+    if (device_loses_pps(&device->head_faults, edge_ns)) return;
     pps_take(&device->pps, edge_ns, tai_s);
     int64_t tai_ns = tai_s * UTC_SECOND_NS;
     char text[UTC_TEXT_LEN];
     struct utc_time utc;
     utc_from_tai(&clock->table, tai_ns, &utc);
     utc_format(&utc, 0, text);
-    device_push_event(device, NATIVE_EV_PPS, (uint64_t)(utc_posix_from_tai(&clock->table, tai_ns) / UTC_SECOND_NS),
-                      (uint64_t)edge_ns, (uint64_t)(utc_gps_ns(tai_ns) / UTC_SECOND_NS), text);
+    device_push_event(&device->events, NATIVE_EV_PPS,
+                      (uint64_t)(utc_posix_from_tai(&clock->table, tai_ns) / UTC_SECOND_NS), (uint64_t)edge_ns,
+                      (uint64_t)(utc_gps_ns(tai_ns) / UTC_SECOND_NS), text);
 }
 
 void device_say_time(struct device *device, uint64_t tick)
 {
     int64_t t_ns = (int64_t)tick * device->tick_ns;
     if (device->clock.source == EPOCH_NONE) return;
-    device_push_event(device, NATIVE_EV_TIME, 0, (uint64_t)t_ns, (uint64_t)device_gps_ns(device, t_ns), "");
+    device_push_event(&device->events, NATIVE_EV_TIME, 0, (uint64_t)t_ns, (uint64_t)device_gps_ns(device, t_ns), "");
 }
 
 void device_set_time_texts(struct device *device)

@@ -4,14 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "firmware_sim/config/config.h"
-#include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/variant.h"
 
 /* Whether the variant is planned for these settings and the stations' present places. */
-static int fits(const struct device *device, const struct device_variant *v, const struct head_settings *settings,
+static int fits(const struct device_variants *all, const struct device_variant *v, const struct head_settings *settings,
                 uint32_t station)
 {
-    return v->version == device->moves.current && v->station == station && !site_varies(&v->settings, settings);
+    return v->version == all->moves->current && v->station == station && !site_varies(&v->settings, settings);
 }
 
 static void free_variant(struct device_variant *v)
@@ -21,11 +20,11 @@ static void free_variant(struct device_variant *v)
     free(v);
 }
 
-void device_free_unused_variants(struct device *device)
+void device_free_unused_variants(struct device_variants *variants)
 {
-    for (struct device_variant **at = &device->variants; *at != NULL;) {
+    for (struct device_variant **at = &variants->list; *at != NULL;) {
         struct device_variant *v = *at;
-        if (v == device->scan.variant || atomic_load(&v->users) != 0) {
+        if (v == variants->scan->variant || atomic_load(&v->users) != 0) {
             at = &v->next;
             continue;
         }
@@ -34,72 +33,50 @@ void device_free_unused_variants(struct device *device)
     }
 }
 
-int device_find_variant(struct device *device, const struct head_settings *settings, uint32_t station,
+int device_find_variant(struct device_variants *variants, const struct head_settings *settings, uint32_t station,
                         struct device_variant **out, struct sh_err *err)
 {
+    const struct site *site = variants->moves->current->site;
     *out = NULL;
-    if (!site_varies(settings, &device->site->cfg->head.settings)) return SH_OK;
-    for (struct device_variant *v = device->variants; v != NULL; v = v->next)
-        if (fits(device, v, settings, station)) {
+    if (!site_varies(settings, site_settings(site))) return SH_OK;
+    for (struct device_variant *v = variants->list; v != NULL; v = v->next)
+        if (fits(variants, v, settings, station)) {
             *out = v;
             return SH_OK;
         }
-    device_free_unused_variants(device);
+    device_free_unused_variants(variants);
     struct device_variant *v = calloc(1, sizeof *v);
     if (v == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    int rc = site_vary(device->site, settings, station, &v->site, err);
+    int rc = site_vary(site, settings, station, &v->site, err);
     if (rc != SH_OK) {
         free(v);
         return rc;
     }
-    v->version = device->moves.current;
+    v->version = variants->moves->current;
     atomic_fetch_add(&v->version->users, 1);
     v->settings = *settings;
     v->station = station;
-    v->next = device->variants;
-    *out = device->variants = v;
+    v->next = variants->list;
+    *out = variants->list = v;
     return SH_OK;
 }
 
 int device_can_plan(void *owner, const struct head_settings *settings, char *why, size_t len)
 {
-    struct device *device = owner;
     struct device_variant *variant;
     struct sh_err err;
-    int rc = device_find_variant(device, settings, settings->station - 1, &variant, &err);
+    int rc = device_find_variant(owner, settings, settings->station - 1, &variant, &err);
     if (rc != SH_OK) snprintf(why, len, "%s", err.text);
     return rc == SH_OK ? 0 : -1;
 }
 
-void device_free_variants(struct device *device)
+void device_free_variants(struct device_variants *variants)
 {
-    while (device->variants != NULL) {
-        struct device_variant *v = device->variants;
-        device->variants = v->next;
+    while (variants->list != NULL) {
+        struct device_variant *v = variants->list;
+        variants->list = v->next;
         free_variant(v);
     }
-}
-
-const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_held *held)
-{
-    const struct site *site = NULL;
-    *held = (struct device_held){NULL, NULL};
-    pthread_mutex_lock(&device->lock);
-    struct device_version *now = device->moves.current;
-    if (device->scan.number == number) {
-        held->variant = device->scan.variant;
-        if (held->variant == NULL && device->scan.site == now->site) held->version = now;
-    }
-    if (held->variant != NULL) {
-        atomic_fetch_add(&held->variant->users, 1);
-        site = held->variant->site;
-    }
-    if (held->version != NULL) {
-        atomic_fetch_add(&held->version->users, 1);
-        site = held->version->site;
-    }
-    pthread_mutex_unlock(&device->lock);
-    return site;
 }
 
 void device_let_go(struct device_held *held)

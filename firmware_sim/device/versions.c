@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/variant.h"
+#include "firmware_sim/device/versions.h"
 
 struct device_version *device_make_version(const struct site *site, struct site *own)
 {
@@ -49,9 +49,9 @@ void device_free_unused_sites(struct device_moves *moves)
     }
 }
 
-void device_use_site(struct device *device, struct device_work *work)
+void device_use_site(struct device_moves *moves, struct device_work *work)
 {
-    struct device_version *version = device->moves.current;
+    struct device_version *version = moves->current;
     atomic_fetch_add(&version->users, 1);
     work->version = version;
 }
@@ -62,15 +62,6 @@ void device_done(struct device_work *work)
     device_give_back(work->version);
     work->variant = NULL;
     work->version = NULL;
-}
-
-const struct site *device_hold_site(struct device *device, struct device_version **version)
-{
-    pthread_mutex_lock(&device->lock);
-    *version = device->moves.current;
-    atomic_fetch_add(&(*version)->users, 1);
-    pthread_mutex_unlock(&device->lock);
-    return (*version)->site;
 }
 
 void device_give_back(struct device_version *version)
@@ -99,48 +90,25 @@ void device_set_places(const struct site *site, struct command_place *place)
         fill_place(site, i, &place[i]);
 }
 
-int device_open_moves(struct device *device, struct sh_err *err)
+int device_open_moves(struct device_moves *moves, const struct site *site, struct sh_err *err)
 {
-    struct device_moves *moves = &device->moves;
-    moves->first = device->site;
-    moves->current = device_make_version(device->site, NULL);
-    moves->place = calloc(device->site->n_stations, sizeof *moves->place);
-    moves->first_place = calloc(device->site->n_stations, sizeof *moves->first_place);
+    moves->first = site;
+    moves->current = device_make_version(site, NULL);
+    moves->place = calloc(site->n_stations, sizeof *moves->place);
+    moves->first_place = calloc(site->n_stations, sizeof *moves->first_place);
     if (moves->current == NULL || moves->place == NULL || moves->first_place == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for the stations' places");
-    device_set_places(device->site, moves->place);
-    device_set_places(device->site, moves->first_place);
+    device_set_places(site, moves->place);
+    device_set_places(site, moves->first_place);
     return SH_OK;
 }
 
-void device_close_moves(struct device *device)
+void device_close_moves(struct device_moves *moves)
 {
-    struct device_moves *moves = &device->moves;
     device_free_versions(&moves->old);
     device_free_versions(&moves->ahead);
     device_free_version(moves->made);
     device_free_version(moves->current);
     free(moves->place);
     free(moves->first_place);
-}
-
-void device_get_station(struct device *device, uint32_t station, struct device_station *out)
-{
-    struct device_version *version;
-    const struct site *site = device_hold_site(device, &version);
-    const struct site_tripod *t = &site->station[station].tripod;
-    memset(out, 0, sizeof *out);
-    memcpy(out->name, site->station[station].station->name, sizeof out->name);
-    site_get_place(site, station, &out->place);
-    out->served = config_serves(site->cfg, station);
-    out->has_tripod = t->from != NULL && out->served;
-    if (out->has_tripod) {
-        out->leg_m = t->from->leg_m;
-        out->height_m = isnan(t->head_m) ? (double)NAN : t->height_m;
-        out->opening_rad = t->opening_rad;
-        out->head_above_m = t->from->head_above_m;
-        out->legs_heading_deg = t->from->legs_heading_deg;
-        out->foot_radius_m = t->from->leg_m * sin(t->opening_rad);
-    }
-    device_give_back(version);
 }

@@ -1,13 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/bvhs.h"
 #include "firmware_sim/site/site.h"
 
 /* The sites of a world share the BVHs: the first site builds them. */
-int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
+int site_build_bvhs(struct site *site, unsigned threads, const struct sh_report *report, struct sh_err *err)
 {
     struct site_world *world = site->world;
-    const unsigned threads = site->cfg->loop.threads;
     int rc = world->bvh != NULL ? SH_OK : bvh_create(site->scene, threads, report, &world->bvh, err);
     for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++) {
         struct site_mover *m = &site->mover[i];

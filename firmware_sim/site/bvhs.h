@@ -7,6 +7,7 @@ struct sh_err;
 struct sh_report;
 struct site;
 
-int site_build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+/* threads: as bvh_create takes them. */
+int site_build_bvhs(struct site *site, unsigned threads, const struct sh_report *report, struct sh_err *err);
 
 #endif

@@ -183,7 +183,7 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = site_name_legs(site, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
-    if (rc == SH_OK) rc = site_build_bvhs(site, report, err);
+    if (rc == SH_OK) rc = site_build_bvhs(site, site->cfg->loop.threads, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);

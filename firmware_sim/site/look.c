@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
 #include "firmware_sim/site/site.h"
 
@@ -17,7 +16,7 @@ static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 /* Fills a place with one pan sweep; along a trajectory with all of it. */
 static void fill_place(const struct site *site, struct site_look_at *at, struct plan_place *place)
 {
-    struct head_settings settings = site->cfg->head.settings;
+    struct head_settings settings = *site_settings(site);
     struct schedule_spec spec;
     if (settings.frames != 1) settings.frames = site->n_knots != 0 ? 0 : 1;
     site_fill_spec(site, &settings, &spec);
@@ -34,7 +33,7 @@ static void fill_place(const struct site *site, struct site_look_at *at, struct 
 static uint32_t served_station(const struct site *site, uint32_t k)
 {
     uint32_t i = 0;
-    while (!config_serves(site->cfg, i) || k-- > 0)
+    while (!site_serves(site, i) || k-- > 0)
         i++;
     return i;
 }

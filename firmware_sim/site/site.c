@@ -18,11 +18,31 @@ void site_fill_spec(const struct site *site, const struct head_settings *setting
     if (spec->emitter != NULL) spec->emitter = &site->emitter;
 }
 
+const char *site_file(const struct site *site)
+{
+    return site->cfg->file;
+}
+
+const struct config_profile *site_profile(const struct site *site)
+{
+    return &site->cfg->profile;
+}
+
+const struct head_settings *site_settings(const struct site *site)
+{
+    return &site->cfg->head.settings;
+}
+
+int site_serves(const struct site *site, uint32_t i)
+{
+    return config_serves(site->cfg, i);
+}
+
 uint32_t site_n_served(const struct site *site)
 {
     uint32_t n = 0;
     for (uint32_t i = 0; i < site->n_stations; i++)
-        n += config_serves(site->cfg, i) != 0;
+        n += site_serves(site, i) != 0;
     return n;
 }
 

@@ -227,7 +227,14 @@ enum { SITE_MAX_SIGHTS = 16 };
  * their scans, and while none is on: casters take the map with the station's setup. */
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
 
-/* The number of stations that this scanner scans from (config_serves); the others only have a place. */
+/* Of its configuration: the file, for messages; the head profile; the head's settings at power-up. */
+const char *site_file(const struct site *site);
+const struct config_profile *site_profile(const struct site *site);
+const struct head_settings *site_settings(const struct site *site);
+
+/* Whether this scanner scans from station i, from 0 (config_serves), and how many such stations there are; the others
+ * only have a place. */
+int site_serves(const struct site *site, uint32_t i);
 uint32_t site_n_served(const struct site *site);
 
 /* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the

@@ -8,7 +8,6 @@
 #include "core/angle.h"
 #include "core/instrument.h"
 #include "core/mat3.h"
-#include "firmware_sim/config/config.h"
 
 /* A margin beyond all known effects that bend or move the beam. */
 static const double MARGIN_RAD = 2e-3;
@@ -84,9 +83,9 @@ void site_view_of(const struct site *site, uint32_t station, struct site_view *v
         view->margin_rad +=
             fabs(k->collimation_rad) + fabs(k->trunnion_rad) + SIGMAS * (k->mirror_sigma_rad + k->pan_sigma_rad);
     if (site->emitter.kind == EMITTER_LINE)
-        add_sweep(view, &site->cfg->head.settings);
+        add_sweep(view, site_settings(site));
     else
-        add_emitter(view, &site->emitter, &site->cfg->head.settings);
+        add_emitter(view, &site->emitter, site_settings(site));
 }
 
 /* Whether a cap meets the band. A cap of radius r around elevation e extends asin(sin r / cos e) to both sides in

@@ -51,7 +51,7 @@ static struct receiver open_receiver(const char *lat, const char *lon, const cha
 static void start_receiver(struct receiver *r)
 {
     struct sh_err err;
-    need(head_clock_create(r->cfg, &r->clock, &err), &err);
+    need(head_clock_create(&r->cfg->time, &r->clock, &err), &err);
     gnss_init(&r->gnss, r->site, &r->clock);
 }
 

@@ -22,7 +22,7 @@ static struct head_clock make_clock(double offset_s, double drift_ppm, double ju
     cfg.time.drift_ppm = drift_ppm;
     cfg.time.jump_s = jump_s;
     cfg.time.jump_at_s = jump_at_s;
-    need(head_clock_create(&cfg, &clock, &err), &err);
+    need(head_clock_create(&cfg.time, &clock, &err), &err);
     return clock;
 }
 
@@ -272,7 +272,7 @@ static void the_systems_clock(void **state)
     struct timespec before, after;
     strcpy(cfg.time.epoch, "utc");
     clock_gettime(CLOCK_REALTIME, &before);
-    need(head_clock_create(&cfg, &clock, &err), &err);
+    need(head_clock_create(&cfg.time, &clock, &err), &err);
     clock_gettime(CLOCK_REALTIME, &after);
     int64_t utc_ns = utc_posix_from_tai(&clock.table, head_clock_ns(&clock, 0));
     assert_true(utc_ns >= before.tv_sec * UTC_SECOND_NS + before.tv_nsec - 1000000);
@@ -292,7 +292,7 @@ static void the_systems_tai(void **state)
     strcpy(cfg.time.epoch, "tai");
     adjtimex(&timex);
     clock_gettime(CLOCK_TAI, &before);
-    int rc = head_clock_create(&cfg, &clock, &err);
+    int rc = head_clock_create(&cfg.time, &clock, &err);
     if (timex.tai == 0) {
         assert_int_equal(rc, SH_ESTATE);
         assert_non_null(strstr(err.text, "time.epoch: tai"));

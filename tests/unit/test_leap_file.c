@@ -36,7 +36,7 @@ static struct head_clock clock_with(uint32_t n, int with_2027, int64_t expires_s
                                 table->leap[i].tai_minus_utc);
     if (with_2027) sprintf(list + used, "%lld 38\n", (long long)JULY_2027_S + NTP_OF_1970_S);
     strcpy(cfg.time.epoch, "2026-01-01T00:00:00Z");
-    need(head_clock_create(&cfg, &clock, &err), &err);
+    need(head_clock_create(&cfg.time, &clock, &err), &err);
     list[0] = '\0';
     return clock;
 }

@@ -46,6 +46,9 @@ struct cfg_key {
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t count_offset;
     int flags;
+    unsigned of;         /* bit by kind of its link, platform or emitter: these have the key; 0: all have it */
+    unsigned of_backend; /* of a key of USB links, the same by back end */
+    int needed;          /* the kinds that have it need it */
     const char *const *definitions; /* of a figure: the words of enum beam_definition */
     size_t definition_offset;
     const char *example; /* a value for the example, where there is no default */
@@ -56,6 +59,8 @@ struct cfg_table {
     const struct cfg_key *keys;
     size_t n;
 };
+/* The kind, as a bit of a row's `of`. */
+#define CFG_KIND(kind)           (1u << (kind))
 #define CFG_LEN(array)           (sizeof(array) / sizeof((array)[0]))
 #define CFG_MEMBER(type, member) offsetof(type, member), sizeof(((type *)0)->member)
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/angle.h"
-#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/profile.h"
 
 static const double LEAST_FRONT = 0.5;
 
@@ -32,7 +32,7 @@ static void turn(const double dir[3], double heading_rad, double out[3])
 /* Places of one heading at a time: they share directions. */
 static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], struct sh_err *err)
 {
-    const struct config_profile *profile = &c->f->site->cfg->profile;
+    const struct config_profile *profile = site_profile(c->f->site);
     c->n_open = 0;
     for (uint32_t i = 0; i < c->f->next->n; i++) {
         const struct coverage_next_place *p = &c->f->next->place[i];

@@ -10,7 +10,7 @@
 #include "core/studio/standpoint.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/coverage/next.h"
-#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/places.h"
 
 enum { MOST_PLACES = 100000, PULSES = 40000 };
 
@@ -30,7 +30,7 @@ static int check_upright(const struct coverage_finder *f, struct sh_err *err)
     if (!anchor->known || anchor->frame.kind != GEOFRAME_ECEF) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "%s: scene.anchor.source: ecef, where z is not up: a grid has no floors; allowed is --candidates",
-                   f->site->cfg->file);
+                   site_file(f->site));
 }
 
 static int find_on_grid(struct coverage_finder *f, struct sh_err *err)

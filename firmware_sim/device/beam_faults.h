@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* Injected faults that change what is measured. They strike at pulses of the scan that is on. */
+#ifndef FIRMWARE_SIM_DEVICE_BEAM_FAULTS_H
+#define FIRMWARE_SIM_DEVICE_BEAM_FAULTS_H
+
+#include <stdint.h>
+
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/device/scan_state.h"
+#include "firmware_sim/fault/board.h"
+
+struct head_settings;
+struct schedule_spec;
+struct site;
+
+struct device_beam {
+    struct device_scan *scan; /* these four are the device's */
+    struct fault_board *board;
+    const struct head_settings *settings;
+    int64_t tick_ns;
+    uint32_t version; /* of the board's list that `fault` was taken from */
+    uint32_t n;
+    struct device_beam_fault {
+        struct fault_entry entry;
+        int strikes;      /* at the scan's next pulse */
+        int64_t begin_ns; /* time of its first pulse, since the scan's start */
+        double turn;      /* mirror_stuck: where the mirror, or the rotor, stands */
+    } fault[FAULT_MAX];
+    uint64_t edge;           /* the next pulse at which one begins or ends; UINT64_MAX: none */
+    struct device_upset now; /* the disturbance by all that strike together */
+};
+
+/* The schedule of a site's head with the present settings, slowed by faults of its mirror. Sets the scan's rates. */
+void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec);
+/* Begins and ends the faults that do so at the scan's next pulse, if that fires before until_ns of the scan. The
+ * segment has the new rates from there on; each change is noted on the board. Sets the next edge. */
+void device_turn_beam(struct device_beam *beam, int64_t until_ns);
+/* A scan begins, or is over at a time since its start: ends all faults that strike. */
+void device_end_beam(struct device_beam *beam, int64_t t_ns);
+
+#endif

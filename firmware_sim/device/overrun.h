@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/* The head's losses, and the events for them: pulses that it could not compute in time, and lines that its files lack. */
+#ifndef FIRMWARE_SIM_DEVICE_OVERRUN_H
+#define FIRMWARE_SIM_DEVICE_OVERRUN_H
+
+#include <stdint.h>
+
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/device/events.h"
+
+struct command_queue;
+
+/* Losses that the head could not compute in time, and the events for them. */
+struct device_overrun {
+    struct device_counters *counters; /* these four are the device's */
+    struct device_events *events;
+    struct command_queue *queue;
+    uint64_t tick_hz;
+    uint64_t ticks_said, pulses_said;
+    uint64_t first; /* first lost pulse that no event has named; UINT64_MAX: none */
+    uint64_t tick;  /* of the last event */
+    /* Lines that files of the head lack (device_files_fill): */
+    uint64_t lines_said;
+    uint64_t lines_tick; /* of the last event; 0: there was none */
+};
+
+/* Adds an event for the losses since the last one. pulse_next: of the scan, where no lost pulse is known. */
+void device_say_overrun(struct device_overrun *overrun, uint64_t pulse_next, uint64_t tick);
+/* The same for lines, once a second at most. */
+void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick);
+/* Counts a lost tick, and keeps its events for later ones. */
+void device_count_lost(struct device_overrun *overrun, const struct device_work *work);
+
+#endif

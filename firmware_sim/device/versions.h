@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT */
+/* The present site, earlier ones that are in use, and the stations that are moved. */
+#ifndef FIRMWARE_SIM_DEVICE_VERSIONS_H
+#define FIRMWARE_SIM_DEVICE_VERSIONS_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "core/err.h"
+#include "firmware_sim/command/command.h"
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/site/site.h"
+
+/* A site that is kept while it is in use: by the device, and by ticks that were claimed while it was the device's. */
+struct device_version {
+    const struct site *site;
+    struct site *own;       /* NULL: the one the device was made with, which is its caller's */
+    _Atomic uint32_t users; /* not counting the device */
+    struct device_version *next;
+};
+
+/* Stations that are moved, one at a time (moves.c). plan, made, ahead and err belong to the thread that plans, without
+ * the lock. */
+struct device_moves {
+    const struct site *first;       /* the site of power-up */
+    struct device_version *current; /* of device->site */
+    struct device_version *old;     /* earlier ones that are not freed yet */
+    struct command_place *place, *first_place;
+    _Atomic int stops; /* the run ends, and planning with it */
+    struct device_move {
+        uint32_t station, session;
+        int to_first, took_control;
+        int stays; /* it stands there already: nothing to plan or report */
+        struct site_place to;
+        int64_t t_ns; /* of a replayed journal: the time of the move; else -1 */
+        char line[COMMAND_MAX_LINE + 1];
+    } plan;
+    struct device_version *made;  /* NULL: err says why */
+    struct device_version *ahead; /* versions that are planned before they are due, in order (device_plan_ahead) */
+    struct sh_err err;
+};
+
+/* own: is freed with the version; NULL: site is its caller's. Returns NULL without memory. */
+struct device_version *device_make_version(const struct site *site, struct site *own);
+void device_free_version(struct device_version *version);
+void device_free_versions(struct device_version **list);
+/* Frees earlier versions that nobody uses. Without the lock; by the thread that plans moves. */
+void device_free_unused_sites(struct device_moves *moves);
+void device_set_places(const struct site *site, struct command_place *place);
+int device_open_moves(struct device_moves *moves, const struct site *site, struct sh_err *err);
+void device_close_moves(struct device_moves *moves);
+/* Makes the work's tick hold the present site. */
+void device_use_site(struct device_moves *moves, struct device_work *work);
+
+#endif
