@@ -64,4 +64,10 @@ void fd_drain(int fd, size_t len);
 
 char *test_dir(void);
 
+/* The link can't be opened: the code, and an error of one line that contains `part`. */
+void expect_refused(const struct link_spec *spec, int code, const char *part);
+
+/* 2 KiB from the link to its other end, and 2 KiB back. */
+void exchange(struct bench *bench, int session, int fd);
+
 #endif

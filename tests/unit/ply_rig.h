@@ -16,7 +16,7 @@
 #include "drivers/record/recorder.h"
 #include "drivers/protocol/native_encode.h"
 
-enum { N = 5 };
+enum { N = 5, RECORD = 50 }; /* points of a stream frame; bytes of a vertex with all columns */
 
 extern char dir[];
 extern char shs_path[64], out_path[64], part_path[64];

@@ -9,151 +9,12 @@
 #include "core/vec3.h"
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"
+#include "tests/unit/soups.h"
 
 #ifndef SCENES
 #define SCENES (SANITIZED ? 2 : 24) /* of each kind */
 #endif
-enum { MOST = 400, RAYS = 6001, SHOWN = 5 };
-
-/* A scene is put together triangle by triangle; corners in one place are one vertex. */
-struct soup {
-    double vertex[3 * MOST][3];
-    uint32_t triangle[MOST][3];
-    uint16_t label[MOST];
-    uint32_t n_vertices, n;
-};
-
-static double between(uint64_t *state, double lo, double hi)
-{
-    return lo + (hi - lo) * case_unit(state);
-}
-
-static uint32_t add_vertex(struct soup *s, const double p[3])
-{
-    for (uint32_t i = 0; i < s->n_vertices; i++)
-        if (memcmp(s->vertex[i], p, sizeof s->vertex[i]) == 0) return i;
-    memcpy(s->vertex[s->n_vertices], p, sizeof s->vertex[0]);
-    return s->n_vertices++;
-}
-
-static void add(struct soup *s, const double a[3], const double b[3], const double c[3])
-{
-    if (s->n == MOST) return;
-    s->label[s->n] = (uint16_t)(s->n % 5);
-    const uint32_t t[3] = {add_vertex(s, a), add_vertex(s, b), add_vertex(s, c)};
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return;
-    memcpy(s->triangle[s->n++], t, sizeof t);
-}
-
-static void any_point(uint64_t *state, double half, double p[3])
-{
-    for (int k = 0; k < 3; k++)
-        p[k] = between(state, -half, half);
-}
-
-static void near_point(uint64_t *state, const double at[3], double most, double p[3])
-{
-    any_point(state, most, p);
-    vec3_add(p, at, p);
-}
-
-/* Triangles anywhere, of all sizes; every third one a needle. */
-static void soup_of_any(struct soup *s, uint64_t *state)
-{
-    const uint32_t n = (uint32_t)case_between(state, 2, 300);
-    for (uint32_t i = 0; i < n; i++) {
-        double a[3], b[3], c[3], size = exp(between(state, -5.0, 2.5));
-        any_point(state, 10.0, a);
-        near_point(state, a, size, b);
-        near_point(state, i % 3 == 0 ? b : a, i % 3 == 0 ? size * exp(between(state, -12.0, -1.0)) : size, c);
-        add(s, a, b, c);
-    }
-}
-
-/* Sheets in common planes, cut into triangles in different ways, some of them faces that stand there already. */
-static void soup_of_overlaps(struct soup *s, uint64_t *state)
-{
-    const uint32_t sheets = (uint32_t)case_between(state, 2, 30);
-    const double tilt = case_between(state, 0, 1) ? 0.0 : 0.37;
-    for (uint32_t i = 0; i < sheets; i++) {
-        const int axis = (int)case_between(state, 0, 2);
-        const double at = 0.5 * (double)case_between(state, -8, 8), x0 = 0.25 * (double)case_between(state, -20, 16),
-                     y0 = 0.25 * (double)case_between(state, -20, 16), w = 0.25 * (double)case_between(state, 1, 24),
-                     h = 0.25 * (double)case_between(state, 1, 24);
-        double corner[4][3];
-        for (int k = 0; k < 4; k++) {
-            const double x = x0 + (k == 1 || k == 2 ? w : 0.0), y = y0 + (k >= 2 ? h : 0.0);
-            corner[k][axis] = at + tilt * x;
-            corner[k][(axis + 1) % 3] = x;
-            corner[k][(axis + 2) % 3] = y;
-        }
-        add(s, corner[0], corner[1], corner[2]);
-        add(s, corner[0], corner[2], corner[3]);
-        if (case_between(state, 0, 3) == 0) add(s, corner[2], corner[0], corner[1]); /* twice */
-        if (case_between(state, 0, 3) == 0) add(s, corner[1], corner[3], corner[0]);
-    }
-}
-
-/* Sheets one after the other, as near as float can hardly tell them apart. */
-static void soup_of_layers(struct soup *s, uint64_t *state)
-{
-    const uint32_t n = (uint32_t)case_between(state, 2, 60);
-    double a[3], b[3], c[3];
-    for (uint32_t i = 0; i < n; i++) {
-        if (i % 6 == 0) {
-            any_point(state, 8.0, a);
-            any_point(state, 8.0, b);
-            any_point(state, 8.0, c);
-        }
-        const double gap = exp(between(state, -32.0, -9.0));
-        double p[3], q[3], r[3];
-        near_point(state, a, gap, p);
-        near_point(state, b, gap, q);
-        near_point(state, c, gap, r);
-        add(s, p, q, r);
-    }
-}
-
-/* Sheets that are folded at shared edges and corners, at all angles. */
-static void soup_of_folds(struct soup *s, uint64_t *state)
-{
-    const uint32_t n = (uint32_t)case_between(state, 1, 40);
-    for (uint32_t i = 0; i < n; i++) {
-        double a[3], b[3], c[3], d[3], e[3];
-        any_point(state, 8.0, a);
-        any_point(state, 8.0, b);
-        any_point(state, 8.0, c);
-        near_point(state, c, exp(between(state, -12.0, 2.0)), d);
-        near_point(state, b, exp(between(state, -12.0, 2.0)), e);
-        add(s, a, b, c);
-        add(s, d, b, a);
-        if (i % 2 == 0) add(s, e, d, a);
-    }
-}
-
-/* Boxes with common corners and faces, some within others. */
-static void soup_of_boxes(struct soup *s, uint64_t *state)
-{
-    static const int face[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-    const uint32_t n = (uint32_t)case_between(state, 1, 24);
-    for (uint32_t i = 0; i < n; i++) {
-        double lo[3], hi[3], corner[8][3];
-        for (int k = 0; k < 3; k++) {
-            lo[k] = 0.5 * (double)case_between(state, -12, 8);
-            hi[k] = lo[k] + 0.5 * (double)case_between(state, 1, 12);
-        }
-        for (int c = 0; c < 8; c++)
-            for (int k = 0; k < 3; k++)
-                corner[c][k] = c >> k & 1 ? hi[k] : lo[k];
-        for (int f = 0; f < 12; f++)
-            add(s, corner[face[f][0]], corner[face[f][1]], corner[face[f][2]]);
-    }
-}
-
-static void (*const KINDS[])(struct soup *, uint64_t *) = {soup_of_any, soup_of_overlaps, soup_of_layers, soup_of_folds,
-                                                           soup_of_boxes};
-enum { N_KINDS = sizeof KINDS / sizeof *KINDS };
+enum { RAYS = 6001, SHOWN = 5 };
 
 struct hits {
     double range_m[RAYS];
@@ -333,7 +194,7 @@ static void open_kind(struct rig *r, uint32_t kind, uint64_t *state)
     static const double far_m[3] = {512345.678, 5412345.678, 321.5};
     r->soup.n = r->soup.n_vertices = 0;
     while (r->soup.n == 0)
-        KINDS[kind](&r->soup, state);
+        SOUPS[kind](&r->soup, state);
     any_point(state, case_between(state, 0, 1) ? 2.0 : 12.0, r->station_m);
     if (case_between(state, 0, 3) == 0)
         for (int k = 0; k < 3; k++)
@@ -360,7 +221,7 @@ static void hits_are_those_of_the_bvh(void **state)
 {
     (void)state;
     static struct rig r;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         r.few = r.asked = 0;
         for (uint64_t seed = 0; seed < SCENES; seed++)
             run_kind(&r, kind, 1000 * kind + seed);
@@ -377,7 +238,7 @@ static void packets_and_numbers_make_no_difference(void **state)
     static const uint32_t width[] = {1, 4, 8, 16}, number[] = {1, 3, 17, 1023, 1024, 1025, 2049, 5000};
     static struct rig r;
     uint64_t seed = 4711;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         open_kind(&r, kind, &seed);
         for (uint32_t k = 0; k < sizeof width / sizeof *width; k++) {
             bvh_set_packet(r.bvh, width[k]);
@@ -399,7 +260,7 @@ static void what_is_not_asked_for_is_left_alone(void **state)
     enum { N = 1500 };
     static struct rig r;
     uint64_t seed = 815;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         open_kind(&r, kind, &seed);
         aim_all(&r, &seed);
         struct bvh_rays rays = rays_of(&r, &r.want, N);
@@ -424,7 +285,7 @@ static void steepness_decides_nothing(void **state)
     (void)state;
     static struct rig r;
     uint64_t seed = 99;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         open_kind(&r, kind, &seed);
         aim_all(&r, &seed);
         struct bvh_rays rays = rays_of(&r, &r.want, RAYS);
