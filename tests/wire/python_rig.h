@@ -16,7 +16,8 @@ int setup(void **state);
 /* Skips the test where Python is missing. */
 void need_python(void);
 
-/* Runs python_client.py. Returns its output, or NULL where numpy is wanted and missing; it is good until the next call. */
+/* Runs python_client.py. Returns its output, which is good until the next call, or NULL where numpy is wanted and
+ * missing. */
 const char *ask_python(struct wire *wire, const char *flavour, const char *what, const char *a, const char *b);
 
 /* Records one station off line, with these keys set. Returns the file's path. */

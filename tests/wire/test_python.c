@@ -41,8 +41,8 @@ static uint32_t take_block(struct dump *dump, char kind)
     return n;
 }
 
-/* Bit for bit: both are IEEE 754 doubles, with the same operations in the same order, sine and cosine from the same
- * C library. NaN has no sign worth comparing. */
+/* Values are equal bit for bit: both are IEEE 754 doubles, with the same operations in the same order, sine and cosine
+ * from the same C library. The sign of NaN does not count. */
 static void same(const char *what, double ours, double theirs)
 {
     if (memcmp(&ours, &theirs, sizeof ours) == 0 || (isnan(ours) && isnan(theirs))) return;
@@ -169,9 +169,10 @@ static void test_same_numbers(void **state)
     }
 }
 
-/* ---- both layouts of one scan, in the CRS and in the scene. Both are made of the same encoder counts. What differs:
- * the range is a count of range_scale_m in one (0.5 um, half of it), coordinates are counts of 1 um in the other
- * (sqrt(3) / 2 um), georeferencing is good to output.tolerance_m (set to 1 um), the axes are good to 1e-10 rad. */
+/* ---- both layouts of one scan, in the CRS and in the scene. Both are made of the same encoder counts. They differ
+ * in four ways: the range is a count of range_scale_m in one (0.5 um, half of it); coordinates are counts of 1 um in
+ * the other (sqrt(3) / 2 um); georeferencing is good to output.tolerance_m (set to 1 um); the axes are good to 1e-10
+ * rad. */
 static void test_both_layouts(void **state)
 {
     struct wire *wire = *state;
@@ -229,7 +230,7 @@ static void test_live(void **state)
     }
 }
 
-/* A recording into another format. */
+/* Converts a recording into another format. */
 static void convert(struct wire *wire, const char *from, const char *to)
 {
     char source[352], file[352];
@@ -262,8 +263,8 @@ static void test_older(void **state)
     free(same_points);
 }
 
-/* Parts of it by numbers of one's own: of two quaternions of one rotation the turn is the short one, of 30 degrees; rings
- * from pole to pole are a degree apart; a shot without echo is nowhere. */
+/* Tries its parts with chosen numbers. Between two quaternions of one rotation the turn is the short one, of 30
+ * degrees. Rings from pole to pole are a degree apart. A shot without echo has no place. */
 static const char PARTS[] =
     "import math, sys\n"
     "sys.path.insert(0, 'drivers/host/python')\n"

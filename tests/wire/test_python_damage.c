@@ -16,7 +16,7 @@ static uint32_t roll(uint32_t n)
     return (dice >> 8) % n;
 }
 
-/* Bytes lost, changed and put in, headers that promise 64 KiB, line ends. */
+/* Writes damaged bytes: some are lost, changed or put in, some headers promise 64 KiB, and there are line ends. */
 static size_t damage(uint8_t *to, const uint8_t *from, size_t len)
 {
     size_t n = 0;
@@ -30,7 +30,7 @@ static size_t damage(uint8_t *to, const uint8_t *from, size_t len)
     return n;
 }
 
-/* The stream some times over, as one whose numbers run over 2^32. */
+/* Repeats the stream as one whose numbers run over 2^32. */
 static size_t prolong(uint8_t *to, const char *from, size_t len)
 {
     uint32_t seq = 0u - 100u;
@@ -41,7 +41,7 @@ static size_t prolong(uint8_t *to, const char *from, size_t len)
     return ROUNDS * len;
 }
 
-/* Some frames come twice, some after others. */
+/* Repeats some frames, and moves some behind others. */
 static size_t shuffle(uint8_t *to, const uint8_t *from, size_t len)
 {
     struct late {
