@@ -23,7 +23,7 @@ extern struct mesh_grid {
     struct sh_err err;
 } t;
 
-/* An empty grid. */
+/* Begins an empty grid. */
 void begin(void);
 void add_column(uint32_t line, int is_pole);
 void add_point(uint32_t row, double x, double y, double z);

@@ -41,7 +41,7 @@ static void near_point(uint64_t *state, const double at[3], double most, double 
     vec3_add(p, at, p);
 }
 
-/* Triangles anywhere, of all sizes; every third one a needle. */
+/* Triangles lie anywhere, in all sizes. Every third one is a needle. */
 static void soup_of_any(struct soup *s, uint64_t *state)
 {
     const uint32_t n = (uint32_t)case_between(state, 2, 300);
@@ -54,7 +54,7 @@ static void soup_of_any(struct soup *s, uint64_t *state)
     }
 }
 
-/* Sheets in common planes, cut into triangles in different ways, some of them faces that stand there already. */
+/* Sheets in common planes are cut into triangles in different ways. Some faces stand there twice. */
 static void soup_of_overlaps(struct soup *s, uint64_t *state)
 {
     const uint32_t sheets = (uint32_t)case_between(state, 2, 30);
@@ -78,7 +78,7 @@ static void soup_of_overlaps(struct soup *s, uint64_t *state)
     }
 }
 
-/* Sheets one after the other, as near as float can hardly tell them apart. */
+/* Sheets lie one after the other, so near that float can hardly tell them apart. */
 static void soup_of_layers(struct soup *s, uint64_t *state)
 {
     const uint32_t n = (uint32_t)case_between(state, 2, 60);
@@ -98,7 +98,7 @@ static void soup_of_layers(struct soup *s, uint64_t *state)
     }
 }
 
-/* Sheets that are folded at shared edges and corners, at all angles. */
+/* Sheets are folded at shared edges and corners, at all angles. */
 static void soup_of_folds(struct soup *s, uint64_t *state)
 {
     const uint32_t n = (uint32_t)case_between(state, 1, 40);
@@ -115,7 +115,7 @@ static void soup_of_folds(struct soup *s, uint64_t *state)
     }
 }
 
-/* Boxes with common corners and faces, some within others. */
+/* Boxes have common corners and faces, and some are within others. */
 static void soup_of_boxes(struct soup *s, uint64_t *state)
 {
     static const int face[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},

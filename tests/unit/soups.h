@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Random small scenes, triangle by triangle, each kind with surfaces that are hard to order along a ray. */
+/* Random small scenes, triangle by triangle. Each kind has surfaces that are hard to order along a ray. */
 #ifndef TESTS_UNIT_SOUPS_H
 #define TESTS_UNIT_SOUPS_H
 
@@ -16,7 +16,7 @@ struct soup {
 
 double between(uint64_t *state, double lo, double hi);
 
-/* A point of the cube from -half to half. */
+/* Draws a point of the cube from -half to half. */
 void any_point(uint64_t *state, double half, double p[3]);
 
 /* Adds a triangle. Corners in one place are one vertex. A triangle with two of them in one place is left out. */

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the head is: on a trajectory, after its end, and on a platform whose poses come live. */
+/* The place of the head: on a trajectory, after its end, and on a platform whose poses come live. */
 #include <math.h>
 
 #include "firmware_sim/device/device_state.h"
 #include "tests/unit/device_rig.h"
 
-/* A time far ahead is counted, and the right ones go on. In steps the time is granted: any. */
+/* A time far ahead is counted, and the right ones go on. In steps time is granted, so any is allowed. */
 static void a_pose_far_ahead_keeps_no_other_out(void **state)
 {
     (void)state;
@@ -25,7 +25,7 @@ static void a_pose_far_ahead_keeps_no_other_out(void **state)
     rig_close(rig);
 }
 
-/* North at 1 m/s. Where a scan ends, by a stop or with its frames, the platform stands until the next one. */
+/* The platform goes north at 1 m/s. Where a scan ends, by a stop or with its frames, it stands until the next one. */
 static void a_platform_stands_where_the_scan_ended(void **state)
 {
     (void)state;

@@ -359,8 +359,7 @@ static void test_soak(void **state)
     uint64_t bytes = s->bytes;
     for (int i = 0; i < events; i++) {
         stream(s, draw((uint64_t)i, 0, 30000));
-        poll(NULL, 0,
-             (int)draw((uint64_t)i, 2, 15)); /* bytes that come meanwhile are on their way when the event strikes */
+        poll(NULL, 0, (int)draw((uint64_t)i, 2, 15)); /* bytes that come meanwhile are on their way at the event */
         strike(s, draw((uint64_t)i, 1, N_KINDS));
     }
     stream(s, 200000); /* still alive */
