@@ -94,8 +94,8 @@ static void a_path_ends_with_its_last_pose(void **state)
     unlink(path);
 }
 
-/* A pose each 10 ms, north at 2 m/s. Between two of them the head is where a straight way has it; after the last it goes on
- * so for extrapolate_ms, and then it stands. */
+/* There is a pose each 10 ms, north at 2 m/s. Between two of them the head is on the straight way. After the last it
+ * goes on so for extrapolate_ms, and then it stands. */
 static void a_live_platform_goes_on_for_a_while(void **state)
 {
     (void)state;
@@ -121,7 +121,7 @@ static void a_live_platform_goes_on_for_a_while(void **state)
     rig_close(rig);
 }
 
-/* Of one time there is one pose, and none comes before another that is known; nor from beyond the reach. */
+/* A time has one pose. None comes before another known one, or from beyond the reach. */
 static void poses_come_in_order(void **state)
 {
     (void)state;
@@ -143,7 +143,8 @@ static void poses_come_in_order(void **state)
     rig_close(rig);
 }
 
-/* North at 20 m/s, with a fix ten times a second: each is where the head was then, not a tenth of a second further. */
+/* The head goes north at 20 m/s, with a fix ten times a second. Each fix is where the head was then, not a tenth of a
+ * second further. */
 static void a_fix_is_where_the_head_was(void **state)
 {
     (void)state;

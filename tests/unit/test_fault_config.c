@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request as the configuration, scenarios and FAULt:ADD read them: which keys a kind has, their limits, and
- * what they are when not given. */
+/* Faults on request as the configuration, scenarios and FAULt:ADD read them: the keys of a kind, their limits, and
+ * their defaults. */
 #include "firmware_sim/command/command.h"
 #include "tests/unit/config_rig.h"
 
-/* Kinds with the keys that say what; and whether for_ms must be given. By hand, from fault/README.md. */
+/* Kinds with their describing keys, and whether for_ms must be given. They are worked out by hand from
+ * fault/README.md. */
 static const struct {
     const char *kind, *keys;
     int needs_ms;
@@ -53,7 +54,7 @@ static int has(const char *keys, const char *key)
     return at != NULL && (at == keys || at[-1] == ' ') && (at[len] == ' ' || at[len] == '\0');
 }
 
-/* None of them is cut off. */
+/* The list is not cut off. */
 static void an_unknown_kind_is_told_all_kinds(void **state)
 {
     (void)state;

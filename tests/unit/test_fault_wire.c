@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the wire, each kind by itself: exactly the frames that it notes are changed, at exactly that byte. All
- * others come as they were, and in order. (Kinds that change when a frame comes are in test_fault_wire_order.c.) */
+/* Faults on the wire, each kind by itself. Exactly the noted frames are changed, at exactly the noted byte. All others
+ * come unchanged and in order. (Kinds that change when a frame comes are in test_fault_wire_order.c.) */
 #include "drivers/protocol/native.h"
 #include "tests/unit/wire_rig.h"
 
@@ -66,7 +66,7 @@ static void truncated_frames_lack_their_end(void **state)
     rig_end(1);
 }
 
-/* How many bits of an item differ from what went out, which came alone. */
+/* Returns how many bits of an item differ from the sent one, which came alone. */
 static uint32_t count_bits(const struct rig_item *item)
 {
     uint32_t n = 0;
@@ -122,7 +122,7 @@ static void two_flips_never_make_each_other_right(void **state)
     rig_end(0);
 }
 
-/* A resealed flip is in the payload, and no checksum sees it. */
+/* A resealed flip is in the payload, and no checksum shows it. */
 static void resealed_flips_are_right_by_their_checksums(void **state)
 {
     (void)state;
@@ -172,7 +172,8 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     rig_end(1);
 }
 
-/* The system of a datagram's reader drops what is damaged on its way, so it is not sent; but what is resealed is. */
+/* A datagram's system drops those that are damaged on their way, so a damaged one is not sent. A resealed one is
+ * sent. */
 static void a_damaged_datagram_is_not_sent(void **state)
 {
     (void)state;
@@ -246,7 +247,7 @@ static void a_dropped_frame_is_hit_by_nothing_else(void **state)
     rig_end(1);
 }
 
-/* Nothing that would have come after it is noted: nobody will see it. */
+/* After the end nothing more is noted, as no client will see it. */
 static void a_session_that_ends_takes_nothing_more(void **state)
 {
     (void)state;
@@ -274,7 +275,7 @@ static void a_session_that_ends_takes_nothing_more(void **state)
     assert_true(wire_is_empty(rig.wire));
 }
 
-/* Until all of its writes are out, a frame is not written; a copy of it is none. */
+/* A frame is not written until all of its writes are out. A copy of it does not count. */
 static void what_is_not_written_is_counted(void **state)
 {
     (void)state;

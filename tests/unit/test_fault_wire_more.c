@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the wire: when they strike, as they are added and taken out at run time too; what a wire keeps; and mixtures
- * of all kinds by chance, whose output is what their notes say. */
+/* Faults on the wire: when they strike, also as they are added and taken out at run time; how much a wire keeps; and
+ * random mixtures of all kinds, whose output follows from their notes. */
 #include "tests/common/thorough.h"
 #include "tests/unit/wire_rig.h"
 
@@ -8,7 +8,7 @@ static struct fault f;
 
 /* ---- when */
 
-/* The numbers of the frames that were hit. */
+/* Expects the numbers of the frames that were hit. */
 static void expect_hits(const uint64_t *numbers)
 {
     uint32_t n = 0;
@@ -227,7 +227,7 @@ static struct fault any_fault(int native)
     return any;
 }
 
-/* The clock and the taking go on as they like: neither changes what comes out, nor what is noted. */
+/* The clock and the taking go on at random. Neither changes the output or the notes. */
 static void mix(uint64_t seed, int pace, int native)
 {
     struct fault list[12];

@@ -37,7 +37,7 @@ static void test_null(void **state)
     bench_close(&bench);
 }
 
-/* A thousand signals are one event, and a link without sessions hears it as well. */
+/* A thousand signals are one event, and a link without sessions gets it as well. */
 static void test_wake(void **state)
 {
     (void)state;
@@ -137,7 +137,7 @@ static void test_fd(void **state)
     bench_close(&bench);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     spec.fd = pair[0];
-    bench = bench_open(&spec); /* ended from this side: what was written goes out before */
+    bench = bench_open(&spec); /* ended from this side: written bytes are sent before */
     bench_expect(&bench, LINK_OPENED, 0);
     bench_write_all(&bench, 0, "last", 4);
     bench.ops->end(bench.link, 0);
@@ -149,7 +149,7 @@ static void test_fd(void **state)
     bench_close(&bench);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     spec.fd = pair[0];
-    bench = bench_open(&spec); /* what the other end wrote before it went is read first */
+    bench = bench_open(&spec); /* bytes that the other end wrote before it went are read first */
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(pair[1], "q", 1), 1);
     close(pair[1]);

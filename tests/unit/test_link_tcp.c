@@ -69,7 +69,7 @@ static void test_tcp_endings(void **state)
     struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
     struct bench bench = bench_open(&spec);
     char byte;
-    /* half closed, with something still to read */
+    /* It is half closed, with a byte still to read. */
     int fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(fd, "q", 1), 1);
@@ -86,7 +86,7 @@ static void test_tcp_endings(void **state)
     bench_expect(&bench, LINK_CLOSED, 0);
     assert_int_equal(fd_read(fd, &byte, 1), 0);
     close(fd);
-    /* and somebody else comes before that has been read: the session is not free yet, but will be */
+    /* Another client comes before that has been read: the session is not free yet, but will be. */
     fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(fd, "q", 1), 1);
@@ -98,12 +98,12 @@ static void test_tcp_endings(void **state)
     bench_expect(&bench, LINK_CLOSED, 0);
     bench_expect(&bench, LINK_OPENED, 0);
     exchange(&bench, 0, fd);
-    /* closed, which shows by the first byte that is written to it */
+    /* It is closed, which shows by the first byte that is written to it. */
     close(fd);
     bench_expect(&bench, LINK_SHUT, 0);
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
     bench_expect(&bench, LINK_CLOSED, 0);
-    /* reset, while frames are on their way */
+    /* It is reset, while frames are on their way. */
     fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     bench_fill(&bench, 0);
@@ -111,7 +111,7 @@ static void test_tcp_endings(void **state)
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
     close(fd);
     bench_expect(&bench, LINK_CLOSED, 1);
-    /* noticed by write before poll came to it */
+    /* write notices it before poll does. */
     fd = tcp_client(tcp_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
@@ -256,7 +256,7 @@ static void test_tcp_refusals(void **state)
     expect_refused(&spec, SH_EINPUT, "tcp:192.0.2.1:0: cannot listen");
 }
 
-/* As a user without rights: the error says which one is needed. */
+/* The user has no rights. The error names the one that is needed. */
 static void test_tcp_privileged_port(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sequence numbers of frames: what is missing, came already, came too late, or begins anew. */
+/* The sequence numbers of frames: missing, repeated, late ones, and restarts. */
 #include "tests/unit/native_rig.h"
 
 static struct native_sequence sequence;
@@ -29,7 +29,7 @@ static void expect(uint32_t seq, enum native_notice_kind kind, uint32_t want_fir
     assert_int_equal(n, want_n);
 }
 
-/* The same story from several first numbers, among them such that it runs over 2^32. */
+/* The same story is told from several first numbers; with some of them it runs over 2^32. */
 static void tell_story(uint32_t s)
 {
     memset(&sequence, 0, sizeof sequence);
@@ -48,10 +48,10 @@ static void tell_story(uint32_t s)
     expect(s + 12, NATIVE_REPEATED, s + 12, 1);
     expect(s + 14, NATIVE_GAP, s + 13, 1);
     expect(s + 13, NATIVE_LATE, s + 13, 1);
-    /* number s + 2 has come, but not this frame */
+    /* Number s + 2 has come, but not this frame. */
     assert_int_equal(take(s + 2, 1), NATIVE_RESTARTED);
     assert_int_equal(first, s + 2);
-    /* what was missing before belongs to another sequence */
+    /* Earlier losses belong to another sequence. */
     expect(s + 3, NATIVE_NO_NOTICE, s + 3, 1);
     expect(s + 14, NATIVE_GAP, s + 4, 10);
     expect(s + 4, NATIVE_LATE, s + 4, 1);
@@ -67,7 +67,7 @@ static void test_story(void **state)
         tell_story(0 - back);
 }
 
-/* What is known of a sequence ends with it. */
+/* All knowledge of a sequence ends with it. */
 static void test_forgets(void **state)
 {
     (void)state;
@@ -80,7 +80,7 @@ static void test_forgets(void **state)
         assert_int_equal(take(20, 1), NATIVE_RESTARTED);
         expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* came, was missing: before */
     }
-    /* a late frame fills its place: another one of its number is of another sequence */
+    /* A late frame fills its place. Another one with its number is of another sequence. */
     memset(&sequence, 0, sizeof sequence);
     expect(10, NATIVE_NO_NOTICE, 10, 1);
     expect(15, NATIVE_GAP, 11, 4);
