@@ -31,7 +31,7 @@ struct head {
     size_t len;
     const char *late; /* comes before the answer to the first line; NULL: nothing */
     size_t half;      /* bytes of a frame that is never ended, before the first answer */
-    int slow;         /* no question is answered until a second one came; the second's answer waits */
+    int slow;         /* the first *IDN? gets no answer; it comes before that of the next command */
     int owed;
     int identities, errors;
 };

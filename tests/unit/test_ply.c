@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The PLY recorder: what it writes is read back by a reader of its own. */
+/* The PLY recorder. A reader of the test's own reads its files. */
 #include <math.h>
 
 #include "tests/common/thorough.h"
 #include "tests/unit/ply_rig.h"
 
-/* ---- a reader of its own */
+/* ---- the reader */
 
 struct vertex {
     double x, y, z, range, time;
@@ -71,7 +71,7 @@ static const char *const properties[] = {"double x",          "double y",      "
                                          "float reflectance", "double time",   "uchar echo", "uchar echo_count",
                                          "ushort label",      "ushort station"};
 
-/* Line by line, as strict as a reader may be: no line beyond 200 bytes, properties as they are, comments
+/* Reads line by line, as strictly as possible: no line beyond 200 bytes, exactly these properties, comments
  * anywhere. */
 static void read_ply(const char *path, int ascii)
 {
@@ -235,13 +235,13 @@ static void test_polar(void **state)
     expect_comment("comment epsg 0");
 }
 
-/* Names that come after the points use the room left for them. Those for which there is none are left out. */
+/* Names that come after the points use the room left for them. Names without room are left out. */
 static void test_late_names(void **state)
 {
     (void)state;
     struct sh_err err;
     char name[256], comment[300];
-    /* Every length up to 36 and from 246 on; between them every 7th. */
+    /* Lengths are all up to 36 and from 246 on; between them every 7th. */
     for (size_t len = 1; len < sizeof name; len += len < 36 || len >= 246 ? 1 : (size_t)thorough(1, 7)) {
         memset(name, 'n', len);
         name[len] = 0;

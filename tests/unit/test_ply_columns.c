@@ -4,7 +4,7 @@
 
 #include "tests/unit/ply_rig.h"
 
-/* The rows of the whole file, without the columns that are left out: byte for byte the same, and as float. */
+/* The rows are those of the whole file, without the columns that are left out: byte for byte the same, and as float. */
 static void test_columns(void **state)
 {
     (void)state;
@@ -61,7 +61,7 @@ static void test_float_far_away(void **state)
     assert_int_equal(record(out_path, (struct recorder_options){.columns = columns}, 1, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "without float"));
 
-    /* a head that starts at the origin and moves: INT32_MAX counts of 10 micrometres */
+    /* The head starts at the origin and moves: INT32_MAX counts of 10 micrometres. */
     const struct native_anchor origin = {
         .scale_m = 1e-5, .moving = NATIVE_MOVING, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     begin_stream();
@@ -102,7 +102,7 @@ static void test_cloudcompare(void **state)
     }
 }
 
-/* Black at -30 dB, white at 0, even steps between; what is not modelled is no grey. */
+/* Black is -30 dB and white 0, with even steps between. A reflectance that is not modelled has no grey. */
 static void test_colours(void **state)
 {
     (void)state;

@@ -10,7 +10,7 @@ static struct trajectory *make(const struct pose_sample *samples, size_t n)
     return tr;
 }
 
-/* A knot counts from its own time on; before the first it is the first. */
+/* A knot counts from its own time on. Before the first knot, the first one counts. */
 static void test_find_knot(void **state)
 {
     (void)state;
@@ -49,8 +49,8 @@ static void test_samples_too_near(void **state)
     }
 }
 
-/* Velocities are those of a parabola through three samples, at the ends too: what is a parabola stays one, with samples
- * at any distance. Rounding: 1e-15 of 30 m, some times. */
+/* Velocities are those of a parabola through three samples, at the ends too. So a parabola stays one, with samples at
+ * any distance. Rounding: 1e-15 of 30 m, some times. */
 static void test_parabola(void **state)
 {
     (void)state;
@@ -68,7 +68,7 @@ static void test_parabola(void **state)
     trajectory_free(tr);
 }
 
-/* Where two samples have one place the body stands between them, and comes to rest there. */
+/* Between two samples at one place the body stands, and it comes to rest there. */
 static void test_pause(void **state)
 {
     (void)state;
@@ -105,7 +105,7 @@ static void test_straight_line(void **state)
     }
     trajectory_at(tr, 5.2, &p, &frame);
     assert_true(fabs(frame - 1.5) < 1e-12);
-    trajectory_at(tr, 4.0, &p, &frame); /* before and behind, it stands */
+    trajectory_at(tr, 4.0, &p, &frame); /* before and after, it stands */
     assert_true(p.position_m[0] == 15.0 && frame == 0.0);
     trajectory_at(tr, 9.0, &p, &frame);
     assert_true(p.position_m[0] == 18.0 && frame == 4.0);
@@ -115,7 +115,7 @@ static void test_straight_line(void **state)
 enum { TURN_SAMPLES = 100 };
 static const double RADIUS_M = 10.0, RATE = 1.0, STEP_S = 0.1;
 
-/* A car that drives a circle at 10 m/s, nose along the way: at t on the circle's angle t, heading -t. */
+/* A car drives a circle at 10 m/s, nose along the way: at t it is at the circle's angle t, with heading -t. */
 static void on_circle(double t, struct pose *pose)
 {
     *pose = (struct pose){.position_m = {RADIUS_M * cos(RATE * t), RADIUS_M * sin(RATE * t), 0.0}};
@@ -132,8 +132,8 @@ static struct trajectory *circle(void)
     return make(s, TURN_SAMPLES);
 }
 
-/* With x = RATE * STEP_S: the parabola's derivative on a circle is the true one times sin(x)/x. Put into the cubic,
- * that is off along the way by R x^3/6 times the largest of f(1-f)(1-2f), 0.0962, and across it by R x^4 3/128; higher
+/* With x = RATE * STEP_S: the parabola's derivative on a circle is the true one times sin(x)/x. In the cubic that gives
+ * an error along the way of R x^3/6 times the largest of f(1-f)(1-2f), 0.0962, and across it of R x^4 3/128. Higher
  * powers of x = 0.1 add below 2 %. By chords it would be R x^2/8. */
 static void test_constant_turn(void **state)
 {
@@ -146,7 +146,7 @@ static void test_constant_turn(void **state)
         trajectory_at(tr, t, &got, &frame);
         on_circle(t, &want);
         worst = fmax(worst, distance(got.position_m, want.position_m));
-        assert_true(pose_angle_between(got.quat, want.quat) < 1e-14); /* constant rate is what slerp does */
+        assert_true(pose_angle_between(got.quat, want.quat) < 1e-14); /* slerp has a constant rate */
         double i = floor(t / STEP_S);
         on_circle(i * STEP_S, &a);
         on_circle((i + 1) * STEP_S, &b);
@@ -160,8 +160,8 @@ static void test_constant_turn(void **state)
     trajectory_free(tr);
 }
 
-/* A parabola is what three samples show: position and speed are exact at the first and the last one, too, whatever lies
- * between their times. */
+/* Three samples define a parabola. Position and speed are exact at the first and the last sample, too, with any times
+ * between. */
 static void test_ends(void **state)
 {
     (void)state;
@@ -188,8 +188,7 @@ static void test_ends(void **state)
     trajectory_free(tr);
 }
 
-/* Between its knots the head moves as pose_between says: within the stated bound of the trajectory, lever arm included.
- */
+/* Between its knots the head moves by pose_between: within the stated bound of the trajectory, lever arm included. */
 static void test_knots(void **state)
 {
     (void)state;
@@ -223,7 +222,7 @@ static void test_knots(void **state)
     trajectory_free(tr);
 }
 
-/* Cut at end_s: the same poses up to there, and the one of that time as the last. */
+/* The path is cut at end_s: it has the same poses up to there, and the pose of that time as its last. */
 static void test_knots_to_an_end(void **state)
 {
     (void)state;
@@ -248,7 +247,7 @@ static void test_knots_to_an_end(void **state)
     trajectory_free(tr);
 }
 
-/* As many knots as the way needs, however long it takes; and a limit. */
+/* There are as many knots as the way needs, however long it takes, up to a limit. */
 static void test_slow_knots(void **state)
 {
     (void)state;

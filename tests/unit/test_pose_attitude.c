@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* core/pose: the convention of attitudes, and what lies between two poses. */
+/* core/pose: the convention of attitudes, and poses between two others. */
 #include "tests/unit/pose_rig.h"
 
 /* The convention written out: R = Rz(-heading) Rx(pitch) Ry(roll) from three elementary matrices. */
@@ -54,8 +54,9 @@ static void test_convention(void **state)
     assert_true(out[2] < -0.08);
 }
 
-/* Nose straight up or down: heading and roll turn about one axis, and only their sum or difference counts. The angles that
- * come back give the same attitude, also just beside the pole. Nearer to it than 1e-9 roll is put into the heading. */
+/* With the nose straight up or down, heading and roll turn about one axis, and only their sum or difference counts. The
+ * angles that come back give the same attitude, also just beside the pole. Nearer to it than 1e-9 roll is added to the
+ * heading. */
 static void test_pole(void **state)
 {
     (void)state;
@@ -84,7 +85,7 @@ static void test_between(void **state)
     pose_from_angles(350 * DEG, 0, 0, a.quat);
     pose_from_angles(30 * DEG, 0, 0, b.quat);
     for (int i = 0; i < 4; i++)
-        b.quat[i] = -b.quat[i]; /* the same attitude: the shorter way is found all the same */
+        b.quat[i] = -b.quat[i]; /* the same attitude: the shorter way is found nevertheless */
     for (double f = 0; f <= 1.0; f += 0.125) {
         double h, p, r;
         pose_between(&a, &b, f, &mid);
@@ -105,7 +106,7 @@ static void test_between(void **state)
     assert_true(fabs(out[1] + 1) < 1e-15);
 }
 
-/* A quaternion and its negative are one attitude: the way between two is the short one, whatever their signs. */
+/* A quaternion and its negative are one attitude. The way between two is the short one, for any signs. */
 static void test_short_way(void **state)
 {
     (void)state;
@@ -131,7 +132,8 @@ static void test_short_way(void **state)
     }
 }
 
-/* Straight up and straight down heading and roll turn about one axis: their difference, or sum, is said as heading. */
+/* Straight up and straight down heading and roll turn about one axis. Their difference, or sum, is reported as
+ * heading. */
 static void test_straight_up(void **state)
 {
     (void)state;
@@ -142,7 +144,7 @@ static void test_straight_up(void **state)
             pose_from_angles(heading, pitch, roll, quat);
             pose_matrix(quat, want);
             pose_to_angles(quat, &said[0], &said[1], &said[2]);
-            /* the cosine of the pitch is what rounding leaves, of which the pitch is the root's error: 2e-8 */
+            /* The cosine of the pitch is a rounding error, and the pitch's error is its root: 2e-8. */
             assert_true(fabs(said[1] - pitch) < 5e-8 && said[2] == 0.0);
             const double off = said[0] - (up ? heading - roll : heading + roll);
             assert_true(fabs(remainder(off, 2.0 * M_PI)) < 1e-12);

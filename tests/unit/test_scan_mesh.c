@@ -61,7 +61,7 @@ static void cells_with_three_corners(void **state)
     assert_faces_the_head();
 }
 
-/* Neither a line nor a row that is missing is bridged. */
+/* A missing line or row is not bridged. */
 static void gaps_stay_open(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void the_shorter_diagonal(void **state)
         }
 }
 
-/* Where the head lies in the plane of a triangle, and where it has no area. */
+/* The head lies in the plane of a triangle, or the triangle has no area. */
 static void what_faces_nowhere_is_counted(void **state)
 {
     (void)state;
@@ -138,7 +138,7 @@ static void normals_are_those_of_the_walls(void **state)
     assert_true(normal[0][0] == 0 && normal[0][1] == 0 && normal[0][2] == 0);
 }
 
-/* A point of a floor and a wall three times as large: the mean of their normals, by their areas. */
+/* A point of a floor and of a wall three times as large has the mean of their normals, weighted by area. */
 static void normals_at_a_corner(void **state)
 {
     (void)state;
@@ -162,8 +162,8 @@ static void loose_points_are_left_out(void **state)
         for (uint32_t row = 0; row < 3; row++)
             add_point(row, column, column == 2 ? 50 : 5, row);
     }
-    /* the two cells to the third column, 45 m further away, are left out: the mean is (9 + 2 root 2 + 3 * 45.01 + 2 *
-     * 45.02) / 16 = 14.8 m */
+    /* The two cells to the third column, 45 m further away, are left out: the mean is (9 + 2 root 2 + 3 * 45.01 + 2 *
+     * 45.02) / 16 = 14.8 m. */
     make(2.9);
     assert_int_equal(t.faces.n_long, 4);
     assert_int_equal(t.faces.n_faces, 4);
@@ -198,9 +198,9 @@ static void sparse_counts_by_hand(void **state)
     scan_sampler_free(&s);
 }
 
-/* 32 cells of 1/4 x 1/4 m on each of the two walls. With 6400 points 100 a cell are expected. Chi-square has 63 degrees of
- * freedom: it is above 126.1 for 4.5 in a million seeds, and below 25 for 5 in a million (Wilson and Hilferty 1931). The
- * seed is fixed, so that the test does not vary. */
+/* There are 32 cells of 1/4 x 1/4 m on each of the two walls. With 6400 points 100 a cell are expected. Chi-square has
+ * 63 degrees of freedom: it is above 126.1 for 4.5 in a million seeds, and below 25 for 5 in a million (Wilson and
+ * Hilferty 1931). The seed is fixed, so that the test does not vary. */
 static void sparse_points_are_even(void **state)
 {
     (void)state;

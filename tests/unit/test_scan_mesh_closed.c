@@ -8,7 +8,7 @@
 
 static const double PI = 3.14159265358979323846;
 
-/* The first wall of a box from -2 -1 -1 to 3 2 1.5 in a direction. */
+/* Adds the point where the direction meets the box from -2 -1 -1 to 3 2 1.5. */
 static void add_in_box(uint32_t row, double azimuth, double elevation)
 {
     static const double low[3] = {-2, -1, -1}, high[3] = {3, 2, 1.5};
@@ -33,8 +33,8 @@ static void make_sphere(uint32_t rings, uint32_t steps)
     make(0);
 }
 
-/* A sphere of R rings and S steps: 2 + (R - 2) S points, two fans of S and (R - 3) S cells of two. The box is convex and the
- * head inside it: all cells face the head. V - E + F = 2 for a sphere (Euler). */
+/* A sphere of R rings and S steps has 2 + (R - 2) S points, two fans of S and (R - 3) S cells of two. The box is convex
+ * and the head inside it, so all cells face the head. V - E + F = 2 for a sphere (Euler). */
 static void a_sphere_in_a_box_is_closed(void **state)
 {
     (void)state;
@@ -54,8 +54,8 @@ static void a_sphere_in_a_box_is_closed(void **state)
     }
 }
 
-/* The volume within, by the divergence theorem, is below that of the box (whose edges and corners are cut off) and comes
- * to it: normals are inward, so that it is negative. */
+/* Returns the volume within, by the divergence theorem. It is below that of the box, whose edges and corners are cut
+ * off. Normals are inward, so it is negative. */
 static double volume(void)
 {
     double sum = 0;
@@ -71,12 +71,12 @@ static void the_sphere_has_the_boxs_volume(void **state)
 {
     (void)state;
     make_sphere(37, 72);
-    /* cells of 5 degrees: what is cut off at an edge is below (cell / 2)^2 of area along 12 edges of at most 5 m, and a
-     * cell on the walls is at most 5 degrees * 4 m (slant 1.7) = 0.6 m wide */
+    /* Cells are 5 degrees. The area cut off at an edge is below (cell / 2)^2 along 12 edges of at most 5 m. A cell on
+     * the walls is at most 5 degrees * 4 m (slant 1.7) = 0.6 m wide. */
     assert_in_range((uint64_t)(-1000 * volume()), 1000 * 5 * 3 * 2.5 - 1000 * 12 * 5 * 0.09, 1000 * 5 * 3 * 2.5);
 }
 
-/* A ring of 36 columns and 5 rows, a tube: V - E + F = 0, the two borders of 36 edges each are in one face. */
+/* A ring of 36 columns and 5 rows is a tube: V - E + F = 0, and the two borders of 36 edges each are in one face. */
 static void a_full_turn_closes(void **state)
 {
     (void)state;
@@ -99,7 +99,7 @@ static void a_full_turn_closes(void **state)
     }
 }
 
-/* Two columns have nothing between them but the one wall, also where the grid closes. */
+/* Two columns have only the one wall between them, even where the grid closes. */
 static void two_columns_do_not_close(void **state)
 {
     (void)state;
@@ -114,8 +114,8 @@ static void two_columns_do_not_close(void **state)
     assert_int_equal(t.faces.n_faces, 4 * 2);
 }
 
-/* Points at random places of the grid: the edges are those that the faces have, whatever is missing. Faces without a
- * direction can't be among them: no point lies in the plane of two others and the head but by chance. */
+/* Points are at random places of the grid. The counted edges are those of the faces, whatever is missing. There are no
+ * faces without a direction: only by chance would a point lie in the plane of two others and the head. */
 static void edges_of_a_ragged_grid(void **state)
 {
     (void)state;

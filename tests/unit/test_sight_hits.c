@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A sight's hits are those of the BVH, bit by bit: random scenes with all that makes surfaces hard to order, and rays
+/* A sight's hits are those of the BVH, bit by bit. Random scenes have surfaces that are hard to order, and rays are
  * aimed at edges, corners and the borders of the map's cells. */
 #include <math.h>
 #include <stdlib.h>
@@ -97,7 +97,7 @@ static void aim(struct rig *r, uint32_t i, const double d[3])
     r->z[i] = d[2] / length;
 }
 
-/* Some units of the last place away. */
+/* Moves a number by some units of the last place. */
 static double shaken(double x, uint64_t *state)
 {
     for (int64_t k = case_between(state, -4, 4); k != 0; k += k < 0 ? 1 : -1)
@@ -105,7 +105,7 @@ static double shaken(double x, uint64_t *state)
     return x;
 }
 
-/* The border of a cell, for any number of cells up to 2,048; on the borders of faces, too. */
+/* Aims at the border of a cell, for any number of cells up to 2,048, and on the borders of faces, too. */
 static void aim_at_cell(struct rig *r, uint32_t i, uint64_t *state)
 {
     const int axis = (int)case_between(state, 0, 2), both = (int)case_between(state, 0, 1);
@@ -121,7 +121,7 @@ static void aim_at_cell(struct rig *r, uint32_t i, uint64_t *state)
     aim(r, i, d);
 }
 
-/* At a corner, an edge or the inside of a triangle, to the last places. */
+/* Aims at a corner, an edge or the inside of a triangle, to the last places. */
 static void aim_at_triangle(struct rig *r, uint32_t i, uint64_t *state)
 {
     const struct soup *s = &r->soup;
@@ -179,7 +179,7 @@ static void compare(struct rig *r, const char *what, uint32_t n)
     }
 }
 
-/* All rays, at once, by both. */
+/* Casts all rays, at once, in both ways. */
 static void cast_both(struct rig *r, const char *what, uint32_t n)
 {
     const struct bvh_rays want = rays_of(r, &r->want, n), got = rays_of(r, &r->got, n);
@@ -188,7 +188,7 @@ static void cast_both(struct rig *r, const char *what, uint32_t n)
     compare(r, what, n);
 }
 
-/* A scene of a kind, a station in it, and where both are. */
+/* Opens a scene of a kind, with a station in it, and places both. */
 static void open_kind(struct rig *r, uint32_t kind, uint64_t *state)
 {
     static const double far_m[3] = {512345.678, 5412345.678, 321.5};
@@ -231,7 +231,7 @@ static void hits_are_those_of_the_bvh(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Whatever the width of packets, and for any number of rays, in chunks or not. */
+/* Packets may have any width, and there may be any number of rays, in chunks or not. */
 static void packets_and_numbers_make_no_difference(void **state)
 {
     (void)state;
@@ -253,7 +253,7 @@ static void packets_and_numbers_make_no_difference(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Labels and steepness left out change no range; nothing is written beyond the last ray. */
+/* Labels and steepness that are left out change no range. Nothing is written beyond the last ray. */
 static void what_is_not_asked_for_is_left_alone(void **state)
 {
     (void)state;
@@ -279,7 +279,8 @@ static void what_is_not_asked_for_is_left_alone(void **state)
     }
 }
 
-/* Once, with steepness asked for, doubt was counted in other units: at edges of large triangles float alone decided. */
+/* In an earlier version, doubt was counted in other units when steepness was asked for: at edges of large triangles
+ * float alone decided. */
 static void steepness_decides_nothing(void **state)
 {
     (void)state;
@@ -318,7 +319,7 @@ static void a_face_that_stands_twice_is_a_twin(void **state)
     close_rig(&r);
 }
 
-/* No ray meets anything; and directions with components of nearly nothing. */
+/* No ray meets anything. Some directions have components of nearly nothing. */
 static void nothing_to_be_seen(void **state)
 {
     (void)state;
@@ -343,8 +344,8 @@ static void nothing_to_be_seen(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Two sheets folded at a common edge, or crossing at a common corner. Rays beside the edge, nearer to it than float can
- * tell the sheets apart: the nearer one is met. */
+/* Two sheets are folded at a common edge, or cross at a common corner. Rays pass beside the edge, nearer to it than
+ * float can tell the sheets apart. The nearer one is met. */
 static void folded_sheets_are_ordered(void **state)
 {
     (void)state;
@@ -371,7 +372,7 @@ static void folded_sheets_are_ordered(void **state)
         bvh_hits(r.work, r.bvh, &rays);
         for (uint32_t i = 0; i < RAYS; i++) {
             if (r.got.triangle[i] == BVH_NO_TRIANGLE) continue;
-            /* Near the middle of the edge both are met, and the planes tell which is nearer. */
+            /* Near the middle of the edge both are met, and the planes decide which is nearer. */
             const double d[3] = {r.x[i], r.y[i], r.z[i]};
             const double in_a = bvh_range_of(r.bvh, 0, r.station_m, d), in_b = bvh_range_of(r.bvh, 1, r.station_m, d);
             const double mid = d[1] / d[0];
