@@ -22,8 +22,8 @@ struct seen_room {
     struct beam_outlines *outlines;
     struct cast_beam beam;
     struct schedule_segment segment;
-    struct cast_setup setup; /* [0] is without the sight, [1] with it */
-    /* 0: without sight, 1: with */
+    struct cast_setup setup; /* single rays, polar, no noise, without sight */
+    /* [0] is without the sight, [1] with it */
     struct caster *caster[2];
     struct line_block block[2];
 };

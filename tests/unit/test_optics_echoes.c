@@ -65,8 +65,8 @@ static void one_of_a_pulse_s_echoes(void **state)
     close_optics(&o);
 }
 
-/* An echo that does not fit into 31 bits of counts is dropped and counted: the wall, here, of the pane's two sides and
- * the wall. The others are numbered as two. Where none fits one entry stays, without echo. */
+/* An echo that does not fit into 31 bits of counts is dropped and counted. Here the wall does not fit, while the pane's
+ * two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
 static void echoes_that_do_not_fit(void **state)
 {
     (void)state;
