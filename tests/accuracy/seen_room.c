@@ -27,7 +27,7 @@ static void draw_triangle(struct drawn *d, const double a[3], const double b[3],
     d->label[d->n_triangles++] = label;
 }
 
-/* The parallelogram a, a + u, a + u + v, a + v. */
+/* Adds the parallelogram a, a + u, a + u + v, a + v. */
 static void draw_quad(struct drawn *d, const double a[3], const double u[3], const double v[3], uint16_t label)
 {
     double b[3], c[3], e[3];

@@ -106,7 +106,7 @@ static void test_end_of_a_plane(void **state)
     }
 }
 
-/* A wall at range_m straight ahead. Its normal is turned away by the incidence. */
+/* A wall stands at range_m straight ahead. Its normal is turned away by the incidence. */
 static struct scene *wall(double range_m, double incidence_rad)
 {
     const double s = sin(incidence_rad), c = cos(incidence_rad), half = 5.0 + 0.1 * range_m;

@@ -2,8 +2,8 @@
 /* Footprints on glass, on mirrors, and on surfaces that mix within one plane, against values worked out by hand. */
 #include "tests/accuracy/lit_plates.h"
 
-/* A pane on the left with a free border, and a wall behind all of it. A part of the wall's echo has passed the pane
- * there and back. Without a signal there are the same echoes. */
+/* A pane with a free border is on the left, and a wall lies behind all of it. A part of the wall's echo has passed the
+ * pane there and back. Without a signal there are the same echoes. */
 static void a_footprint_on_the_border_of_glass(void **state)
 {
     (void)state;
@@ -87,7 +87,7 @@ static void surfaces_mix_within_a_plane(void **state)
         }
 }
 
-/* The same with a mirror in place of the pane. In it the wall behind the head is seen, 40 m and 12 m away, as a
+/* This is the same with a mirror in place of the pane. In it the wall behind the head is seen, 40 m and 12 m away, as a
  * ghost. */
 static struct scene *mirror_and_two_walls(void)
 {

@@ -46,8 +46,8 @@ struct place {
     double offset_m[3];
 };
 
-/* Easting and northing of ordinary and of extreme points of the grid: Berlin; the equator at a zone's edge;
- * 84 degrees north, high up; just south of the equator on the southern grid. Not multiples of anything. */
+/* Easting and northing of ordinary and of extreme points of the grid: Berlin; the equator at a zone's edge; 84 degrees
+ * north, high up; just south of the equator on the southern grid. They are multiples of nothing. */
 static const struct place PLACE[] = {
     {"E 391431 N 5819712", {391431.123, 5819712.456, 34.567}},
     {"E 833978 N 12", {833978.557, 12.345, -3.2}},

@@ -30,7 +30,7 @@ enum { MOST_RAYS = 1 << 16 };
 #define SCENES thorough(1000, 400)
 #endif
 
-/* Beyond the farthest corner of any scene: 2e6 m. */
+/* This lies beyond the farthest corner of any scene, which is 2e6 m away. */
 static const double RANGE_MAX_M = 1e7;
 
 struct tally {

@@ -29,7 +29,8 @@ static const double RANGE_MAX_M = 1e4;
 /* The bound is that of single rays (test_range). A plane's components are doubles, and the error grows by the inverse
  * of the incidence's cosine. */
 static const double BOUND_M = 1e-6;
-/* A share of the range. Surfaces nearer to each other than this are met at once, and the lowest number is reported. */
+/* This is a share of the range. Surfaces nearer to each other than this are met at once, and the lowest number is
+ * reported. */
 static const double TIED = 2e-12;
 
 static const struct {

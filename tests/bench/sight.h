@@ -9,8 +9,8 @@
 
 enum { BENCH_SIGHT_ROUNDS = 15, BENCH_SIGHT_MIB = 64 /* cast.sight_mib */ };
 
-/* A whole scan has so many pulses, with the same angle between lines and in them. Of each `bundle * every` lines that
- * follow each other only the first `bundle` are cast. */
+/* A whole scan has so many pulses, with the same angle between lines and in them. Only the first `bundle` of each
+ * `bundle * every` lines in a row are cast. */
 struct bench_scan {
     uint64_t pulses; /* lines * line_pulses */
     uint32_t lines, line_pulses, bundle, every;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A beam by brute force. Each pulse has 1,000 sub-rays on a spiral (Vogel 1979) in place of rings, and each is cast by
- * itself to its exact range. Echoes follow from a plain reading of core/footprint.h. */
+/* This computes a beam by brute force. Each pulse has 1,000 sub-rays on a spiral (Vogel 1979) in place of rings, and
+ * each is cast by itself to its exact range. Echoes follow from a plain reading of core/footprint.h. */
 #ifndef TESTS_COMMON_BEAM_REFERENCE_H
 #define TESTS_COMMON_BEAM_REFERENCE_H
 
@@ -37,7 +37,7 @@ struct beam_tally {
 /* Compares the pulse whose entries begin at *at, and moves *at to the next pulse. */
 void beam_compare(struct beam_tally *tally, const struct line_block *block, uint32_t *at, const struct beam_ref *ref);
 
-/* A scan cast with a beam, and the directions of its pulses. */
+/* This is a scan cast with a beam, with the directions of its pulses. */
 struct beam_rig {
     struct scene *scene;
     struct bvh *bvh;

@@ -100,7 +100,7 @@ struct scene *chart_load(const char *file, enum scene_up up)
     return scene;
 }
 
-/* A square upright across the y axis. With y_m below 0 it is behind the head. */
+/* The square stands upright across the y axis. With y_m below 0 it is behind the head. */
 struct scene *chart_load_board(const char *image, const char *options, double y_m, const char *more)
 {
     char text[1024];

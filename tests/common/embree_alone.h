@@ -30,7 +30,8 @@ struct embree_alone_spec {
     unsigned threads;   /* of the build; 0: all */
     float range_max_m;
 };
-/* The rays begin at the origin. To begin elsewhere, set ray_origin. Release with embree_alone_free. */
+/* The rays begin at the origin. To begin elsewhere, set ray_origin. The caller must release it with
+ * embree_alone_free. */
 int embree_alone_create(const struct scene *scene, const struct embree_alone_spec *spec, struct embree_alone *out,
                         struct sh_err *err);
 /* Takes n rays from the origin. The arrays stay the caller's, and n is a multiple of 16. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A limit for each test program: it ends one that waits for ever, and prints where that waits. It is linked with every
- * test program.
+/* This is a limit for each test program. It ends a program that waits for ever, and prints where that waits. It is
+ * linked with every test program.
  *
  * The limit is TEST_LIMIT_S seconds, else DEFAULT_S; 0 sets none. run_tap.sh sets the variable to its own limit. The
  * limit only catches a hang, and no result depends on it. Where more processes want to run than there are processors,

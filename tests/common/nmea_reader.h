@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tests' own reader of NMEA 0183: fields, checksum, angles. */
+/* This is the tests' own reader of NMEA 0183: fields, checksum, angles. */
 #ifndef TESTS_COMMON_NMEA_READER_H
 #define TESTS_COMMON_NMEA_READER_H
 

@@ -237,7 +237,7 @@ static void add_twins(struct odd_maker *m)
     }
 }
 
-/* A triangle of up to 1e6 m, below, above or beside the station, with dwarfs of 1e-6 m and more upon it. */
+/* A triangle of up to 1e6 m lies below, above or beside the station, with dwarfs of 1e-6 m and more upon it. */
 static void add_giant(struct odd_maker *m)
 {
     double p[3][3], size_m = odd_decades(m, 2.0, 6.0), to_m = odd_decades(m, -2.0, 2.0);

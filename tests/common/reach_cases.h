@@ -48,7 +48,7 @@ struct reach_run {
     uint32_t packet;             /* rays of one */
     uint32_t triangles;          /* of all that stands and moves */
 };
-/* Release with reach_close, also after an error. */
+/* The caller must release it with reach_close, also after an error. */
 int reach_open(const struct reach_folder *folder, const struct reach_case *of, struct reach_run *out,
                struct sh_err *err);
 void reach_close(struct reach_run *run);

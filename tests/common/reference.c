@@ -218,7 +218,7 @@ void reference_free(struct reference *r)
     free(r);
 }
 
-/* The state of the walk: the cell, and the ranges at which the ray leaves it along each axis. */
+/* This is the state of the walk: the cell, and the ranges at which the ray leaves it along each axis. */
 struct walk {
     int32_t at[3], step[3];
     double leave_m[3], cell_along_m[3];

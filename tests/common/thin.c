@@ -129,7 +129,7 @@ static double between(uint64_t key, uint64_t i)
     return 2.0 * (double)(int64_t)(rng_u64(key, i) >> 11) * 0x1p-53 - 1.0;
 }
 
-/* A triangle about a point in the crown. The point is uniform in the ball, by rejection. */
+/* Makes a triangle about a point in the crown. The point is uniform in the ball, by rejection. */
 static void add_leaf(struct builder *b, const struct generate_crown *crown, uint64_t key, uint64_t *counter)
 {
     double p[3], r2;

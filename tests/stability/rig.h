@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One scene, seen from one station by our cast and by the reference, and the errors of its rays. */
+/* The rig holds one scene, seen from one station by our cast and by the reference, and the errors of its rays. */
 #ifndef TESTS_STABILITY_RIG_H
 #define TESTS_STABILITY_RIG_H
 
@@ -59,9 +59,9 @@ struct rig_errors rig_errors_of(const struct rig *rig, int judge);
 /* Casts both ways: with ours, and with float packets of 16 (robust) about naive_origin_m. Prints a row of the largest
  * errors in metres. */
 void rig_row_of_ranges(struct rig *rig, const char *regime, const double naive_origin_m[3], double bound_m);
-/* The same as a row of the number of wrong rays. Ours are wrong by more than a micrometre. Of the naive ones only those
- * count that are wrong by more than a centimetre: they met another surface, and it is not their float range that makes
- * them wrong. */
+/* The same as a row of the number of wrong rays. Ours are wrong by more than a micrometre. Naive rays count only if
+ * they are wrong by more than a centimetre: they met another surface, and it is not their float range that makes them
+ * wrong. */
 void rig_row_of_rays(struct rig *rig, const char *regime, const double naive_origin_m[3]);
 
 /* A line of pulses straight ahead (y), half a degree up and down. */

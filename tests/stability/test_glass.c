@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene behind a pane. A second ray that sets out a fixed step after a float hit meets the pane again. */
+/* These tests look at a scene behind a pane. A second ray that sets out a fixed step after a float hit meets the pane
+ * again. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

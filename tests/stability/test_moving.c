@@ -12,7 +12,7 @@ enum { LINES = 100, LINE_PULSES = 3000, KNOTS = 102 };
 
 static const double RATE = 1.0, SPEED_M_S = 10.0; /* a car in a bend of 10 m */
 
-/* The pose on the circle at t, leaning with its road. */
+/* Gives the pose on the circle at t, leaning with its road. */
 static void car_at(double t, struct pose *pose)
 {
     const double r = SPEED_M_S / RATE;

@@ -15,7 +15,7 @@
 enum { RAYS = BVH_CHUNK, PACKET = 16 };
 static const double BALL_M = 1.5;
 
-/* The cost of a packet. */
+/* This is the cost of a packet. */
 struct cost {
     double leaves, decided;
     uint32_t hits;

@@ -149,9 +149,9 @@ static void test_changes(void **state)
 
 /* ---- lines that do not divide the pulses */
 
-/* Mirror angle after an hour against k * lines / pulses modulo 1 in whole numbers. Ours: the ratio r/den and two
- * products round by 2^-53 of a turn each: 4 x 2^-53 turns = 2.8e-15 rad. Naive: the line has the nearest whole number
- * of pulses, or the mirror's step is added up in double. */
+/* The mirror angle after an hour is compared with k * lines / pulses modulo 1 in whole numbers. Ours: the ratio r/den
+ * and two products round by 2^-53 of a turn each: 4 x 2^-53 turns = 2.8e-15 rad. Naive: the line has the nearest whole
+ * number of pulses, or the mirror's step is added up in double. */
 static void line_row(int64_t prr_hz, int64_t lines_uhz)
 {
     const double turn_rad = 2.0 * acos(-1.0);

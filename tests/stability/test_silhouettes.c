@@ -103,8 +103,8 @@ static void test_solids(void **state)
     table_check();
 }
 
-/* The top of a table from hardly above it. Its far edge stands at 89 degrees to the ray, and the wall is 20 m
- * behind. */
+/* The head sees the top of a table from hardly above it. Its far edge stands at 89 degrees to the ray, and the wall is
+ * 20 m behind. */
 static void test_grazed_edge(void **state)
 {
     (void)state;

@@ -28,7 +28,7 @@ void cola_head_state(const char *state);
 /* Sends one request in CoLa-A. Returns the one answer without its frame. */
 const char *cola_ask(const char *request);
 void cola_expect(const char *request, const char *answer);
-/* The same in CoLa-B. The payloads have no marks, length and check byte. */
+/* Does the same in CoLa-B. The payloads have no marks, length and check byte. */
 void cola_expect_b(const void *request, size_t len, const void *answer, size_t answer_len);
 #define EXPECT_B(request, answer) cola_expect_b(request, sizeof(request) - 1, answer, sizeof(answer) - 1)
 /* Adds marks, length and check byte. */

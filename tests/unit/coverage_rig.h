@@ -17,7 +17,7 @@
 #include "core/studio/coverage.h"
 #include "core/vec3.h"
 
-/* A room with a coverage. */
+/* This is a room with a coverage. */
 struct cover {
     struct scene *scene;
     struct bvh *bvh;
@@ -31,8 +31,8 @@ void cover_close(struct cover *cover);
 /* Makes a box with faces inward; its labels are 0..5. */
 struct scene *cover_box(const double lo[3], const double hi[3]);
 
-/* The L: (0, 0) (6, 0) (6, 2) (2, 2) (2, 5) (0, 5), from z = 0 to L_HEIGHT_M. The walls go round in that order, each of
- * two triangles; then come floor and ceiling. */
+/* The L is (0, 0) (6, 0) (6, 2) (2, 2) (2, 5) (0, 5), from z = 0 to L_HEIGHT_M. The walls go round in that order, each
+ * of two triangles; then come floor and ceiling. */
 #define L_HEIGHT_M 2.4
 struct scene *cover_l_room(void);
 

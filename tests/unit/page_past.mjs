@@ -14,7 +14,7 @@ function equal(got, wanted, what) {
   if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
 }
 
-// A descriptor and an anchor of the polar layout, from the samples of the protocol.
+// This makes a descriptor and an anchor of the polar layout, from the samples of the protocol.
 const text = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
 const samples = [...text.matchAll(/```text\n(d5 [0-9a-f \n]*)```/g)].map(([, hex]) => Buffer.from(hex.replace(/\s/g, ''), 'hex'));
 const sampleOf = (type) => samples.find((s) => s[1] === type).subarray(28);
@@ -61,7 +61,7 @@ class Stream {
   shots(from, to) { return Array.from({length: to - from}, (_, i) => this.push(POINTS, shot(from + i))); }
   telemetry() { return [this.push(TELEMETRY, sampleOf(TELEMETRY))]; }
 
-  // The body of /past, a frame a piece. `keeps` is how many of the kept frames it has so far.
+  // This makes the body of /past, with a frame in each piece.
   get = async (url) => {
     const at = Number(url.split('=')[1]), head = Buffer.alloc(56), end = this.keeps ?? this.kept.length;
     const piece = at < end ? this.kept[at] : Buffer.alloc(0);

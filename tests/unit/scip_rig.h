@@ -22,7 +22,7 @@ extern struct protocol_rig_shot shot[SCIP_STEPS]; /* of the steps first..last */
 
 /* Opens a session of that model, whose head is described: 0.02 to 5.6 m for URG-04LX, 0.1 to 30 m else. */
 void scip_open(const char *model);
-/* The same with a chosen head. */
+/* Does the same with a chosen head. */
 void scip_open_head(const char *model, uint32_t steps, int first, int last, int front, int turn, uint32_t lines_hz);
 void scip_close(void);
 

@@ -53,7 +53,7 @@ static uint32_t shoot(const struct bvh *bvh, struct bvh_work *work, int want, do
     return found;
 }
 
-/* A sheet at y = 60, and one through it: y = 60 + slope x. */
+/* One sheet lies at y = 60, and another one cuts it: y = 60 + slope x. */
 static struct scene *crossing(double slope)
 {
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {3, 4, 5}};
@@ -70,7 +70,7 @@ static struct scene *crossing(double slope)
 static uint32_t wrong_of_crossing(const struct bvh *bvh, struct bvh_work *work, double slope)
 {
     static struct fan fan;
-    /* The resolution of double at the place, over the angle. */
+    /* This is the resolution of double at the place, over the angle. */
     const double least_m = 8.0 * 0x1p-53 * 300.0 * slope + 1e-9;
     int want[RAYS];
     uint64_t random = 5;
@@ -171,8 +171,8 @@ static void what_a_ray_begins_on_is_not_met(void **state)
     scene_free(scene);
 }
 
-/* A facing sheet, and one through it at a slant of up to 1 in 20,000. Rays meet the slanted one 0.1 um to 1 cm before
- * or behind the other. */
+/* A sheet faces the ray, and another one cuts it at a slant of up to 1 in 20,000. Rays meet the slanted one 0.1 um to 1
+ * cm before or behind the other. */
 static void sheets_that_cross_at_a_slant(void **state)
 {
     (void)state;

@@ -14,7 +14,7 @@ static struct cast_rig *room(void)
     return cast_rig_open(box_scene(LO, HI), HERE);
 }
 
-/* Any direction, evenly. */
+/* Gives any direction, evenly. */
 static void any_direction(uint64_t *seed, double d[3])
 {
     double s, c, z = 2.0 * case_unit(seed) - 1.0, r = sqrt(1.0 - z * z);

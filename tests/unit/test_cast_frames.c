@@ -303,7 +303,7 @@ static void rounded_coordinates_cost_no_more_than_their_rounding(void **state)
     assert_true(worst > 0.0);
 }
 
-/* The room, and a triangle 2 km away. The BVH's origin is the middle of that. */
+/* The scene is the room, and a triangle 2 km away. The BVH's origin is the middle of that. */
 static struct scene *room_and_far_triangle(void)
 {
     struct scene *room = box_scene(LO, HI), *both;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The error queue and the collector of lines. */
+/* These are tests of the error queue and of the collector of lines. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

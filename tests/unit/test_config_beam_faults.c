@@ -2,7 +2,7 @@
 /* Faults that change the measurements. Heads that can't have them get the reason. */
 #include "tests/unit/config_rig.h"
 
-/* For a line head without noise and signal (base), with a list of faults, and for other heads. */
+/* The cases are for a line head without noise and signal (base), with a list of faults, and for other heads. */
 static void assert_refused(const char *profile, const char *rest, const char *item, const char *says)
 {
     char with[512];

@@ -194,8 +194,8 @@ static void a_full_list_takes_no_more(void **state)
     assert_says("--set links[8].type: links has 8 elements; allowed indices 0 to 7");
 }
 
-/* When not given, the tolerance of positions is a thousandth of the plan's, at least 1e-7 m. That of meshes is a tenth
- * of it, or 1 m where the plan's is not given either. */
+/* When not given, the tolerance of positions is a thousandth of the plan's, at least 1e-7 m. The tolerance of meshes is
+ * a tenth of it, or 1 m where the plan's is not given either. */
 static void tolerances_follow_the_plan(void **state)
 {
     (void)state;

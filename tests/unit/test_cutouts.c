@@ -151,7 +151,7 @@ static void cast_all(const struct scene *scene, uint32_t packet)
     bvh_free(bvh);
 }
 
-/* A layer of the truth. */
+/* This is a layer of the truth. */
 struct layer {
     double y, half, shift_u;
     int cut, label;

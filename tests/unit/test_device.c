@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The device in device time: the test claims each tick, with no threads and no clock. */
+/* These tests run the device in device time. The test claims each tick, with no threads and no clock. */
 #include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 

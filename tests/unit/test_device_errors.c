@@ -2,7 +2,7 @@
 /* Events of errors: their number is limited, and none is forgotten. */
 #include "tests/unit/device_rig.h"
 
-/* A tick holds 24 events. Those of a client that sends errors all the time must not displace the scan's end. */
+/* A tick holds 24 events. The errors of a client that sends them all the time must not displace the scan's end. */
 static void the_last_events_are_said_however_many(void **state)
 {
     (void)state;

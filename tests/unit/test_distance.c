@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Distance to the scene against brute force in 113-bit arithmetic by another algorithm. */
+/* These tests compare the distance to the scene with brute force in 113-bit arithmetic by another algorithm. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The console of a gadget, with a socket pair in place of the kernel's tty, and an eventfd in place of the timer. A
- * socket pair also reports how much was not taken yet (TIOCOUTQ is SIOCOUTQ). Clients stop reading, and others come
- * after them. */
+/* These tests run the console of a gadget, with a socket pair in place of the kernel's tty, and an eventfd in place of
+ * the timer. A socket pair also reports how much was not taken yet (TIOCOUTQ is SIOCOUTQ). Clients stop reading, and
+ * others come after them. */
 #include "tests/unit/usb_host.h"
 
 #include <poll.h>

@@ -78,8 +78,8 @@ static void test_local(void **state)
     georef_free(georef);
 }
 
-/* The meridian arc from the equator by Simpson's rule. The integrand is smooth, so 20000 steps have an error below 1e-9
- * m. */
+/* Computes the meridian arc from the equator by Simpson's rule. The integrand is smooth, so 20000 steps have an error
+ * below 1e-9 m. */
 static double meridian_arc_m(double lat_deg)
 {
     enum { STEPS = 20000 };

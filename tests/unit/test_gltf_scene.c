@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tree of glTF in double, scenes, instances, skins and morph targets in their default pose. */
+/* These are tests of the tree of glTF in double, scenes, instances, skins and morph targets in their default pose. */
 #include "tests/unit/gltf_files.h"
 
 #include <math.h>

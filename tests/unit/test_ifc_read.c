@@ -112,7 +112,7 @@ static void facets_hold_the_tolerance(void **state)
     double area, volume;
     measure(0, &area, &volume);
     assert_true(fabs(volume / (2 * M_PI) - 1) <= facets_share(1, 70));
-    /* Chords of 71 sides are 0.089 m. Those of a cap that leave out a corner are twice that. */
+    /* Chords of 71 sides are 0.089 m. The edges of a cap that leave out a corner are twice that. */
     double least = 1.0; /* least distance of the middle of an edge along the circle from the axis */
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         for (int c = 0; c < 3; c++) {
@@ -156,7 +156,7 @@ static void openings_and_styles(void **state)
     scene_free(scene);
 }
 
-/* IFC2x3 and IFC4x3, feet, a site 2,700 km away, and complete names. */
+/* The files have IFC2x3 and IFC4x3, feet, a site 2,700 km away, and complete names. */
 static void schemas_units_and_places(void **state)
 {
     (void)state;

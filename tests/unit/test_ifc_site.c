@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The site of an IFC model: files of the test, and the house that Debian ships. */
+/* These are tests of the site of an IFC model, with files of the test and with the house that Debian ships. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -274,8 +274,8 @@ static void a_hole_is_what_is_below_the_half(void **state)
     assert_null(mask_of(cut, 1, 0.4, 0, TEXTURE_REPEAT));
 }
 
-/* Signature and header of a PNG with that size, and the name of its data's chunk, which newer decoders look for. The
- * checksums of a file that goes no further don't count. */
+/* Makes signature and header of a PNG with that size, and the name of its data's chunk, which newer decoders look for.
+ * The checksums of a file that goes no further don't count. */
 static size_t png_of_size(uint8_t *png, uint32_t width, uint32_t height)
 {
     static const uint8_t start[16] = {0x89, 'P', 'N', 'G', 13, 10, 26, 10, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Import by Assimp in a process of its own. Limits, crashes and the end of either process give one line, and nothing
- * stays behind. */
+/* These tests import by Assimp in a process of its own. Limits, crashes and the end of either process give one line,
+ * and nothing stays behind. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <poll.h>

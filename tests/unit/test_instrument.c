@@ -116,9 +116,9 @@ static void tilts_add_up(void **state)
     }
 }
 
-/* A point at R along the beam, seen from the head's origin. Plane triangles: for a transit offset e ahead distance^2 =
- * R^2 + e^2 + 2 R e cos m, and the pan does not change. A mirror offset e to the right changes the pan by atan(e / (R
- * cos m)). */
+/* The point lies at R along the beam, seen from the head's origin. Plane triangles: for a transit offset e ahead
+ * distance^2 = R^2 + e^2 + 2 R e cos m, and the pan does not change. A mirror offset e to the right changes the pan by
+ * atan(e / (R cos m)). */
 static void offsets_make_plane_triangles(void **state)
 {
     (void)state;

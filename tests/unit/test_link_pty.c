@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The pty link: one client after the other, and the path of its terminal. */
+/* These are tests of the pty link: one client after the other, and the path of its terminal. */
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <termios.h>

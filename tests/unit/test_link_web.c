@@ -209,7 +209,7 @@ static void test_session(void **state)
     bench_close(&bench);
 }
 
-/* A client in a thread of its own. It takes all until the link says goodbye, and answers that. */
+/* The client runs in a thread of its own. It takes all until the link says goodbye, and answers that. */
 struct taker {
     int fd;
     uint8_t bytes[300000];

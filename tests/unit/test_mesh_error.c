@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The error of single precision in a mesh. Errors that the format makes are allowed, reported, and planned with. */
+/* These are tests of the error of single precision in a mesh. Errors that the format makes are allowed, reported, and
+ * planned with. */
 #include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 

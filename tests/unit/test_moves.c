@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SITE:POSE in the device, without threads. A scan from a moved station has the bytes of one whose configuration has
- * that place. Shared parts stay, unused ones are freed once, and a failed move changes nothing. */
+/* These are tests of SITE:POSE in the device, without threads. A scan from a moved station has the bytes of one whose
+ * configuration has that place. Shared parts stay, unused ones are freed once, and a failed move changes nothing. */
 #include "tests/unit/device_rig.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The parser with every single damage. */
+/* These tests give the parser every single damage. */
 #include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"
 

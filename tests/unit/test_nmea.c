@@ -82,7 +82,7 @@ static void the_example_comes_out(void **state)
     assert_string_equal(line.field[8], "0.0300");
 }
 
-/* Half a step of the last digit: 0.5e-7 of a minute, and the rounding of 180 degrees in a double. */
+/* The tolerance is half a step of the last digit, 0.5e-7 of a minute, and the rounding of 180 degrees in a double. */
 #define HALF_STEP_DEG (0.5e-7 / 60 + 1e-13)
 
 static void check_place(double lat_deg, double lon_deg)

@@ -9,7 +9,7 @@
 
 static struct site *site;
 
-/* A floor of 60 x 60 m about (x, y), at z. */
+/* Makes a floor of 60 x 60 m about (x, y), at z. */
 static void write_floor(double x, double y, double z)
 {
     char text[512];
@@ -332,7 +332,7 @@ static void the_house_has_its_site(void **state)
     }
 }
 
-/* A slab of 8 x 8 m. Its x axis points 30 deg to the left of grid east. Scene and grid agree but for the grid's
+/* Makes a slab of 8 x 8 m. Its x axis points 30 deg to the left of grid east. Scene and grid agree but for the grid's
  * scale. */
 static const char mapped_ifc[] =
     "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('a','2026-01-01T00:00:00',(''),(''),'','','');\n"

@@ -241,7 +241,7 @@ static void a_frame_is_missing(void **state)
         }
 }
 
-/* The last attributes of a turn are lost. Of the next turn's frame, with as many points, all but the attributes are
+/* The last attributes of a turn are lost. The next turn's frame has as many points, and all of it but the attributes is
  * lost. */
 static void attributes_of_another_turn(void **state)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The PLY recorder. A reader of the test's own reads its files. */
+/* These are tests of the PLY recorder. A reader of the test's own reads its files. */
 #include <math.h>
 
 #include "tests/common/thorough.h"

@@ -2,7 +2,7 @@
 /* core/pose: the convention of attitudes, and poses between two others. */
 #include "tests/unit/pose_rig.h"
 
-/* The convention written out: R = Rz(-heading) Rx(pitch) Ry(roll) from three elementary matrices. */
+/* This is the convention written out: R = Rz(-heading) Rx(pitch) Ry(roll) from three elementary matrices. */
 static void matrix_by_hand(double heading, double pitch, double roll, double out[9])
 {
     const double h = -heading;

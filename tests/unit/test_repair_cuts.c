@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair, in process. A small file of each format is cut at every byte, damaged at every third, replaced by another
- * format, and given absurd numbers. The result holds the whole units and is whole, or nothing has changed. */
+/* These tests repair in process. A small file of each format is cut at every byte, damaged at every third, replaced by
+ * another format, and given absurd numbers. The result holds the whole units and is whole, or nothing has changed. */
 #include "tests/common/thorough.h"
 #include "tests/unit/repair_rig.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The random generator. All seeds are fixed, so a run can't fail by chance. The limits are chosen as if they weren't:
- * each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for one in 700). */
+/* These are tests of the random generator. All seeds are fixed, so a run can't fail by chance. The limits are chosen as
+ * if they weren't: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for one
+ * in 700). */
 #include "tests/common/cases.h"
 
 #include <math.h>
@@ -185,7 +186,7 @@ static void a_block_is_its_pulses(void **state)
     assert_true(bits[4] == rng_u64(key, pulse[RNG_BLOCK + 4]));
 }
 
-/* Quantile of chi-square by Wilson and Hilferty, good to 1 % in the tail from 64 degrees of freedom on. */
+/* Computes the quantile of chi-square by Wilson and Hilferty, good to 1 % in the tail from 64 degrees of freedom on. */
 static double chi2_limit(double dof, double z)
 {
     double c = 1.0 - 2.0 / (9.0 * dof) + z * sqrt(2.0 / (9.0 * dof));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes in binary PLY that have a vertex for each corner. Those at the same place become one, as by a naive comparison
- * of all of them. Meshes that share vertices stay as they are. */
+/* Some meshes in binary PLY have a vertex for each corner. Vertices at the same place become one, as by a naive
+ * comparison of all of them. Meshes that share vertices stay as they are. */
 #include "core/rng.h"
 #include "tests/unit/scene_files.h"
 

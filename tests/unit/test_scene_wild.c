@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* OBJ, MTL, PLY and STL in the forms of other programs: names of other machines, rare orders and parts. Parts that are
- * left out are reported, with file and line. Colours of vertices are in test_vertex_colours.c. */
+/* These tests read OBJ, MTL, PLY and STL in the forms of other programs: names of other machines, rare orders and
+ * parts. Parts that are left out are reported, with file and line. Colours of vertices are in test_vertex_colours.c. */
 #include <math.h>
 #include <sys/stat.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The schedule against a model of its own: each pulse's time, place and angle as one fraction in 128-bit
- * integers. */
+/* These tests compare the schedule with a model of their own: each pulse's time, place and angle as one fraction in
+ * 128-bit integers. */
 #include "tests/common/cases.h"
 
 #include <inttypes.h>

@@ -9,7 +9,7 @@
 
 static const char ROOM[] = "o floor\nv -50 -50 0.25\nv 50 -50 0.25\nv 50 50 0.25\nv -50 50 0.25\nf 1 2 3 4\n";
 
-/* A station over a floor at z = 0.25 m, with these keys. */
+/* Makes a station over a floor at z = 0.25 m, with these keys. */
 static struct site *load(const char *station)
 {
     char text[512];

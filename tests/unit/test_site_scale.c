@@ -32,7 +32,7 @@ static FILE *open_in(const char *name, const char *mode)
     return f;
 }
 
-/* The profile of full-sweep with another range. */
+/* Writes the profile of full-sweep with another range. */
 static void write_profile(double range_max_m)
 {
     char line[512];

@@ -4,7 +4,8 @@
 
 #include "tests/unit/scene_files.h"
 
-/* The area by the shoelace formula. The triangles' own areas only add up to it when none overlaps or sticks out. */
+/* Computes the area by the shoelace formula. The triangles' own areas only add up to it when none overlaps or sticks
+ * out. */
 static void check_polygon(const double (*uv)[2], int n, bool at_utm)
 {
     char *text = malloc((size_t)n * 128 + 64), *p = text;

@@ -142,7 +142,7 @@ static void test_idle_clients(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
-/* laser and rpm of a head that stands. A rate alone does not start it. */
+/* A client posts laser and rpm to a head that stands. A rate alone does not start it. */
 static void test_head_at_rest(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The choice of the client that makes room at a web link. */
+/* These are tests of the choice of the client that makes room at a web link. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/usb_models.h"
 
-/* A vendor class with only one bulk pair. */
+/* This is a vendor class with only one bulk pair. */
 static const struct usb_endpoint_row pair_endpoints[] = {
     {.address = 0x81, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}, .burst = 3},
     {.address = 0x02, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}}};

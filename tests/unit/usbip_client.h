@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A USB/IP client without a kernel, for a usb link. The test polls the link itself, so one thread plays both ends.
- * Numbers are written out from the kernel's Documentation/usb/usbip_protocol.rst. */
+/* This is a USB/IP client without a kernel, for a usb link. The test polls the link itself, so one thread plays both
+ * ends. Numbers are written out from the kernel's Documentation/usb/usbip_protocol.rst. */
 #ifndef TESTS_UNIT_USBIP_CLIENT_H
 #define TESTS_UNIT_USBIP_CLIENT_H
 

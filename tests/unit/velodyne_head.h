@@ -21,7 +21,7 @@ int velodyne_head_elevation_deg(uint32_t beam);
 /* Fires one points frame of n pulses from pulse0 on, n <= 4096. turn0: the azimuth of pulse 0 of the scan. */
 void velodyne_head_fire(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, const struct protocol_rig_shot *shot,
                         double rpm, double turn0);
-/* The same with one range for all. */
+/* Does the same with one range for all. */
 void velodyne_head_fire_alike(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, double range_m);
 void velodyne_head_event(struct protocol_rig *rig, uint32_t code);
 

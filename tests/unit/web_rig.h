@@ -11,14 +11,14 @@ enum { WEB_SESSIONS = 2 };
 /* place: "127.0.0.1:40123". Its owner answers /scene: 5 bytes, or 3 million with ?n=big. */
 struct bench web_open(char place[64]);
 int web_dial(const char *place);
-/* The same from 127.0.0.LAST. */
+/* Does the same from 127.0.0.LAST. */
 int web_dial_from(const char *place, uint8_t last);
 /* Lets the link work until the client has bytes, or its end. Returns the bytes read, or 0 at the end. */
 size_t web_listen_to(struct bench *bench, int fd, void *buf, size_t len);
 /* Reads the whole answer to a request with these fields. Returns its status, or 0 where the connection ended without a
  * byte. */
 int web_ask(struct bench *bench, const char *place, const char *line, const char *fields, char **body, size_t *len);
-/* The same with a right Host. */
+/* Does the same with a right Host. */
 int web_status_of(struct bench *bench, const char *place, const char *line, const char *fields);
 
 /* Opens a WebSocket. Returns 0 where it was turned down. */

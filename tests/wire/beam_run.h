@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A scan of the room with faults, made off line, as a native client receives it: its shots by pulse number, its line
- * ends, and the truth about the faults. */
+/* This makes a scan of the room with faults, off line, as a native client receives it. It has its shots by pulse
+ * number, its line ends, and the truth about the faults. */
 #ifndef TESTS_WIRE_BEAM_RUN_H
 #define TESTS_WIRE_BEAM_RUN_H
 
@@ -38,7 +38,7 @@ extern const struct room_config BEAM_ROOM;
 /* Records the room with these faults (YAML of the list's items; NULL: none) and settings (KEY=VALUE, ends with NULL; or
  * NULL). The run is the callee's, one for each `slot` of 0 and 1, until the next call. */
 const struct beam_run *beam_record(struct wire *wire, int slot, const char *faults, const char *const *sets);
-/* The same for another room. */
+/* Does the same for another room. */
 const struct beam_run *beam_record_room(struct wire *wire, int slot, const struct room_config *room, const char *faults,
                                         const char *const *sets);
 /* The same for a stream and a truth that are there already. */

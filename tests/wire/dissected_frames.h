@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Each field of each frame type by tshark, beside libscanhead's value of the same frame. */
+/* These are the fields of each frame type by tshark, beside libscanhead's values of the same frame. */
 #ifndef TESTS_WIRE_DISSECTED_FRAMES_H
 #define TESTS_WIRE_DISSECTED_FRAMES_H
 

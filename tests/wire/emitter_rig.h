@@ -8,7 +8,7 @@
 
 enum { VLP_BEAMS = 16 };
 
-/* Direction and time of a pulse of the scan. Angles are in degrees: elevation, and azimuth clockwise from y. */
+/* This is direction and time of a pulse of the scan. Angles are in degrees: elevation, and azimuth clockwise from y. */
 struct shot {
     int64_t t_ns;
     double elevation_deg, azimuth_deg;

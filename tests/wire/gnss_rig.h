@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head with a GNSS receiver, for the wire tests. */
+/* This runs a head with a GNSS receiver, for the wire tests. */
 #ifndef TESTS_WIRE_GNSS_RIG_H
 #define TESTS_WIRE_GNSS_RIG_H
 

@@ -44,7 +44,7 @@ void grabber_end(struct grabber *grabber);
 
 enum { RAWLOG_PACKET_LEN = 1206 };
 
-/* One observation. */
+/* This is one observation. */
 struct rawlog_item {
     enum { RAWLOG_SCAN, RAWLOG_TURN, RAWLOG_GPS } kind;
     int64_t t_100ns; /* since 1601 */

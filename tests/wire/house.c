@@ -8,7 +8,7 @@
 
 const double HOUSE_HEADING_DEG = 25.0;
 
-/* The station of config/hokuyo.yaml and the other ready configurations. */
+/* This is the station of config/hokuyo.yaml and the other ready configurations. */
 static const double STATION_M[3] = {5.5, 2.2, 1.6};
 
 struct house {
@@ -17,7 +17,7 @@ struct house {
     uint32_t mark_triangle; /* the first one of the mark */
 };
 
-/* A post 1 m to the right of the head and 0.4 m before it. It is 20 cm wide, from the floor to the ceiling. */
+/* A post stands 1 m to the right of the head and 0.4 m before it. It is 20 cm wide, from the floor to the ceiling. */
 static void write_mark(const struct wire *wire)
 {
     const double heading = HOUSE_HEADING_DEG * M_PI / 180.0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The output of `scanhead check`: all errors of a configuration, the keys of a section, an example that passes. And
- * short options in getopt's forms. */
+/* These are tests of the output of `scanhead check`: all errors of a configuration, the keys of a section, an example
+ * that passes. And short options in getopt's forms. */
 #include "tests/wire/room.h"
 
 /* A value may follow its letter at once: -oFILE. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead coverage, through the real program: figures, the mesh of cells, the next station, and its refusals. */
+/* These tests run scanhead coverage, through the real program: figures, the mesh of cells, the next station, and its
+ * refusals. */
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 

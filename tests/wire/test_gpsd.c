@@ -162,8 +162,8 @@ static double number(const char *line, const char *key)
     return value;
 }
 
-/* The bound is half a step of the sentence, 0.5e-7', and half of gpsd's nine decimals: 0.15 mm on the ground. Of the
- * heights, two of four decimals go in and one comes out. Together that is 0.26 mm, and the promise is 1 mm. */
+/* The bound is half a step of the sentence, 0.5e-7', and half of gpsd's nine decimals: 0.15 mm on the ground. Two
+ * heights of four decimals go in, and one comes out. Together that is 0.26 mm, and the promise is 1 mm. */
 static const double ANGLE_TOLERANCE_DEG = 0.5e-7 / 60 + 0.5e-9 + 1e-12, HEIGHT_TOLERANCE_M = 3 * 0.5e-4 + 1e-9;
 
 /* Status as gpsd_json(5) of 3.2x defines it: 1 a fix (left out), 2 DGPS, 3 RTK fixed, 4 RTK float. */
@@ -340,7 +340,7 @@ static void to_ecef(double lat_deg, double lon_deg, double height_m, double p[3]
     p[2] = (n * (1 - e2) + height_m) * s;
 }
 
-/* East, north and up from the station. */
+/* Gives east, north and up from the station. */
 static void from_station(const char *line, double d[3])
 {
     double p[3], q[3], lat = LAT_DEG * M_PI / 180, lon = LON_DEG * M_PI / 180;

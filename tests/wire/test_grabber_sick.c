@@ -51,7 +51,7 @@ static pid_t relay_start(struct wire *wire, int listener, const char *endpoint)
     _exit(fclose(keep) != 0);
 }
 
-/* One telegram in CoLa-A, with its fields as text. */
+/* This is one telegram in CoLa-A, with its fields as text. */
 struct telegram {
     char *field[FIELDS];
     int n;

@@ -9,7 +9,7 @@
 
 enum { TURNS = 25, BLOCKS = 12, SHOTS = 32, PACKET = RAWLOG_PACKET_LEN };
 
-/* Elevation of each laser of a firing sequence, in the layout's order; times in us. */
+/* This is the elevation of each laser of a firing sequence, in the layout's order; times in us. */
 static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
 static const double LASER_US = 2.304, SEQUENCE_US = 55.296, PACKET_US = 24 * 55.296, DEG_PER_US = 3600e-6; /* 600 rpm */
 static const double MIN_M = 0.1, MAX_M = 100.0; /* the room has nothing outside of that */

@@ -49,8 +49,8 @@ static struct head start(struct wire *wire, int i, const char *profile, const ch
     return head_start(wire, wire_write_text(wire, name, text), NULL);
 }
 
-/* The nearest wall in m of the head with that source, in a stream of both. Every azimuth occurs to 0.1 degrees, and two
- * beams are 1 degree from the horizon: cos(1 deg) cos(0.1 deg) is 1 - 1.6e-4. The wire has steps of 2 mm. */
+/* Returns the nearest wall in m of the head with that source, in a stream of both. Every azimuth occurs to 0.1 degrees,
+ * and two beams are 1 degree from the horizon: cos(1 deg) cos(0.1 deg) is 1 - 1.6e-4. The wire has steps of 2 mm. */
 static void expect_velodynes(int fd, int port)
 {
     double nearest_m[N] = {INFINITY, INFINITY};

@@ -35,7 +35,7 @@ static void has(const char *in, const char *what)
     if (in == NULL || strstr(in, what) == NULL) fail_msg("\"%s\" is missing in:\n%s", what, in);
 }
 
-/* A hill of 60 m. The scene is anchored where the file's system is one of the registry, in metres. */
+/* The raster is a hill of 60 m. The scene is anchored where the file's system is one of the registry, in metres. */
 static void a_raster_gives_the_place(void **state)
 {
     struct wire *wire = *state;

@@ -8,7 +8,7 @@
 
 enum { MAX_POINTS = 1081, MAX_LINES = 16, SCANS = 6, PACKETS = 40, PER_PACKET = 384, MAX_SHOTS = 300000 };
 
-/* One scan of a planar head, in the order of its steps. */
+/* This is one scan of a planar head, in the order of its steps. */
 struct scan {
     int n;
     double range_m[MAX_POINTS]; /* 0: none */

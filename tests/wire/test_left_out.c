@@ -5,7 +5,7 @@
 #include "drivers/protocol/native.h"
 #include "tests/wire/room.h"
 
-/* A profile like full-sweep, but with two echoes a pulse, which sees half a white target at REACH_M. */
+/* This is a profile like full-sweep, but with two echoes a pulse, which sees half a white target at REACH_M. */
 static const double REACH_M = 4.0;
 static const char PROFILE[] = "maker: scanhead\n"
                               "model: two echoes\n"

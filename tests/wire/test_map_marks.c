@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead map, from above. Stations stand and look where the configuration says, and one is beside the scene. A
- * picture in perspective leaves out the same by --above and --below. */
+/* These tests run scanhead map, from above. Stations stand and look where the configuration says, and one is beside the
+ * scene. A picture in perspective leaves out the same by --above and --below. */
 #include "tests/wire/room.h"
 
 /* Pixels of a centimetre. A station is east of the room, and the area then includes it. */

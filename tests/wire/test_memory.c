@@ -3,8 +3,8 @@
  * command sets more. The stream is the same as from a head that was set to more from the start. */
 #include "tests/wire/room.h"
 
-/* A second of scanning at slow rates, at the profile's fastest, at slow ones, and at the fastest again. The start is at
- * slow rates in any configuration. */
+/* The head scans for a second at slow rates, at the profile's fastest, at slow ones, and at the fastest again. The
+ * start is at slow rates in any configuration. */
 static const char JOURNAL[] = "# scanhead journal 1\n"
                               "300 300000000 1 HEAD:PRR 20000\n"
                               "300 300000000 1 HEAD:LINES 20\n"

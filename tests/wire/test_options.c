@@ -172,8 +172,8 @@ static void test_options(void **state)
 
 /* ---- help */
 
-/* -h and --help of a command go to standard output: its purpose, the usage, and lines of at most 110 columns. Those of
- * check end where the keys begin. */
+/* -h and --help of a command go to standard output: its purpose, the usage, and lines of at most 110 columns. The help
+ * of check is only looked at up to its configuration keys. */
 static void expect_help(struct wire *wire, const char *name, const char *option)
 {
     char want[128];

@@ -11,8 +11,8 @@ static char *plan(struct wire *wire, const char *const *args, int status)
     return wire_read(wire_path(wire, status == 0 ? "out" : "err"), NULL);
 }
 
-/* Ground of 600 by 600 m, with a station in its middle and one in its corner. Points are up to 430 m and 860 m away,
- * within the head's 1000 m. */
+/* The ground has 600 by 600 m, with a station in its middle and one in its corner. Points are up to 430 m and 860 m
+ * away, within the head's 1000 m. */
 static const char *set_up_with(struct wire *wire, const char *profile)
 {
     char text[1024];
@@ -38,8 +38,8 @@ static const char *set_up(struct wire *wire)
     return set_up_with(wire, "full-sweep");
 }
 
-/* The same head without a footprint. `plan` has no beam to try then, which is four fifths of its time here; georef
- * and sight are chosen as before. */
+/* This is the same head without a footprint. `plan` has no beam to try then, which is four fifths of its time here;
+ * georef and sight are chosen as before. */
 static const char *set_up_without_footprint(struct wire *wire)
 {
     char *text = wire_read("config/heads/full-sweep.yaml", NULL);

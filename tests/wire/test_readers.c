@@ -63,7 +63,7 @@ static void keep_points(struct scanhead *sh, const struct scanhead_frame *frame)
     }
 }
 
-/* Time and length of the first frames. */
+/* These are time and length of the first frames. */
 static struct {
     int64_t t_ns;
     size_t len;

@@ -153,7 +153,7 @@ static void test_hit_as_the_head_was(void **state)
 
 /* ---- readers */
 
-/* Half a second of 1 MHz, 10 MB, in open ground. */
+/* The recording is half a second of 1 MHz, 10 MB, in open ground. */
 static const char *record_much(struct wire *wire)
 {
     struct room_config config = {.prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 45, .frames = 1};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead report. A noise-free recording deviates by no more than plan and counts allow, a noisy one by its noise, in
- * all layouts. Contradictions are reported. The page is complete for any names. */
+/* These are tests of scanhead report. A noise-free recording deviates by no more than plan and counts allow, a noisy
+ * one by its noise, in all layouts. Contradictions are reported. The page is complete for any names. */
 #include "tests/wire/room.h"
 
 enum { MAX_SETS = 10 };

@@ -206,7 +206,7 @@ static void test_journal_ends_where_its_session_ended(void **state)
     free(said);
 }
 
-/* A session in real time. Settings change in mid-scan, each at a moment that the clock chose. The first scan is
+/* The session runs in real time. Settings change in mid-scan, each at a moment that the clock chose. The first scan is
  * stopped, a second one runs to its end, and one command is refused. */
 static void live_session(struct wire *wire, const char *config, const char *journal, struct result *result)
 {

@@ -263,7 +263,7 @@ static void test_record_from_a_head(void **state)
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "echoes")); /* to the last one */
 }
 
-/* A profile like full-sweep, with another value of one key, in seconds. */
+/* Writes a profile like full-sweep, with another value of one key, in seconds. */
 static void profile_write(const struct wire *wire, const char *key, const char *value)
 {
     char *text = wire_read("config/heads/full-sweep.yaml", NULL), line[32];

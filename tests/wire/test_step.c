@@ -176,7 +176,7 @@ static const struct room_config LIVE = {.profile = NULL,
                                         .links = LINK_YAML_TCP,
                                         .more = "platform: {kind: live, reach_m: 5, extrapolate_ms: 20}\n"};
 
-/* The vehicle of the other simulator, t seconds after power-up: it moves back and forth and turns, heading
+/* This is the vehicle of the other simulator, t seconds after power-up. It moves back and forth and turns, heading
  * clockwise. */
 static void vehicle(double t, double p[6])
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* TIME:STEP over every protocol at once. When OK is there, all units that fell due in the granted time are in each
- * client's socket. Each client is emptied once after OK, without waiting. A unit that comes later must be due later:
- * each one contains the time at which the device could send it.
+/* These tests run TIME:STEP over every protocol at once. When OK is there, all units that fell due in the granted time
+ * are in each client's socket. Each client is emptied once after OK, without waiting. A unit that comes later must be
+ * due later: each one contains the time at which the device could send it.
  *
  * Clock here: device time, ns. */
 #include "tests/wire/room.h"

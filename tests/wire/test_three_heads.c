@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A Hokuyo, a SICK and a VLP-16 at once. Each has clients of its personality, of the native stream and of the GNSS
- * receiver, for 6 s (THOROUGH=1: 15 s) of device time. Nothing is lost on any number of processors. */
+/* These tests run a Hokuyo, a SICK and a VLP-16 at once. Each has clients of its personality, of the native stream and
+ * of the GNSS receiver, for 6 s (THOROUGH=1: 15 s) of device time. Nothing is lost on any number of processors. */
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
 
@@ -11,7 +11,7 @@
 enum { N_HEADS = 3, N_READERS = 9 };
 #define SECONDS thorough(15, 6)
 
-/* One reader, in a thread of its own. */
+/* Each reader runs in a thread of its own. */
 struct reader {
     const char *(*read)(struct reader *reader); /* NULL, or what is wrong */
     int fd;

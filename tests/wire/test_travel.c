@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A drive of 30 km. The anchor moves along with the head, so that counts keep 1e-6 m, and every point is where
- * GeographicLib puts it. */
+/* These tests go on a drive of 30 km. The anchor moves along with the head, so that counts keep 1e-6 m, and every point
+ * is where GeographicLib puts it. */
 #include "tests/wire/room.h"
 
 #include "core/geoframe.h"

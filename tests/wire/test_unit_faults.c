@@ -4,7 +4,8 @@
 #include "tests/wire/room.h"
 #include "tests/wire/unit_faults.h"
 
-/* Faults have numbers up to 60. Those of the datagrams stay within 150 packets, of which 20 are sent as several. */
+/* Faults have numbers up to 60. The faults of the datagrams stay within 150 packets, of which 20 are sent as
+ * several. */
 static const char FAULTS[] = "faults:\n"
                              "  - {kind: drop, link: 1, from: 3, until: 60, every: 7}\n"
                              "  - {kind: duplicate, link: 1, at: 4, n: 2}\n"
@@ -208,7 +209,7 @@ static void test_cola(void **state)
 
 /* ---- NMEA: the clean units are in a file */
 
-/* From RMC to ZDA. */
+/* Returns the length of a burst, from RMC up to the end of ZDA, or 0. */
 static size_t nmea_whole(const uint8_t *bytes, size_t len)
 {
     const uint8_t *last = memmem(bytes, len, "$GNZDA", 6);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The dissector in Wireshark beside libscanhead: frames of every kind over TCP, on USB and in packets of their own.
- * Each value is compared. */
+/* These tests compare the dissector in Wireshark with libscanhead: frames of every kind over TCP, on USB and in packets
+ * of their own. Each value is compared. */
 #include "tests/wire/dissected_frames.h"
 
 #include "drivers/protocol/native.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The dissector in Wireshark and damage. Damaged frames are marked, and a damaged stream is read as libscanhead reads
- * it, in one pass and in two. */
+/* These tests give the dissector in Wireshark damage. Damaged frames are marked, and a damaged stream is read as
+ * libscanhead reads it, in one pass and in two. */
 #include "tests/wire/wireshark_rig.h"
 
 #include "drivers/protocol/native.h"

@@ -34,7 +34,7 @@ struct unit_kind {
     int datagrams; /* 1: each is compared by itself */
 };
 
-/* A line of the truth. */
+/* This is a line of the truth. */
 struct truth_note {
     char kind[24], of[12], text[64];
     uint64_t number, n;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Wrong input through the real program, for the tests of its answers. */
+/* This gives the real program wrong input, for the tests of its answers. */
 #ifndef TESTS_WIRE_USAGE_RIG_H
 #define TESTS_WIRE_USAGE_RIG_H
 

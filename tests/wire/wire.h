@@ -43,7 +43,7 @@ struct wire {
     int n_children;
 };
 
-/* A running head. */
+/* This is a running head. */
 struct head {
     struct wire *wire;
     pid_t pid;
@@ -138,7 +138,7 @@ int is_event(const struct scanhead_frame *frame, uint32_t code);
 
 /* Takes frames until an event of this code, and writes that one. */
 void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
-/* The same for an event that the head sends at once (wire_soon). */
+/* Does the same for an event that the head sends at once (wire_soon). */
 void client_until_soon(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
 
 /* Waits for the state by asking. Each answer comes from the head, so this is no busy loop. Frames are taken. */
