@@ -14,8 +14,8 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
-/* A wall, a flat and a steep needle, one that is a single piece, an equal-sided one, a right angle at the base's end to
- * double precision, and one at coordinates of UTM. */
+/* The triangles are a wall, a flat and a steep needle, one that is a single piece, and an equal-sided one. Two more
+ * have a right angle at the base's end to double precision, and coordinates of UTM. */
 static const double CASES[][3][3] = {
     {{0, 0, 0}, {10.2, 0, 0}, {10.2, 0, 4.24}},
     {{0, 0, 0}, {10, 0, 0}, {4, 0.01, 0.02}},

@@ -143,8 +143,9 @@ static void add_tick(struct rig *rig, struct seen *seen)
     }
 }
 
-/* The expected share by core/detect.h. It is the reflectance that is just seen, through the two reaches of the program,
- * and the share of pulses that see a target with noise of 1/8 of the threshold (threshold_snr). */
+/* Computes the expected share by core/detect.h. First comes the reflectance that is just seen, from the two reaches
+ * of the program. Then comes the share of pulses that see the target, with noise of 1/8 of the threshold
+ * (threshold_snr). */
 static double expected_share(const struct program *p, double reflectance, double range_m)
 {
     if (range_m > p->reach_90_m) return 0.0; /* nothing is seen beyond it */
@@ -188,8 +189,8 @@ static void targets_vanish_at_the_reach_of_each_program(void **state)
     assert_true(expected_share(&heads[0].program[0], 0.2, 408.0) < 0.4);
 }
 
-/* Signals have no noise. A target between the reaches of two rates is seen by each pulse of one rate and by none of the
- * other, from the very pulse on at which the command took effect. */
+/* Signals have no noise. Each pulse of one rate sees a target between the reaches of two rates, and no pulse of the
+ * other rate does. That holds from the very pulse at which the command took effect. */
 static void a_rate_changes_the_reach_at_its_pulse(void **state)
 {
     (void)state;

@@ -78,8 +78,8 @@ static void attitude_is_the_product(void **state)
     assert_memory_equal(got, about_z, sizeof got);
 }
 
-/* The scene has a floor at z = 0 of 10 x 10 m with a hole at 4..6, a cellar at -3, a table at 0.75 over 1..2, and a
- * wall at x = 8. */
+/* The scene has a floor at z = 0 of 10 x 10 m with a hole at 4..6, and a cellar at -3. A table stands at 0.75 over
+ * 1..2, and a wall at x = 8. */
 static const double at_z[][5] = {
     /* x0 x1 y0 y1 z */
     {0, 4, 0, 10, 0}, {6, 10, 0, 10, 0}, {4, 6, 0, 4, 0}, {4, 6, 6, 10, 0}, {0, 10, 0, 10, -3}, {1, 2, 1, 2, 0.75},

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The usbredir back end and the usb link over it, with the library's own guest-side parser at the other end of a Unix
- * socket, and no virtual machine. */
+/* These are tests of the usbredir back end and of the usb link over it. The library's own guest-side parser is at the
+ * other end of a Unix socket, so there is no virtual machine. */
 #ifdef HAVE_USBREDIR
 
 #include "tests/unit/usbredir_guest.h"

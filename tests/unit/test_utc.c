@@ -31,8 +31,8 @@ static const char *text_of(const struct utc_table *table, int64_t tai_ns, int de
     return buf;
 }
 
-/* The dates are those of IS-GPS-200 (epoch), IERS Bulletin C 52 (the leap second of 2016), the GPS week rollovers of
- * 1999 and 2019 as the US Coast Guard announced them, and LIGO's tconvert. */
+/* The dates are those of IS-GPS-200 (epoch), IERS Bulletin C 52 (the leap second of 2016) and LIGO's tconvert. The GPS
+ * week rollovers of 1999 and 2019 are those that the US Coast Guard announced. */
 static void published_dates(void **state)
 {
     (void)state;

@@ -5,8 +5,8 @@
 
 #include "tests/wire/wire.h"
 
-/* The scene has wide ground, a plate at x = 5 m that goes east at 2 m/s, and one at x = -4 m that turns about its own
- * origin by 10 deg/s. Both are much larger than their visible part. */
+/* The scene has wide ground and two plates. The plate at x = 5 m goes east at 2 m/s, and the one at x = -4 m turns
+ * about its own origin by 10 deg/s. Both are much larger than their visible part. */
 #define SCENE                                                                              \
     "scene:\n  meshes:\n    - {file: ground.obj, up: z, scale: 1}\n"                       \
     "    - {file: plate.obj, up: z, scale: 1, offset_m: [5, 0, 0], move_m_s: [2, 0, 0]}\n" \

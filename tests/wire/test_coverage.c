@@ -181,8 +181,8 @@ static void test_next(void **state)
     free(text);
 }
 
-/* A head whose beams lie in a plane. All its 682 pulses are tried, so the estimate is the gain, but for two cells of
- * 0.25 m where a ray lies on the border of one. */
+/* A head whose beams lie in a plane. All its 682 pulses are tried, so the estimate is the gain. The exception is two
+ * cells of 0.25 m, because a ray lies on the border of one. */
 static void test_next_planar(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw` of TCP: the exchange of the recorder and a device, a Hokuyo with its client over the relay, a SICK
- * scanner and the native protocol asked by --send, and connections that end in odd ways. */
+/* These are tests of `record --raw` of TCP. They cover the exchange of the recorder and a device, and a Hokuyo with its
+ * client over the relay. Others are a SICK scanner and the native protocol asked by --send, and connections that end in
+ * odd ways. */
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
 

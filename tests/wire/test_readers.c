@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Recordings by other people's readers. A scan of two stations in UTM is written in each format at once, read back by
- * their software, and compared with the raw stream point by point. A reader that is not installed is skipped. */
+/* These tests give recordings to other people's readers. A scan of two stations in UTM is written in each format at
+ * once. Each format's own software reads it back, and each point is compared with the raw stream. A reader that is not
+ * installed is skipped. */
 #include "core/georef.h"
 #include "drivers/record/crs_wkt.h"
 #include "tests/wire/readers.h"

@@ -173,8 +173,8 @@ static void a_noisy_scan_deviates_by_its_noise(void **state)
     free(json);
 }
 
-/* In a ball of 5 mm the mean distance from a plane is 3/8 of the radius (of |x|, x uniform in the unit ball), with a
- * scatter of 0.244 of it. Six standard errors of 10,000 points are 1.5 % of the radius. */
+/* In a ball of 5 mm the mean distance from a plane is 3/8 of the radius (|x| for x uniform in the unit ball). Its
+ * scatter is 0.244 of the radius. Six standard errors of 10,000 points are 1.5 % of the radius. */
 static void noise_of_balls_and_angles_is_known(void **state)
 {
     struct wire *wire = *state;

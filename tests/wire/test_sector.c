@@ -70,8 +70,8 @@ static double ring_deg(const struct panorama *p, int ring)
     return p->gaps == 0 ? p->circle_deg : -90 + 180.0 * (p->first + ring) / p->gaps;
 }
 
-/* Angles are right to half a count of 2^-32 of a turn. At 11 m in the room that moves a range by less than 1e-6 m, but
- * at walls that are met at a small angle, and there are none here. */
+/* Angles are right to half a count of 2^-32 of a turn. At 11 m in the room that moves a range by less than 1e-6 m.
+ * Walls that are met at a small angle are the exception, and there are none here. */
 static void check_shot(const struct panorama *p, const struct scanhead_point *at, int ring, int step)
 {
     struct room_ray ray;

@@ -6,8 +6,8 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-/* 20 MB/s: while the slow reader reads nothing, the buffers to it (1 MiB of the head, at most 6 of the kernel's for a
- * receiver that asks for none) and the queue of 500 ms fill in a second. */
+/* The rate makes 20 MB/s. While the slow reader reads nothing, the buffers to it and the queue of 500 ms fill in a
+ * second. The buffers are 1 MiB of the head, and at most 6 of the kernel's for a receiver that asks for none. */
 static const struct room_config RATE = {
     .prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_TCP};
 enum { HOLD_BYTES = 40 << 20 };
