@@ -89,7 +89,7 @@ enum bench_stage {
     STAGE_REFINE,     /* labels and incidence */
     STAGE_DETECT,     /* limits, echo, label */
     STAGE_NOISE,
-    STAGE_GEOREF, /* what the encoders read, its sines, position, CRS, counts */
+    STAGE_GEOREF, /* encoder readings, their sines, position, CRS, counts */
     STAGE_ENCODE, /* the frame but its checksum */
     STAGE_CRC,
     BENCH_STAGES

@@ -196,7 +196,7 @@ static void a_resting_head_is_started(void **state)
     assert_int_equal(cola.n_lines, 0);
     cola_head_state("fault");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
-    cola_head_state("spin-down"); /* as soon as it can */
+    cola_head_state("spin-down"); /* it stops as soon as it can */
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 200000000);
@@ -239,7 +239,7 @@ static void writing_needs_its_level(void **state)
     cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2");
     cola_expect("sMN SetAccessMode 03 81BE23AA", "sAN SetAccessMode 0");
     cola_expect("sMN SetAccessMode 05 F4724744", "sAN SetAccessMode 0");
-    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2"); /* as it was */
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2"); /* it is as it was */
     cola_expect("sMN SetAccessMode 04 81BE23AA", "sAN SetAccessMode 1");
     cola_expect("sWN EIHstCola 1", "sWA EIHstCola");
     cola_expect("sMN CheckPassword 3 F4724744", "sAN CheckPassword 1");

@@ -81,7 +81,7 @@ static void other_pairs_are_refused(void **state)
     cola_expect("sMN mLMPsetscancfg 9C4 1 D05 0 225510", "sAN mLMPsetscancfg 3" FAST);
     cola_expect("sMN mLMPsetscancfg 9C4 2 9C4 FFF92230 225510", "sAN mLMPsetscancfg 5" FAST);
     expect_set(NULL, NULL, NULL);
-    cola_expect("sMN mLMPsetscancfg" FAST, "sAN mLMPsetscancfg 0" FAST); /* as it is */
+    cola_expect("sMN mLMPsetscancfg" FAST, "sAN mLMPsetscancfg 0" FAST); /* this changes nothing */
     cola_expect("sMN mLMPsetscancfg 1388 1 1388 -449997 +2249997", "sAN mLMPsetscancfg 0" FAST);
     expect_set(NULL, NULL, NULL);
 }

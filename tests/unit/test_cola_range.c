@@ -57,7 +57,7 @@ static void expect_range(uint32_t line, const char *step, int32_t start_e4, int3
     assert_int_equal(dist->step_e4, read_step);
     /* The last angle is rounded by itself; the rounded step is up to 1/2 wrong, and that adds up. */
     assert_true(labs((int32_t)stop - (dist->start_e4 + (int32_t)((n - 1) * read_step))) <= (long)n / 2 + 1);
-    assert_int_equal(((int32_t)stop - (int32_t)start) / (int32_t)read_step + 1, n); /* as clients count */
+    assert_int_equal(((int32_t)stop - (int32_t)start) / (int32_t)read_step + 1, n); /* clients count like this */
 }
 
 static void a_range_off_the_grid_goes_to_the_nearest_beams(void **state)

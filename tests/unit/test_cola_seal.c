@@ -71,7 +71,7 @@ static void values_of_all_kinds(void **state)
     static const uint32_t n_bits[] = {12 * 16, 2 * 12 * (16 + 8), 2 * 12 * (16 + 16)};
     for (int i = 0; i < 3; i++) {
         check(cfg[i], 1, n_bits[i]);
-        check(cfg[i], 0, 0); /* as many as the digits have */
+        check(cfg[i], 0, 0); /* their digits give the number of bits */
     }
 }
 

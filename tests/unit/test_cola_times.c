@@ -329,7 +329,7 @@ static void the_stream_has_the_chosen_form(void **state)
     cola_expect("sRN EIHstCola", "sRA EIHstCola 1"); /* in the form of this request, */
     protocol_rig_clear(&cola);
     cola_turn(1, 1.0);
-    assert_memory_equal(cola.bytes, "\2sSN", 4); /* as is what follows */
+    assert_memory_equal(cola.bytes, "\2sSN", 4); /* so is the scan that follows */
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
     protocol_rig_clear(&cola);
     cola_turn(2, 1.0);

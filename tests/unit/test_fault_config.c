@@ -204,7 +204,7 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     write_in("scenario.yaml", many);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     assert_non_null(strstr(wrong.fault[0].text, "30 faults, and the configuration has 3; allowed 32 together"));
-    assert_int_equal(cfg->faults.n, 3); /* as it was */
+    assert_int_equal(cfg->faults.n, 3); /* the list is as it was */
     snprintf(path, sizeof path, "%s/none.yaml", dir);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, link: 2}\noutput:"), SH_EINPUT);

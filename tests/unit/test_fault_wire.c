@@ -152,7 +152,7 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     rig_run(&f, 2);
     assert_int_equal(rig.n_notes, 0);
     rig_end(2);
-    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* what is flipped besides stays wrong, in any order */
+    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* other flipped bits stay wrong, in any order */
     both[1].byte = -1;
     rig_open(both, 2, 1);
     for (int i = 0; i < 20; i++)
@@ -268,7 +268,7 @@ static void a_session_that_ends_takes_nothing_more(void **state)
     assert_int_equal(rig_take(0), 5);
     assert_int_equal(rig.n_notes, 2);
     assert_true(rig.note[1].kind == FAULT_DISCONNECT && rig.note[1].number == 5);
-    rig_expect((const int[]){0, 2, 3, 1, -1}); /* what was held comes before the end */
+    rig_expect((const int[]){0, 2, 3, 1, -1}); /* held units come before the end */
     assert_true(rig.write[4].kind == WIRE_ACT && rig.write[4].act == FAULT_DISCONNECT);
     wire_count_unwritten(rig.wire, &frames, &pulses);
     assert_true(frames == 4 && pulses == 400);

@@ -212,7 +212,7 @@ static void test_failing_endpoint(void **state)
 static void test_failures_long_past(void **state)
 {
     (void)state;
-    struct rig rig = rig_open("/dev/zero"); /* whoever reads it gets a whole buffer */
+    struct rig rig = rig_open("/dev/zero"); /* each read gets a whole buffer */
     struct ffs_pipe *pipe = &rig.ffs->pipes.pipe[1];
     static uint8_t bytes[FFS_SLOT_BYTES];
     event(&rig, FUNCTIONFS_ENABLE);

@@ -204,7 +204,7 @@ static void test_borders(void **state)
         struct georef_spec spec = {
             .crs = GEOREF_UTM, .lat_deg = at[i].lat_deg, .lon_deg = at[i].lon_deg, .utm_zone = at[i].zone};
         struct georef *georef = NULL;
-        if (at[i].zone != 0) { /* as far east of the central meridian as is allowed */
+        if (at[i].zone != 0) { /* the farthest east of the central meridian that is allowed */
             double low = 3, high = 17;
             while (high - low > 1e-9) {
                 spec.lon_deg = (low + high) / 2;

@@ -48,7 +48,7 @@ static void transparency_is_kept(void **state)
     static const struct {
         const char *material;
         float clear;
-        const char *odd; /* what a warning names; NULL: there is none */
+        const char *odd; /* the name in a warning; NULL: there is none */
     } as[] = {{"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f, NULL},
               {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
               {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},

@@ -39,7 +39,7 @@ static void test_strings(void **state)
         assert_string_equal(head[0].problem, "");
         snprintf(other, sizeof other, "usb:1209:0001:%s", cases[i].shown);
         assert_string_equal(head[0].source, other);
-        close_head(open_head(head[0].source)); /* what is shown is what opens it */
+        close_head(open_head(head[0].source)); /* the shown name opens the head */
         close_head(open_head("usb"));
         snprintf(other, sizeof other, "usb:1209:1:%.60sx", cases[i].shown);
         assert_int_equal(scanhead_open(other, &sh, err, sizeof err), SCANHEAD_ELOST);

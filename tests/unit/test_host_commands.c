@@ -109,7 +109,7 @@ static void test_command(void **state)
     assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
     struct script h = {.fd = head, .expect = "SCAN:STOP", .frames_before = 1, .reply = NULL};
     assert_int_equal(run_command(sh, &h, reply, sizeof reply), SCANHEAD_ECLOSED);
-    expect_frame(sh, SCANHEAD_POINTS, &f); /* what came before the end is not lost */
+    expect_frame(sh, SCANHEAD_POINTS, &f); /* frames before the end are not lost */
     assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ECLOSED);
     assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, 10), SCANHEAD_ECLOSED);
     close(head);

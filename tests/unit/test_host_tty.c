@@ -27,7 +27,7 @@ enum { FRAMES = 40, TIMEOUT_MS = 120000 };
 struct head {
     int master;
     pthread_t thread;
-    char line[512]; /* what it has of a command */
+    char line[512]; /* the part of a command that has come */
     size_t len;
     const char *late; /* comes before the answer to the first line; NULL: nothing */
     size_t half;      /* bytes of a frame that is never ended, before the first answer */

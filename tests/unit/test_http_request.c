@@ -41,7 +41,7 @@ static void test_broken_requests(void **state)
         int status, ends;
     } cases[] = {
         {"\x16\x03\x01\x02\x01\x01\r\n\r\n", 400, 1}, /* TLS */
-        {"\x16\x03\x01\x02\x01\x01", 400, 1},         /* as it comes: its end is never an empty line */
+        {"\x16\x03\x01\x02\x01\x01", 400, 1},         /* it is refused at once: its end is never an empty line */
         {"GET /\r\n", 400, 1},                        /* HTTP/0.9 */
         {"GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n", 400, 1},
         {"GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400, 1},

@@ -168,7 +168,7 @@ static void the_end_does_not_wait_for_ever(void **state)
              (unsigned long long)lost);
     assert_string_equal(err.text, want);
     assert_int_equal(fcntl(fd[0], F_SETFL, O_NONBLOCK), 0);
-    char text[65537]; /* what the pipe holds: its writer goes on as soon as there is room again */
+    char text[65537]; /* fills the pipe: its writer goes on as soon as there is room again */
     const ssize_t n = read(fd[0], text, sizeof text - 1);
     assert_true(n > 0);
     text[n] = '\0';

@@ -83,7 +83,7 @@ static void test_tcp_disconnect(void **state)
     assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_OK);
     expect_reset(a);
     assert_int_equal(bench.ops->write(bench.link, 0, "abc", 3), SH_ECLOSED);
-    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* nobody is there */
+    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* there is no client */
     bench.n_queue = 0;
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 0);
     bench_write_all(&bench, 1, "def", 3);
@@ -216,7 +216,7 @@ static void test_pty_disconnect(void **state)
     char *dir = test_dir(), byte, before[PATH_MAX], after[PATH_MAX];
     snprintf(spec.path, sizeof spec.path, "%s/scan0", dir);
     struct bench bench = bench_open(&spec);
-    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* nobody is there */
+    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* there is no client */
     for (int round = 0; round < 3; round++) {
         assert_non_null(realpath(spec.path, before));
         int fd = client_open(&bench);

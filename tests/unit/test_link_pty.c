@@ -15,7 +15,7 @@ static void test_raw_both_ways(void **state)
     uint8_t out[4096], back[4096];
     for (size_t i = 0; i < sizeof out; i++) /* all values, at steps of 1, 2, .. 16 */
         out[i] = (uint8_t)(i * (1 + i / 256));
-    assert_int_equal(bench.ops->write(bench.link, 0, out, 1), SH_ECLOSED); /* nobody there */
+    assert_int_equal(bench.ops->write(bench.link, 0, out, 1), SH_ECLOSED); /* there is no client */
     int fd = client_open(&bench);
     bench_expect(&bench, LINK_OPENED, 0);
     bench_write_all(&bench, 0, out, sizeof out);

@@ -153,7 +153,7 @@ static void test_kill(void **state)
         if (with_other) bench_expect(&bench, LINK_OPENED, 0);
         int fd = client_open(&bench);
         if (!with_other) bench_expect(&bench, LINK_OPENED, 0);
-        bench_fill(&bench, 0); /* nobody reads: what is left in the terminal must not keep the session up */
+        bench_fill(&bench, 0); /* no client reads, and bytes left in the terminal must not keep the session up */
         pid_t child = fork_child();
         if (child == 0) {
             char data[512] = "";

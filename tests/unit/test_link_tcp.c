@@ -165,7 +165,7 @@ static void test_tcp_kill(void **state)
     kill(child, SIGKILL);
     waitpid(child, NULL, 0);
     const int64_t end_ms = give_up_ms();
-    for (int closed = 0; !closed;) { /* what the child wrote comes first */
+    for (int closed = 0; !closed;) { /* the child's bytes come first */
         if (now_ms() > end_ms) give_up("the end of a client that was killed");
         while (bench.ops->read(bench.link, 0, data, sizeof data) > 0)
             ;

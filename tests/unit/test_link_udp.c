@@ -78,7 +78,7 @@ static void end_with_receiver(struct bench *bench, const struct sockaddr_in *at)
     assert_int_equal(bind(fd, (const struct sockaddr *)at, sizeof *at), 0);
     assert_int_equal(bench->ops->write(bench->link, 0, "here", 4), 4);
     expect_datagram(fd, "here", 4);
-    assert_true(bench->ops->refused(bench->link) > 0); /* what went before; not this one */
+    assert_true(bench->ops->refused(bench->link) > 0); /* earlier datagrams were refused, this one was not */
     bench_close(bench);
     close(fd);
 }

@@ -112,7 +112,7 @@ static void float_columns_of_ply_are_told(void **state)
     memcpy(ply + sizeof head - 1 + sizeof v, face, sizeof face);
     write_file("hall.ply", ply, sizeof ply);
     check_accepted("hall.ply", "", "");
-    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* what is done is done: never refused */
+    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* a step that is done is never refused */
 }
 
 /* A millimetre shows in a scan, so the warning gives the remedy. */

@@ -218,7 +218,7 @@ static void who_asks_holds_the_site_of_now(void **state)
     assert_true(fabs(at.foot_radius_m - sqrt(2.5 * 2.5 - 1.8 * 1.8)) < 1e-9);
     expect_moved(rig, "SITE:POSE 1, 0,0,0.5,90,0,0");
     expect_moved(rig, "SITE:POSE 1, 0,0,0.4,90,0,0");
-    assert_true(site->station[0].at.position_m[2] == 0.0); /* as it was */
+    assert_true(site->station[0].at.position_m[2] == 0.0); /* it is as it was */
     device_give_back(version);
     device_get_station(rig->device, 0, &at);
     assert_true(at.place.position_m[2] == 0.4 && at.place.heading_deg == 90.0 && fabs(at.height_m - 2.2) < 1e-9);

@@ -214,7 +214,7 @@ static void check_hidden(void)
 static void check_garbage_at_end(void)
 {
     assert_int_equal(n_noticed, 1);
-    expect(0, NATIVE_BAD_BYTES, at[1], 0, 4); /* whatever the sync byte in it promises */
+    expect(0, NATIVE_BAD_BYTES, at[1], 0, 4); /* the promise of its sync byte does not matter */
 }
 
 static void test_end(void **state)

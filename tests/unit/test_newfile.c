@@ -315,7 +315,7 @@ static void test_append(void **state)
     assert_int_equal(write(fd, "one", 3), 3);
     expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, "is being written by process");
     close(fd);
-    assert_int_equal(newfile_append(path, &fd, &err), 0); /* as it is, and free again */
+    assert_int_equal(newfile_append(path, &fd, &err), 0); /* it is unchanged, and free again */
     assert_int_equal(pread(fd, &c, 1, 0), 1);
     assert_int_equal(c, 'o');
     assert_int_equal(write(fd, "two", 3), 3); /* at the end, though nothing was sought */

@@ -91,7 +91,7 @@ static void test_moving(void **state)
     put_scan(0, 1, &a);
     put_poses(0, 100, 5);
     put_poses(100, 200, 6);
-    put_poses(300, 400, 7); /* those of 200 to 300 ms are lost */
+    put_poses(300, 400, 7); /* the poses of 200 to 300 ms are lost */
     put_scan(0, 2, &a);
     put_poses(0, 50, 8);
     const char *at = record();

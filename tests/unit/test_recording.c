@@ -181,7 +181,7 @@ static void record(const enum deed *script, struct recording_result *result)
     struct sh_err err = {0, ""};
     int rc = recording_run(sh, &options, result, &err);
     scanhead_close(sh);
-    shutdown(head.listener, SHUT_RDWR); /* whatever the head waits for */
+    shutdown(head.listener, SHUT_RDWR); /* this ends any wait of the head */
     pthread_join(thread, NULL);
     close(head.fd);
     close(head.listener);

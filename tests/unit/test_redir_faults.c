@@ -30,7 +30,7 @@ static void test_unplug(void **state)
 {
     (void)state;
     struct bench bench = redir_bench(1);
-    assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_ESTATE); /* nobody has it */
+    assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_ESTATE); /* no guest has it */
     struct guest *g = guest_new(&bench);
     for (int round = 0; round < 3; round++) {
         guest_configure(g);

@@ -291,7 +291,7 @@ static void test_connections(void **state)
     assert_int_equal(row->missed, 1);
     end(soak);
 
-    soak = make(); /* nobody asked for that */
+    soak = make(); /* this fault was not asked for */
     send_clean(soak);
     see_others(soak, FIRST, HIT);
     soak_saw_end(&soak->link[0]);

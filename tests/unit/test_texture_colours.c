@@ -19,7 +19,7 @@ static const double AWAY_M = 10.0;
 /* ---- scans of the board */
 
 struct view {
-    const struct scene *scene; /* what stands still; has the board unless mover is there */
+    const struct scene *scene; /* the scene that stands still; has the board unless mover is there */
     const struct surface_colours *colours;
     enum texture_wrap wrap[2];
     const chart_texels *texels;

@@ -13,7 +13,7 @@
 #include "firmware_sim/loop/kept.h"
 #include "firmware_sim/loop/unit_queue.h"
 
-enum { CAP = 1000, HEAD = 32 }; /* what a unit costs beside its bytes: two ticks, a kind and a length, aligned */
+enum { CAP = 1000, HEAD = 32 }; /* a unit's cost beside its bytes: two ticks, a kind and a length, aligned */
 
 static void units_come_out_as_they_went_in(void **state)
 {

@@ -56,7 +56,7 @@ static void test_stream_begun_again(void **state)
         expect(&bench, LINK_OPENED);
         bench_read_all(&bench, STREAM, heard, 4);
         assert_memory_equal(heard, "new\n", 4);
-        for (int k = 0; k < 2; k++) { /* what was sent was taken */
+        for (int k = 0; k < 2; k++) { /* all sent bytes were taken */
             assert_true(client_reply(&c, &r, 0));
             assert_int_equal(r.status, 0);
         }

@@ -139,7 +139,7 @@ static void test_usbip_cancel(void **state)
         assert_int_equal(r.command, 4);
         assert_int_equal(r.seqnum, unlink);
         assert_int_equal(r.status, ECONNRESET_WIRE);
-        assert_int_equal(bench.ops->write(bench.link, 0, telegram, 1024), 0); /* nobody reads: it stays here */
+        assert_int_equal(bench.ops->write(bench.link, 0, telegram, 1024), 0); /* no host reads, so it stays here */
         const uint32_t next = client_submit(&c, 1, 1, NULL, NULL, MOST);
         bench_expect(&bench, LINK_WRITABLE, 1);
         assert_int_equal(bench.ops->write(bench.link, 0, telegram, 1024), 1024);

@@ -40,7 +40,7 @@ static void test_silent(void **state)
         silent[i] = connect_silent(&bench);
     other.fd = client_connect(&bench);
     list_devices(&other);
-    assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* who has the device keeps it */
+    assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* the owner keeps the device */
     list_devices(&other);
     for (int i = 0; i < 2 * SILENT; i++)
         close(silent[i]);
@@ -68,7 +68,7 @@ static void test_oldest(void **state)
         client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
     close(client[1].fd); /* its place is free, and goes to one that is younger than its neighbours */
     bench_poll(&bench, 0, DEADLINE_MS);
-    static const int out[] = {-1, 0, 2, 3}; /* who goes as 3, 4, 5 and 6 come */
+    static const int out[] = {-1, 0, 2, 3}; /* the hosts that go as 3, 4, 5 and 6 come */
     for (int i = 3; i < 7; i++) {
         client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
         for (int k = 0; k <= i; k++)
@@ -108,7 +108,7 @@ static uint32_t send_requests(struct client *c)
     uint32_t n = 0;
     for (size_t pos = HEADER, stuck = 0; stuck < 3;) {
         if (pos == HEADER) {
-            assert_true(n < MANY); /* nobody holds so much */
+            assert_true(n < MANY); /* no buffer holds so much */
             put_submit(head, ++n, 1, 0, 2, get_status);
             pos = 0;
         }

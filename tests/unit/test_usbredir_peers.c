@@ -20,7 +20,7 @@ static void test_silent(void **state)
         bench_poll(&bench, 0, 0);
     }
     struct guest *g = guest_new(&bench);
-    int late = guest_socket(); /* who has said hello keeps the device */
+    int late = guest_socket(); /* the guest that has said hello keeps the device */
     bench_poll(&bench, 0, 0);
     assert_int_equal(guest_control(g, 0x80, 6, 0x0100, 0, 18, NULL)->status, usb_redir_success);
     const int64_t start_ms = now_ms();
@@ -204,7 +204,7 @@ static void check_reconnects(const struct link_spec *spec, int listener, const s
     g = accept_device(&bench, listener); /* it comes by itself */
     guest_configure(g);
     expect_notice(&bench, "plugged in again");
-    close(listener); /* nobody there: it says so once, and tries again */
+    close(listener); /* nobody answers: it says so once, and tries again */
     if (at->sa_family == AF_UNIX) unlink(((const struct sockaddr_un *)at)->sun_path);
     guest_free(g);
     expect_notice(&bench, "detached");

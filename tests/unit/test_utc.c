@@ -197,7 +197,7 @@ static void the_systems_table_is_the_same(void **state)
     for (uint32_t i = 0; i < common; i++)
         assert_true(table.leap[i].posix_s == ours->leap[i].posix_s &&
                     table.leap[i].tai_minus_utc == ours->leap[i].tai_minus_utc);
-    for (uint32_t i = common; i < table.n; i++) /* what is new to us came after ours ended */
+    for (uint32_t i = common; i < table.n; i++) /* seconds that are new to us came after ours ended */
         assert_true(table.leap[i].posix_s > ours->expires_s);
 }
 

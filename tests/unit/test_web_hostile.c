@@ -58,7 +58,7 @@ static const struct {
     CASE("GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\nHost: localhost:99999\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\nHost: local host\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400), /* what follows is not waited for */
+    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400), /* the link does not wait for more */
     CASE("GET / HTTP/1.1\r\n" HOST "X: a\0b", 400),
     CASE("GET / HTTP/1.1\r\n" HOST "X: a\rb\r\n", 400),
     CASE("GET / HTTP/1.1\r\n" HOST " folded\r\n\r\n", 400),

@@ -28,7 +28,7 @@ struct rig_item {
     uint64_t number; /* in its counting, from 1 */
     size_t len;
     uint8_t bytes[RIG_UNIT];
-    uint32_t notes_from; /* what was noted while it was put begins here */
+    uint32_t notes_from; /* the notes of the last put begin here */
 };
 
 struct rig_write {

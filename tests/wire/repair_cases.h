@@ -30,7 +30,7 @@ extern const struct repair_row repair_cases[];
 /* Returns the ending of a file beside the recording, FILE + that, from which a repair makes the recording's rest. On a
  * full disk it needs more room. The file is gone after the repair. NULL: there is none. */
 const char *repair_row_beside(const struct repair_row *row);
-extern struct bytes repair_beside; /* what was left of that file */
+extern struct bytes repair_beside; /* the rest of that file */
 extern const size_t n_repair_cases;
 
 #endif

@@ -125,7 +125,7 @@ static void killed_client(struct wire *wire, const char *link)
         client_wait_state(sh, "idle");
         scanhead_close(sh);
         struct scanhead *other = client_open(head_endpoint(&head, strcmp(link, "tcp") == 0 ? "pty" : "tcp"));
-        expect_error(other, 101, NONE); /* who had control hung up: that, too */
+        expect_error(other, 101, NONE); /* also after the client in control has hung up */
         scanhead_close(other);
     }
     head_end(&head, SIGTERM);

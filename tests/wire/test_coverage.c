@@ -262,7 +262,7 @@ static void test_interrupt(void **state)
         struct pollfd on = {.fd = fd, .events = POLLIN};
         assert_int_equal(poll(&on, 1, DEADLINE_MS), 1);
         const ssize_t some = read(fd, got + n, sizeof got - 1 - n);
-        if (some <= 0) continue; /* nobody has opened the other end yet */
+        if (some <= 0) continue; /* the other end is not open yet */
         n += (size_t)some;
         got[n] = '\0';
     }

@@ -221,7 +221,7 @@ static void expect_broken(const struct scanhead_notice *got, const struct truth 
         fail_msg("%s: %s", truth->note[i].same, scanhead_notice_name((int)got->kind));
     if (!no_header) assert_int_equal(got->seq, seq);
     if (is_garbage) assert_int_equal(got->n, 100);
-    if (cut) assert_int_equal(got->n, byte); /* what is left of it */
+    if (cut) assert_int_equal(got->n, byte); /* the rest of it */
     if (!is_garbage && !cut) assert_true((long)got->n > byte && got->n >= NATIVE_HEADER_LEN);
 }
 

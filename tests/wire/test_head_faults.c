@@ -284,7 +284,7 @@ static void test_power_cycle_in_steps(void **state)
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);
     assert_true(ends == 0 && last_ns < 2000000000);
     assert_int_equal(scanhead_reattach(sh, DEADLINE_MS), SCANHEAD_OK);
-    while (atoll(client_ask(sh, "TIME?")) < 2500000000) /* what was granted passes */
+    while (atoll(client_ask(sh, "TIME?")) < 2500000000) /* the granted time passes */
         continue;
     assert_string_equal(client_ask(sh, "HEAD:STATE?"), "off");
     assert_non_null(strstr(client_ask(sh, "SCAN:START"), "ERR -221"));

@@ -87,7 +87,7 @@ static void what_others_reach_is_said(void **state)
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
     const int port = endpoint_port(head_link(&head, 2));
-    assert_int_equal(try_tcp("127.0.0.2", port), 0); /* what the other test would see of such a link */
+    assert_int_equal(try_tcp("127.0.0.2", port), 0); /* the other test would see such a link */
     head_end(&head, SIGTERM);
     char *said = wire_read(wire_path(wire, "head.err"), &len), want[64];
     snprintf(want, sizeof want, "link tcp:0.0.0.0:%d: other machines may reach it", port);

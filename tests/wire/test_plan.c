@@ -29,7 +29,7 @@ static const char *set_up_with(struct wire *wire, const char *profile)
              "links: [{type: \"null\"}]\noutput: {crs: utm, layout: geo}\n",
              profile);
     const char *config = wire_write_text(wire, "config.yaml", text);
-    snprintf(path, sizeof path, "%s", config); /* those of wire_path are used again */
+    snprintf(path, sizeof path, "%s", config); /* wire_path uses its room again */
     return path;
 }
 

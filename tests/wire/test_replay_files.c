@@ -310,7 +310,7 @@ static void test_waits_for_clients(void **state)
     sh[0] = client_open(head_endpoint(&head, "tcp"));
     assert_string_equal(client_ask(sh[0], "HEAD:STATe?"), "idle");
     while ((rc = scanhead_next(sh[0], &frame, 50)) == SCANHEAD_OK)
-        assert_true((frame.flags & SCANHEAD_LOCAL) != 0); /* what those who join are told */
+        assert_true((frame.flags & SCANHEAD_LOCAL) != 0); /* clients that join are told this */
     assert_int_equal(rc, SCANHEAD_ETIMEOUT);
     sh[1] = client_open(head_endpoint(&head, "tcp"));
     for (int i = 0; i < 2; i++) {

@@ -282,7 +282,7 @@ static void test_pose_with_each_grant(void **state)
         if (strncmp(reply, wrong[i][1], 8) != 0) fail_msg("%s: %s", wrong[i][0], reply);
     }
     granted_ns += 50000000;
-    assert_int_equal(time_ns(sh), granted_ns); /* what is refused grants nothing */
+    assert_int_equal(time_ns(sh), granted_ns); /* a refused command grants nothing */
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     assert_true(stats_uint(wire, "late_poses") >= 10);

@@ -100,7 +100,7 @@ static void check_two_streams(struct wire *wire, struct head *head, const struct
     close(faulty);
     close(clean);
     head_end(head, SIGTERM);
-    got.len = least; /* as many bytes as certainly have their clean units */
+    got.len = least; /* all these bytes have their clean units */
     check(wire, kind, &want, &got);
     units_free(&got);
     units_free(&want);

@@ -40,7 +40,7 @@ static void write_clean(void)
 /* The second answer has its command in this capture; the first one's is before it. */
 static void expect_tcp_lines(int number)
 {
-    if (number != JOINED) { /* nobody knows the stream yet: what is first in a segment */
+    if (number != JOINED) { /* the stream is not known yet: the first bytes in a segment */
         expect_text(S "reply", "est,1,scanhead native 1");
         expect_text(S "reply", "idle");
     }
