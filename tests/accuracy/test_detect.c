@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Detection over many pulses. The noise has the sigma that follows from the data sheet's figures, is normal, and is
- * independent of everything else. Targets vanish where the data sheet says. Seeds are fixed. Where a statistic of n
+ * independent of everything else. Targets vanish where the data sheet says. Seeds are fixed. If a statistic of n
  * numbers is compared, 4.75 of its standard errors are allowed, which chance exceeds twice in a million. */
 #include <math.h>
 #include <stdlib.h>

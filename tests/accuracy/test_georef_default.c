@@ -78,7 +78,7 @@ static void set_frame(int i, enum scene_frame kind, struct georef_spec *spec)
     if (rc != SH_OK) fail_msg("place %d: %s", i, err.text);
 }
 
-/* Asks GeographicLib for each point. Where ours is linear, it goes by way of geodetic coordinates. */
+/* Asks GeographicLib for each point. If ours is linear, it goes by way of geodetic coordinates. */
 static void reference(const struct georef_spec *spec, const struct georef *georef, struct station_points *p)
 {
     double rotation[9], anchor[3], base[3];

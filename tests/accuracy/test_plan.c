@@ -325,7 +325,7 @@ static void test_figures(void **state)
     beam_rig_close(&rig);
 }
 
-/* A step of 4 mm gives one echo, at the mean over both sides. Where a share E of the energy lies beyond the edge, a
+/* A step of 4 mm gives one echo, at the mean over both sides. If a share E of the energy lies beyond the edge, a
  * single ray is wrong by E steps, so the mean square is known. All pulses in the strip count as those that meet more
  * than one smooth surface, so the plan looks at each. Its figure is 3 standard errors above the mean square that it
  * finds, which scatters by one. So it is 0 to 6 of them above the true one. A plan that looked at one pulse in 32 would

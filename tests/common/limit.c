@@ -3,7 +3,7 @@
  * linked with every test program.
  *
  * The limit is TEST_LIMIT_S seconds, else DEFAULT_S; 0 sets none. run_tap.sh sets the variable to its own limit. The
- * limit only catches a hang, and no result depends on it. Where more processes want to run than there are processors,
+ * limit only catches a hang, and no result depends on it. If more processes want to run than there are processors,
  * it is longer by that ratio. The main thread gets the signal of a timer. It prints the running test as failed and
  * where each thread is, and ends the program with status 124, as timeout(1) does. A SIGALRM of a test's own alarm()
  * does the same at once. */

@@ -49,7 +49,7 @@ static int is_beside_lines(const struct scene *scene, uint32_t triangle, const d
     return 1;
 }
 
-/* Where the claimed triangle is not known, the place may be beside any of them. */
+/* If the claimed triangle is not known, the place may be beside any of them. */
 static int is_beside_any(const struct scene *scene, const struct odd_shot *shot)
 {
     if (shot->triangle < scene->n_triangles) return is_beside_lines(scene, shot->triangle, shot->at_m, shot->dir);

@@ -99,7 +99,7 @@ static struct off off_on_ground(double height_m, double incidence_deg)
 }
 
 /* A head at a tripod's height above the ground: 1.8 m away at 0 deg, 1031 m at 89.9 deg. Ours casts one ray. The bound
- * is the one for a wall. Where the footprint is small, the ray in the centre keeps it, too. */
+ * is the one for a wall. If the footprint is small, the ray in the centre keeps it, too. */
 static void one_ray_stands_for_the_ground(void **state)
 {
     (void)state;

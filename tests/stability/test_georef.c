@@ -227,7 +227,7 @@ static double rounding_m(const struct georef *georef, const double scale[3], dou
     return most_m;
 }
 
-/* Where all points are near the pole, only degrees of longitude need longer counts. The others have half a
+/* If all points are near the pole, only degrees of longitude need longer counts. The others have half a
  * micrometre. */
 static void test_counts_at_the_pole(void **state)
 {

@@ -115,7 +115,7 @@ static uint64_t parts_of(int64_t prr_hz)
 }
 
 /* Ours: a change cuts the rest of a nanosecond to a part in prr_uhz, at least 1e-11 ns with these rates, so 10^5
- * changes make 1e-6 ns. Where the true time is a whole number of nanoseconds or just above, the floor of ours is then
+ * changes make 1e-6 ns. If the true time is a whole number of nanoseconds or just above, the floor of ours is then
  * one less. There is no drift, but a bound of 1 ns. Naive: each segment's length in float seconds, or periods in whole
  * nanoseconds. */
 static void test_changes(void **state)

@@ -212,7 +212,7 @@ static void test_edges_of_corners(void **state)
     table_check();
 }
 
-/* Each triangle gets the side of a common edge from its own corners, and rounds it in its own way. Where both say
+/* Each triangle gets the side of a common edge from its own corners, and rounds it in its own way. If both say
  * outside, the ray slips out of a closed mesh. */
 static void test_no_doubts(void **state)
 {

@@ -176,7 +176,7 @@ static void load(struct filter *filter, size_t at)
     add(filter, (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS, (uint32_t)at));
 }
 
-/* Where the value is equal, `yes` ops are skipped; else `no` ops. */
+/* If the value is equal, `yes` ops are skipped, and otherwise `no` ops. */
 static void compare(struct filter *filter, uint32_t value, uint8_t yes, uint8_t no)
 {
     add(filter, (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, yes, no));

@@ -158,7 +158,7 @@ static void test_two_caps(void **state)
     }
 }
 
-/* Where there are too many echoes the weakest is left out, wherever it comes. The returned light counts, not the
+/* If there are too many echoes the weakest is left out, wherever it comes. The returned light counts, not the
  * energy. When two are equally weak, the first one goes. The others keep their numbers among all. */
 static void test_crowd(void **state)
 {

@@ -76,7 +76,7 @@ static struct cast_rig *open_room(struct pose_knot knot[KNOTS])
 }
 
 /* Ten lines of 10 ms, which the knots cover. The range is exact to a rounding of 1e-5 m counts; 1e-9 m is for the
- * encoders' arithmetic. Where a ray passes within 1e-9 of an edge of the room, the wall may be either. */
+ * encoders' arithmetic. If a ray passes within 1e-9 of an edge of the room, the wall may be either. */
 static void test_room(void **state)
 {
     (void)state;

@@ -20,7 +20,7 @@ static void expect_field(int number, const void *values, size_t len)
     cola_expect_b(request, 12, answer, 13 + len);
 }
 
-/* sick_scan_xd asks for 30 fields of an LMS1xx. Where one of them is refused, it starts over for ever. */
+/* sick_scan_xd asks for 30 fields of an LMS1xx. If one of them is refused, it starts over for ever. */
 static void an_lms_has_ten_empty_fields(void **state)
 {
     (void)state;

@@ -118,7 +118,7 @@ static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
     expect_error(&dev, 1, "SCAN:FRAMES 4294967300", CMD_E_RANGE, "allowed 0 to 1000000");
     expect(&dev, "SCAN:FRAMES 1000000", "OK");
     expect_error(&dev, 1, "HEAD:STATION 4294967297", CMD_E_RANGE, "allowed 1 to 3");
-    /* Where one value is left, it is given alone. */
+    /* If one value is left, it is given alone. */
     dev.limits.pan_max_udeg_s = 0;
     expect_error(&dev, 1, "HEAD:PAN 1", CMD_E_RANGE, "HEAD:PAN 1 deg/s, allowed 0\"");
 }

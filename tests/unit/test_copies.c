@@ -163,7 +163,7 @@ static void copies_are_what_they_are_written_out(void **state)
         }
 }
 
-/* Steepness is compared for rays from one point. Where it is large, its rounding is. */
+/* Steepness is compared for rays from one point. If it is large, its rounding is large, too. */
 static void incidence_is_the_same(void **state)
 {
     (void)state;

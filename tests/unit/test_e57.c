@@ -107,7 +107,7 @@ static void test_xml(void **state)
     assert_null(strstr(e57rig_xml, "creationDateTime")); /* no clock in this stream */
 }
 
-/* Shots whose reflectance is not modelled do not count for the limits. Where there are no others, there are no
+/* Shots whose reflectance is not modelled do not count for the limits. If there are no others, there are no
  * limits. */
 static void test_intensity_limits(void **state)
 {

@@ -190,7 +190,7 @@ static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
     return 0;
 }
 
-/* Where the same packets are left, the same file comes out, so it is read once. */
+/* If the same packets are left, the same file comes out, so it is read once. */
 static void check_cut(const char *path, const uint8_t *from, size_t len)
 {
     struct repair repair;

@@ -161,7 +161,7 @@ static void density_is_points_by_area(void **state)
     figures_density_within(&d, 1, 3.0, 5.0, &row); /* from the first one on, up to before the second */
     assert_true(row.cells == 2 && row.points == 18);
     figures_density_free(&d);
-    /* Two stations come in turns. Where both have points there are two cells in one place. */
+    /* Two stations come in turns. If both have points there are two cells in one place. */
     uint16_t station[20];
     for (size_t i = 0; i < n; i++)
         station[i] = (uint16_t)(1 + i % 2);

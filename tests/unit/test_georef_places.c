@@ -109,7 +109,7 @@ static void test_recentre(void **state)
     georef_free(georef);
 }
 
-/* A count is at most scale_m long on the ground and the farthest points fit. Where they can't, it is reported. */
+/* A count is at most scale_m long on the ground and the farthest points fit. If they can't, it is reported. */
 static void test_scale(void **state)
 {
     (void)state;

@@ -231,7 +231,7 @@ static void test_web(void **state)
     starve(&(struct link_spec){.type = LINK_WEB, .max_sessions = 1});
 }
 
-/* Where clients come for a request, the one that has been silent for longest makes room; elsewhere none does. */
+/* If clients come for a request, the one that has been silent for longest makes room. Otherwise none does. */
 static void test_brief(void **state)
 {
     (void)state;

@@ -194,7 +194,7 @@ static void cuts_leave_no_trace(void **state)
     close_optics(&o);
 }
 
-/* Where nothing is asked for, or none of it is met, the bytes are those of the plain caster. */
+/* If nothing is asked for, or none of it is met, the bytes are those of the plain caster. */
 static void nothing_asked_for_changes_nothing(void **state)
 {
     (void)state;

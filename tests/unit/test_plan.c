@@ -78,7 +78,7 @@ static void test_least_off(void **state)
     /* Five times the allowed range error is worse than twice the share of other echo counts. */
     const struct plan_option two[2] = {{"f", 5e-3, 0.0, 1.0, ""}, {"g", 1e-4, 2e-2, 2.0, ""}};
     assert_int_equal(choose(&row, "beam", two, 2, -1, ""), 1);
-    /* Options go from rough to exact. Where all miss by as much, the last possible one is chosen. */
+    /* Options go from rough to exact. If all miss by as much, the last possible one is chosen. */
     struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, ""},
                                   {"1", 0.0, 1.0, 1.0, ""},
                                   {"2", 0.0, 1.0, 2.0, ""},

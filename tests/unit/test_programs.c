@@ -302,7 +302,7 @@ static void shipped_figures_have_a_grade(void **state)
     assert_true(files >= 10);
 }
 
-/* Accuracy is shown and never drawn. Where a profile has both, the noise is less. */
+/* Accuracy is shown and never drawn. If a profile has both, the noise is less. */
 static void accuracy_is_not_noise(void **state)
 {
     (void)state;

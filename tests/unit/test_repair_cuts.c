@@ -126,7 +126,7 @@ static void test_cut_whole(void **state)
     }
 }
 
-/* Bytes are changed here and there. Nothing crashes, and an accepted file is whole. Where damage can be seen, it is
+/* Bytes are changed here and there. Nothing crashes, and an accepted file is whole. If damage can be seen, it is
  * refused. */
 static void test_damaged(void **state)
 {

@@ -115,7 +115,7 @@ static void cast_lines(const struct site *site, double t_s, struct lines *out)
     caster_free(caster);
 }
 
-/* A micrometre is a count, so a rounding may move from one count to the next. Where a ray passes an edge by less than
+/* A micrometre is a count, so a rounding may move from one count to the next. If a ray passes an edge by less than
  * rounding, it may meet either side. */
 static void compare(struct lines *a, struct lines *b, uint32_t least_on_trees)
 {

@@ -106,7 +106,7 @@ static void packets_of_a_line(void **state)
     /* Packets of the next line count from its own first pulse. */
     is(shot(1, 1003, 1003, 1018), TIMING_KNOWN, T0_NS + fired(1018));
     is(shot(1, 1003, 1019, 1023), TIMING_AT_MOST, T0_NS + fired(1003 + 2 * PACKET - 1));
-    /* Where a line begins with blind pulses, its first pulse is still known from the line before. */
+    /* If a line begins with blind pulses, its first pulse is still known from the line before. */
     is(line_end(1, 1003, 1000, fired(2003), 0), TIMING_KNOWN, T0_NS + fired(2002));
     is(shot(2, 2003, 2103, 2104), TIMING_AT_MOST, T0_NS + fired(2003 + 7 * PACKET - 1));
 }
@@ -183,7 +183,7 @@ static void rates_change_within_a_line(void **state)
     is(points(1, 60, 16, at + 200000, at + 200000, 150000), TIMING_KNOWN, T0_NS + at + 350000);
 }
 
-/* Where the end of the line before is missing, the line's first time gives its first pulse. */
+/* If the end of the line before is missing, the line's first time gives its first pulse. */
 static void frames_are_missing(void **state)
 {
     (void)state;

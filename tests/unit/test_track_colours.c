@@ -107,7 +107,7 @@ static char *body_of(char *ply)
     return at + 11;
 }
 
-/* Attributes come between or not. Where colours, attributes or points are lost, each point has its own colour or
+/* Attributes come between or not. If colours, attributes or points are lost, each point has its own colour or
  * grey. */
 static void test_as_sent(void **state)
 {

@@ -53,7 +53,7 @@ static void test_fill(void **state)
         }
 }
 
-/* Where the last transfer is exactly full, the zero-length packet that ends the unit comes in the next one. */
+/* If the last transfer is exactly full, the zero-length packet that ends the unit comes in the next one. */
 static void test_zero_packet(void **state)
 {
     (void)state;

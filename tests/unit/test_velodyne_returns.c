@@ -114,7 +114,7 @@ static void test_dual_returns(void **state)
     }
 }
 
-/* Ranges are 2 mm a unit, rounded. Where no number fits, the entry has no return, and it is counted. */
+/* Ranges are 2 mm a unit, rounded. If no number fits, the entry has no return, and it is counted. */
 static void test_range_units(void **state)
 {
     (void)state;

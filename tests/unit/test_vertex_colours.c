@@ -288,7 +288,7 @@ static void hits_have_the_colour_between(void **state)
     scene_free(s);
 }
 
-/* Where a rule has no reflectance it is the colour's luminance, 0.2126 of red and so on, in linear light. */
+/* If a rule has no reflectance it is the colour's luminance, 0.2126 of red and so on, in linear light. */
 static void hits_reflect_as_their_colour(void **state)
 {
     (void)state;

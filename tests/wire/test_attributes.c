@@ -318,7 +318,7 @@ static void count_echoes(const struct wire *wire, const char *name, uint32_t whi
     scanhead_close(sh);
 }
 
-/* Where attributes are lost the points stay, without any. Where points are lost, their attributes are not given to
+/* If attributes are lost the points stay, without any. If points are lost, their attributes are not given to
  * others. The recording says that it is not complete. */
 static void test_lost(void **state)
 {

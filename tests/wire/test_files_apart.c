@@ -39,7 +39,7 @@ static const struct {
 };
 enum { N_COMMANDS = sizeof COMMANDS / sizeof COMMANDS[0] };
 
-/* The written files: the option or key, the words, and the file. Where one command writes two, the words of both are
+/* The written files: the option or key, the words, and the file. If one command writes two, the words of both are
  * given. */
 static const struct output {
     unsigned bit;

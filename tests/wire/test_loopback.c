@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where no address is given, a head listens at 127.0.0.1 alone. 127.0.0.2 is loopback, too. A listener at all addresses
+/* If no address is given, a head listens at 127.0.0.1 alone. 127.0.0.2 is loopback, too. A listener at all addresses
  * of the machine would accept a connection to it; one at 127.0.0.1 refuses it. So the test needs no other machine. */
 #include <arpa/inet.h>
 

@@ -277,7 +277,7 @@ static void test_target(void **state)
     t = tally_of(wire, board, is_board_alone); /* the only label */
     assert_int_equal(t.points, whole.chosen);
     assert_int_equal(t.chosen, t.points);
-    /* Where the board cuts a footprint, the part on the wall stays: board and wall are metres apart, two echoes. */
+    /* If the board cuts a footprint, the part on the wall stays: board and wall are metres apart, two echoes. */
     const char *const rings[] = {"beam.mode=rings", NULL};
     const char *const behind[] = {"beam.mode=rings", "scene.target.objects.0=[!b]*", walls[3], NULL};
     const struct tally edges = tally_of(wire, rings, is_board);

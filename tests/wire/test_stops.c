@@ -228,7 +228,7 @@ static void test_files(void **state)
     free(text);
 }
 
-/* Where the file contradicts the configuration there is one line with the allowed values. */
+/* If the file contradicts the configuration there is one line with the allowed values. */
 static void test_wrong_parts(void **state)
 {
     struct wire *wire = *state;
