@@ -68,7 +68,7 @@ END
         test "$("$work/root$prefix/bin/scanhead" --version)" = "scanhead $version"
 }
 
-# The only example in C.
+# README.md has only one example in C, which is compiled here.
 sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it "$work/root" "$prefix"
 check "make install into folders with blanks in their names" blanks_stay

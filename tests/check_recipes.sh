@@ -88,7 +88,8 @@ checkout() { # document
     ln -s "$program" "$(dirname "$program")/libscanhead.a" "$work/tree/build/"
 }
 
-# within COMMAND...: in the checkout, within the limit, by itself in a group that ends with it. Output to $work/out.
+# within COMMAND...: runs a command in the checkout, within the limit, in a group of its own that ends with it. Its output
+# goes to $work/out.
 within() {
     : >"$work/out"
     set -m
