@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The layout of the C sources is that of .clang-format, by version 14: another one lays some lines out otherwise. And each source
-# names its licence. Prints TAP.
+# The C sources have the layout of .clang-format, by version 14, as other versions lay some lines out differently. Each
+# source names its licence. Prints TAP.
+#
 #   clang-format -i FILE    mends a file
 set -u
 cd "$(dirname "$0")/.." || exit 1
@@ -14,7 +15,7 @@ sources() { # SUFFIX...
     find core drivers firmware_sim tests config -regextype posix-egrep -regex ".*\.($(IFS='|' && echo "$*"))" ! -path 'tests/fuzz/seeds/*'
 }
 
-# laid_out FILE...: names those that are not.
+# laid_out FILE...: prints those that are not.
 laid_out() {
     clang-format --style=file:.clang-format --dry-run --Werror "$@"
 }
@@ -23,7 +24,7 @@ licensed() {
     ! grep -L 'SPDX-License-Identifier: MIT' "$@" | grep .
 }
 
-finds() { # FUNCTION FILE: what it must object to, it does
+finds() { # FUNCTION FILE: it objects to a planted file
     ! "$1" "$2" >"$work/said" 2>&1
 }
 

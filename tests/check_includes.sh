@@ -33,7 +33,7 @@ prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
 #   host           itself, protocol, core/err.h, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
 #   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, the studio's rooms mesh and picture
 # The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
-# At most one in core, one in firmware_sim and one in drivers.
+# There is at most one in core, one in firmware_sim and one in drivers.
 upward='
 '
 #
@@ -54,7 +54,7 @@ rules='
         n = split(upward, list, "\n")
         for (i = 1; i <= n; i++) if (split(list[i], word, " ") > 1) exception[word[1], word[2]] = 1
     }
-    # The room that a file lies in; of a header in core/ or core/studio/ itself the room that it declares.
+    # The room that a file lies in. A header in core/ or core/studio/ itself belongs to the room that it declares.
     function room(path,   part, n, name, folder) {
         n = split(path, part, "/")
         name = folder = path; sub(/\.[a-z]*$/, "", name); sub(/\/[^\/]*$/, "", folder)
@@ -108,7 +108,8 @@ include_rules='
         else if (!may_use(FILENAME, to)) print FILENAME ":" FNR ": must not include " to
     }'
 
-# Of the lines of nm -A -P: what an object lacks, and which one defines it. The client library is called by its public names.
+# Reads the lines of nm -A -P: the symbols that an object lacks, and the object that defines each. The client library is
+# called by its public names.
 call_rules='
     BEGIN { system_call = "^(clock_.*|gettimeofday|time|nanosleep|usleep|pthread_.*|thrd_.*|fork|vfork|exec.*|posix_spawn.*|wait.*|system|popen|socket.*)$" }
     { path = $1; sub(/\.o(\[.*\])?:$/, "", path) }

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# What `make install` installs is enough for a client: the README's example, compiled with the installed files alone,
-# reads a scan. Prints TAP. $SCANHEAD: the program of the build that is installed.
+# The files that `make install` installs are enough for a client: the README's example, compiled with them alone, reads
+# a scan. Prints TAP. $SCANHEAD: the program of the build that is installed.
 set -u
 program=${SCANHEAD:-build/scanhead}
 work=$(mktemp -d) || exit 1
@@ -10,13 +10,13 @@ trap '[ -z "$head" ] || kill "$head"; rm -rf "$work"' EXIT
 prefix=/opt/scanhead
 . tests/tap.sh
 
-# Without the variables of the make above this one.
+# The variables of the make above are not for this one.
 install_it() {
     env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$(dirname "$program")" DESTDIR="$1" \
         PREFIX="$2"
 }
 
-# All files are where they belong, and none beside it.
+# All files are where they belong, and there are no others.
 blanks_stay() {
     mkdir "$work/none" && install_it "$work/none/a root" "/opt/scan head" && test "$(ls "$work/none")" = "a root" &&
         test "$(ls "$work/none/a root")" = opt && "$work/none/a root/opt/scan head/bin/scanhead" --version &&
@@ -34,7 +34,7 @@ compile() {
     (cd "$work" && ${CC:-cc} -Wall -Werror client.c $(config --cflags) "$@" -o "$out")
 }
 
-# The scan of the guest tests' head, read by the client as points in lines of three numbers.
+# The client reads a scan of the guest tests' head as points, in lines of three numbers.
 reads_a_scan() {
     sed "\$alinks: [{type: pty, path: port}]" tests/guest/head.yaml >"$work/config.yaml"
     cp tests/guest/room.obj "$work/"
@@ -42,7 +42,7 @@ reads_a_scan() {
     "$work/root$prefix/bin/scanhead" run "$work/config.yaml" --pace fast --ready-fd 9 9>"$work/ready" 2>"$work/head.err" &
     head=$!
     read -r ready <"$work/ready" || { cat "$work/head.err"; return 1; }
-    left=500 # a head that is asked at once may still boot
+    left=500 # so many tries: a head that is asked at once may still boot
     until LD_LIBRARY_PATH=$work/root$prefix/lib timeout 60 "$work/client" "tty:$work/port" >"$work/points"; do
         left=$((left - 1))
         if [ $left = 0 ] || ! grep -q 'in state boot' "$work/points"; then
@@ -53,7 +53,7 @@ reads_a_scan() {
     test "$(grep -c '^-\{0,1\}[0-9.]* -\{0,1\}[0-9.]* -\{0,1\}[0-9.]*$' "$work/points")" -gt 1000
 }
 
-# Program, library, header and libscanhead.pc say the same.
+# Program, library, header and libscanhead.pc have the same version.
 versions_agree() {
     version=$(config --modversion)
     expr "$version" : '[0-9][0-9]*\.[0-9]' >/dev/null || { echo "no version in libscanhead.pc: $version"; return 1; }
@@ -68,7 +68,7 @@ END
         test "$("$work/root$prefix/bin/scanhead" --version)" = "scanhead $version"
 }
 
-# The only example in C.
+# README.md has only one example in C, which is compiled here.
 sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it "$work/root" "$prefix"
 check "make install into folders with blanks in their names" blanks_stay
@@ -81,7 +81,8 @@ example_passes() {
         "$work/root$prefix/bin/scanhead" check "$work/example.yaml"
 }
 check "the installed program's example passes its check" example_passes
-# A page for each command, the library's with all that its header declares, the completion, the unit of the service.
+# There are a page for each command, the library's page with all that its header declares, the completion, and the unit
+# of the service.
 has_pages() {
     share=$work/root$prefix/share
     for page in $("$work/root$prefix/bin/scanhead" help --man list); do
@@ -95,7 +96,7 @@ has_pages() {
         grep -qxF "ExecStart=\"$prefix/bin/scanhead\" run /etc/scanhead/%i.yaml" "$work/root$prefix/lib/systemd/system/scanhead@.service"
 }
 check "manual pages, a completion and a unit for the service" has_pages
-# With the modules where npm has installed them.
+# The modules are there where npm has installed them.
 has_ifc_readers() {
     ifc=$work/root$prefix/share/scanhead/ifc
     for file in core/import/ifc/*.mjs; do cmp "$file" "$ifc/${file##*/}" || return; done

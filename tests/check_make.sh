@@ -1,15 +1,15 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Checks what make would do elsewhere: for another machine, and with both Embrees or the one that is asked for. Checks
-# what the archive shows of the library. Scripts stand in for compilers and headers that aren't here; of those builds
-# only the commands are checked. Prints TAP.
+# Checks the commands of make for builds that this machine can't do: for another machine, with both Embrees or with the
+# one that is asked for. Checks the names that the archive of the library exports. Scripts stand in for compilers and
+# headers that aren't here. Only the commands of those builds are checked. Prints TAP.
 set -u
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 
-# would TARGET [VARIABLE=...]: the commands that make would run for it in a new folder, without the variables of a make
-# above.
+# would TARGET [VARIABLE=...]: prints the commands that make would run for it in a new folder. The variables of a make
+# above are not passed on.
 would() {
     target=$1
     shift
@@ -138,7 +138,7 @@ for file in rigs.sh shipped.sh; do cp "tests/$file" "$toy/tests/"; done
 printf '#!/bin/bash\n' >"$toy/tests/run_tap.sh"
 cat >"$toy/tools/gcc" <<'END'
 #!/bin/sh
-# Writes what it was called with to the output, and what it compiled to the log.
+# Writes its arguments to the output, and the name of the source to the log.
 case $1 in -dumpmachine) echo toy; exit ;; esac
 all=$*
 compiled= out=
@@ -155,7 +155,7 @@ printf '#!/bin/sh\n' >"$toy/tools/pkg-config"
 for name in g++ clang clang++ ccache; do cp "$toy/tools/gcc" "$toy/tools/$name"; done
 printf '#!/bin/sh\nexec "$@"\n' >"$toy/tools/ccache"
 chmod +x "$toy"/tools/*
-# toy ARGUMENT...: make in that tree. compiles N ARGUMENT...: it compiles so many sources.
+# toy ARGUMENT...: make in that tree. compiles N ARGUMENT...: make compiles N sources.
 toy() {
     : >"$work/log"
     (cd "$toy" && env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u CC -u CXX -u BUILD LOG="$work/log" PATH="$toy/tools:$PATH" \
@@ -192,7 +192,7 @@ installs_as_built() {
         lacks "$work/toy_out" ' -c ' && compiles 8
 }
 check "make install BUILT=yes installs what is there" installs_as_built
-# The archives and the library lose what has gone, with nothing compiled.
+# The archives and the library lose the members whose sources are gone, and nothing is compiled.
 removed_leaves() {
     says "$toy/build/modules.a" core/sub/two && says "$toy/build/test/common.a" common/five || return
     says "$toy/build/libscanhead.so" host/four || return
@@ -202,14 +202,14 @@ removed_leaves() {
         lacks "$toy/build/libscanhead.so" host/four && lacks "$toy/build/libscanhead.o" host/four
 }
 check "a source that is removed leaves the archives" removed_leaves
-# Its program stays in the folder, and is not asked for.
+# Its program stays in the folder, but make does not ask for it.
 removed_test() {
     [ -e "$toy/build/test/tests/unit/test_toy" ] && rm "$toy/tests/unit/test_toy.c" && ! toy test T=test_toy >"$work/gone" &&
         says "$work/gone" "no tests/\*/test_toy.c"
 }
 check "a test that is removed is not run" removed_test
 
-# ---- the archive, of the objects of both compilers; that of the program is there
+# ---- the archive, made of the objects of both compilers; the program's archive is there, too
 only_the_interface() {
     folder=$1 archive=$1/libscanhead.a
     shift
@@ -223,7 +223,7 @@ check "the archive defines scanhead_... and nothing else for others" only_the_in
 if command -v clang >/dev/null; then
     check "the same of clang's objects" only_the_interface "${BUILD:-build}/clang" OPT=-O0 "CC=$(command -v ccache) clang" CFLAGS=-g0
 fi
-# A client whose functions have the names of some internal ones of the library.
+# A client may have functions with the names of internal ones of the library.
 cat >"$work/client.c" <<END
 #include <scanhead.h>
 #include <stdio.h>

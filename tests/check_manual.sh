@@ -19,13 +19,13 @@ make_pages() {
 
 no_warnings() {
     for page in "$pages"/*; do
-        # As it is read: without marks, and lines are not broken.
+        # The page as it is read: without marks, and with its lines joined.
         LC_ALL=C.UTF-8 groff -man -Tutf8 -P-c -rLL=1000n -rHY=0 -ww "$page" 2>"$work/said" | col -bx >"$page.txt"
         said=$(cat "$work/said")
         [ -z "$said" ] || { echo "$page: $said"; return 1; }
         grep -q '^NAME' "$page.txt" || { echo "$page: no NAME"; return 1; }
     done
-    ls "$pages" | grep -q . # there were some
+    ls "$pages" | grep -q . # there are pages
 }
 
 # Names of options in a help: "  -o, --output FILE".
@@ -51,17 +51,19 @@ options_are_there() {
     done
     twice=$(grep ') echo' "$work/completion" | sort | uniq -d)
     [ -z "$twice" ] || { echo "twice in the completion: $twice"; return 1; }
-    [ $n -gt 150 ] || { echo "only $n options were found"; return 1; } # 203 now; the reading of the help may be wrong
+    # There are 203 now. With far fewer the help was probably read wrongly.
+    [ $n -gt 150 ] || { echo "only $n options were found"; return 1; }
 }
 
-# The text of each, too: the words of the help in their order, whatever the line breaks. A page has '-' where it was one.
+# The text of each is there, too: the words of the help in their order, whatever the line breaks. A page may have '-'
+# for a break.
 texts_are_there() {
     for command in $(commands_of); do
         "$program" "$command" --help | sed '/^Configuration keys:/,$d' | sed -n '/^  /,$p' | tr -s ' \n' '\n\n' |
             grep -v '^$' >"$work/words"
         tr -s ' \n' '\n\n' <"$pages/scanhead-$command.1.txt" | grep -v '^$' >"$work/page"
         missing=$(diff "$work/words" "$work/page" | sed -n 's/^< //p' | tr '\n' ' ')
-        # --help's own row says another thing in the page.
+        # The row of --help itself has other words in the page.
         left=$(echo "$missing" | tr ' ' '\n' | grep . |
             grep -vx 'this\|text\|text,\|or\|only\|that\|part\|-h,\|--help\|\[SECTION\]')
         [ -z "$left" ] || { echo "scanhead-$command.1 lacks: $left"; return 1; }
@@ -77,7 +79,7 @@ keys_are_there() {
         END { exit bad }' "$pages/scanhead.yaml.5.txt" "$work/keys"
 }
 
-# completes "WORDS BEFORE" WORD EXPECTED...: what bash offers for the last word; words are taken apart as bash does it.
+# completes "WORDS BEFORE" WORD EXPECTED...: bash offers these for the last word. Words are split as bash does it.
 completes() {
     COMP_WORDS=($1 "$2")
     COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
@@ -105,7 +107,7 @@ completions() {
         completes "scanhead help --completion" "" bash
 }
 
-# The program takes every word that is offered for an option: where it fails, it has another reason.
+# The program takes every word that is offered for an option. Where it fails, it has another reason.
 words_are_known() {
     ! "$program" record none.yaml -o x.ply --colour nothing 2>&1 | grep -qv -e "--colour nothing: allowed are" || return
     for pair in run:--pace record:--colour record:--crs record:--ply-names; do

@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# What `make deb` would put into packages, without building any: symbols, versions, files, the unit, licences. The packages
-# themselves: make deb-check. Prints TAP. $SCANHEAD: the program of the build whose library is looked at.
+# Checks the contents of the packages of `make deb` without building any: symbols, versions, files, the unit, licences.
+# `make deb-check` tries the packages themselves. Prints TAP. $SCANHEAD: the program of the build whose library is
+# looked at.
 set -u
 build=$(dirname "${SCANHEAD:-build/scanhead}")
 work=$(mktemp -d) || exit 1
@@ -9,7 +10,7 @@ trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 packaging=config/packaging
 
-# Both ways: what the library exports, and what it promises; no symbol says that it came in a release of the future.
+# The library exports exactly the promised symbols, and no symbol is said to come in a future release.
 symbols_agree() {
     nm -D --defined-only --with-symbol-versions "$build/libscanhead.so" | sed -n 's/.* \(scanhead_.*\)@@/\1@/p' | sort >"$work/has"
     sed -n 's/^ \(scanhead_[^ ]*\) [0-9].*/\1/p' $packaging/debian/libscanhead1.symbols | sort >"$work/says"
@@ -19,7 +20,7 @@ symbols_agree() {
     [ "$(printf '%s\n' "$newest" "$version" | sort -V | tail -n 1)" = "$version" ]
 }
 
-# All that is installed belongs to a package, and a package has nothing else. (check_install.sh looks at make install.)
+# All that is installed belongs to a package, and packages have nothing else. (check_install.sh looks at make install.)
 files_agree() {
     env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$build" DESTDIR="$work/root" PREFIX=/usr \
         LIB=lib/triplet || return
@@ -37,7 +38,7 @@ files_agree() {
     done
 }
 
-# A release has what the Makefile reads, and no more at its top.
+# A release has the files that the Makefile reads, and no others at its top.
 sources_are_all() {
     listed=$(sed -n 's/^DEB_SOURCES = //p' $packaging/packaging.mk)
     for top in $listed; do [ -e "$top" ] || { echo "no $top"; return 1; }; done
@@ -57,7 +58,7 @@ licences_are_named() {
         grep -q '^Copyright (c) .* the scanhead authors$' LICENSE
 }
 
-# systemd rates the unit's exposure 1.5 now. The rest is what the head needs: the network, real time.
+# systemd rates the unit's exposure 1.5 now. The rest is needed by the head: the network, and real time.
 unit_is_sound() {
     sed "s|@PREFIX@|$work/root/usr|" $packaging/scanhead@.service.in >"$work/scanhead@.service"
     systemd-analyze verify --man=no "$work/scanhead@example.service" 2>&1 | grep "$work" && return 1
@@ -65,7 +66,7 @@ unit_is_sound() {
         { tail -n 1 "$work/security"; return 1; }
 }
 
-# What its manager allows covers what the pacing thread asks for.
+# The unit's limits allow all that the pacing thread asks for.
 limits_agree() {
     priority=$(sed -n 's/^enum { PACER_PRIORITY = \([0-9]*\) };/\1/p' firmware_sim/loop/pacer.c)
     [ -n "$priority" ] && grep -qx "LimitRTPRIO=$priority" $packaging/scanhead@.service.in &&

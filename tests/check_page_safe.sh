@@ -1,14 +1,14 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The page takes what a head says as text, never as HTML or as a program, and loads nothing from elsewhere: names of
-# surfaces, texts of errors and replies come from a head that may be hostile. Prints TAP.
+# The page takes the texts of a head as text, never as HTML or as a program, and loads nothing from elsewhere. A hostile
+# head may send any name of a surface, error or reply. Prints TAP.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
 
-# none PATTERN FILE...: prints where it is.
+# none PATTERN FILE...: prints each place where it is found.
 none() {
     ! grep -n -E -- "$@"
 }

@@ -88,7 +88,8 @@ checkout() { # document
     ln -s "$program" "$(dirname "$program")/libscanhead.a" "$work/tree/build/"
 }
 
-# within COMMAND...: in the checkout, within the limit, by itself in a group that ends with it. Output to $work/out.
+# within COMMAND...: runs a command in the checkout, within the limit, in a group of its own that ends with it. Its output
+# goes to $work/out.
 within() {
     : >"$work/out"
     set -m
@@ -105,8 +106,8 @@ within() {
     return $status
 }
 
-# interrupt PID: as Ctrl-C does, the whole group, once something stands on standard output. A group that ends, or says nothing
-# within the limit, isn't interrupted.
+# interrupt PID: interrupts the whole group, as Ctrl-C does, once there is a line on standard output. A group that ends,
+# or prints nothing within the limit, isn't interrupted.
 interrupt() {
     until [ -s "$work/out" ]; do
         kill -0 "$1" 2>/dev/null || return 0
@@ -115,13 +116,13 @@ interrupt() {
     kill -INT -- "-$1" 2>/dev/null
 }
 
-# save FILE WHERE: where a recipe looks for it, which is in build/ and nowhere else.
+# save FILE WHERE: saves it where a recipe looks for it, which may only be in build/.
 save() {
     echo "$2: not a name in build/" >"$work/out"
     [[ $2 =~ ^build/[A-Za-z0-9_.-]+$ ]] && cp "$1" "$work/tree/$2"
 }
 
-# do_block FILE INFO: 0 when the block holds what its mark promises; else the reason is in $work/out.
+# do_block FILE INFO: returns 0 when the block does what its mark promises; else the reason is in $work/out.
 do_block() {
     local language=${2%% *} mark=${2#* }
     [ "$language" != "$2" ] || mark=
@@ -153,7 +154,7 @@ dead_links() {
     done
 }
 
-# runs_here PROGRAM: else why not is in $lacks.
+# runs_here PROGRAM: returns whether it is installed; if not, the reason is in $lacks.
 runs_here() {
     lacks="$1 is not installed"
     command -v "$1" >/dev/null || return 1
@@ -162,7 +163,7 @@ runs_here() {
         NR == 1 { for (i = 1; i < NF; i++) if ($i ~ /^[0-9]+$/) exit !($i > 4 || ($i == 4 && $(i + 1) >= 4)) }'
 }
 
-# One test for each block with a mark, one that all have one, and one of its links.
+# There is one test for each block with a mark, one that all blocks have a mark, and one of the document's links.
 check_document() { # document, as it is called
     local number line info dead unmarked=
     rm -rf "$work/blocks"
@@ -197,7 +198,7 @@ expect() {
     report $? "planted: $2" "$found"
 }
 
-limit_s=60 # but where a command does not end
+limit_s=60 # 2 s where a command does not end
 expect 0 'a good document' '```sh run' 'echo 1 >build/a' '```' '```sh run' 'grep 1 build/a' '```' '```sh not run: root' 'false' '```' \
     '```c as build/a.c' 'int main(void) { return 0; }' '```' '```sh run' 'cc build/a.c -o build/a; build/a' '```' '```text' 'x' '```'
 expect 0 'a program that is there' '```sh run with true' 'true' '```'

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# scanheadd is the head alone: its libraries and commands, and the same stream as scanhead's. Prints TAP. $SCANHEAD: a
-# program; the two that lie beside it are looked at.
+# scanheadd is the head alone: it has the head's libraries and commands, and the same stream as scanhead. Prints TAP.
+# $SCANHEAD: a program; the two that lie beside it are checked.
 set -u
 built=$(dirname "${SCANHEAD:-build/scanhead}")
 head=$built/scanheadd
@@ -21,7 +21,7 @@ libraries() {
     needed "$head" | grep -qx yaml-0 && needed "$built/scanhead" | grep -q '^png'
 }
 
-# A name is defined by the studio alone, and scanheadd has none of these.
+# These names are defined by the studio alone, and scanheadd has none of them.
 without_studio() {
     (cd "$built" && find core/studio drivers/record firmware_sim/app/studio -name '*.c.o' -exec nm -g --defined-only {} +) |
         awk 'NF == 3 { print $3 }' | sort >"$work/studio"

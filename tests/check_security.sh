@@ -11,7 +11,7 @@ trap 'rm -rf "$work"' EXIT
 names() {
     grep -o '`[^`]*`' "$1" | tr -d '`' | grep -E '^(test_|fuzz_.|check_|tsan_|page\.sh)[a-z0-9_.]*$' | sort -u
 }
-# is_there NAME: the file, and the case as a word in it.
+# is_there NAME: the file exists, and the case is a word in it.
 is_there() {
     local file=${1%%.*} word=${1#*.} path
     [ "$1" != page.sh ] || { [ -e tests/page/page.sh ]; return; }
@@ -26,7 +26,7 @@ all_there() {
     for name in $(names "$1"); do is_there "$name" || { echo "no $name" && bad=1; }; done
     return $bad
 }
-# Each row of a table has one.
+# Each row of a table names a test.
 rows_have_one() {
     ! grep '^|' "$1" | grep -v '^| ---' | grep -v '| test |$' | grep -v '`\(test_\|fuzz_\|check_\)'
 }

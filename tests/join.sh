@@ -5,8 +5,8 @@
 # of a program the sanitizer of leaks looks through the variables of all of them.)
 #   LINK='cc ...' LIBS='-l...' LD=ld OBJCOPY=objcopy JOBS=2 join.sh BUILD PROGRAM...     PROGRAM: BUILD/tests/FOLDER/test_NAME
 #
-# Only main of a program and its rigs is seen from outside, under the program's name: programs may use the same names. One that
-# puts a function of its own in the place of a library's, or of the head's, is linked by itself: in the joined file all
+# Only a program's main is visible from outside, under the program's name. So programs and their rigs may use the same
+# names. A program is linked by itself where it replaces a function of a library or of the head: in the joined file all
 # programs would call that function.
 set -euo pipefail
 build=$1
@@ -16,7 +16,7 @@ limit=$build/tests/common/limit.c.o
 work=$build/tests/joining AT_ONCE=20
 mkdir -p "$work"
 
-# PROGRAM OBJECT... for each, its own object first.
+# Each line is a program and its objects, its own object first.
 sh tests/rigs.sh | awk -v build="$build" -v programs="$*" '
     { split($0, pair, ":"); rigs[build "/" pair[1]] = rigs[build "/" pair[1]] " " build "/" pair[2] ".o" }
     END { n = split(programs, list, " "); for (i = 1; i <= n; i++) print list[i], list[i] ".c.o" rigs[list[i]] }' >"$work/list"
@@ -29,7 +29,8 @@ cut -d ' ' -f 2- "$work/list" | tr ' ' '\n' | sort -u | xargs nm -P -g -A --defi
 awk 'NR == FNR { own[$1] = 1; next } { for (i = 2; i <= NF; i++) if ($i in own) { print; next } }' "$work/own" "$work/list" >"$work/apart"
 grep -v -x -F -f "$work/apart" "$work/list" >"$work/together" || : # none
 
-# one FOLDER/NAME OBJECT...: an object in which main is called after the program; it stays until one of its own is newer.
+# one FOLDER/NAME OBJECT...: makes an object in which main has the program's name. It is kept until one of its own
+# objects is newer.
 one() {
     local program=$1 name=${1##*/}
     local out=$work/${program%/*}-$name.o object
@@ -51,7 +52,7 @@ export -f one by_itself
 sed "s|^$build/tests/||" "$work/together" | xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; one "$@"' -
 xargs -r -P "$JOBS" -L 1 bash -c 'set -eu; by_itself "$@"' - <"$work/apart"
 
-# join FILE OBJECTS-PREFIX NAME...: one file of these programs
+# join FILE OBJECTS-PREFIX NAME...: makes one file of these programs.
 join() {
     local file=$1 folder=${1%/*} prefix=$2 name
     shift 2

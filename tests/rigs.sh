@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Which rigs a test program is linked with: those whose headers it includes, directly or not. Prints PROGRAM:SOURCE for
-# each, without folders of its own choosing: `#include "tests/unit/cast_rig.h"` links tests/unit/cast_rig.c, if there is one.
-# The Makefile calls this; what lies in tests/common and tests/bench is a library and not listed.
+# Finds the rigs that a test program is linked with: those whose headers it includes, directly or not. Prints
+# PROGRAM:SOURCE for each. `#include "tests/unit/cast_rig.h"` links tests/unit/cast_rig.c, if there is one. The Makefile
+# calls this. The sources of tests/common and tests/bench are libraries and not listed.
 cd "$(dirname "$0")/.." || exit 1
 {
     for source in tests/*/*.c; do echo "$source"; done

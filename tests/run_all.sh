@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part all of
-# them: the unit tests with the sanitizers in, and those that make built as shipped once more. Ends with one line of counts.
+# Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part it
+# runs all: the unit tests with sanitizers, and once more those that make built as shipped. It ends with one line of
+# counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
 #   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
@@ -15,14 +16,14 @@ part=${2:-}
 waiting="three_heads head_faults fault_times slow_reader pty gnss fault_links sessions grabber_hokuyo grabber_velodyne raw_replay signals same_stream"
 waiting="$waiting clients join soak"
 alone="bench_cli latency overrun ring_threads"
-beside="grabber_sick gpsd" # other people's clients that take their time
+beside="grabber_sick gpsd" # other people's clients take their time
 longest="beside leaks meshes beam_reference range sight_cast coordinates plan beam georef_default attributes moving travel ticks"
 
 wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]
 }
 
-# Unit tests that run as shipped beside those with the sanitizers in; all of them when the unit tests run alone.
+# These unit tests run as shipped beside those with sanitizers. All do when the unit tests run alone.
 if [ -z "$part" ]; then shipped=$(sh tests/shipped.sh | sed 's|.*/test_||; s/\.c$//' | tr '\n' ' '); else shipped=all; fi
 runs() { # FOLDER NAME [BUILD]
     [ -e "tests/$1/test_$2.c" ] || return 1
@@ -58,7 +59,7 @@ fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
 if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh tests/check_scanheadd.sh tests/check_package.sh; fi # a browser beside them
 
-# apart NAME...: those programs of the wanted folders, and those of unit with the sanitizers in.
+# apart NAME...: prints those programs of the wanted folders, and those of unit with sanitizers.
 apart() {
     for name; do
         for folder in accuracy stability unit wire; do

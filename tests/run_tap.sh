@@ -37,7 +37,7 @@ processors=$(getconf _NPROCESSORS_ONLN)
 declare -A running=() # process: number of its program
 declare -A overdue=() # number: its limit, which it has passed
 ticker=
-# timeout has made a process group of the program and passes the signal on to all of it.
+# timeout has made a process group of the program, and passes the signal on to the whole group.
 trap '[ ${#running[@]} -gt 0 ] && kill "${!running[@]}" 2>/dev/null; [ -z "$ticker" ] || kill "$ticker" 2>/dev/null; rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 
@@ -68,8 +68,8 @@ total_passed=0 total_failed=0 total_skipped=0
 
 programs=() started_ms=() ended_ms=() statuses=() reported=0
 
-# start PROGRAM: in the background, so that an interrupt needs no wait for the program; its streams apart, as a line of one must not
-# fall into a line of the other.
+# start PROGRAM: starts it in the background, so that an interrupt doesn't wait for the program. Its streams go to
+# separate files, as lines of one must not mix with lines of the other.
 start() {
     local number=${#programs[@]} program=$1
     programs+=("$program")
@@ -118,7 +118,7 @@ wait_one() {
     unset "running[$process]"
     ended_ms[number]=$(date +%s%3N)
     [ -z "${overdue[$number]:-}" ] || status=124
-    kill -KILL -- "-$process" 2>/dev/null # what it has left behind
+    kill -KILL -- "-$process" 2>/dev/null # kills processes that it has left behind
     statuses[number]=$status
     while [ -n "${statuses[reported]:-}" ]; do
         report $reported
@@ -126,7 +126,7 @@ wait_one() {
     done
 }
 
-# report NUMBER: of a program that has ended.
+# report NUMBER: reports a program that has ended.
 report() {
     local number=$1 program=${programs[$1]} status=${statuses[$1]} name planned passed failed skipped results missing why=""
     local took_ms=$((ended_ms[number] - started_ms[number])) out=$work/$1.out
@@ -154,7 +154,7 @@ report() {
     printf '%-4s %-32s %4d ok %4d not ok %4d skip  %d.%03d s%s\n' "$([ "$failed" -eq 0 ] && echo ok || echo FAIL)" \
         "$name" "$passed" "$failed" "$skipped" $((took_ms / 1000)) $((took_ms % 1000)) "$why"
     if [ "$failed" -eq 0 ]; then
-        case $program in # their tables are what they are for
+        case $program in # these programs exist for their tables
         */stability/* | */accuracy/* | */test_models | */test_hostile_files) grep -a '^# ' "$out" | grep -a -v -E '^# (not )?ok' | sed 's/^# /    /' ;;
         esac
     else
@@ -186,7 +186,7 @@ for program; do
         at_a_time=${at_a_time:-1}
         ;;
     +*)
-        beside=$((beside + 1)) # also once it has ended: one more at a time is no harm
+        beside=$((beside + 1)) # it stays counted once it has ended: one more at a time does no harm
         start "${program#+}"
         ;;
     *)

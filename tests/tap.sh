@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-# For scripts that print TAP; to be sourced, with the folder $work. It ends with the plan: echo "1..$tests".
+# Functions for scripts that print TAP. A script sources it with the folder $work, and ends with the plan: echo
+# "1..$tests".
 tests=0
 
-# check NAME COMMAND...: passes when the command does; else what it wrote is shown.
+# check NAME COMMAND...: passes when the command succeeds; else it shows the command's output.
 check() {
     tests=$((tests + 1))
     name=$1

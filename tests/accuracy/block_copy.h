@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A copy of a block's entries, to compare another cast with. */
+/* A copy of a block's entries, for comparison with another cast. */
 #ifndef TESTS_ACCURACY_BLOCK_COPY_H
 #define TESTS_ACCURACY_BLOCK_COPY_H
 

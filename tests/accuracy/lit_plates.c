@@ -9,8 +9,8 @@ void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view 
     if (beam_rig_open(rig, scene, STATION, view, &err) != 0) fail_msg("%s", err.text);
 }
 
-/* Energy beyond a line at h of the unit disc: the Gaussian's strips across, each an error function long, by Simpson's
- * rule over x = -cos a, which has no corner at the disc's border. */
+/* Returns the energy beyond a line at h of the unit disc. The Gaussian's strips across are each an error function long.
+ * They are summed by Simpson's rule over x = -cos a, which has no corner at the disc's border. */
 static double energy_beyond(double h)
 {
     enum { STEPS = 2000 };

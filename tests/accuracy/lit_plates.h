@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Two plates, one behind the other, in one beam: what each echo must bring back, written down. For tests of footprints
- * with detection. */
+/* Two plates, one behind the other, in one beam. The light that each echo must bring back is worked out here. For tests
+ * of footprints with detection. */
 #ifndef TESTS_ACCURACY_LIT_PLATES_H
 #define TESTS_ACCURACY_LIT_PLATES_H
 
@@ -24,7 +24,7 @@ void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view 
 
 enum { FRONT, BACK };
 
-/* Left of x = 0 a plate at near_m, behind it another one, or on the right only. */
+/* A plate at near_m is on the left of x = 0. Another one at far_m is behind all of it, or on the right only. */
 struct scene *plates(double near_m, double far_m, int whole_back);
 
 /* A rig with a signal: reflectances of both plates, and rho_min at 1 m (0: everything is seen). */
@@ -40,7 +40,7 @@ void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, 
 
 void close_lit(struct lit *l);
 
-/* What a pulse along d meets: energy on the front plate, and what comes back of both, slope included. */
+/* The energy of a pulse along d on the front plate, and the light that comes back from both, slope included. */
 struct edge {
     double front, back[2], range_m[2];
 };
@@ -49,9 +49,9 @@ struct edge at_edge(const struct lit *l, double dx, double dy);
 
 double linear(const struct line_block *b, uint32_t i);
 
-/* Reflectances are told in 0.01 dB: 0.12 % of themselves. The edge lies off its place in the footprint by a part in
- * 1,000 of the radius (the view's slopes). Of 18 rings' 1,027 sub-rays, 37 lie on one line through the centre: an edge
- * along it has half of them on the wrong side, 1.8 %. */
+/* Reflectances are reported in 0.01 dB: 0.12 % of themselves. The edge lies beside its place in the footprint by a part
+ * in 1,000 of the radius (the view's slopes). 18 rings have 1,027 sub-rays, of which 37 lie on one line through the
+ * centre. An edge along it has half of them on the wrong side, 1.8 %. */
 #define PARTS_OFF 1e-3
 #define RINGS_OFF 0.02
 void near_energy(double told, double want, double rho, double slack);

@@ -27,7 +27,7 @@ static void draw_triangle(struct drawn *d, const double a[3], const double b[3],
     d->label[d->n_triangles++] = label;
 }
 
-/* The parallelogram a, a + u, a + u + v, a + v. */
+/* Adds the parallelogram a, a + u, a + u + v, a + v. */
 static void draw_quad(struct drawn *d, const double a[3], const double u[3], const double v[3], uint16_t label)
 {
     double b[3], c[3], e[3];
@@ -40,7 +40,7 @@ static void draw_quad(struct drawn *d, const double a[3], const double u[3], con
     draw_triangle(d, a, c, e, label);
 }
 
-/* Its edges are x, y, z. */
+/* A box with the edges x, y and z. */
 static void draw_box(struct drawn *d, const double a[3], const double x[3], const double y[3], const double z[3],
                      uint16_t label)
 {
@@ -62,7 +62,7 @@ static void any_vector(uint64_t *random, double most, double out[3])
         out[i] = most * (2.0 * case_unit(random) - 1.0);
 }
 
-/* Walls of squares of 1 m, 12 x 10 x 5 m around the middle, with a window of 4 squares that is open. */
+/* Walls of squares of 1 m, 12 x 10 x 5 m around the middle. An open window takes 4 squares. */
 static void draw_walls(struct drawn *d, const double at_m[3])
 {
     static const double half[3] = {6.0, 5.0, 2.5};
@@ -82,7 +82,7 @@ static void draw_walls(struct drawn *d, const double at_m[3])
         }
 }
 
-/* In a ball around at_m, not nearer than 0.7 m. */
+/* Draws a point in a ball around at_m, not nearer than 0.7 m. */
 static void any_place(uint64_t *random, const double at_m[3], double out[3])
 {
     double r;

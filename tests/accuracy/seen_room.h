@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A room full of what a sight must get right, and two casts of it: one asks the BVH for each ray, one has a sight. */
+/* A room full of surfaces that are hard for a sight, and two casts of it: one asks the BVH for each ray, one has a
+ * sight. */
 #ifndef TESTS_ACCURACY_SEEN_ROOM_H
 #define TESTS_ACCURACY_SEEN_ROOM_H
 
@@ -22,17 +23,17 @@ struct seen_room {
     struct cast_beam beam;
     struct schedule_segment segment;
     struct cast_setup setup; /* single rays, polar, no noise, without sight */
-    /* 0: without sight, 1: with */
+    /* [0] is without the sight, [1] with it */
     struct caster *caster[2];
     struct line_block block[2];
 };
 
-/* Things, overlaps, needles, pairs of faces that lie less apart than float resolves, a hole to the outside;
- * everything around at_m. */
+/* Makes a room around at_m: things, overlaps, needles, pairs of faces that lie closer than float resolves, and a hole
+ * to the outside. */
 void seen_room_open(struct seen_room *room, uint64_t seed, const double at_m[3]);
 void seen_room_close(struct seen_room *room);
 
-/* Casts all lines both ways, and compares the blocks: each bit must be the same. Returns the number of echoes. */
+/* Casts all lines both ways and compares the blocks: each bit must be the same. Returns the number of echoes. */
 uint64_t seen_room_compare(struct seen_room *room, const struct cast_setup *without, const struct cast_setup *with);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Slanted surfaces in a beam, and how wide an echo they make by the definition in core/footprint.h: many sub-rays, met with
- * the plane one by one. For tests of attributes. */
+/* Slanted surfaces in a beam, and the width of their echo by the definition in core/footprint.h: many sub-rays meet the
+ * plane one by one. For tests of attributes. */
 #ifndef TESTS_ACCURACY_SLANTED_H
 #define TESTS_ACCURACY_SLANTED_H
 
@@ -9,7 +9,7 @@
 #define CNS_PER_M (2e11 / 299792458.0)
 #define FULL2     (8.0 * M_LN2) /* square of the full width at half maximum of a Gaussian, in sigma^2 */
 
-/* Pulses close together, so that they all look at the same. */
+/* Pulses so close together that they all see the same. */
 extern const struct beam_view AHEAD;
 enum { MOST_CUTS = 3 };
 
@@ -20,23 +20,24 @@ struct face {
     double cut[MOST_CUTS][4];
 };
 
-/* Mean and variance of the ranges of sub-rays on a Vogel spiral, equal energy each, that meet the face; their share. */
+/* Writes mean and variance of the ranges of sub-rays on a Vogel spiral, equal energy each, that meet the face. Returns
+ * their share. */
 double spread(const struct beam *beam, const double dir[3], const struct face *f, double *mean, double *variance);
 
 double width_of(double pulse_m, double variance);
 
-/* A quad on the plane through (0, range, 0) that is slanted by i, about an axis that is turned by `about` from
- * vertical; its corners u, v of the plane's axes, the second one along the slant. */
+/* Makes a quad on the plane through (0, range, 0). The plane is slanted by i, about an axis that is turned by `about`
+ * from vertical. u and v are the corners along the plane's axes, the second one along the slant. */
 struct scene *slanted(double range_m, double i, double about, const double u[2], const double v[2], struct face *face);
 
 void open_attributes(struct beam_rig *rig, struct scene *scene, const struct beam_view *view, double pulse_s);
 
-/* Half a count, and 0.02 % of 40,000 rays' spread. Beyond that the closed form is first order in b = s tan i, and short
- * by b^2 / 2: E sin^2 rho^2 = 0.1715, so the series of 1 / (1 - b rho sin phi) has (3 * 0.0701 - 0.1715^2) / 0.1715 /
- * 2 = 0.53 b^2 of the standard deviation. */
+/* The bound is half a count, and 0.02 % of 40,000 rays' spread. Beyond that the closed form is first order in b = s tan
+ * i, and short by b^2 / 2: E sin^2 rho^2 = 0.1715, so the series of 1 / (1 - b rho sin phi) has (3 * 0.0701 - 0.1715^2)
+ * / 0.1715 / 2 = 0.53 b^2 of the standard deviation. */
 void check_width(double told_cns, double want_cns, double b, double slack);
 
-/* What is off beyond the wire's rounding, as a share of the width. */
+/* Returns the error beyond the wire's rounding, as a share of the width. */
 double excess(double told_cns, double want_cns);
 
 #endif

@@ -60,7 +60,8 @@ void station_forward(const struct georef *georef, struct station_points *p, doub
                    (struct vec3_out){out[0], out[1], out[2]});
 }
 
-/* A degree is at most pi/180 (a^2/b + height) long, of longitude that times the cosine of latitude. */
+/* A degree of latitude is at most pi/180 (a^2/b + height) long; one of longitude is that times the cosine of
+ * latitude. */
 double station_error_m(const struct georef *georef, const struct station_points *p)
 {
     double anchor[3], worst = 0.0;

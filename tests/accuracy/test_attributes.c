@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Amplitudes against the range equation; and amplitude and width beside their echo, whatever becomes of that. */
+/* Amplitudes against the range equation. Amplitude and width stay with their echo, whatever happens to it. */
 #include "tests/accuracy/lit_plates.h"
 
 /* A = rho cos i / rho_min(R), and rho_min goes with R^2: 20 dB less at ten times the range. */
@@ -33,8 +33,8 @@ static void amplitudes_follow_the_range_equation(void **state)
     }
 }
 
-/* Thresholds of a data sheet with two reaches, in another air, with light lost at short range: at a reach the sheet's
- * own target is at the threshold but for that. */
+/* Thresholds of a data sheet with two reaches, in another air, with light lost at short range. At a reach the sheet's
+ * own target is at the threshold, but for those losses. */
 static void amplitudes_in_fog_and_at_short_range(void **state)
 {
     (void)state;
@@ -67,7 +67,8 @@ static void amplitudes_in_fog_and_at_short_range(void **state)
     assert_true(fabs(cdb[2] - 1000.0 * log10(a)) < 0.51);
 }
 
-/* With a noisy detector amplitude and reflectance carry the same noise, and what is told is above the threshold. */
+/* With a noisy detector amplitude and reflectance carry the same noise, and echoes that are sent are above the
+ * threshold. */
 static void amplitude_and_reflectance_agree(void **state)
 {
     (void)state;
@@ -103,7 +104,7 @@ static void amplitude_and_reflectance_agree(void **state)
 
 /* ---- beside their echo */
 
-/* Of pulses on two plates, the nearer one slanted: by plate, what goes with it. */
+/* Attributes of pulses on two plates, by plate. The nearer one is slanted. */
 struct told {
     int16_t amplitude_cdb[2];
     uint16_t width_cns[2];
@@ -127,7 +128,7 @@ static struct told *tell(struct beam_rig *rig, uint32_t line, struct told told[1
     return told;
 }
 
-/* Every echo that is told has what it had when all were. Returns how many. */
+/* Every echo that is sent has the attributes that it had when all were sent. Returns their number. */
 static uint32_t same_as(const struct told all[16], const struct told now[16])
 {
     uint32_t n = 0;
@@ -141,7 +142,7 @@ static uint32_t same_as(const struct told all[16], const struct told now[16])
     return n;
 }
 
-/* Left of x = 0 a plate at 20 m, slanted by 70 degrees; behind it one at 23 m. */
+/* A plate at 20 m on the left of x = 0, slanted by 70 degrees, and one at 23 m behind it. */
 static struct scene *slanted_front(void)
 {
     const double vertex[8][3] = {{-1.0, 20.0 - 2.75, -1.0}, {0.0, 20.0, -1.0}, {0.0, 20.0, 1.0}, {-1.0, 17.25, 1.0},
@@ -156,8 +157,8 @@ static struct scene *slanted_front(void)
     return scene;
 }
 
-/* Chosen, crowded out, folded in front of each other, moved by noise, or too far for the integers: those that stay keep
- * their own. */
+/* Echoes are chosen, crowded out, folded in front of each other, moved by noise, or too far for the integers. Those
+ * that stay keep their own attributes. */
 static void attributes_stay_with_their_echo(void **state)
 {
     (void)state;
@@ -199,7 +200,7 @@ static void attributes_stay_with_their_echo(void **state)
             *s = plain;
             if (!detect) continue;
             s->detect = &l.detect;
-            /* pulses 21.5 m of range apart: what is behind is told in front */
+            /* pulses are 21.5 m of range apart: the plate behind is reported in front */
             l.detect.ambiguity = DETECT_FOLDED;
             struct schedule_segment segment = l.rig.segment;
             l.rig.segment.ns_quot = 143;
@@ -214,7 +215,7 @@ static void attributes_stay_with_their_echo(void **state)
     close_lit(&l);
 }
 
-/* A block without room for them is filled as ever, with the same points. */
+/* A block without room for attributes is filled as ever, with the same points. */
 static void points_are_the_same_without(void **state)
 {
     (void)state;

@@ -19,7 +19,7 @@ static void open_rig(struct beam_rig *rig, struct scene *scene, const struct bea
     if (beam_rig_open(rig, scene, station_m, view, &err) != 0) fail_msg("%s", err.text);
 }
 
-/* Energy and moment beyond a line, summed over small cells of the disc in polar coordinates. */
+/* Writes energy and moment beyond a line, summed over small cells of the disc in polar coordinates. */
 static void sum_half(double h, double *energy, double *moment)
 {
     enum { RINGS = 2000, PARTS = 2000 };
@@ -37,7 +37,7 @@ static void sum_half(double h, double *energy, double *moment)
     *moment = m / all;
 }
 
-/* The sum's cells at the line are off by half a cell at random: 1e-3 / sqrt(number of them) < 1e-4. */
+/* The sum's cells at the line are wrong by half a cell at random: 1e-3 / sqrt(number of them) < 1e-4. */
 static void test_half(void **state)
 {
     (void)state;
@@ -53,8 +53,8 @@ static void test_half(void **state)
     }
 }
 
-/* Each sub-ray stands for the same energy: of n, the share within radius r is the Gaussian's, up to one ring. Their
- * mean rho^2 is 0.3435. */
+/* Each sub-ray stands for the same energy. The share of n within radius r is the Gaussian's, up to one ring. Their mean
+ * rho^2 is 0.3435. */
 static void test_rings(void **state)
 {
     (void)state;
@@ -73,8 +73,8 @@ static void test_rings(void **state)
     assert_true(fabs(inside - (1.0 - exp(-0.5)) / (1.0 - exp(-2.0))) < 0.03);
 }
 
-/* The middle of those sub-rays that are beyond a line, against that of the part of the footprint beyond it: below what
- * beam_end_error says, for each line that leaves what may be an echo, and above two fifths of it for some line. */
+/* The middle of the sub-rays beyond a line is compared with that of the part of the footprint beyond it. The difference
+ * is below beam_end_error for each line that leaves enough for an echo, and above two fifths of it for some line. */
 static void test_end_of_a_plane(void **state)
 {
     (void)state;
@@ -106,7 +106,7 @@ static void test_end_of_a_plane(void **state)
     }
 }
 
-/* A wall at range_m straight ahead, its normal turned away by the incidence. */
+/* A wall stands at range_m straight ahead. Its normal is turned away by the incidence. */
 static struct scene *wall(double range_m, double incidence_rad)
 {
     const double s = sin(incidence_rad), c = cos(incidence_rad), half = 5.0 + 0.1 * range_m;
@@ -126,7 +126,8 @@ static struct scene *wall(double range_m, double incidence_rad)
     return scene;
 }
 
-/* One ray and the closed term: within 0.05 mm of the mean. Without the term it is 0.14 mm off at 800 m and 80 deg. */
+/* One ray and the closed term are within 0.05 mm of the mean. Without the term the error is 0.14 mm at 800 m and 80
+ * deg. */
 static void test_wall(void **state)
 {
     (void)state;
@@ -164,7 +165,7 @@ static void test_wall(void **state)
 
 /* ---- a door edge */
 
-/* The left half of the view at 20 m, the rest deeper by step_m. */
+/* The left half of the view is at 20 m, the rest deeper by step_m. */
 static struct scene *door(double step_m)
 {
     double vertex[8][3];
@@ -186,9 +187,9 @@ static struct scene *door(double step_m)
     return scene;
 }
 
-/* With steps from less than a millimetre to more than the resolution: one echo at the energy-weighted mean of both
- * surfaces up to it, two beyond, for each of the pulses across the edge. Half a millimetre is what the outlines take
- * for none; the mean there is off by at most half of the step. */
+/* Steps go from less than a millimetre to more than the resolution. Up to it there is one echo at the energy-weighted
+ * mean of both surfaces, beyond it two, for each pulse across the edge. The outlines take up to half a millimetre for
+ * no step, and the mean there is wrong by at most half of the step. */
 static void test_door_edge(void **state)
 {
     (void)state;
@@ -205,7 +206,7 @@ static void test_door_edge(void **state)
             beam_rig_line(&rig, l);
             for (uint32_t i = 0, at = 0; i < view.pulses; i++) {
                 double energy, moment, x = d[0][i] / d[1][i] * 20.0, h = -x / beam_radius(&rig.beam.beam, 20.0);
-                beam_half(&rig.beam.beam, fmax(-1.0, fmin(1.0, h)), &energy, &moment); /* of what is behind */
+                beam_half(&rig.beam.beam, fmax(-1.0, fmin(1.0, h)), &energy, &moment); /* of the surface behind */
                 uint32_t n = rig.block.echo[at] >> 4, first = at;
                 at += n;
                 if (fabs(energy - 0.01) < 0.001 || fabs(energy - 0.99) < 0.001) continue;
@@ -225,7 +226,7 @@ static void test_door_edge(void **state)
     }
 }
 
-/* Which echoes are sent: first, last and strongest are those of all. */
+/* The echo mode chooses: first, last and strongest are those of all. */
 static void test_selection(void **state)
 {
     (void)state;

@@ -43,7 +43,7 @@ struct points {
     uint8_t echo[ROOM];
 };
 
-/* Line l in runs of `most` pulses, the first one of them `lead`; 0: as a whole. */
+/* Casts line l in runs of `most` pulses, the first one of `lead`. With 0 the line is cast as a whole. */
 static void cast_cut(struct beam_rig *rig, uint32_t l, uint32_t lead, uint32_t most, struct points *to)
 {
     struct schedule_line line;
@@ -87,7 +87,7 @@ static void all_cuts_alike(struct beam_rig *rig)
             assert_memory_equal(cut.echo, whole.echo, whole.n);
         }
     }
-    assert_true(several > 100); /* the scene has what is in question */
+    assert_true(several > 100); /* the scene has many pulses with several echoes */
 }
 
 static void modes_alike(const struct cast_detect *detect)
@@ -125,8 +125,8 @@ static void with_glass(void **state)
     surface_table_free(&table);
 }
 
-/* A plate at 54 m up to an edge, a wall behind it: pulses within 3 um of the edge, where the outline, in float, and the
- * central ray may not agree on which side the centre is. Each footprint lies half on either. */
+/* A plate at 54 m reaches up to an edge, with a wall behind it. Pulses pass within 3 um of the edge, where the outline,
+ * in float, and the central ray may disagree on the centre's side. Each footprint lies half on either. */
 static void within_floats_of_an_edge(void **state)
 {
     (void)state;
@@ -160,9 +160,10 @@ static void within_floats_of_an_edge(void **state)
     beam_rig_close(&rig);
 }
 
-/* A plate at 5 m up to an edge, the sky, and in it a wire of 4 mm at 50 m, within 2 cm of where the edge is seen: of
- * footprints whose centre lies on the plate a part sees past it, and the wire there, which the ray of that part mostly
- * misses. Against 1,000 sub-rays, where these leave no doubt: each echo has 3 % of the energy, or less than 0.5 %. */
+/* A plate at 5 m reaches up to an edge, with the sky beyond it. In the sky a wire of 4 mm hangs at 50 m, within 2 cm of
+ * where the edge is seen. Footprints whose centre lies on the plate have a part that sees past it. The wire is in that
+ * part, whose ray mostly misses it. They are compared with 1,000 sub-rays where these leave no doubt: each echo has 3 %
+ * of the energy, or less than 0.5 %. */
 static void a_wire_in_the_sky_behind_an_edge(void **state)
 {
     (void)state;

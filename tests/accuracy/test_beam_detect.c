@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Footprints and detection together: each echo of a pulse by itself, against what can be written down. */
+/* Footprints and detection together: each echo of a pulse by itself, against values worked out by hand. */
 #include "core/rng.h"
 #include "tests/accuracy/block_copy.h"
 #include "tests/accuracy/lit_plates.h"
@@ -47,8 +47,8 @@ static void each_echo_has_its_own_reflectance(void **state)
     close_lit(&l);
 }
 
-/* A pulse that may send one echo sends that with more signal, though more of the light comes back from the other, which
- * is three times as far. What is below the threshold takes no room: there the other one is sent. */
+/* A pulse that may send one echo sends the one with more signal. The other one, three times as far, returns more of the
+ * light. An echo below the threshold takes no room: there the other one is sent. */
 static void of_a_crowd_the_strongest_signal_is_sent(void **state)
 {
     (void)state;
@@ -89,7 +89,8 @@ static void of_a_crowd_the_strongest_signal_is_sent(void **state)
     close_lit(&l);
 }
 
-/* Two plates within the range resolution: one echo, at the mean weighted by what comes back of each, and its sum. */
+/* Two plates within the range resolution give one echo, at the mean weighted by what each returns, and with their
+ * sum. */
 static void a_mixed_pixel_leans_to_what_is_bright(void **state)
 {
     (void)state;
@@ -118,8 +119,8 @@ static void a_mixed_pixel_leans_to_what_is_bright(void **state)
     close_lit(&l);
 }
 
-/* An echo stays away when what comes back of it is below the threshold: A = back / (least R^2) < 1; the other stays,
- * and keeps its place among random numbers. */
+/* An echo is missing when its returned light is below the threshold: A = back / (least R^2) < 1. The other echo stays,
+ * with its own random numbers. */
 static void an_echo_drops_out_by_itself(void **state)
 {
     (void)state;
@@ -161,8 +162,8 @@ static void an_echo_drops_out_by_itself(void **state)
     close_lit(&l);
 }
 
-/* Angle noise moves the beam, footprint and all: ranges and energies are those of where it went, angles those of where
- * it was meant to go. */
+/* Angle noise moves the whole footprint. Ranges and energies are those of where the beam went, angles those of where it
+ * was meant to go. */
 static void angle_noise_moves_the_footprint(void **state)
 {
     (void)state;
@@ -241,8 +242,8 @@ static void ball_noise_moves_each_echo(void **state)
     close_lit(&l);
 }
 
-/* At 650 kHz the second plate lies behind the first zone, whose end is at R_u = 230.6 m: folded, its echo is told at
- * 260 - R_u, before the other; resolved, where it is. */
+/* At 650 kHz the second plate lies behind the first zone, whose end is at R_u = 230.6 m. Folded, its echo is reported
+ * at 260 - R_u, before the other; resolved, where it is. */
 static void each_echo_is_folded_by_itself(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Footprints with a detection that asks for nothing, and which of the echoes are sent: neither changes an echo. */
+/* Footprints with a detection that changes nothing, and the choice of the echoes that are sent. Neither changes an
+ * echo. */
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/accuracy/block_copy.h"
@@ -17,7 +18,7 @@ static void same_block(const struct line_block *b, const struct copy *c)
     assert_memory_equal(b->a, c->a, c->n * sizeof *c->a);
 }
 
-/* A railing, wires and leaves before a wall that is out of range in part: pulses of none, one and several echoes. */
+/* A railing, wires and leaves before a wall that is partly out of range. Pulses have no, one and several echoes. */
 static struct scene *railing(void)
 {
     struct generate_bar bar[48];
@@ -33,7 +34,7 @@ static struct scene *railing(void)
     return scene;
 }
 
-/* Where detection asks for nothing, the beam's blocks are its own, entry by entry: noise, numbers, order. */
+/* With a detection that changes nothing, the beam's blocks are the same, entry by entry: noise, numbers, order. */
 static void nothing_asked_for_changes_nothing(void **state)
 {
     (void)state;
@@ -79,7 +80,8 @@ static void nothing_asked_for_changes_nothing(void **state)
     beam_rig_close(&rig);
 }
 
-/* The noise of an echo is its own, whichever of the pulse's are sent: first, last and strongest are entries of all. */
+/* The noise of an echo is its own, whichever of the pulse's echoes are sent. First, last and strongest are entries of
+ * all. */
 static void selection_keeps_the_noise(void **state)
 {
     (void)state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Footprints on glass, on mirrors, and on surfaces that mix within one plane, against what can be written down. */
+/* Footprints on glass, on mirrors, and on surfaces that mix within one plane, against values worked out by hand. */
 #include "tests/accuracy/lit_plates.h"
 
-/* A pane on the left, its border free, and a wall behind all of it: of the wall's echo, a part has passed the pane
- * there and back. Without a signal there are the same echoes. */
+/* A pane with a free border is on the left, and a wall lies behind all of it. A part of the wall's echo has passed the
+ * pane there and back. Without a signal there are the same echoes. */
 static void a_footprint_on_the_border_of_glass(void **state)
 {
     (void)state;
@@ -54,8 +54,8 @@ static void outline_kinds(struct lit *l)
     l->rig.beam.outlines = l->rig.outlines;
 }
 
-/* Two surfaces in one plane, with corners in common (a part of a wall) or without (a foil on it): what comes back of a
- * footprint on both is the sum, of which the brighter one gives the label. Without a difference there is no outline. */
+/* Two surfaces in one plane, with corners in common (a part of a wall) or without (a foil on it). A footprint on both
+ * returns the sum, with the label of the brighter one. Surfaces without a difference have no outline. */
 static void surfaces_mix_within_a_plane(void **state)
 {
     (void)state;
@@ -87,7 +87,7 @@ static void surfaces_mix_within_a_plane(void **state)
         }
 }
 
-/* The same with a mirror in place of the pane: what is seen in it is the wall behind the head, 40 m and 12 m away, as a
+/* This is the same with a mirror in place of the pane. In it the wall behind the head is seen, 40 m and 12 m away, as a
  * ghost. */
 static struct scene *mirror_and_two_walls(void)
 {
@@ -115,7 +115,7 @@ static struct scene *mirror_and_two_walls(void)
 }
 
 /* All light of a footprint that lies on surfaces comes back. Pulse 0 of line 30 goes along an axis of the scene, to the
- * digit: some of its sub-rays have a component of -1e-22 or so, which must not cost those that are packed with them
+ * digit. Some of its sub-rays have a component of about -1e-22, which must not harm those that are packed with them
  * (core/bvh/refine.c). */
 static void no_light_is_lost(void **state)
 {
@@ -130,7 +130,7 @@ static void no_light_is_lost(void **state)
             double sum = 0.0;
             for (uint32_t end = i + (b->echo[i] >> 4); i < end; i++)
                 sum += linear(b, i);
-            assert_true(fabs(sum - 0.5) < 0.01 * 0.5); /* what is too little for an echo: 1 % */
+            assert_true(fabs(sum - 0.5) < 0.01 * 0.5); /* 1 %: returns that are too weak for an echo */
         }
     }
     close_lit(&l);

@@ -33,8 +33,8 @@ struct bars {
     uint32_t n;
 };
 
-/* Whether the footprint can reach the bar: the distance of its axis's line from the ray, which for long bars across the
- * view is that of the bar. */
+/* Returns whether the footprint can reach the bar: the distance of its axis's line from the ray. For long bars across
+ * the view that is the distance of the bar. */
 static int may_reach(const struct beam *beam, const struct generate_bar *bar, const double dir[3])
 {
     double axis[3], n[3], length = 0.0, off = 0.0,
@@ -58,8 +58,9 @@ static int may_reach_some(const struct beam *beam, const struct bars *bars, cons
     return near;
 }
 
-/* Every `step`th line of the view: adaptive and rings of 61 sub-rays against the reference. bars: what reaches
- * none of them and is nothing but a smooth surface to 128 sub-rays gets no more of them; NULL: all get 1,000. */
+/* Compares every `step`th line of the view, with adaptive and with rings of 61 sub-rays, with the reference. Pulses
+ * that reach none of the bars, and see but a smooth surface with 128 sub-rays, get no more of them. With bars NULL all
+ * get 1,000. */
 static void against_reference(struct beam_rig *rig, const struct beam_view *view, uint32_t step,
                               const struct bars *bars, struct beam_tally *adaptive, struct beam_tally *rings)
 {
@@ -124,7 +125,7 @@ static void test_house(void **state)
 
 enum { WIRES = 8 };
 
-/* 3 and 10 mm at 10 to 100 m, one above the other, a little inclined; and a railing in 15 m. */
+/* Wires of 3 and 10 mm at 10 to 100 m, one above the other, a little inclined; and a railing at 15 m. */
 static uint32_t make_wires(struct generate_bar *bar)
 {
     static const double far_m[] = {10.0, 20.0, 50.0, 100.0};
@@ -151,8 +152,8 @@ static void count_labels(const struct line_block *b, uint32_t at, uint64_t *seen
         if (b->label[at + k] >= 1 && b->label[at + k] <= WIRES) seen[b->label[at + k] - 1]++;
 }
 
-/* Pulses that see each wire: equal to the reference's number within 2 %. Two pulses in a hundred of those that see a
- * wire lie within a quarter of the threshold at its edge, where 1,000 sub-rays themselves are one part in ten off. */
+/* The number of pulses that see each wire is the reference's within 2 %. Two in a hundred of them lie within a quarter
+ * of the threshold at its edge, where 1,000 sub-rays themselves are wrong by one part in ten. */
 static void test_wires_are_seen(void **state)
 {
     (void)state;
@@ -200,7 +201,7 @@ static void test_wires_are_seen(void **state)
     beam_rig_close(&rig);
 }
 
-/* At most a third of the error of rings that cost more than twenty times as much. */
+/* The error is at most a third of that of rings, which cost more than twenty times as much. */
 static void test_wires_against_rings(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Detection over many pulses: the noise has the sigma that the data sheet's figures give, is normal, and depends on
- * nothing; targets vanish where the data sheet says. Seeds are fixed. Where a statistic of n numbers is compared, 4.75
- * of its standard errors are allowed, which chance exceeds twice in a million. */
+/* Detection over many pulses. The noise has the sigma that follows from the data sheet's figures, is normal, and is
+ * independent of everything else. Targets vanish where the data sheet says. Seeds are fixed. If a statistic of n
+ * numbers is compared, 4.75 of its standard errors are allowed, which chance exceeds twice in a million. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static int free_pulses(void **state)
     return 0;
 }
 
-/* A head as the data sheets of such have it. */
+/* A head as its data sheet describes it. */
 static struct detect_signal_spec head(void)
 {
     return (struct detect_signal_spec){.n_reaches = 2,
@@ -55,7 +55,7 @@ static void set_up(const struct detect_signal_spec *spec, struct detect_signal *
     if (detect_signal_set_up(spec, signal, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* n pulses from pulse0 on onto a target; echo `number` of each. */
+/* Detects n pulses from pulse0 on at a target, and keeps echo `number` of each. */
 static struct detect_echoes shoot(uint32_t n, uint64_t pulse0, uint32_t number, double range_m, double rho)
 {
     for (uint32_t i = 0; i < n; i++) {
@@ -71,8 +71,8 @@ static struct detect_echoes shoot(uint32_t n, uint64_t pulse0, uint32_t number, 
                                   .refl_cdb = pulses->refl_cdb};
 }
 
-/* The two ranges of `head` make the extinction of the data sheet's air: rho_min falls with R^2 and exp(2 a R), so
- * 2 a 400 m = log(0.9 / 0.2) - 2 log 2. The figure at 100 m then holds at R by the ratio of the signals. */
+/* The two ranges of `head` give the extinction of the data sheet's air. rho_min falls with R^2 and exp(2 a R), so 2 a
+ * 400 m = log(0.9 / 0.2) - 2 log 2. The figure at 100 m then holds at R by the ratio of the signals. */
 static double sigma_of(double range_m, double rho)
 {
     double a2 = (log(0.9 / 0.2) - 2.0 * log(2.0)) / 400.0;
@@ -122,9 +122,9 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Anderson and Darling's A^2 against the standard normal distribution with nothing estimated: above 6.0 once in 1000
- * (T. W. Anderson, D. A. Darling, A test of goodness of fit, 1954). And chi^2 of 1000 bins that are as likely each: 999
- * +- 44.7. */
+/* Anderson and Darling's A^2 against the standard normal distribution, with nothing estimated, is above 6.0 once in
+ * 1000 (T. W. Anderson, D. A. Darling, A test of goodness of fit, 1954). The test has chi^2 of 1000 equally likely
+ * bins, too: 999 +- 44.7. */
 static void check_normal(double *z, uint32_t n)
 {
     static uint32_t bin[1000];
@@ -173,7 +173,8 @@ static double correlation(const double *x, const double *y, uint32_t n)
     return sum / n;
 }
 
-/* Between pulses at any distance, echoes of a pulse, purposes and seeds; of the numbers, and of their squares. */
+/* There is no correlation between pulses at any distance, echoes of a pulse, purposes and seeds, neither of the numbers
+ * nor of their squares. */
 static void noise_hangs_on_nothing(void **state)
 {
     (void)state;
@@ -216,7 +217,7 @@ static double share_seen(const struct detect_signal *signal, uint32_t n, uint64_
     return (double)seen / n;
 }
 
-/* Where half of the pulses still see a target, by bisection. */
+/* Returns where half of the pulses still see a target, by bisection. */
 static void targets_vanish_where_the_data_sheet_says(void **state)
 {
     (void)state;
@@ -243,7 +244,7 @@ static void targets_vanish_where_the_data_sheet_says(void **state)
     }
 }
 
-/* Phi(k (A - 1)), with one range as data sheet: A = (R_k / R)^2. */
+/* The expected share is Phi(k (A - 1)). With one range as data sheet A = (R_k / R)^2. */
 static void the_share_seen_is_the_detection_probability(void **state)
 {
     (void)state;

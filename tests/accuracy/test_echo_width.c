@@ -3,7 +3,8 @@
 #include "tests/accuracy/slanted.h"
 #include "tests/common/thorough.h"
 
-/* One ray stands for the footprint; with rings the sub-rays have spreads of their own, so that few do. */
+/* The closed form has one ray for the footprint. The sub-rays of rings have spreads of their own, so few of them are
+ * enough. */
 static void a_slanted_wall_widens_the_echo(void **state)
 {
     (void)state;
@@ -38,7 +39,7 @@ static void a_slanted_wall_widens_the_echo(void **state)
                   1e2 * worst);
 }
 
-/* An edge, or a corner, cuts the footprint: the echo is of a part, and as wide as that. */
+/* An edge, or a corner, cuts the footprint. The echo is of the rest, and as wide as that. */
 static void a_part_has_its_own_width(void **state)
 {
     (void)state;
@@ -52,7 +53,7 @@ static void a_part_has_its_own_width(void **state)
                 struct beam_rig rig;
                 struct face face;
                 const double range_m = 100.0, i = slants_deg[s] * M_PI / 180.0, w = 0.0178;
-                /* edges at all places of the footprint: one, or (k >= 12) two that meet in it */
+                /* edges at all places of the footprint: one, or for k >= 12 two that meet in it */
                 double u = (k % 12 - 5.7) / 6.5 * w, v = k < 12 ? -9.0 : 0.4 * w / cos(i) * sin(k);
                 struct scene *scene =
                     slanted(range_m, i, abouts[a], (const double[]){u, 9.0}, (const double[]){v, 9.0}, &face);
@@ -119,7 +120,8 @@ static void a_mixed_pixel_is_wide(void **state)
     close_lit(&l);
 }
 
-/* A pane in front of a wall, 0.2 m apart: one echo, its width that of two returns; at 2 m two, each a pulse wide. */
+/* A pane 0.2 m in front of a wall gives one echo, with the width of two returns. At 2 m there are two echoes, each a
+ * pulse wide. */
 static void glass_and_what_is_behind(void **state)
 {
     (void)state;
@@ -155,8 +157,8 @@ static void glass_and_what_is_behind(void **state)
         }
 }
 
-/* Behind a pane, and on a body that moves, only the incidence of a sub-ray is known: a slanted wall there is as wide.
- */
+/* Behind a pane, and on a body that moves, only the incidence of a sub-ray is known. A slanted wall there is as
+ * wide. */
 static void slanted_behind_glass_and_in_motion(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Georeferencing at 200 places all over the Earth: exact figures against definitions in long double (tests/common/geodesy.h),
- * every order's error against its bound. */
+/* Georeferencing at 200 places all over the Earth. Exact figures are compared with definitions in long double
+ * (tests/common/geodesy.h), and every order's error with its bound. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -37,7 +37,7 @@ static double true_error_m(int i, const struct georef *georef, const struct stat
 
 static const enum georef_crs CRS[] = {GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC};
 
-/* The bounds of GEOREF_EXACT themselves: 20 nm, ECEF 5 nm. */
+/* The bounds of GEOREF_EXACT itself are 20 nm, and 5 nm in ECEF. */
 static void test_exact_against_definitions(void **state)
 {
     (void)state;
@@ -59,8 +59,8 @@ static void test_exact_against_definitions(void **state)
     print_message("# exact: ecef %.2g m, utm and ups %.2g m, geodetic %.2g m\n", worst_m[0], worst_m[1], worst_m[2]);
 }
 
-/* Each order is within its bound, and the bound is not idle: where errors are above rounding it is at most ten times
- * the largest error found. (Not so where a pole is within ten radii: no point is worst in all of the parts.) */
+/* Each order is within its bound, and the bound is tight: where errors are above rounding it is at most ten times the
+ * largest error found. Places with a pole within ten radii are left out, as no point is worst in all parts there. */
 static void test_bounds(void **state)
 {
     (void)state;

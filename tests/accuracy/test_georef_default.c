@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What a run does within 2 km, in every CRS and from every kind of scene frame: 200 places, 20,000 points each with
- * THOROUGH=1 and 5,000 else, against GeographicLib point by point. And what it costs against that. */
+/* The method that a run takes within 2 km, in every CRS and from every kind of scene frame. There are 200 places, with
+ * 20,000 points each with THOROUGH=1 and 5,000 else, compared with GeographicLib point by point. The test also compares
+ * the cost. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -26,8 +27,8 @@ static const char *const FRAME_NAME[] = {"tangent here", "tangent 30 km away, tu
 
 static const struct plan_georef_need NEED = {.radius_m = 2000.0, .height_m = 2000.0, .tolerance_m = 1e-6};
 
-/* Geodetic is exact within this distance of a pole: where the points go half around it, which no series follows. From a
- * frame that is turned points may be as far up as away, and nearer to the axis. */
+/* Geodetic is exact within this distance of a pole, as no series follows points that go half around it. In a frame that
+ * is turned points may be as far up as away, and nearer to the axis. */
 static const double POLE_M[] = {13000.0, 20000.0, 20000.0, 13000.0, 13000.0};
 
 struct tally {
@@ -50,7 +51,7 @@ static struct georef *create(const struct georef_spec *spec)
     return georef;
 }
 
-/* The place in a scene whose frame is of that kind. */
+/* Returns the place in a scene whose frame is of that kind. */
 static void set_frame(int i, enum scene_frame kind, struct georef_spec *spec)
 {
     struct geoframe frame;
@@ -77,7 +78,7 @@ static void set_frame(int i, enum scene_frame kind, struct georef_spec *spec)
     if (rc != SH_OK) fail_msg("place %d: %s", i, err.text);
 }
 
-/* GeographicLib for each point. Where ours is linear, by way of geodetic coordinates. */
+/* Asks GeographicLib for each point. If ours is linear, it goes by way of geodetic coordinates. */
 static void reference(const struct georef_spec *spec, const struct georef *georef, struct station_points *p)
 {
     double rotation[9], anchor[3], base[3];
@@ -118,8 +119,8 @@ static void check_exact_only_at_pole(int i, enum scene_frame kind, const struct 
                  from_pole_m);
 }
 
-/* One in 250 by definitions, without GeographicLib, where the scene frame allows it: from ECEF forward; from UTM to
- * degrees and by the projection back. */
+/* One in 250 is compared with definitions, without GeographicLib, where the scene frame allows it: from ECEF forward;
+ * from UTM to degrees and by the projection back. */
 static double true_error_m(enum scene_frame kind, const struct georef_spec *spec, const struct georef *georef,
                            const struct station_points *p)
 {
@@ -221,8 +222,9 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The promise is 10 ns a point, and exact costs 250 ns (geodetic) and 900 ns: medians of runs in turns, which a busy
- * machine slows alike, so a ratio of 20 is met by whatever is near the promise. `make chart` has the nanoseconds. */
+/* The promise is 10 ns a point, and exact costs 250 ns (geodetic) and 900 ns. The figures are medians of runs in
+ * turns, which a busy machine slows alike. So any method near the promise has a ratio of 20. `make chart` has the
+ * nanoseconds. */
 static void test_cost(void **state)
 {
     (void)state;

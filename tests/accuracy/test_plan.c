@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Plans against the reference: what a configuration's run uses, as planned, meets what the plan says, on pulses other
- * than those that the plan has looked at. Footprints against 1,000 sub-rays on a spiral, each cast by itself; all else
- * against a run with exact planes, the deepest way through glass, and georeferencing point by point. */
+/* Plans against the reference. A configuration's run, with the methods that the plan chose, keeps the plan's figures,
+ * on pulses that the plan has not looked at. Footprints are compared with 1,000 sub-rays on a spiral, each cast by
+ * itself. All else is compared with a run with exact planes, the deepest way through glass, and georeferencing point by
+ * point. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -59,7 +60,7 @@ static void close_side(struct side *side)
     free(side->cfg);
 }
 
-/* Spread evenly over the frame: by the golden ratio. 0: behind the field of view. */
+/* Pulses are spread evenly over the frame, by the golden ratio. 0 is outside of the field of view. */
 static int get_run(const struct side *side, uint32_t j, struct schedule_run *run)
 {
     double share = fmod((j + 0.5) * 0.6180339887498949, 1.0);
@@ -71,7 +72,8 @@ static int get_run(const struct side *side, uint32_t j, struct schedule_run *run
     return 1;
 }
 
-/* Casts the run with what scans of the site use; ranges in micrometres, and no noise: what the plan is about. */
+/* Casts the run as scans of the site do, but with ranges in micrometres and without noise: the plan is not about
+ * these. */
 static const struct line_block *cast(struct side *side, uint32_t station, const struct schedule_run *run,
                                      enum line_layout layout, double scale[3])
 {
@@ -105,8 +107,8 @@ static void add(struct tally *t, double off)
     t->sum4 += off * off * off * off;
 }
 
-/* By its own sample a bound of p shows up to p + 3 sqrt(p / n) (one time in a thousand more), a mean square up to two
- * standard errors more than it is. */
+/* A sample shows a bound of p as up to p + 3 sqrt(p / n) (exceeded one time in a thousand), and a mean square up to two
+ * standard errors larger. */
 static void expect_within(const char *what, const struct tally *t, const struct plan_row *row, const struct config *cfg)
 {
     double n = (double)t->pulses, wrong = (double)t->wrong / n, rms = sqrt(t->sum2 / t->echoes);
@@ -158,10 +160,10 @@ static void check_beam(const char *file, struct side *side)
     expect_within(file, &t, &side->site->plan.beam, side->cfg);
 }
 
-/* Footprints and detection work together: then the reference has 1,027 sub-rays, too. */
+/* Footprints and detection work together, so the reference has 1,027 sub-rays, too. */
 enum { JOINED = 1 };
 
-/* Echoes as the deepest way has them. */
+/* Casts echoes with the deepest way through glass. */
 static void check_optics(const char *file, struct side *side, struct side *reference)
 {
     struct tally t = {0};
@@ -188,8 +190,8 @@ static void check_optics(const char *file, struct side *side, struct side *refer
     expect_within(file, &t, &both, side->cfg);
 }
 
-/* Positions of pulses with the same echoes: two counts are each rounded, and the order of surfaces may move a range.
- */
+/* Compares positions of pulses with the same echoes. Two counts are each rounded, and the order of surfaces may move a
+ * range. */
 static void check_positions(struct side *side, struct side *reference)
 {
     const struct plan_row *row = &side->site->station[0].plan;
@@ -261,7 +263,7 @@ static void test_glass(void **state)
     check_plan("config/glass.yaml", 0, 1);
 }
 
-/* Half of the view at 20 m, the other half deeper by a step. */
+/* Half of the view is at 20 m, the other half deeper by a step. */
 static struct scene *step_edge(double step_m)
 {
     const double y = 20 + step_m;
@@ -275,7 +277,7 @@ static struct scene *step_edge(double step_m)
     return scene;
 }
 
-/* Where on the edge's far side there is just 1 % of the energy, from the centre, in radii. */
+/* Returns where just 1 % of the energy is on the edge's far side, in radii from the centre. */
 static double threshold(const struct beam *beam)
 {
     double low = 0.0, high = 1.0, energy, moment;
@@ -287,10 +289,10 @@ static double threshold(const struct beam *beam)
     return low;
 }
 
-/* A step of more than the resolution gives two echoes where both sides have 1 %: a strip of known width, in a view of
- * known width. A single ray is wrong in all of it: the plan's figure is its share, and an upper limit: 1.645 standard
- * errors more, where the sample scatters by one. From 3 below the mean to 3 above: -1.4 to 4.7 standard errors. The
- * adaptive beam knows the strip. */
+/* A step of more than the resolution gives two echoes where both sides have 1 %. That is a strip of known width, in a
+ * view of known width. A single ray is wrong in all of it. The plan's figure is the strip's share plus 1.645 standard
+ * errors, an upper limit, and the sample scatters by one standard error. From 3 below the mean to 3 above that is -1.4
+ * to 4.7 standard errors. The adaptive beam finds the strip. */
 static void test_figures(void **state)
 {
     (void)state;
@@ -323,10 +325,11 @@ static void test_figures(void **state)
     beam_rig_close(&rig);
 }
 
-/* A step of 4 mm gives one echo, of the mean over both sides. Where a share E of the energy lies beyond the edge, a single
- * ray is wrong by E steps: the mean square is known. All pulses in the strip count as those that meet more than one smooth
- * surface, so each of them is looked at. The plan's figure is 3 standard errors above what it finds, which scatters by one:
- * it is from 0 to 6 of them above the mean square. Those who look at one of 32 would be 17 above it. */
+/* A step of 4 mm gives one echo, at the mean over both sides. If a share E of the energy lies beyond the edge, a
+ * single ray is wrong by E steps, so the mean square is known. All pulses in the strip count as those that meet more
+ * than one smooth surface, so the plan looks at each. Its figure is 3 standard errors above the mean square that it
+ * finds, which scatters by one. So it is 0 to 6 of them above the true one. A plan that looked at one pulse in 32 would
+ * be 17 above it. */
 static void test_small_steps(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From a configuration to points: with each shipped head, a wall of 20 or 90 % head on vanishes where the profile says,
- * and the range noise is the profile's where it says. */
+/* From a configuration to points. With each shipped head, a wall of 20 or 90 % head on vanishes where the profile says.
+ * The range noise is the profile's where it gives one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -57,8 +57,8 @@ struct scan {
     double share, sigma_m, refl_db; /* of the pulses that found the wall; means over these */
 };
 
-/* `lines` of 1666 pulses within half a degree of the wall's normal: its cosine is 1 to 4e-5. Ranges less the
- * wall's own. */
+/* Casts `lines` of 1666 pulses within half a degree of the wall's normal: its cosine is 1 to 4e-5. Ranges are those
+ * less the wall's own. */
 static void scan_wall(const char *profile, int prr_hz, double range_m, double reflectance, uint64_t lines,
                       struct scan *scan)
 {
@@ -111,7 +111,7 @@ static void scan_wall(const char *profile, int prr_hz, double range_m, double re
     free(cfg);
 }
 
-/* 2 % before it more than half of the pulses see the wall, 2 % behind it fewer: 63 and 37 % in clear air, and
+/* 2 % before that range more than half of the pulses see the wall, 2 % behind it fewer: 63 and 37 % in clear air.
  * 33,320 pulses have a standard error of 0.3 %. */
 static void walls_vanish_where_the_profiles_say(void **state)
 {
@@ -138,9 +138,8 @@ static void walls_vanish_where_the_profiles_say(void **state)
     }
 }
 
-/* 333,200 pulses: 4.75 standard errors of a sigma are 0.58 %. Counts of 1 um and
- * the wall's own plane, 1e-7 of it off at most, add nothing. The mean of the reflectance in dB: 0.01 dB and its noise.
- */
+/* 333,200 pulses: 4.75 standard errors of a sigma are 0.58 %. Counts of 1 um, and the wall's own plane, whose error is
+ * at most 1e-7 of it, add nothing. The bound of the reflectance's mean in dB is 0.01 dB and its noise. */
 static void noise_is_the_profiles(void **state)
 {
     (void)state;

@@ -29,16 +29,16 @@ enum { BATCH = 1024, THREADS = 2 };
 #define SHARE ((uint32_t)thorough(1, 6))
 #endif
 
-/* The promise: 1 um from 0.5 m to 2 km and to 89.9 degrees anywhere on the UTM grid. Derived: n . dir and n .
- * v as sums of three products in double are off by 8 x 2^-53 of range x |n|, v counted from the BVH's origin: with
- * planes up to 2 km from there 16 x 2^-53 x 4 km / cos 89.9 = 4e-9 m. Edges are rounded to 2^-53 of them, so a
+/* The promise is 1 um from 0.5 m to 2 km and to 89.9 degrees anywhere on the UTM grid. Derived: n . dir and n . v as
+ * sums of three products in double have errors of 8 x 2^-53 of range x |n|, with v counted from the BVH's origin. With
+ * planes up to 2 km from there it is 16 x 2^-53 x 4 km / cos 89.9 = 4e-9 m. Edges are rounded to 2^-53 of them, so a
  * normal is tilted by that over the sine of the triangle's smallest angle. */
 static const double BOUND_M = 1e-6;
 static const double RANGE_MAX_M = 1e4;
 
-/* Of ordinary scans: what a sight leaves to the BVH, or the BVH could do everything. Found were 0.0 % in the room, 3.0 %
- * on the terrain and 3.1 % in the house, with 0.15 to 0.8 M rays; each cell that an outline cuts may ask in full, and
- * twice as many such cells should be noticed. */
+/* The share of rays in ordinary scans that a sight leaves to the BVH. Without a bound the BVH could do everything. It
+ * was 0.0 % in the room, 3.0 % on the terrain and 3.1 % in the house, with 0.15 to 0.8 M rays. Each cell that an
+ * outline cuts may need the BVH, and twice as many such cells should be noticed. */
 static const double MOST_ASKED = 0.06;
 
 struct place {
@@ -46,8 +46,8 @@ struct place {
     double offset_m[3];
 };
 
-/* Easting and northing of ordinary and of extreme points of the grid: Berlin; the equator at a zone's edge;
- * 84 degrees north, high up; just south of the equator on the southern grid. Not multiples of anything. */
+/* Easting and northing of ordinary and of extreme points of the grid: Berlin; the equator at a zone's edge; 84 degrees
+ * north, high up; just south of the equator on the southern grid. They are multiples of nothing. */
 static const struct place PLACE[] = {
     {"E 391431 N 5819712", {391431.123, 5819712.456, 34.567}},
     {"E 833978 N 12", {833978.557, 12.345, -3.2}},
@@ -79,7 +79,7 @@ static double unit(uint64_t key, uint64_t i)
     return (double)(int64_t)(rng_u64(key, i) >> 11) * 0x1p-53;
 }
 
-/* A head's view: all round, from -60 degrees to 60, and now and then anywhere. */
+/* A head's view: all round, from -60 degrees to 60, and now and then in any direction. */
 static void aim(struct job *j, uint64_t number, uint32_t at)
 {
     double limit = number % 8 == 0 ? 1.0 : sin(acos(-1.0) / 3.0);
@@ -206,7 +206,7 @@ static void scan(const struct scene *scene, const double station_m[3], uint32_t 
 
 /* ---- the reference itself */
 
-/* The grid finds what all triangles tell, in a scene of everything: terrain, its walls, from inside and from
+/* The grid finds the same as all triangles one by one. The scene is terrain and its walls, from inside and from
  * outside. */
 static void test_grid_is_brute_force(void **state)
 {
@@ -243,7 +243,7 @@ static void test_grid_is_brute_force(void **state)
     scene_free(scene);
 }
 
-/* And all triangles tell what analysis does: a plane of one triangle, z = x/8 + y/4 + 1, below and beside the
+/* Trying all triangles gives the same as analysis. The plane is one triangle, z = x/8 + y/4 + 1, below and beside the
  * origin. */
 static void test_brute_force_is_analytic(void **state)
 {
@@ -317,7 +317,7 @@ static void test_room(void **state)
     }
 }
 
-/* Ground below the station, then station 0.5 m above it. */
+/* Draws ground below the station, then the station 0.5 m above it. */
 static void stand_on(const struct scene *scene, double x, double y, double station_m[3])
 {
     const double down[3] = {0.0, 0.0, -1.0}, from_m[3] = {x, y, 0.5 * (scene->min_m[2] + scene->max_m[2])};
@@ -332,8 +332,9 @@ static void stand_on(const struct scene *scene, double x, double y, double stati
     reference_free(reference);
 }
 
-/* 20,000 triangles over 3 km, hills of 40 m: long and short ranges, steep and grazing, near the ground and
- * far along it. From two stations, the second one 1 km from the scene's middle, where the BVH's origin is. */
+/* 20,000 triangles over 3 km, hills of 40 m. Ranges are long and short, incidence steep and grazing, near the ground
+ * and far along it. There are two stations. The second one is 1 km from the scene's middle, where the BVH's origin
+ * is. */
 static void test_terrain(void **state)
 {
     (void)state;
@@ -354,7 +355,7 @@ static void test_terrain(void **state)
     }
 }
 
-/* A building as planners draw it: 31,235 triangles, thin layers, faces that overlap. From outside and from
+/* A building as planners draw it: 31,235 triangles, thin layers, faces that overlap. It is seen from outside and from
  * within. */
 static void test_house(void **state)
 {
@@ -381,8 +382,8 @@ static void test_house(void **state)
     scene_free(scene);
 }
 
-/* Fewer than one ray in a million of normal scans. With none among 3 million, THOROUGH=1, the true share is below that at
- * 95 % (3.0 is -ln 0.05); with none among a sixth of them below six. */
+/* The bound is one ray in a million of normal scans. With none among 3 million (THOROUGH=1) the true share is below
+ * that at 95 % (3.0 is -ln 0.05). With none among a sixth of them it is below six in a million. */
 static void test_share_of_undecidable(void **state)
 {
     (void)state;

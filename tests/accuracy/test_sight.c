@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What a standing station sees, by its map and by the BVH: the same bits, in random scenes of what is hard.
+/* Rays of a standing station, by its map and by the BVH, have the same bits, in random odd scenes.
  *
- * SIGHT_SCENES: how many scenes (default 400, THOROUGH=1: 1000), SIGHT_FIRST: the number of the first (0), SIGHT_RAYS: rays from
- * each station (1024); make test-sight: 50,000 scenes. */
+ * SIGHT_SCENES: how many scenes (default 400, THOROUGH=1: 1000). SIGHT_FIRST: the number of the first (0). SIGHT_RAYS:
+ * rays from each station (1024). make test-sight: 50,000 scenes. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -30,7 +30,7 @@ enum { MOST_RAYS = 1 << 16 };
 #define SCENES thorough(1000, 400)
 #endif
 
-/* Beyond the farthest corner of any scene: 2e6 m. */
+/* This lies beyond the farthest corner of any scene, which is 2e6 m away. */
 static const double RANGE_MAX_M = 1e7;
 
 struct tally {
@@ -55,7 +55,7 @@ struct look {
     struct bvh *bvh;
 };
 
-/* A cap about an axis, as a head sees that doesn't turn all the way round. */
+/* A cap about an axis: the view of a head that doesn't turn all the way round. */
 struct cap {
     double axis[3], angle_rad;
 };
@@ -66,7 +66,7 @@ static int sees_cap(const void *ctx, const double dir[3], double radius_rad)
     return acos(fmax(-1.0, fmin(1.0, vec3_dot(cap->axis, dir)))) <= cap->angle_rad + radius_rad + 1e-6;
 }
 
-/* What is right where they disagree. */
+/* Prints the true hit where they disagree. */
 static void print_truth(const struct look *look, const struct sight_beside *beside)
 {
     struct reference *reference =
@@ -162,8 +162,8 @@ static void test_same_bits(void **state)
             printf("# with %-10s %llu\n", odd_part_name(i), (unsigned long long)tally.differ_by_part[i]);
     assert_true(tally.refused <= tally.scenes / 100);
     assert_true(tally.hits > tally.rays / 4);
-    /* Half of these rays are aimed where nothing but the BVH decides, or at caps and with memory for nothing; of all
-     * 50 % ask and 26 % are decided among a few. A sight that always asks knows nothing. */
+    /* Half of these rays are aimed where only the BVH decides, or at caps, or with too little memory for a map. In all,
+     * 50 % ask the BVH, and 26 % are decided among a few. A sight that always asks is of no use. */
     assert_true(tally.asked < tally.rays * 2 / 3 && tally.few > tally.rays / 10);
     assert_true(tally.differ == 0);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Blocks with and without a sight are the same, byte by byte, whatever else a setup asks for. */
+/* Blocks with and without a sight are the same, byte by byte, whatever else a setup has. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 
 enum { PULSES = ROOM_LINES * ROOM_PULSES };
 
-/* What a setup asks for beside rays. */
+/* The settings of a setup beside rays. */
 struct asked {
     struct instrument instrument;
     struct detect_signal signal;
@@ -144,7 +144,7 @@ static void movers_and_optics(struct seen_room *r, struct cast_setup *s, struct 
     movers(r, s, a);
 }
 
-/* A head that moves has no sight: where one is given, it is not asked. */
+/* A head that moves has no sight. One that is given is not asked. */
 static void moving(struct seen_room *r, struct cast_setup *s, struct asked *a)
 {
     (void)r;

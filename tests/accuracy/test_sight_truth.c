@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a sight says of rays at corners and edges, and within 4 units in the last place of its cells' borders, against
- * long double: which triangle is met, and at what range.
+/* A sight's answers for rays at corners and edges, and within 4 units in the last place of its cells' borders, against
+ * long double: the triangle that is met, and its range.
  *
  * SIGHT_RAYS: rays of each kind in each scene (default 1000; 125000: a million in all). */
 #include <math.h>
@@ -26,10 +26,11 @@ static const long RAYS = 1000;
 #endif
 
 static const double RANGE_MAX_M = 1e4;
-/* As for single rays (test_range): a plane's components are doubles, and the error grows by the inverse of the incidence's
- * cosine. */
+/* The bound is that of single rays (test_range). A plane's components are doubles, and the error grows by the inverse
+ * of the incidence's cosine. */
 static const double BOUND_M = 1e-6;
-/* Of the range: surfaces nearer to each other than this are met at once, and the lowest number is reported. */
+/* This is a share of the range. Surfaces nearer to each other than this are met at once, and the lowest number is
+ * reported. */
 static const double TIED = 2e-12;
 
 static const struct {
@@ -131,7 +132,7 @@ static void test_terrain(void **state)
     scene_free(scene);
 }
 
-/* Outlines everywhere: each leaf in front of others and of a wall. */
+/* Outlines everywhere: each leaf is in front of others and of a wall. */
 static void test_foliage(void **state)
 {
     (void)state;

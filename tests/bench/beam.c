@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Pulses as single rays, as rings of sub-rays, and adaptive: cost, and error against 1,000 sub-rays.
+/* This measures pulses as single rays, as rings of sub-rays, and adaptive ones: their cost, and their error against
+ * 1,000 sub-rays.
  *
  *   build/tests/bench/beam [--chart|--speed] [house|wires|foliage|leaves ...]
  *
- * ns: per pulse, the whole cast; median of interleaved rounds, processor time of the thread. ratio: by the single-ray
- * cast of the same rounds, without sight. seen: with a sight (core/sight.h). count: pulses with another number of echoes than the reference, of all pulses, and of those
- * of several echoes or a partial hit. rms, p99.9, max: ranges of the echoes of pulses whose number agrees; off: how
- * many of them are off by more than the resolution (a different leaf, say: a few decide the rms of a tree), and the rms
- * without those. --chart: rows of the chart's table, without the seen. --speed: single and adaptive pulses alone, and
- * only their ns and ratios. */
+ * ns is the cost of a pulse for the whole cast, the median of interleaved rounds in processor time of the thread. ratio
+ * is that time by the single-ray cast of the same rounds, without sight. seen means with a sight (core/sight.h). count
+ * is the share of pulses whose number of echoes differs from the reference: of all pulses, and of those with several
+ * echoes or a partial hit. rms, p99.9 and max are the range errors of the pulses whose number agrees. off is how many
+ * of their echoes are off by more than the resolution (say, on a different leaf, and a few such decide the rms of a
+ * tree), and the rms without those. --chart prints rows of the chart's table, without the methods with a sight. --speed
+ * measures single and adaptive pulses alone, and only their ns and ratios. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +42,7 @@ static const struct method methods[] = {{"single", BEAM_SINGLE, 0, 0},      {"ad
 enum { N_METHODS = sizeof methods / sizeof methods[0] };
 _Static_assert((int)N_METHODS <= (int)MAX_METHODS, "room");
 
-/* Whether this method is measured. */
+/* Says whether this method is measured. */
 static int is_asked(const struct method *m)
 {
     return !(as_chart && m->seen) && !(only_speed && m->mode == BEAM_RINGS);
@@ -51,7 +53,7 @@ struct result {
     struct beam_tally tally;
     uint64_t n_off, capacity;
     double *off_m; /* [n_off] */
-    /* in the end: */
+    /* These are set in the end: */
     double ns_median, ratio_median, rms_m, p999_m, max_m, wrong_part;
     int front;
 };
@@ -88,7 +90,7 @@ static void set_method(struct beam_rig *rig, const struct sight *sight, const st
     rig->setup.sight = m->seen ? sight : NULL;
 }
 
-/* Every sample-th line. */
+/* Compares every sample-th line. */
 static void accuracy(struct beam_rig *rig, const struct sight *sight, const struct beam_view *view, uint32_t sample,
                      struct result *result)
 {
@@ -114,8 +116,8 @@ static void accuracy(struct beam_rig *rig, const struct sight *sight, const stru
     free(ref);
 }
 
-/* The view's lines are as dense as their pulses. A few are cast, groups of neighbours all over the view: what one line
- * has read is in the cache for the next, as in a whole scan. */
+/* The view's lines are as dense as their pulses. Only a few are cast, in groups of neighbours all over the view. What
+ * one line has read is then in the cache for the next, as in a whole scan. */
 enum { NEIGHBOURS = 20 };
 static uint32_t line_of(const struct beam_view *view, uint32_t i)
 {
@@ -132,7 +134,7 @@ static double pass_ns(struct beam_rig *rig, const struct beam_view *view, uint32
     return 1e9 * (bench_thread_s() - start_s) / ((double)lines * view->pulses);
 }
 
-/* Each method in turn; of many sub-rays, fewer rounds and each fourth line. */
+/* Measures each method in turn. Many sub-rays get fewer rounds and only each fourth line. */
 static void speed(struct beam_rig *rig, const struct sight *sight, const struct beam_view *view, struct result *result)
 {
     for (int r = 0; r < ROUNDS; r++)
@@ -158,7 +160,8 @@ static void sum_up(struct result *r)
     r->wrong_part = (double)t->wrong / (double)t->mixed;
 }
 
-/* On the front: no other one is at least as fast and, in both figures, at least as exact, and better in one. */
+/* A method is on the front unless another one is at least as fast and, in both figures, at least as exact, and better
+ * in one. */
 static void mark_front(struct result *result)
 {
     for (uint32_t i = 0; i < N_METHODS; i++) {
@@ -176,7 +179,7 @@ static void mark_front(struct result *result)
 static void print_rows(const char *scene, const struct result *result)
 {
     const char *by_default = cfg_find(&cfg_config_table, "beam.mode")->def;
-    if (strcmp(by_default, "auto") == 0) by_default = "adaptive"; /* of a head that stands still */
+    if (strcmp(by_default, "auto") == 0) by_default = "adaptive"; /* auto means adaptive for a head that stands still */
     for (uint32_t m = 0; m < N_METHODS; m++) {
         const struct result *r = &result[m];
         if (!is_asked(&methods[m]) || (methods[m].mode == BEAM_RINGS && methods[m].rings == 0)) continue;
@@ -284,7 +287,8 @@ static void house(void)
     measure("house", scene, station_m, &view, 180);
 }
 
-/* Wires of 3 and 10 mm at 10 to 100 m, a little inclined, and a railing; label: its place in the list. */
+/* Wires of 3 and 10 mm lie at 10 to 100 m, a little inclined, with a railing. The label is a wire's place in the
+ * list. */
 static void wires(void)
 {
     static const double station_m[3] = {0.0, 0.0, 0.0}, far_m[] = {10.0, 20.0, 50.0, 100.0};
@@ -299,7 +303,7 @@ static void wires(void)
                                          .diameter_m = k % 2 == 0 ? 0.003 : 0.010,
                                          .label = (uint16_t)(k + 1)};
     }
-    for (uint16_t k = 0; k < 40; k++) /* a railing across the view, in 15 m */
+    for (uint16_t k = 0; k < 40; k++) /* a railing across the view, at 15 m */
         bar[n++] = (struct generate_bar){
             .a = {-2.0 + 0.1 * k, 15.0, 4.0}, .b = {-2.0 + 0.1 * k, 15.0, 5.0}, .diameter_m = 0.016, .label = 9};
     if (generate_bars(bar, n, 150.0, &scene, &err) != 0) exit(1);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* build/bench: how fast the head computes, beside Embree alone; README.md says what is measured and how. */
+/* This is build/bench. It measures how fast the head computes, beside Embree alone. README.md says what is measured and
+ * how. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +18,7 @@ static void warn(void *ctx, const char *text)
     fprintf(stderr, "bench: %s\n", text);
 }
 
-/* Warnings alone: what takes long here is announced by its scene. */
+/* Only warnings are shown, because each scene here announces itself what takes long. */
 static const struct sh_report REPORT = {.warn = warn};
 
 static uint32_t all_threads(const struct bench_options *o)
@@ -42,7 +43,7 @@ static int measure_stages(const struct bench_options *o, const struct bench_case
     return rc;
 }
 
-/* The smallest scene shows nothing that the next one doesn't; the largest takes too long to look at 15 times. */
+/* The smallest scene shows nothing that the next one doesn't. The largest takes too long to look at 15 times. */
 static const char *scans_of(const struct bench_options *o, const struct bench_target *target)
 {
     const uint32_t triangles = target->scene->n_triangles;
@@ -114,7 +115,7 @@ static int measure_scene(const struct bench_options *o, const char *name, struct
     return rc;
 }
 
-/* In the house, where its file is. */
+/* The reach is measured in the house if its file is there. */
 static int measure_reach(const struct bench_options *o, struct bench_report *report, struct sh_err *err)
 {
     const char *house = o->house != NULL ? o->house : BENCH_HOUSE_FILE;
@@ -154,13 +155,13 @@ static int write_out(const struct bench_options *o, const struct bench_report *r
 
 static int judge(const struct bench_report *report, struct sh_err *err)
 {
-    uint64_t leaks = 0; /* what passes its target by has slipped through, too */
+    uint64_t leaks = 0; /* a ray that passes its target has slipped through, too */
     for (int i = 0; i < BENCH_LEAK_MESHES && report->have_leaks; i++)
         leaks += report->leaks[i].leaks + report->leaks[i].passed + report->leaks[i].sight_differ;
     return leaks == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "bench: %llu rays leaked", (unsigned long long)leaks);
 }
 
-/* Wrong input is the user's, all else is a failure. */
+/* Wrong input is the user's fault. Every other error is a failure. */
 static int fail(const struct sh_err *err)
 {
     fprintf(stderr, "bench: %s\n", err->text);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For all programs of tests/bench: what is measured, and what it is measured with. README.md says the method.
- * Metres and nanoseconds per pulse; positions in the scene frame. */
+/* All programs of tests/bench share this: what is measured, and the means. README.md describes the method. Lengths are
+ * in metres, times in nanoseconds per pulse, and positions in the scene frame. */
 #ifndef TESTS_BENCH_BENCH_H
 #define TESTS_BENCH_BENCH_H
 
@@ -11,29 +11,30 @@
 
 enum { BENCH_LINES = 400, BENCH_LINE_PULSES = 2500, BENCH_MIN_ROUNDS = 7, BENCH_MAX_ROUNDS = 101 };
 
-/* Beyond any wall of the scenes; the same for Embree and for us. */
+/* This is beyond any wall of the scenes, and is the same for Embree and for us. */
 #define BENCH_RANGE_MAX_M 10000.0
-#define BENCH_SCALE_M     1e-5 /* with which that fits into 31 bits */
+#define BENCH_SCALE_M     1e-5 /* the range fits into 31 bits with it */
 
-/* ---- scene.c: where is scanned */
+/* ---- scene.c: the places that are scanned */
 struct bench_target {
     char name[32];
     struct scene *scene;
     double station_m[3];
     double load_s;
 };
-/* Triangles that a name like 10k, 1M or 25000 stands for; 0: it is no number of 100 to 100M. */
+/* Returns the number of triangles that a name like 10k, 1M or 25000 stands for. Returns 0 if it is no number of 100 to
+ * 100M. */
 uint32_t bench_count(const char *name);
 int bench_is_house(const char *name); /* one of the two below that need its file */
 int bench_is_made(const char *name);  /* one that is generated and is no terrain */
-/* "house" reads the IFC file, seen from its living room, and "garden" from outside; a number makes closed
- * terrain, 200 m wide and 3 m rough, seen from 4.7 m above its middle; "foliage" is three crowns of 20,000 leaves in a box,
- * "huge" a triangle of 1,000 km below 4,000 of some centimetres. */
+/* "house" reads the IFC file and is seen from its living room, "garden" from outside. A number makes closed terrain,
+ * 200 m wide and 3 m rough, seen from 4.7 m above its middle. "foliage" is three crowns of 20,000 leaves in a box.
+ * "huge" is a triangle of 1,000 km below 4,000 triangles of some centimetres. */
 int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
                       struct sh_err *err);
 void bench_target_free(struct bench_target *target);
 
-/* ---- rays.c: a normal scan: lines of 100 degrees, spread over a turn of the pan */
+/* ---- rays.c: a normal scan of lines of 100 degrees, spread over a turn of the pan */
 enum { BENCH_LOWEST_DEG = -40, BENCH_HIGHEST_DEG = 60, BENCH_MAX_LINE = 6000 /* pulses */ };
 struct bench_rays {
     struct schedule_segment segment;
@@ -41,40 +42,40 @@ struct bench_rays {
     double *dx, *dy, *dz; /* unit vectors, prcs */
     float *fx, *fy, *fz;  /* the same for Embree */
 };
-/* A turn of so many lines, BENCH_LINE_PULSES each, or `pulses` each. */
+/* Sets a turn of so many lines, with BENCH_LINE_PULSES each, or with `pulses` each. */
 void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
 void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec);
-/* Room for some lines of a turn; then the rays of those from first_line on. */
+/* The first makes room for some lines of a turn. The second fills in the rays of the lines from first_line on. */
 int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
                     struct sh_err *err);
 void bench_rays_aim(struct bench_rays *rays, uint32_t first_line);
-/* Those of the first `bundle` of each bundle * every lines. */
+/* Fills in the rays of the first `bundle` of each bundle * every lines. */
 void bench_rays_spread(struct bench_rays *rays, uint32_t bundle, uint32_t every);
-/* A whole turn of so many lines. */
+/* Makes the rays of a whole turn of so many lines. */
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
 void bench_rays_free(struct bench_rays *rays);
-/* A block of them, to be worked on while it lies in the cache, as the pipeline has its rays. */
-enum { BENCH_BLOCK = 2000 }; /* divides what 4 lines have, is a multiple of 16 */
+/* One block of rays is worked on while it lies in the cache, as the pipeline has its rays. */
+enum { BENCH_BLOCK = 2000 }; /* it divides the pulses of 4 lines and is a multiple of 16 */
 struct bench_block {
     double dx[BENCH_BLOCK], dy[BENCH_BLOCK], dz[BENCH_BLOCK];
     float fx[BENCH_BLOCK], fy[BENCH_BLOCK], fz[BENCH_BLOCK];
 };
-/* Up to a block's rays; returns how many. */
+/* Takes up to a block's rays. Returns how many. */
 uint32_t bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
 
-/* ---- setup.c: what a scan needs beside the mesh, with the figures of a real head */
+/* ---- setup.c: the other parts that a scan needs, with the figures of a real head */
 struct bench_case {
     const struct bench_target *target;
     const struct bench_rays *rays;
     struct embree_alone *embree, *fast; /* robust: the measure of all; without that flag */
     struct bvh *bvh;
-    double seconds; /* measure for so long, but at least BENCH_MIN_ROUNDS */
+    double seconds; /* it measures for so long, but at least BENCH_MIN_ROUNDS */
 };
 #define BENCH_ENCODER 1048576.0 /* counts per turn of all profiles in config/heads */
-/* Embree alone over a mesh, with the bench's longest range and all threads for the build. */
+/* Sets Embree up alone over a mesh, with the bench's longest range and all threads for the build. */
 int bench_embree(const struct scene *scene, const double origin_m[3], int robust, struct embree_alone *out,
                  struct sh_err *err);
-/* Station at 52.5 N, 13.4 E, positions in ECEF. */
+/* The station is at 52.5 N, 13.4 E, and positions are in ECEF. */
 int bench_georef(const struct bench_target *target, struct georef **out, struct sh_err *err);
 void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup);
 double bench_thread_s(void);                     /* processor time of this thread */
@@ -88,7 +89,7 @@ enum bench_stage {
     STAGE_REFINE,     /* labels and incidence */
     STAGE_DETECT,     /* limits, echo, label */
     STAGE_NOISE,
-    STAGE_GEOREF, /* what the encoders read, its sines, position, CRS, counts */
+    STAGE_GEOREF, /* encoder readings, their sines, position, CRS, counts */
     STAGE_ENCODE, /* the frame but its checksum */
     STAGE_CRC,
     BENCH_STAGES
@@ -103,25 +104,24 @@ struct bench_result {
     double cast_ratio, pipeline_ratio, ideal_ratio,
         fast_ratio; /* Embree's time by ours: medians of the rounds' ratios */
     double stage_ns[BENCH_STAGES];
-    int same_bytes;                /* the staged pipeline gave the bytes of the whole one */
+    int same_bytes;                /* the staged pipeline gave the same bytes as the whole one */
     struct cast_counters counters; /* of one pass */
 };
-/* Pin the thread first. */
+/* The caller must pin the thread first. */
 int bench_measure(const struct bench_case *c, struct bench_result *out, struct sh_err *err);
 
-/* ---- stages.c: the whole pipeline again, with the counter of cycles read between its stages */
+/* ---- stages.c: the whole pipeline again, with the cycle counter read between its stages */
 struct bench_stages;
 int bench_stages_create(struct bench_stages **out, struct sh_err *err);
 void bench_stages_free(struct bench_stages *stages);
-/* One line; adds the cycles of each stage. The block and its bytes are as the pipeline makes them. Returns
- * the bytes. */
+/* Makes one line and adds the cycles of each stage. The block and its bytes are as the pipeline makes them. Returns the
+ * number of bytes. */
 size_t bench_stages_line(struct bench_stages *stages, const struct cast_setup *setup,
                          const struct schedule_segment *segment, uint64_t line, uint64_t cycles[BENCH_STAGES],
                          struct line_block *block, uint8_t *bytes, size_t cap);
 uint64_t bench_cycles(void);
 
-/* ---- real_loop.c: the real loop with the null link, as fast as it goes, against Embree on as many threads
- */
+/* ---- real_loop.c: the real loop with the null link, as fast as it goes, beside Embree on as many threads */
 struct bench_threads {
     uint32_t threads;
     double embree_mrays_s, pulses_per_s, ratio; /* ratio: median of the rounds */
@@ -135,7 +135,7 @@ enum { BENCH_LEAK_MESHES = 4 };
 struct bench_leaks {
     const char *mesh;
     uint32_t triangles;
-    uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target; wrong as well */
+    uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target, which is wrong as well */
     double ns_per_ray;            /* processor time */
     struct cast_counters counters;
     uint64_t plain_rays, plain_leaks;               /* Embree alone, robust, in packets */

@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# It measures size, memory and start of a head for a board: bash tests/bench/board.sh FOLDER PROGRAM...
+# This measures size, memory and start of a head for a board: bash tests/bench/board.sh FOLDER PROGRAM...
 #   MiB          the program's file without symbols for debuggers; its libraries come on top
 #   idle MiB     memory of a head that waits for a client: all of it, and what is its own (anonymous)
 #   start s      processor time from the start until its links are open, of all its threads
@@ -17,7 +17,7 @@ stations: [{position_m: [0, 0, 1.5]}]
 links: [{type: tcp, port: 0}]
 END
 
-# one PROGRAM: "RSS OWN NANOSECONDS" of a head whose links are open, which is ended then.
+# one PROGRAM: starts a head, waits until its links are open, and ends it. Prints "RSS OWN NANOSECONDS".
 one() {
     local ready pid line
     exec {ready}< <("$1" run "$folder/head.yaml" --quiet --ready-fd 9 9>&1 >/dev/null 2>"$folder/said" & echo $! && wait)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Speed against accuracy of the ways to cast: rows of the chart's table to standard output. README.md tells
- * how to read it.
+/* This measures speed against accuracy of the ways to cast, and prints rows of the chart's table. README.md tells how
+ * to read it.
  *
- * A method's name is its family and, as the last word, what is varied in it: "robust decided 16". */
+ * A method's name is its family and, as the last word, the value that is varied in it: "robust decided 16". */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,9 +38,9 @@ struct chart_scene {
     double side_m, rough_m;
     int at_edges;
 };
-/* Near: ranges to 100 m. Far: flat ground to 1.5 km seen from 4.7 m above it, up to 89.9 degrees of
- * incidence. At edges: as near, but each ray goes to a corner, or to a point of an edge, of the triangle that
- * it would hit. */
+/* Near scenes have ranges to 100 m. The far one has flat ground to 1.5 km seen from 4.7 m above it, up to 89.9 degrees
+ * of incidence. At edges, ranges are as near, but each ray goes to a corner, or to a point of an edge, of the triangle
+ * that it would hit. */
 static const struct chart_scene SCENES[] = {{"terrain 200 m wide", 100000, 200.0, 3.0, 0},
                                             {"terrain 3 km wide", 100000, 3000.0, 3.0, 0},
                                             {"200 m; each ray at an edge or corner", 100000, 200.0, 3.0, 1}};
@@ -54,7 +54,7 @@ struct chart {
     struct bvh *bvh;
     struct caster *caster;
     struct bench_scan scan;
-    int planned; /* a map */
+    int planned; /* the plan takes a map */
     struct sight *sight;
     struct sight_work *work;
     struct bvh_work *bvh_work;
@@ -80,7 +80,7 @@ static void add_methods(struct chart *c)
     *m = (struct method){.kind = SIGHT, .robust = 1, .width = c->native, .is_default = sight};
 }
 
-/* Planes through the double vertices. */
+/* Makes the planes through the double vertices. */
 static int fill_planes(struct chart *c)
 {
     uint32_t n = c->scene->n_triangles;
@@ -116,7 +116,7 @@ static void refine(const double *restrict plane, uint32_t n_triangles, const uin
     }
 }
 
-/* Anew for each round: what it costs belongs to the cast. */
+/* A sight is made anew for each round, because its cost belongs to the cast. */
 static int make_sight(struct chart *c, double *cost_s, struct sh_err *err)
 {
     struct sight_spec spec;
@@ -170,7 +170,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What is missed is wrong by the whole range. */
+/* A ray that misses is wrong by the whole range. */
 static void measure_error(struct chart *c, struct method *m)
 {
     const struct embree_alone *e = &c->embree[m->robust];
@@ -204,7 +204,8 @@ static int measure_speed(struct chart *c, struct sh_err *err)
     return SH_OK;
 }
 
-/* On the front: no other one is at least as fast and, in both figures, at least as exact, and better in one of them. */
+/* A method is on the front unless another one is at least as fast and, in both figures, at least as exact, and better
+ * in one of them. */
 static void mark_front(struct method *method)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -333,7 +334,7 @@ static void print_rows(const struct method *method, const char *scene)
     fflush(stdout);
 }
 
-/* What a method costs in normal scans, and its worst error in any. */
+/* Adds the cost of a method in normal scans, and its worst error in any scan. */
 static void add_to_all(struct method *all, const struct chart *c, int n_normal)
 {
     for (int i = 0; i < METHODS; i++) {

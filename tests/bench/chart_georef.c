@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Speed against accuracy of the ways to georeference: rows of the chart's table to standard output. README.md tells how
- * to read it. Scene frame to UTM and UPS; errors are against tests/common/geodesy.h, which shares nothing with GeographicLib.
- */
+/* This measures speed against accuracy of the ways to georeference, and prints rows of the chart's table. README.md
+ * tells how to read it. Points go from the scene frame to UTM and UPS. Errors are against tests/common/geodesy.h, which
+ * shares nothing with GeographicLib. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,7 +14,8 @@
 
 enum { PLACES = 6, POINTS = 2048, METHODS = 5, ROUNDS = 15, SCENES = 5 };
 
-/* An ordinary place, a zone's edge on the equator, the neighbouring zone forced there, 83.9 N, UPS, and high up. */
+/* The places are an ordinary one, a zone's edge on the equator, the neighbouring zone forced there, 83.9 N, UPS, and a
+ * high one. */
 static const struct georef_spec PLACE[PLACES] = {
     {.lat_deg = 52.5, .lon_deg = 13.4, .height_m = 110.0},   {.lat_deg = 1.0, .lon_deg = 11.99, .height_m = 20.0},
     {.lat_deg = 1.0, .lon_deg = 13.2, .utm_zone = 32},       {.lat_deg = 83.9, .lon_deg = -40.0, .height_m = 500.0},
@@ -29,7 +30,8 @@ static const struct {
                    {"2 km", 2000.0, 700.0},
                    {"5 km", 5000.0, 1000.0}};
 
-/* Flat: metres turned by the grid's convergence and stretched by its scale at the station. Not of the program. */
+/* The flat method turns metres by the grid's convergence and stretches them by its scale at the station. The program
+ * does not have it. */
 #define FLAT GEOREF_AUTO
 static const char *const NAME[METHODS] = {"flat earth", "order 1", "order 2", "order 3", "exact"};
 static const enum georef_method METHOD[METHODS] = {FLAT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_EXACT};
@@ -122,7 +124,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What the plan takes at the place that needs most. */
+/* Returns the method that the plan takes at the place that needs most. */
 static int planned(const struct georef *georef, int scene, int before)
 {
     const struct plan_georef_need need = {

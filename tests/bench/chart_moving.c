@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that moves, and a body that moves: rows of the chart's table to standard output.
+/* This measures a head that moves, and a body that moves, and prints rows of the chart's table.
  *
- * Each ray begins at its own point; of a body each chunk of rays sees another pose. Against the program stand what Embree
- * has for it: rays in float over float triangles, and of the body an instance of it with a float transform. Errors are
- * against tests/common/reference, in long double; rays of the body are taken into its frame in long double as well. */
+ * Each ray begins at its own point, and each chunk of rays sees another pose of the body. The program is compared with
+ * Embree's own means: rays in float over float triangles, and for the body an instance of it with a float transform.
+ * Errors are against tests/common/reference, in long double. Rays of the body are taken into its frame in long double
+ * as well. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,7 @@
 
 enum { RAYS = 64 * BVH_CHUNK, ROUNDS = 9, WIDTHS = 4, METHODS = 3 * WIDTHS, SAMPLE_EVERY = 4 };
 static const uint32_t WIDTH[WIDTHS] = {1, 4, 8, 16};
-static const double BODY_M = 10.0, AWAY_M = 40.0; /* its radius; how far from the head it goes */
+static const double BODY_M = 10.0, AWAY_M = 40.0; /* its radius, and how far from the head it goes */
 
 struct method {
     int embree, robust;
@@ -27,12 +28,12 @@ struct method {
 };
 
 struct world {
-    int body; /* else the head moves */
+    int body; /* if 0, the head moves */
     struct scene *scene;
     struct bvh *bvh;
     struct bvh_work *work;
     RTCDevice device;
-    RTCScene mesh[2], top[2]; /* not robust, robust; top: the scene that rays are cast into */
+    RTCScene mesh[2], top[2]; /* not robust, robust; top is the scene that rays are cast into */
     RTCGeometry instance[2];
     double *o[3], *d[3], *range_m; /* in the frame of the scene */
     uint32_t *triangle;
@@ -73,7 +74,7 @@ static void open_embree(struct world *w)
     }
 }
 
-/* Row by row, 3 x 4, as Embree takes it. */
+/* Embree takes the matrix row by row, 3 x 4. */
 static void set_pose(const struct world *w, int robust, uint32_t chunk)
 {
     float to[12];
@@ -158,7 +159,7 @@ static void cast_embree(struct world *w, const struct method *m)
     }
 }
 
-/* A ray in the body's frame, as core/cast takes it there. */
+/* Takes a ray into the body's frame as core/cast does. */
 static void to_body(const struct world *w, uint32_t i, double o[3], double d[3])
 {
     const uint32_t chunk = i / BVH_CHUNK;
@@ -206,7 +207,7 @@ static void cast(struct world *w, const struct method *m)
 
 /* ---- rays */
 
-/* Lines of a head that moves 10 m sideways while it casts them: to the ground, or at the body. */
+/* Makes lines of a head that moves 10 m sideways while it casts them, to the ground or at the body. */
 static void aim(struct world *w)
 {
     for (uint32_t i = 0; i < RAYS; i++) {
@@ -223,7 +224,7 @@ static void aim(struct world *w)
     }
 }
 
-/* It spins once while it goes by. */
+/* The body spins once while it goes by. */
 static void move_body(struct world *w)
 {
     for (uint32_t c = 0; c < RAYS / BVH_CHUNK; c++) {
@@ -235,7 +236,7 @@ static void move_body(struct world *w)
     }
 }
 
-/* ---- errors: what is missed, or met where nothing is, is wrong by the whole range */
+/* ---- errors: a missed ray, and one that meets something where nothing is, are wrong by the whole range */
 
 static int compare(const void *a, const void *b)
 {

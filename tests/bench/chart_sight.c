@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* From how many pulses a scan has on a sight pays: rows of the chart's table to standard output.
+/* This measures how many pulses a scan needs until a sight pays, and prints rows of the chart's table.
  *
- * Cost of a pulse, a sight's building shared by all pulses of the scan; Embree alone, robust, for comparison. On the
- * front are, for a number of pulses, the cheapest method and the cheapest exact one. */
+ * The figures are the cost of a pulse, with a sight's building shared by all pulses of the scan. Embree alone, robust,
+ * stands for comparison. For each number of pulses the cheapest method and the cheapest exact one are on the front. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What the polynomials of georeferencing cost on each width of vectors that this CPU has: rows of the chart's table,
- * which it does not draw. The loops are those of the program (core/georef/polynomial_kernels.h), compiled once more for
- * each instruction set; errors are against the exact method. README.md tells how to read it. */
+/* This measures what the polynomials of georeferencing cost on each vector width of this CPU. It prints rows of the
+ * chart's table, but the chart does not draw them. The loops are those of the program
+ * (core/georef/polynomial_kernels.h), compiled once more for each instruction set. Errors are against the exact method.
+ * README.md tells how to read it. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,7 +43,7 @@ static int find_widths(struct width width[MAX_WIDTHS])
     return n;
 }
 
-/* Each form of polynomial, with the order that 2 km take. */
+/* Each form of polynomial comes with the order that 2 km take. */
 static const struct {
     const char *name;
     struct georef_spec spec;

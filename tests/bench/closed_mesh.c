@@ -33,7 +33,7 @@ static int finish(struct builder *b, int rc, struct scene **out, struct sh_err *
     return rc;
 }
 
-/* A point of one of the six faces, whose first axis x second axis points outward. */
+/* Gives a point of one of the six faces. The first axis x the second axis of a face points outward. */
 static void box_point(int face, uint32_t i, uint32_t j, uint32_t cells, double half_m, double p[3])
 {
     int axis = face / 2, up = face % 2;
@@ -43,8 +43,8 @@ static void box_point(int face, uint32_t i, uint32_t j, uint32_t cells, double h
     p[(axis + 2) % 3] = up ? v : u;
 }
 
-/* Faces of cells x cells quads; neighbours share corners bit by bit, since both compute them alike. Turned
- * about z and x a little, so that nothing lies along an axis. */
+/* Adds faces of cells x cells quads. Neighbours share corners bit by bit, since both compute them alike. The box is
+ * turned about z and x a little, so that nothing lies along an axis. */
 static void add_box(struct builder *b, uint32_t cells, double half_m)
 {
     const double c = cos(0.3), s = sin(0.3), c2 = cos(0.2), s2 = sin(0.2);
@@ -69,7 +69,7 @@ static void add_box(struct builder *b, uint32_t cells, double half_m)
     }
 }
 
-/* A box of 40 m with fine walls, close around it one of 41 m. */
+/* A box of 40 m with fine walls lies close inside one of 41 m. */
 static int nested_boxes(struct bench_mesh *mesh, struct sh_err *err)
 {
     const uint32_t cells = 40;
@@ -98,8 +98,8 @@ static uint32_t middle(struct builder *b, uint32_t i, uint32_t j, double radius_
     return b->n_vertices++;
 }
 
-/* Cuts every triangle into four. A middle is made by both its triangles, from the same numbers up to the
- * order of a sum, which doesn't matter: the mesh stays closed without looking for what is there. */
+/* Cuts every triangle into four. Both triangles of an edge make its middle from the same numbers, up to the order of a
+ * sum, which doesn't matter. So the mesh stays closed without a search for corners that are there already. */
 static void divide(struct builder *b, double radius_m)
 {
     for (uint32_t i = b->n_triangles; i-- > 0;) {
@@ -119,8 +119,7 @@ static double distance2(const double a[3], const double b[3])
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-/* Of the corners of an icosahedron, those that are neighbours make its faces; turned so that normals point
- * outward. */
+/* Corners of an icosahedron that are neighbours make its faces. These are turned so that normals point outward. */
 static void add_icosahedron(struct builder *b, double radius_m)
 {
     const double g = 0.5 * (1.0 + sqrt(5.0)), scale = radius_m / sqrt(1.0 + g * g), near2 = 5.0 * scale * scale;
@@ -168,7 +167,7 @@ static int terrain(uint32_t n_triangles, struct bench_mesh *mesh, struct sh_err 
     return generate_terrain(n_triangles, 200.0, 3.0, centre_m, 1, &mesh->scene, err);
 }
 
-/* Of 4 c^2 + 8 c triangles the first 2 c^2 are the ground, whose normals point up. */
+/* The first 2 c^2 of 4 c^2 + 8 c triangles are the ground, whose normals point up. */
 static uint32_t ground(uint32_t n_triangles)
 {
     uint32_t cells = (uint32_t)lround(sqrt(0.25 * n_triangles + 1.0) - 1.0);

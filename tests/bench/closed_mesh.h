@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to leaks.c: closed meshes with a station inside. */
+/* These closed meshes with a station inside are private to leaks.c. */
 #ifndef TESTS_BENCH_CLOSED_MESH_H
 #define TESTS_BENCH_CLOSED_MESH_H
 
@@ -16,7 +16,7 @@ struct bench_mesh {
                           rest outward */
 };
 
-/* which: 0 to 3. mesh->scene is the caller's. */
+/* which is 0 to 3. mesh->scene belongs to the caller. */
 int bench_mesh_create(int which, struct bench_mesh *mesh, struct sh_err *err);
 
 #endif

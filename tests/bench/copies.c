@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A forest of copies: 10,000 of a tree of 100,000 triangles. What memory it takes, and what a ray costs, in turns with
- * one tree by itself and with the trees about it as triangles of their own. Processor time of the thread, medians of
- * the rounds.
+/* This measures a forest of copies: 10,000 of a tree of 100,000 triangles. It shows the memory of it, and the cost of a
+ * ray in turns with one tree by itself and with the trees about it as triangles of their own. Figures are processor
+ * time of the thread, medians of the rounds.
  *
  *   build/tests/bench/copies */
 #include <math.h>
@@ -29,7 +29,7 @@ static double between(double lo, double hi)
     return lo + (hi - lo) * (double)(seed >> 11) * 0x1p-53;
 }
 
-/* A crown of leaves of 6 cm, each of two triangles that lie as they like. */
+/* Writes a crown of leaves of 6 cm. Each leaf has two triangles and lies at random. */
 static int write_tree(const char *path)
 {
     FILE *f = fopen(path, "w");
@@ -85,7 +85,7 @@ static int load(const char *path, int which, struct scene **scene, struct bvh **
 static double x[RAYS], y[RAYS], z[RAYS], range_m[RAYS];
 static uint32_t triangle[RAYS];
 
-/* Lines that go up, from the middle to the crown of the tree that stands alone. */
+/* Aims lines upward, from the middle to the crown of the tree that stands alone. */
 static void aim(const double at_m[3])
 {
     const double azimuth = atan2(at_m[0], at_m[1]), elevation = atan2(at_m[2], hypot(at_m[0], at_m[1]));
@@ -133,7 +133,7 @@ static void measure(struct bvh_work *work, struct bvh *const bvh[SCENES])
 {
     static double ns[SCENES][ROUNDS], ratio[SCENES][ROUNDS];
     double hit[SCENES];
-    for (int round = -1; round < ROUNDS; round++) /* the first warms up */
+    for (int round = -1; round < ROUNDS; round++) /* the first round warms up */
         for (int k = 0; k < SCENES; k++) {
             const double now = cast_ns(work, bvh[k], &hit[k]);
             if (round < 0) continue;

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CELLS = 200 }; /* each way */
+enum { CELLS = 200 }; /* along each axis */
 
 struct ground_truth {
     const struct scene *scene;
@@ -14,8 +14,8 @@ struct ground_truth {
     uint32_t *list;
 };
 
-/* Cells from..to that the interval touches, its margin included: far more than double precision can be wrong
- * by. */
+/* Gives the cells from..to that the interval touches with its margin. The margin is far more than double precision can
+ * be wrong by. */
 static void cells_of(const struct ground_truth *r, int axis, double lo, double hi, int *from, int *to)
 {
     double a = (lo - r->margin_m - r->min_m[axis]) / r->cell_m[axis],
@@ -37,7 +37,7 @@ static void triangle_cells(const struct ground_truth *r, uint32_t prim, int from
     }
 }
 
-/* Counts (list NULL) or lists the triangles of each cell; next is where the cell's next one goes. */
+/* Counts the triangles of each cell (list NULL), or lists them. next is the place of the cell's next triangle. */
 static void each_triangle(const struct ground_truth *r, uint32_t *next, uint32_t *list)
 {
     for (uint32_t prim = 0; prim < r->scene->n_triangles; prim++) {
@@ -104,11 +104,12 @@ static long double dot(const long double a[3], const long double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* What a ray has met so far. */
+/* This is what a ray has met so far. */
 struct met {
-    long double range;     /* of the first triangle; its border belongs to it, and a little around it, so that
-                            * there is no gap between neighbours in long double */
-    long double around[2]; /* of the first one that it meets or just misses, seen from its front, from its back */
+    /* Range of the first triangle. Its border belongs to it, and a little around that, so that there is no gap between
+     * neighbours in long double. */
+    long double range;
+    long double around[2]; /* of the first triangle that it meets or just misses, seen from its front, from its back */
 };
 
 static void hit(const struct ground_truth *r, uint32_t prim, const long double dir[3], struct met *met)
@@ -132,7 +133,7 @@ static void hit(const struct ground_truth *r, uint32_t prim, const long double d
     met->around[det < 0.0L] = fminl(met->around[det < 0.0L], t);
 }
 
-/* Part of 0..reach in which the ray is within lo..hi of an axis; 0 when nowhere. */
+/* Gives the part of 0..reach in which the ray is within lo..hi of an axis. Returns 0 if there is none. */
 static int part_within(double dir, double lo, double hi, double reach, double *t0, double *t1)
 {
     double a = lo / dir, b = hi / dir;

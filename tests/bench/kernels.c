@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the arithmetic around the cast costs: each kernel alone, on arrays that stay in the cache, in turns. Processor
- * time of the thread, medians of the rounds, ns per pulse.
+/* This measures the arithmetic around the cast: each kernel alone, on arrays that stay in the cache, in turns. Figures
+ * are processor time of the thread, medians of the rounds, in ns per pulse.
  *
  *   build/tests/bench/kernels          the version that the program takes on this CPU
  *
@@ -19,7 +19,7 @@
 
 enum { N = BVH_CHUNK, ROUNDS = 41, TIMES = 100 };
 
-/* Not at a distance of whole pages: they would get into each other's way in a cache. */
+/* The arrays do not lie whole pages apart, because they would then push each other out of a cache. */
 struct vectors {
     double x[N + 48], y[N + 48], z[N + 48];
 };
@@ -32,7 +32,7 @@ static struct {
     uint8_t number[N + 48], echo[N + 48];
 } m;
 
-/* 0.04 degrees a pulse, encoders of 2^20 counts. */
+/* 0.04 degrees a pulse, encoders of 2^20 counts */
 static const struct schedule_run run = {.n = N,
                                         .in_line = 16,
                                         .r = 16,

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays aimed at edges and corners of closed meshes, from inside: does any slip through?
+/* Rays are aimed at edges and corners of closed meshes, from inside, and none may slip through.
  *
- * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its
- * target it hits a face from outside: then it has left the mesh. One that meets the inside of the mesh behind its
- * target has passed an edge that it was aimed at: no leak, but no less wrong, and counted apart.
+ * A ray leaks when it hits nothing, or when it reports the outer wall of nested meshes. It also leaks when it hits,
+ * behind its target, a face from outside, because then it has left the mesh. A ray that meets the inside of the mesh
+ * behind its target has passed an edge that it was aimed at. That is no leak, but no less wrong, and is counted apart.
  *
- * Every second batch is a moving head's: it goes about the station, up to half as far as the nearest wall. The rays of
- * the others are looked up in a sight of the station, too: each must be the cast's, bit by bit. */
+ * Every second batch is a moving head's. This head goes about the station, up to half as far as the nearest wall. The
+ * rays of the other batches are looked up in a sight of the station, too. Each must equal the cast's, bit by bit. */
 #include <math.h>
 #include <stdio.h>
 #include <pthread.h>
@@ -28,11 +28,11 @@ enum { BATCH = 4096, ROW = 256, MAX_THREADS = 64, PLAIN_RAYS = 1000000 / BENCH_L
 struct job {
     const struct bench_mesh *mesh;
     struct bvh *bvh;
-    struct sight_beside sight; /* of the station; threads join it */
+    struct sight_beside sight; /* a sight of the station, which the threads join */
     double room_m;             /* how far from the station a moving head goes */
     uint64_t n, key;
-    _Atomic uint64_t next; /* first ray that nobody has taken yet */
-    pthread_mutex_t lock;  /* of what follows */
+    _Atomic uint64_t next; /* the first ray that no thread has taken yet */
+    pthread_mutex_t lock;  /* it guards the members below */
     struct bench_leaks *out;
     double cpu_s;
 };
@@ -41,12 +41,12 @@ struct batch {
     double dx[BATCH], dy[BATCH], dz[BATCH], target_m[BATCH], range_m[BATCH];
     struct {
         double x[BATCH], y[BATCH], z[BATCH];
-    } o; /* where rays begin */
+    } o; /* the points where rays begin */
     float fx[BATCH], fy[BATCH], fz[BATCH];
     uint32_t prim[BATCH];
 };
 
-/* Onto the nearest border of two cells of the sight, and up to 4 units in the last place beside it. */
+/* Moves the ray onto the nearest border of two cells of the sight, or up to 4 units in the last place beside it. */
 static void to_border(uint32_t cells, uint64_t r, double d[3], double *length)
 {
     int axis = fabs(d[0]) >= fabs(d[1]) ? 0 : 1;
@@ -72,9 +72,9 @@ static void origin_of(const struct job *job, uint64_t i, double from[3])
         from[j] = job->mesh->station_m[j] + (is_moving(i) ? job->room_m * sin(turn[j] * (double)i) / sqrt(3.0) : 0.0);
 }
 
-/* Ray number i: to a corner, or to a point of an edge. Four rays each to a row of neighbouring triangles,
- * which begins anywhere: rays of a packet are near each other, as in a scan. Of four, one goes on to a border of
- * the sight's cells. */
+/* Aims ray number i at a corner, or at a point of an edge. Four rays go to each triangle of a row of neighbours that
+ * begins anywhere. So rays of a packet are near each other, as in a scan. One ray of four goes on to a border of the
+ * sight's cells. */
 static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
 {
     const struct scene *scene = job->mesh->scene;
@@ -95,14 +95,14 @@ static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
     VEC3_SET(b->o, k, from);
     if (job->sight.sight != NULL && i % 4 == 3 && !is_moving(i)) {
         to_border(job->sight.info.cells, r, d, &length);
-        b->target_m[k] = INFINITY; /* it has left the edge, and may only not get out */
+        b->target_m[k] = INFINITY; /* it has left the edge, so only leaving the mesh counts */
     }
     b->dx[k] = d[0] / length;
     b->dy[k] = d[1] / length;
     b->dz[k] = d[2] / length;
 }
 
-/* From outside, as the mesh's faces are turned. */
+/* Says whether the ray hits a face from outside. */
 static int hits_outside(const struct bench_mesh *mesh, uint32_t prim, const double dir[3])
 {
     double e1[3], e2[3];
@@ -116,7 +116,7 @@ static int hits_outside(const struct bench_mesh *mesh, uint32_t prim, const doub
     return prim < mesh->n_turned ? along > 0.0 : along < 0.0;
 }
 
-/* 1: leaked; 2: passed by. tolerance: of the range, in shares. */
+/* Returns 1 for a leak and 2 for a ray that passed its target. tolerance is a share of the range. */
 static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m, uint32_t prim,
                  double tolerance)
 {
@@ -214,14 +214,14 @@ static int run_job(struct job *job, uint32_t threads, const struct sh_report *re
     return SH_OK;
 }
 
-/* Half as far as the nearest wall, of which samples all around are within a tenth. */
+/* The room is half as far as the nearest wall. Samples all around find that within a tenth. */
 static int find_room(struct job *job, struct sh_err *err)
 {
     struct caster *caster;
     struct batch *b = aligned_alloc(64, sizeof *b);
     double nearest_m = BENCH_RANGE_MAX_M;
     int rc = b != NULL ? caster_create(&caster, err) : sh_fail(err, SH_ENOMEM, "bench: no memory");
-    for (uint32_t k = 0; k < BATCH && rc == SH_OK; k++) { /* a spiral: even over the sphere */
+    for (uint32_t k = 0; k < BATCH && rc == SH_OK; k++) { /* a spiral that is even over the sphere */
         const double z = (2.0 * k + 1.0) / BATCH - 1.0, r = sqrt(1.0 - z * z), turn = 2.399963229728653 * k;
         b->dx[k] = r * cos(turn);
         b->dy[k] = r * sin(turn);
@@ -239,7 +239,7 @@ static int find_room(struct job *job, struct sh_err *err)
     return rc;
 }
 
-/* The rays from the station by Embree alone. */
+/* Casts the rays from the station with Embree alone. */
 static int plain(struct job *job, struct sh_err *err)
 {
     struct embree_alone e;

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Measures what loading a large mesh costs: `scanhead check` of terrain in a file, beside bare Embree on the same triangles.
+/* This measures the cost to load a large mesh: `scanhead check` of terrain in a file, beside bare Embree on the same
+ * triangles.
  *
  *   build/tests/bench/loading [options] [CASE...]
  *
- * In each round, in turns, and each in a process of its own: `check`, and Embree's build of the triangles, which lie in
- * memory. Processor time is that of all threads, kernel included. Of Embree it is that of its build alone; of `check` it
- * is all there is, from reading the file on. Peaks of memory are those of whole processes, for the same reason. */
+ * Each round runs `check`, and then Embree's build of the triangles, which lie in memory. Each runs in a process of its
+ * own. Processor time is that of all threads, kernel included. For Embree it is the time of its build alone. For
+ * `check` it is all there is, from reading the file on. Peaks of memory are those of whole processes, for the same
+ * reason. */
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
@@ -48,7 +50,7 @@ enum { N_CASES = sizeof CASES / sizeof *CASES };
 
 static char folder[PATH_ROOM], config_path[PATH_ROOM + 32], mesh_path[PATH_ROOM + 32], messages_path[PATH_ROOM + 32];
 
-/* ---- the mesh; whoever has it in memory is a process that ends, so that the peaks of others are their own */
+/* ---- the mesh: a process that has it in memory ends afterwards, so that the peaks of the others are their own */
 
 static int make_terrain(uint32_t triangles, struct bench_target *target, struct sh_err *err)
 {
@@ -57,7 +59,7 @@ static int make_terrain(uint32_t triangles, struct bench_target *target, struct 
     return bench_target_load(name, NULL, NULL, target, err);
 }
 
-/* Three vertices for each triangle. */
+/* Makes three vertices for each triangle. */
 static int tear(const struct mesh *mesh, double (**xyz_m)[3], uint32_t (**face)[3], struct sh_err *err)
 {
     *xyz_m = malloc((size_t)mesh->n_faces * 3 * sizeof **xyz_m);
@@ -114,7 +116,7 @@ struct figures {
     double cpu_s, wall_s, bytes, triangles;
 };
 
-/* In a child: what it leaves there the parent sees. */
+/* The parent sees the figures that a child leaves here. */
 static struct figures *shared;
 
 static int build_alone(uint32_t triangles, unsigned threads, struct sh_err *err)
@@ -132,7 +134,7 @@ static int build_alone(uint32_t triangles, unsigned threads, struct sh_err *err)
     return rc;
 }
 
-/* Does not return. */
+/* This does not return. */
 static void become_check(const struct options *o, unsigned threads)
 {
     char set[32];
@@ -157,7 +159,7 @@ static double seconds_of(const struct timeval *t)
     return (double)t->tv_sec + 1e-6 * (double)t->tv_usec;
 }
 
-/* Ends well where the child does. usage and wall_s: its own. */
+/* Waits for the child and returns 0 if it ended well. usage and wall_s are the child's own. */
 static int wait_for(pid_t pid, const char *what, struct figures *out, struct sh_err *err)
 {
     struct rusage usage;

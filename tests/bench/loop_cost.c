@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What the real loop costs around the cast: whole programs in turns, on the null link, with one caster.
+/* This measures what the real loop costs around the cast: whole programs in turns, on the null link, with one caster.
  *
  *   build/tests/bench/loop_cost [options] PROGRAM...
  *
  * A PROGRAM is a path of scanhead, and more of its options after blanks: 'build/scanhead --no-hash'. Each round runs
- * each program twice, for a short and for a long scan. The difference of both is the cost of the pulses between them;
- * loading the scene is in neither. Processor time is that of all threads, from --stats. */
+ * each program twice, for a short and for a long scan. The difference of both is the cost of the pulses between them.
+ * Loading the scene is in neither. Processor time is that of all threads, from --stats. */
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
@@ -37,20 +37,20 @@ struct options {
 
 struct figures {
     double cpu_s, wall_s, pulses;
-    char sha256[65]; /* empty: the program kept none */
+    char sha256[65]; /* empty if the program kept none */
 };
 
 struct costs {
     double ns[MAX_ROUNDS], share[MAX_ROUNDS], ratio[MAX_ROUNDS];
     uint64_t pulses;
     char sha256[65];
-    int differs; /* from its own other rounds */
+    int differs; /* it differs between its own rounds */
 };
 
 static char folder[] = "/tmp/scanhead-loop-XXXXXX";
 static char config_path[PATH_ROOM], mesh_path[PATH_ROOM], stats_path[PATH_ROOM], messages_path[PATH_ROOM];
 
-/* ---- what is scanned */
+/* ---- the scene */
 
 static int write_mesh(struct sh_err *err)
 {
@@ -107,7 +107,7 @@ static int read_figures(struct figures *out, struct sh_err *err)
     return SH_OK;
 }
 
-/* Does not return. */
+/* This does not return. */
 static void become(const struct options *o, const char *program, double seconds)
 {
     char words[512], duration[32], *arg[MAX_WORDS + 1], *save = NULL;
@@ -176,7 +176,7 @@ static void print_costs(const struct options *o, struct costs *costs, const stru
 {
     const uint32_t n = o->rounds;
     const double ratio = bench_median(costs->ratio, n), share = bench_median(costs->share, n);
-    const double ns = bench_median(costs->ns, n); /* sorted now */
+    const double ns = bench_median(costs->ns, n); /* they are sorted now */
     printf("%9.1f %9.1f %9.1f %8.3f %8.1f  %-9s  %s\n", ns, costs->ns[n / 4], costs->ns[n - 1 - n / 4], ratio, share,
            costs->sha256[0] == '\0'                    ? "none"
            : costs->differs                            ? "CHANGES"
@@ -191,7 +191,7 @@ static int measure(const struct options *o, struct sh_err *err)
     static struct costs costs[MAX_PROGRAMS];
     for (uint32_t round = 0; round < o->rounds; round++)
         for (uint32_t i = 0; i < o->n; i++) {
-            const uint32_t which = (i + round) % o->n; /* nobody is always the first */
+            const uint32_t which = (i + round) % o->n; /* the programs take turns at being first */
             int rc = run_pair(o, o->program[which], &costs[which], round, err);
             if (rc != SH_OK) return rc;
         }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One thread: Embree, robust and not, the exact cast, the whole pipeline, the pipeline by stages, in turns. */
+/* One thread runs Embree, robust and not, the exact cast, the whole pipeline, and the pipeline by stages, in turns. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,7 +24,7 @@ struct measure {
     struct bench_block *rays;
     double range_m[BENCH_BLOCK];
     uint32_t prim[BENCH_BLOCK];
-    uint8_t *sink, *staged; /* the null link: the last line's bytes */
+    uint8_t *sink, *staged; /* the bytes of the last line, as the null link gets them */
     size_t cap;
     double ns[N_METHODS][BENCH_MAX_ROUNDS], stage_ns[BENCH_STAGES][BENCH_MAX_ROUNDS];
 };
@@ -61,7 +61,7 @@ static void tear_down(struct measure *m)
     free(m->rays);
 }
 
-/* A line as a worker of the loop makes it. */
+/* Makes a line as a worker of the loop makes it. */
 static size_t whole_line(struct measure *m, const struct cast_setup *setup, uint32_t l)
 {
     const struct schedule_segment *segment = &m->c->rays->segment;
@@ -80,13 +80,13 @@ static void staged_pass(struct measure *m, uint32_t round)
     double start_s = bench_thread_s();
     for (uint32_t l = 0; l < rays->lines; l++)
         bench_stages_line(m->stages, &m->setup, &rays->segment, l, cycles, &m->block, m->staged, m->cap);
-    /* Cycles go on while somebody else has the processor; its time doesn't. */
+    /* Cycles go on while another program has the processor, but this thread's time doesn't. */
     double ns = 1e9 * (bench_thread_s() - start_s) / (double)(bench_cycles() - start) / rays->n;
     for (int s = 0; s < BENCH_STAGES; s++)
         m->stage_ns[s][round] = (double)cycles[s] * ns;
 }
 
-/* Embree and the cast get their rays as the pipeline has them: a block at a time, in the cache; the clock stands while
+/* Embree and the cast get their rays as the pipeline has them: a block at a time, in the cache. The clock stands while
  * a block is laid out. */
 static double timed_blocks(struct measure *m, int method)
 {
@@ -125,7 +125,7 @@ static double timed_pass(struct measure *m, int method, uint32_t round)
     return 1e9 * s / m->c->rays->n;
 }
 
-/* Embree at its best: packets of 4, 8 or 16, from memory or filled on the way. */
+/* Chooses the packets at which Embree is fastest: 4, 8 or 16, from memory or filled on the way. */
 static int choose_embree(struct measure *m, struct sh_err *err)
 {
     static const uint32_t widths[] = {4, 8, 16};
@@ -166,7 +166,7 @@ static int check_same(struct measure *m)
     return 1;
 }
 
-/* One method's time by another's. */
+/* Returns the ratio of one method's time to another's. */
 static double ratio(const struct measure *m, int base, int method)
 {
     double r[BENCH_MAX_ROUNDS];
@@ -178,7 +178,7 @@ static double ratio(const struct measure *m, int base, int method)
 static void summarise(struct measure *m)
 {
     struct bench_result *out = m->out;
-    out->cast_ratio = ratio(m, EMBREE, CAST); /* before the medians: those sort */
+    out->cast_ratio = ratio(m, EMBREE, CAST); /* comes before the medians, because those sort */
     out->pipeline_ratio = ratio(m, EMBREE, PIPELINE);
     out->ideal_ratio = ratio(m, EMBREE, IDEAL);
     out->fast_ratio = ratio(m, FAST, CAST);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// make bench-page: what a browser costs a head at its limit, and how fast the page is. A table for each question:
+// make bench-page: this measures what a browser costs a head at its limit, and how fast the page is. It prints a table for each:
 //   1. 2.2 million pulses a second of a small room, without a browser, and with one at nice 10 that can't follow
 //   2. pictures a second of 2, 5 and 10 million points, drawn in software
 //   3. decoding, ns a point, in the page and in node
@@ -32,7 +32,7 @@ ${more}`;
 const sleep = (s) => new Promise((done) => setTimeout(done, 1000 * s));
 const figures = (page) => page.eval('(({point_hash, ...f}) => f)(scanhead.head.figures())');
 
-// Rows of texts, the first one the head; numbers to the right.
+// Makes rows of texts, with numbers to the right. The first row is the head.
 function table(rows) {
   const width = rows[0].map((_, k) => Math.max(...rows.map((row) => String(row[k]).length)));
   for (const row of rows) console.log(`  ${row.map((cell, k) => (k === 0 ? String(cell).padEnd(width[k]) : String(cell).padStart(width[k]))).join('  ')}`);
@@ -70,7 +70,7 @@ async function load() {
 }
 
 // ---- 2
-// Points on the walls of a hall, as a scan has them: all of these are in sight from outside.
+// The points lie on the walls of a hall, as a scan has them, and all are in sight from outside.
 const fill = (n) => `(() => {
   const cloud = scanhead.cloud, N = 50000;
   cloud.clear();

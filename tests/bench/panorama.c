@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* A whole panorama of 0.1 degrees to a binary PLY file, beside Embree alone on the same rays.
+/* This measures a whole panorama of 0.1 degrees to a binary PLY file, beside Embree alone on the same rays.
  *
  *   build/tests/bench/panorama [options]
  *
- * In each round, in turns: Embree alone casts all rays, robust, with ready packets at its best width, on one thread; the
- * head scans the same panorama off line, as `scanhead record` does, into files. Loading and building the BVH come before.
- * Figures are processor time of all threads, kernel included, so they are those of one core. */
+ * Each round runs both in turns. Embree alone casts all rays, robust, with ready packets at its best width, on one
+ * thread. The head scans the same panorama off line, as `scanhead record` does, into files. Loading and building the
+ * BVH come before. Figures are processor time of all threads, kernel included, so they are those of one core. */
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
@@ -47,7 +47,7 @@ static char folder[PATH_ROOM], config_path[PATH_ROOM + 32], head_path[PATH_ROOM 
 
 static const double RAD = M_PI / 180.0;
 
-/* ---- what is scanned */
+/* ---- the scene */
 
 static int write_mesh(const struct scene *s, struct sh_err *err)
 {
@@ -162,7 +162,7 @@ static void remove_files(void)
 struct alone {
     struct embree_alone e;
     struct bench_block *block;
-    float *d[3]; /* [n], RAYS and then the last one again: whole blocks */
+    float *d[3]; /* [n]: RAYS, and then the last one again up to whole blocks */
     uint32_t n, width;
     enum embree_feed feed;
 };
@@ -185,7 +185,7 @@ static void aim(struct alone *a)
             a->d[k][i] = a->d[k][i - 1];
 }
 
-/* Seconds for n rays. Those of a block lie in the cache when their time begins. */
+/* Returns the seconds for n rays. The rays of a block lie in the cache when their time begins. */
 static double alone_pass(struct alone *a, uint32_t n)
 {
     double spent_s = 0.0;
@@ -201,7 +201,7 @@ static double alone_pass(struct alone *a, uint32_t n)
     return spent_s;
 }
 
-/* The fastest of packets of 4, 8 and 16, ready or filled from arrays. */
+/* Chooses the fastest packets: 4, 8 or 16, ready or filled from arrays. */
 static int choose(struct alone *a, struct sh_err *err)
 {
     double best_s = INFINITY;
@@ -254,7 +254,7 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return record_files_frame(ctx, sh, frame, err);
 }
 
-/* Seconds for a scan, files included. */
+/* Returns the seconds for a scan, files included. */
 static int scan_once(const struct options *o, struct offline *off, double *spent_s, uint64_t *pulses,
                      struct sh_err *err)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What effects cost that a configuration names and a scene doesn't need: the cast as the program sets it up, by the
- * plain one of the same rays, which knows of none. In turns, line by line, processor time of the thread; the median of
- * the rounds' ratios is to lie within 5 %.
+/* This measures the cost of effects that a configuration names but the scene doesn't need. It compares the cast as the
+ * program sets it up with the plain cast of the same rays, which has none of the effects. Both run in turns, line by
+ * line, in processor time of the thread. The median of the rounds' ratios must lie within 5 %.
  *
  *   build/tests/bench/plain */
 #include <math.h>
@@ -21,7 +21,7 @@ static const double ALLOWED = 0.05;
 
 struct plain_case {
     const char *name;
-    int hall; /* else the demo's house, from its living room */
+    int hall; /* if 0, the demo's house, from its living room */
     const char *set[MAX_SETS];
 };
 
@@ -41,7 +41,7 @@ static const struct plain_case CASES[] = {
     {"beam auto, a hall without edges to cut a footprint", 1, {"beam.mode=auto"}},
 };
 
-/* A hall of 30 m x 20 m x 8 m, its walls of triangles of about 20 cm: no outline is seen from within. */
+/* The hall is 30 m x 20 m x 8 m, with walls of triangles of about 20 cm. No outline is seen from inside. */
 static int write_hall(const char *path)
 {
     static const double size_m[3] = {30.0, 20.0, 8.0}, low_m[3] = {-9.5, -7.8, 0.0};
@@ -136,7 +136,7 @@ static double measure(struct run *r, double *plain_ns, double *ns)
     double plain[ROUNDS], asked[ROUNDS], ratio[ROUNDS];
     for (uint32_t k = 0; k < ROUNDS; k++) {
         double s[2] = {0.0, 0.0};
-        for (uint32_t l = 0; l < LINES; l++) /* who comes second finds the caches warm */
+        for (uint32_t l = 0; l < LINES; l++) /* the second of the two finds the caches warm */
             for (uint32_t turn = 0; turn < 2; turn++) {
                 uint32_t which = (k + l + turn) % 2;
                 s[which] += line_s(r, which == 0 ? &r->plain : &r->setup, l);

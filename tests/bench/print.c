@@ -65,7 +65,7 @@ static double rest_ns(const struct bench_result *r)
     return rest;
 }
 
-/* Of n rays: how many of a million. */
+/* Prints the counts of n rays as counts per million. */
 static void put_counters(struct json *json, const char *key, const struct cast_counters *c, double rays)
 {
     double per_million = rays > 0.0 ? 1e6 / rays : 0.0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What build/bench measured, as JSON and as a table. */
+/* This prints the results of build/bench, as JSON and as a table. */
 #ifndef TESTS_BENCH_PRINT_H
 #define TESTS_BENCH_PRINT_H
 
@@ -20,7 +20,7 @@ struct bench_scene_report {
     struct bench_result result;
     struct bench_threads loop[2]; /* one thread, all threads */
     uint32_t n_loop;
-    int stages; /* result was measured; else only the sights are there */
+    int stages; /* result was measured; otherwise only the sights are there */
     struct bench_sight sight[BENCH_MAX_SCANS];
     uint32_t n_sights;
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Prints what bench_reach measured: JSON and a table, and beside each figure the bound that it is to hold. */
+/* This prints the results of bench_reach, as JSON and as a table, and beside each figure its bound. */
 #include <string.h>
 
 #include "tests/bench/reach.h"
@@ -14,8 +14,8 @@ static int has_bound(const struct bench_reach *r)
     return r->of != &REACH_CASE[r->of->standing];
 }
 
-/* A body that moves may cost half as much again as one that stands, and a head three tenths. How far a head may go, or
- * where another station is, may change nothing. */
+/* A body that moves may cost half as much again as one that stands, and a head three tenths. The distance that a head
+ * goes, or of another station, may change nothing. */
 static struct bound bound_of(const struct bench_reach *r)
 {
     const struct reach_case *of = r->of;

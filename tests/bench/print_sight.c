@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What bench_sight measured: JSON and tables, and beside each figure the bound that it is to hold. */
+/* This prints the results of bench_sight, as JSON and as tables, and beside each figure its bound. */
 #include <math.h>
 #include <string.h>
 
@@ -56,7 +56,7 @@ static const struct bound BOUND[] = {
 };
 enum { N_BOUNDS = sizeof BOUND / sizeof BOUND[0] };
 
-/* Scans are of whole lines: within 1 % of the number that was asked for. */
+/* Scans are of whole lines, so their pulses are within 1 % of the number that was asked for. */
 static int applies(const struct bound *b, const char *scene, const struct bench_sight *s)
 {
     return (b->scene == NULL || strcmp(b->scene, scene) == 0) &&

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One thread: the cases of a group line by line in turns, the whole cast of each. */
+/* One thread casts the cases of a group line by line in turns, and measures the whole cast of each. */
 #include "tests/bench/reach.h"
 
 #include <stdlib.h>
@@ -13,7 +13,8 @@ struct group {
     double ns[BENCH_MAX_REACH][BENCH_REACH_ROUNDS];
 };
 
-/* Each line is cast for all cases before the next one. They take turns in who finds the caches as another left them. */
+/* Each line is cast for all cases before the next line. The cases take turns at who finds the caches as another case
+ * left them. */
 static void round_of(struct group *g, uint32_t round)
 {
     double spent_s[BENCH_MAX_REACH] = {0.0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The real loop with the null link, as fast as it goes, and Embree on as many threads, in turns. */
+/* This measures the real loop with the null link, as fast as it goes, and Embree on as many threads, in turns. */
 #include <math.h>
 #include <poll.h>
 #include <pthread.h>
@@ -33,7 +33,7 @@ static void *slice_main(void *arg)
     return NULL;
 }
 
-/* Rays per second of Embree alone, the rays dealt out to the threads. 0: no threads to be had. */
+/* Returns rays per second of Embree alone, with the rays dealt out to the threads. Returns 0 if it gets no threads. */
 static double embree_rays_s(const struct bench_case *c, const struct bench_result *one, uint32_t threads,
                             uint32_t passes)
 {
@@ -55,7 +55,7 @@ static double embree_rays_s(const struct bench_case *c, const struct bench_resul
     return begun == threads ? (double)c->rays->n * passes / s : 0.0;
 }
 
-/* A head as configurations make it, that fires as the bench's rays go: frames turns of the pan. */
+/* Makes a head as configurations do, which fires as the bench's rays go. frames is the number of turns of the pan. */
 static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t threads, uint32_t frames)
 {
     struct schedule_spec spec;
@@ -97,7 +97,7 @@ static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t
     cfg->noise.seed = 1;
     cfg->link[0].type = LINK_NULL;
     cfg->n_links = 1;
-    cfg->loop.tick_hz = 1000.0; /* this and the next as by default (config/keys.c) */
+    cfg->loop.tick_hz = 1000.0; /* this and the next are as by default (config/keys.c) */
     cfg->loop.ahead_ms = 64.0;
     cfg->loop.queue_ms = 250.0;
     cfg->loop.threads = threads;
@@ -162,7 +162,7 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     struct config *cfg = malloc(sizeof *cfg);
     if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
     fill_config(cfg, c, out->threads, frames);
-    /* A site of what is there already; nothing of it is released here but the georeference. */
+    /* The site is made of parts that are there already. Only the georeference is released here. */
     struct site_station only = {.station = &cfg->station[0]}, *station = &only;
     struct site site = {.cfg = cfg,
                         .scene = c->target->scene,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# How late the pacing thread wakes up, beside cyclictest in turns: under two minutes.
+# This measures how late the pacing thread wakes up, beside cyclictest in turns. It takes under two minutes.
 .PHONY: bench-rt
 #? bench-rt          how late the pacing thread wakes up, beside cyclictest
 bench-rt: deps-build

@@ -1,8 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# How late the pacing thread wakes up, beside cyclictest in turns: sh tests/bench/real_time.sh SCANHEAD FOLDER. Five pairs;
-# both sleep up to absolute times, 1 ms apart, with the same priority: SCHED_FIFO 80 where that is permitted to both, else
-# none. Prints a table, the ratio of the medians of p99, and a verdict: status 1 where it is above 1.5.
+# This measures how late the pacing thread wakes up, beside cyclictest in turns: sh tests/bench/real_time.sh SCANHEAD
+# FOLDER. It runs five pairs. Both sleep up to absolute times, 1 ms apart, with the same priority. That is SCHED_FIFO 80
+# if both may have it, and otherwise none. It prints a table, the ratio of the medians of p99, and a verdict. The status
+# is 1 if the ratio is above 1.5.
 #
 # RT_S: seconds of a turn (10). RT_PAIRS: pairs (5). RT_SETS: options for the head, as `--set head.prr_hz=1000`.
 set -eu
@@ -28,7 +29,7 @@ else
     policy="--policy=other" said="no priority"
 fi
 
-# A room and a head that scans it: links have no clients, as only wake-ups and releases count.
+# A head scans a room. Its links have no clients, as only wake-ups and releases count.
 cat >"$out/head.yaml" <<END
 head: {profile: $PWD/config/heads/any-rate.yaml, prr_hz: 300000, lines_hz: 100, pan_deg_s: 50, frames: 0}
 scene: {meshes: [{file: $PWD/config/scenes/glass_room.obj, up: z, scale: 1}]}
@@ -36,7 +37,8 @@ stations: [{position_m: [0, 0, 1.5]}]
 links: [{type: "null"}]
 END
 
-# cyclictest NUMBER: its p50, p99 and largest, us. It tunes nothing that the head does not (--default-system).
+# cyclic NUMBER: runs cyclictest and prints its p50, p99 and largest, in us. It tunes nothing that the head does not
+# (--default-system).
 cyclic() {
     # shellcheck disable=SC2086
     timeout $((seconds + 60)) cyclictest --default-system -m -q -t 1 -i 1000 -l $((seconds * 1000)) $policy -h 100000 \
@@ -51,7 +53,7 @@ cyclic() {
         END { if (n == 0) exit 1; printf "%.0f %.0f %.0f\n", share(0.5), share(0.99), max }' "$out/cyclictest$1"
 }
 
-# head NUMBER: p50, p99 and largest of its wake-ups; the same of the release of frames; us.
+# head NUMBER: runs the head and prints p50, p99 and largest of its wake-ups, then of the release of frames, in us.
 head() {
     # shellcheck disable=SC2086
     timeout $((seconds + 60)) "$scanhead" run "$out/head.yaml" --start --duration "$seconds" --quiet --no-hash \
@@ -71,7 +73,7 @@ row='%-5s %16s %5s %6s %16s %5s %6s %16s %5s %6s\n'
 printf "$row" pair 'cyclictest: p50' p99 max 'wake-up: p50' p99 max 'release: p50' p99 max
 pair=1
 while [ "$pair" -le "$pairs" ]; do
-    # Each is first in turn.
+    # The two take turns at being first.
     if [ $((pair % 2)) = 1 ]; then
         theirs=$(cyclic $pair)
         ours=$(head $pair)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A whole scan, and what a sight is made of for it. */
+/* This describes a whole scan, and what a sight is made of for it. */
 #include <math.h>
 #include <string.h>
 #include <time.h>
@@ -11,7 +11,7 @@ enum { BUNDLE = 8, MOST_OF_A_ROUND = 5000000 };
 void bench_scan_of(double pulses, uint32_t every, struct bench_scan *out)
 {
     const double fov_deg = BENCH_HIGHEST_DEG - BENCH_LOWEST_DEG;
-    /* Of BUNDLE lines it is a multiple of the widest packet then. */
+    /* The pulses of BUNDLE lines are a multiple of the widest packet then. */
     double of_line = 4.0 * round(sqrt(pulses * fov_deg / 360.0) / 4.0);
     out->line_pulses = (uint32_t)fmin(fmax(of_line, 4.0), BENCH_MAX_LINE);
     out->lines = BUNDLE * (uint32_t)fmax(round(pulses / out->line_pulses / BUNDLE), 1.0);
@@ -30,7 +30,7 @@ int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad)
            elevation_rad - radius_rad <= BENCH_HIGHEST_DEG * RAD;
 }
 
-static double share(void) /* of the sphere */
+static double share(void) /* the share of the sphere that the scan covers */
 {
     return (sin(BENCH_HIGHEST_DEG * RAD) - sin(BENCH_LOWEST_DEG * RAD)) / 2.0;
 }

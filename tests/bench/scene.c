@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where is scanned. */
+/* These are the places that are scanned. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,7 +31,7 @@ int bench_is_house(const char *name)
 
 static int load_house(const char *file, const struct sh_report *report, struct bench_target *t, struct sh_err *err)
 {
-    static const double living_room_m[3] = {5.5, 2.2, 1.6}; /* of config/demo.yaml */
+    static const double living_room_m[3] = {5.5, 2.2, 1.6}; /* as in config/demo.yaml */
     static const double garden_m[3] = {6.0, -2.6, 1.7};
     struct scene_mesh_spec spec = {.file = file, .up = SCENE_UP_Y, .scale = 1.0};
     memcpy(t->station_m, strcmp(t->name, "garden") == 0 ? garden_m : living_room_m, sizeof t->station_m);
@@ -56,7 +56,7 @@ static double part(uint64_t i)
     return (double)(rng_u64(rng_key(1, RNG_SCENE), i) >> 11) * 0x1p-53 - 0.5;
 }
 
-/* The small ones lie anyhow, up to 5 m away, over ground a metre below the head. */
+/* The small triangles lie at random, up to 5 m away, over ground a metre below the head. */
 static int make_huge(struct scene **out, struct sh_err *err)
 {
     enum { SMALL = 4000 };

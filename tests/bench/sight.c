@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Whole scans, one thread: Embree, the cast and the pipeline, each without and with a sight, in turns. */
+/* One thread measures whole scans: Embree, the cast and the pipeline, each of the latter two without and with a sight,
+ * in turns. */
 #include "tests/bench/sight.h"
 
 #include <math.h>
@@ -12,7 +13,7 @@
 enum { EMBREE, WITHOUT, SIGHT, PIPELINE_WITHOUT, PIPELINE, N_METHODS };
 enum { KINDS = 3 /* one or nothing, few, ask */, WIDTHS = 3, TRIES = 3 };
 
-struct sums { /* of the least squares: what a block cost by what was in it */
+struct sums { /* sums of the least squares that explain a block's cost by its kinds of pulses */
     double a[KINDS][KINDS], b[KINDS];
 };
 
@@ -70,7 +71,7 @@ static void tear_down(struct rows *r)
     free(r->block);
 }
 
-/* The sight of this round, and what its building cost. */
+/* Builds the sight of this round and takes its cost. */
 static int build(struct rows *r, uint32_t round, struct sh_err *err)
 {
     struct sight_spec spec;
@@ -114,7 +115,7 @@ static void add_block(struct sums *s, uint32_t n, const struct sight_counters *b
     }
 }
 
-/* Solves the normal equations. What hardly occurs has no cost that could be told: NaN. */
+/* Solves the normal equations. A kind that hardly occurs has no cost that could be told, and gets NaN. */
 static void solve(struct sums *s, double of_kind[KINDS])
 {
     int known[KINDS];
@@ -176,7 +177,7 @@ static double timed_lines(struct rows *r, int method, uint32_t first_line)
     return bench_thread_s() - start_s;
 }
 
-/* Of the pulses that are cast; ns each. */
+/* Returns the time of the pulses that are cast, in ns each. */
 static double timed_pass(struct rows *r, int method, uint32_t step, struct sums *sums)
 {
     const struct bench_scan *scan = &r->out->scan;
@@ -188,7 +189,7 @@ static double timed_pass(struct rows *r, int method, uint32_t step, struct sums 
     return 1e9 * spent_s / pulses;
 }
 
-/* Embree at its best: packets of 4, 8 or 16, from memory or filled on the way. */
+/* Chooses the packets at which Embree is fastest: 4, 8 or 16, from memory or filled on the way. */
 static int choose_embree(struct rows *r, struct sh_err *err)
 {
     static const uint32_t widths[WIDTHS] = {4, 8, 16};
@@ -209,7 +210,8 @@ static int choose_embree(struct rows *r, struct sh_err *err)
     return embree_alone_prepare(r->c->embree, out->embree_width, out->embree_feed, err);
 }
 
-/* The same triangles and the same bits with and without; and how many pulses the map left open. */
+/* Counts pulses whose triangle or bits differ between the cast without and with the sight. Also counts the pulses that
+ * the map left open. */
 static void compare(struct rows *r)
 {
     const struct bench_scan *scan = &r->out->scan;
@@ -248,7 +250,7 @@ static int round_of(struct rows *r, uint32_t round, struct sh_err *err)
     return SH_OK;
 }
 
-/* One method's time by another's; a sight's building belongs to what needs it. */
+/* Returns the ratio of one method's time to another's. A sight's building belongs to the methods that need it. */
 static double ratio(const struct rows *r, int base, int method)
 {
     const int built = method == SIGHT || method == PIPELINE;
@@ -263,7 +265,7 @@ static void summarise(struct rows *r)
 {
     struct bench_sight *out = r->out;
     const uint32_t n = out->rounds;
-    out->cast_ratio = ratio(r, EMBREE, SIGHT); /* before the medians: those sort */
+    out->cast_ratio = ratio(r, EMBREE, SIGHT); /* comes before the medians, because those sort */
     out->cast_ratio_without = ratio(r, EMBREE, WITHOUT);
     out->pipeline_ratio = ratio(r, EMBREE, PIPELINE);
     out->pipeline_ratio_without = ratio(r, EMBREE, PIPELINE_WITHOUT);

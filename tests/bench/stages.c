@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The pipeline once more, line by line, with the counter of cycles read between its stages. */
+/* This is the pipeline once more, line by line, with the cycle counter read between its stages. */
 #include <stdlib.h>
 
 #include "drivers/protocol/crc32c.h"
@@ -12,7 +12,7 @@ struct bench_stages {
     struct bvh_profile profile;
 };
 
-/* Where a stage of the caster is told. */
+/* This says which stage of the bench a stage of the caster belongs to. */
 static const enum bench_stage STAGE_OF[CAST_STAGES] = {
     [CAST_DIRECTIONS] = STAGE_DIRECTIONS, [CAST_EMBREE] = STAGE_EMBREE, [CAST_REFINE] = STAGE_REFINE,
     [CAST_DETECT] = STAGE_DETECT,         [CAST_NOISE] = STAGE_NOISE,   [CAST_POSITIONS] = STAGE_GEOREF};
@@ -43,7 +43,7 @@ void bench_stages_free(struct bench_stages *stages)
     free(stages);
 }
 
-/* What the caster spent goes to its stages, the rest of the time between the marks to `other`. */
+/* Gives the caster's cycles to its stages, and the other cycles between the marks to `other`. */
 static void share(struct bench_stages *s, uint64_t from, uint64_t to, enum bench_stage other,
                   uint64_t cycles[BENCH_STAGES])
 {
@@ -70,8 +70,8 @@ size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup,
     share(s, start, cast, STAGE_SCHEDULE, cycles); /* times of the pulses belong to the schedule */
     size_t len = native_encode_points(bytes, cap, block, 0);
     uint64_t encoded = bench_cycles();
-    /* The checksum, made within the encoder, once more by itself: its time is taken from that of the encoder.
-     */
+    /* The checksum, made within the encoder, is made once more by itself. Its time is taken from that of the
+     * encoder. */
     volatile uint32_t crc = crc32c(0, bytes + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN);
     (void)crc;
     uint64_t spent = bench_cycles() - encoded, encode = encoded - cast;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What a VLP-16's data packets cost: the protocol alone, from the head's points frames of 76 packets, a turn
- * at 600 rpm, to packets that go nowhere, in processor time of the thread. Medians of the rounds.
+/* This measures the cost of a VLP-16's data packets. It runs the protocol alone, from the head's points frames of 76
+ * packets, a turn at 600 rpm, to packets that go nowhere. Figures are medians of the rounds, in processor time of the
+ * thread.
  *
  *   build/tests/bench/velodyne */
 #include <stdio.h>
@@ -43,7 +44,7 @@ static void count(void *ctx, enum protocol_count what, uint64_t n)
     (void)n;
 }
 
-/* Walls at 2 to 12 m, every fifth firing with two returns where there are some to choose from. */
+/* Walls stand at 2 to 12 m. Every fifth firing has two returns if the protocol has a choice. */
 static void add_firing(struct line_block *b, uint64_t pulse, int dual)
 {
     const uint32_t returns = dual && pulse % 5 == 0 ? 2 : 1;
@@ -96,7 +97,7 @@ static void describe(const struct protocol_ops *ops, void *protocol, int dual)
     ops->frame(protocol, frame, native_encode_emitter(frame, sizeof frame, &e, beam, 0, 0));
 }
 
-/* 0, or -1: it could not be set up, or packets are missing. */
+/* Returns 0, or -1 if it could not be set up or packets are missing. */
 static int measure(int dual)
 {
     const struct protocol_ops *ops = protocol_ops_get(PROTOCOL_VELODYNE);

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """clang-tidy's analyzer and cppcheck over the code: python3 tests/check/analyse.py --out FOLDER [--jobs N] FILE... -- FLAGS...
 
-What they find is printed, but what tests/check/answered.txt has an answer to. A line there that answers nothing any more is
-a finding, too. Ends with the counts; exit status 1 when there was a finding, 2 when a tool could not be run.
+This prints their findings, except those that tests/check/answered.txt has an answer to. A line there that answers nothing any
+more is a finding, too. The counts come last. The exit status is 1 if there was a finding, and 2 if a tool could not be run.
 """
 import argparse
 import collections
@@ -17,7 +17,7 @@ ROW = re.compile(r"(\S+?):(\d+): (.*) \[([\w.,-]+)\]$")
 
 
 def answers(path):
-    """{(check, file): count}: lines `CHECK FILE COUNT REASON`; FILE may be `*`: wherever that check finds something."""
+    """Reads lines `CHECK FILE COUNT REASON` into {(check, file): count}. FILE `*` means each file where that check finds something."""
     found = {}
     for number, line in enumerate(path.read_text().splitlines(), 1):
         if not line.strip() or line.startswith("#"):

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* For clang-tidy's analyzer alone, which reads one file at a time: a function of another file may return anything, it
- * believes, so that each failure might be none. Here it sees that these always return the code of a failure.
+/* This is for clang-tidy's analyzer alone, which reads one file at a time. It believes that a function of another file
+ * may return anything, so that each failure might be none. Here it sees that these functions always return the code of
+ * a failure.
  *
- * DEFINES_...: the file that is looked at is the one that defines it. IN_SCENE: it is one of core/scene or core/import. */
+ * DEFINES_... says that the file that is looked at is the one that defines the function. IN_SCENE says that the file is
+ * one of core/scene or core/import. */
 #ifndef TESTS_CHECK_ANALYZER_H
 #define TESTS_CHECK_ANALYZER_H
 

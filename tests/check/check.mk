@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Analysers over the code, and ThreadSanitizer over the program: README.md here.
+# This runs analysers over the code, and ThreadSanitizer over the program (README.md here).
 #   make check                all of it
 #   make check-analysers      clang-tidy's analyzer and cppcheck
 #   make check-tsan           every kind of link, pace and source, with clients; CHECK_S=15 seconds a round
@@ -12,7 +12,8 @@ deps-check: deps-build
 	$(call install_missing,$(DEPS_CHECK))
 check-analysers: deps-check $(BUILD)/drivers/link/web_pages.inc
 	@python3 tests/check/analyse.py --out $(BUILD)/check --jobs $(JOBS) $(CHECK_FILES) -- $(CHECK_FLAGS)
-# CPPFLAGS: what is built otherwise for sanitizers. -O1: races are those of the source, and it takes a third of the time.
+# CPPFLAGS selects the code that is built otherwise for sanitizers. -O1 is enough because races are those of the source,
+# and it takes a third of the time.
 TSAN = $(ASAN_CC) OPT=-O1 WERROR= CFLAGS="-g1 -w" CXXFLAGS="-g1 -w" CPPFLAGS=-DSH_SANITIZE SAN=-fsanitize=thread
 check-tsan: deps-check
 	@$(MAKE) --no-print-directory -j$(JOBS) BUILD=$(BUILD)/tsan $(TSAN) $(BUILD)/tsan/scanhead
@@ -21,8 +22,8 @@ check-tsan: deps-check
 check: check-analysers check-tsan
 .PHONY: deps-check check check-analysers check-tsan check-tsan-short
 
-# The short form: what threads share is built for it, and linked with the rest as it is (PLAIN: the build it is taken from).
-# -O0 is built fastest, and finds the same.
+# This is the short form. Only the code that threads share is built for it, and linked with the rest as it is (PLAIN is
+# the build that the rest comes from). -O0 is built fastest, and finds the same.
 PLAIN ?= $(BUILD)/test
 TSAN_SHARED = $(wildcard firmware_sim/loop/*.c firmware_sim/device/*.c firmware_sim/fault/*.c drivers/link/*.c)
 TSAN_SHORT = $(TSAN) OPT=-O0 BUILD=$(BUILD)/tsan_short PLAIN=$(PLAIN) $(BUILD)/tsan_short/tsan_head

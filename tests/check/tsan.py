@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """ThreadSanitizer over the built program: python3 tests/check/tsan.py --scanhead PROGRAM --out FOLDER [--short]
 
-Heads on all kinds of links, and clients that come, go, stall, misbehave and turn knobs. Each round is one head; it fails
-when the sanitizer has reported something, when the program does not end with status 0, or when a client never got what it
-should. Prints TAP. What was reported is in FOLDER/NAME.tsan.*; tests/check/tsan.supp has what is none of ours.
+Heads run on all kinds of links, with clients that come, go, stall, misbehave and turn knobs. Each round is one head. It fails
+if the sanitizer has reported something, if the program does not end with status 0, or if a client never got its answer. This
+prints TAP. The reports are in FOLDER/NAME.tsan.*, and tests/check/tsan.supp has the ones of foreign code.
 """
 import argparse
 import os
@@ -23,8 +23,8 @@ import clients  # noqa: E402
 import scanhead  # noqa: E402
 from long import Head  # noqa: E402
 
-PATIENCE_S = 60  # the sanitizer takes ten times the time, and others may have the processors
-REPLY_S = 2  # a fault has swallowed it
+PATIENCE_S = 60  # the sanitizer takes ten times the time, and other programs may have the processors
+REPLY_S = 2  # after this time a fault has swallowed the reply
 SCENE = f"""
 scene: {{meshes: [{{file: {ROOT}/config/scenes/glass_room.obj, up: z, scale: 1}}]}}
 stations:
@@ -52,10 +52,10 @@ FAULTS = """faults:
 
 
 class Knobs(clients.Client):
-    """Takes control and changes what can be changed, scans begun and stopped; and gives control back."""
+    """Takes control, changes settings, starts and stops scans, and gives control back."""
 
     pause_s = 0.05
-    # What a head of another kind does not know is an error, which goes its own way through the threads.
+    # A command that a head of another kind does not know is an error, which goes its own way through the threads.
     LINES = ["HEAD:PRR 20 KHZ", "HEAD:PRR 5 KHZ", "HEAD:LINes 20", "HEAD:PAN 90", "HEAD:RANGe:MIN 0.5", "HEAD:PRR DEF",
              "SITE:POSE 1, 0.1, 0.2, 1.5, 0, 0, 45", "SITE:POSE? 1", "FAULt:ADD {kind: drop, every: 30}", "FAULt:LIST?",
              "FAULt:INJected?", "FAULt:CLEar ALL", "SYST:ERR?", "HEAD:STATe?", "HELP:SETtings?", "TIME?", "*STB?", "NO:SUCH 1"]
@@ -67,7 +67,7 @@ class Knobs(clients.Client):
                     break
                 try:
                     head.query(line, REPLY_S)
-                    self.good += 1  # one that is refused was heard, too
+                    self.good += 1  # a refused command was heard, too
                 except scanhead.Timeout:
                     pass
 
@@ -77,12 +77,12 @@ class Knobs(clients.Client):
             try:
                 self.visit()
             except (OSError, scanhead.ScanheadError):
-                pass  # a fault ends connections; the next visit is another one
+                pass  # a fault ends connections, and the next visit is another one
             self.stop.wait(self.pause_s)
 
 
 class Poses(threading.Thread):
-    """The poses of a live platform, by UDP."""
+    """Sends the poses of a live platform by UDP."""
 
     def __init__(self, endpoint, stop):
         super().__init__(name="poses", daemon=True)
@@ -106,7 +106,7 @@ class Rounds:
         return self.only and name not in self.only
 
     def prepare(self, name):
-        """Where the sanitizer writes to in this round."""
+        """Sets the file that the sanitizer writes to in this round."""
         for old in self.out.glob(f"{name}.tsan.*"):
             old.unlink()
         os.environ["TSAN_OPTIONS"] = f"log_path={self.out}/{name}.tsan exitcode=66 suppressions={HERE}/tsan.supp history_size=4"
@@ -131,7 +131,7 @@ class Rounds:
         return path
 
     def serve(self, name, text, who, seconds, options=()):
-        """A head with its clients: who(endpoints, stop) gives them. It goes on until each was served, and for `seconds`."""
+        """Runs a head with its clients, which who(endpoints, stop) gives. It goes on until each was served, and for `seconds`."""
         if self.left_out(name):
             return
         self.prepare(name)
@@ -160,7 +160,7 @@ class Rounds:
         self.say(name, wrong)
 
     def run(self, name, *args):
-        """A command that ends by itself."""
+        """Runs a command that ends by itself."""
         if self.left_out(name):
             return
         self.prepare(name)
@@ -178,7 +178,7 @@ def native_clients(endpoints, stop):
     made = [kind(name, endpoint, stop, seed) for seed, (kind, name, endpoint) in enumerate(kinds)]
     for client in made:
         if isinstance(client, clients.Stalls):
-            client.good = 1  # it is served when nobody else waits for it
+            client.good = 1  # the head serves it only while nobody else waits
     return made
 
 
@@ -223,7 +223,7 @@ def one_reader(endpoints, stop):
 
 
 class Steps(Knobs):
-    """Grants time, at whose pace the head runs."""
+    """Grants the time that the head runs by."""
 
     LINES = ["TIME:STEP 20 MS", "TIME?", "HEAD:STATe?", "TIME:STEP 50 MS", "HEAD:PRR 20 KHZ"] * 3
 

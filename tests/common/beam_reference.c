@@ -18,7 +18,7 @@ static int by_range(const void *a, const void *b)
     return (x->range_m > y->range_m) - (x->range_m < y->range_m);
 }
 
-/* Equal energies: the i-th of n lies where (i + 1/2) / n of the energy is inside of it. */
+/* Sub-rays have equal energies: the i-th of n lies where (i + 1/2) / n of the energy is inside of it. */
 static void spiral(double (*place)[2], int n)
 {
     for (int i = 0; i < n; i++) {
@@ -60,7 +60,7 @@ static uint32_t strongest_label(const struct met *m, uint32_t n)
     return best;
 }
 
-/* A pulse's sub-rays: from where, and to where. */
+/* A pulse's sub-rays: the points where they begin, and their directions. */
 struct rays {
     double p[3][BEAM_REF_RAYS], d[3][BEAM_REF_RAYS], range_m[BEAM_REF_RAYS];
     uint32_t triangle[BEAM_REF_RAYS];
@@ -109,7 +109,7 @@ void beam_ref_pulse(struct caster *c, const struct bvh *bvh, const struct beam *
         least = fmin(least, met[i].range_m);
         most = fmax(most, met[i].range_m);
     }
-    int together = most - least <= beam->resolution_m; /* one echo, in whatever order */
+    int together = most - least <= beam->resolution_m; /* such returns are one echo, whatever their order */
     if (!together) qsort(met, n, sizeof *met, by_range);
     memset(out, 0, sizeof *out);
     out->partial = n < N;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The beam by brute force: 1,000 sub-rays a pulse, each cast by itself to its exact range, on a spiral (Vogel 1979) in
- * place of rings, and echoes from a plain reading of core/footprint.h. */
+/* This computes a beam by brute force. Each pulse has 1,000 sub-rays on a spiral (Vogel 1979) in place of rings, and
+ * each is cast by itself to its exact range. Echoes follow from a plain reading of core/footprint.h. */
 #ifndef TESTS_COMMON_BEAM_REFERENCE_H
 #define TESTS_COMMON_BEAM_REFERENCE_H
 
@@ -23,20 +23,21 @@ struct beam_ref {
 void beam_ref_pulse(struct caster *caster, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
                     const double dir[3], double range_max_m, struct beam_ref *out);
 
-/* Mean range over the footprint on the plane n . p = d, seen from the origin, by the definition: sub-rays as straight
- * lines of the hyperboloid, weights as their Gaussian. Simpson's rule over t = rho^2, equal steps over phi. */
+/* Returns the mean range over the footprint on the plane n . p = d, seen from the origin. It follows from the
+ * definition: sub-rays are straight lines of the hyperboloid, and their weights are their Gaussian. The integral is
+ * Simpson's rule over t = rho^2, with equal steps over phi. */
 double beam_ref_plane_mean(const struct beam *beam, const double dir[3], const double n[3], double d);
 
-/* Echoes against the reference's. */
+/* Counts of echoes that were compared with the reference's. */
 struct beam_tally {
     uint64_t pulses, mixed, wrong, wrong_mixed, echoes; /* wrong: pulses with another number of echoes */
     uint64_t off;                                       /* echoes of the others, more than the resolution off */
     double range2, near2;                               /* squares of differences: of the echoes; of those not off */
 };
-/* The pulse whose entries begin at *at; moves that on to the next. */
+/* Compares the pulse whose entries begin at *at, and moves *at to the next pulse. */
 void beam_compare(struct beam_tally *tally, const struct line_block *block, uint32_t *at, const struct beam_ref *ref);
 
-/* A scan cast with a beam, and the directions of its pulses. */
+/* This is a scan cast with a beam, with the directions of its pulses. */
 struct beam_rig {
     struct scene *scene;
     struct bvh *bvh;
@@ -48,8 +49,8 @@ struct beam_rig {
     struct schedule_segment segment;
     struct line_block block;
 };
-/* Takes the scene over. 0.35 mrad, 7 mm, 4 ns. Lines of `pulses`, from line_start to line_stop and over the pan's range
- * in `lines`. */
+/* The rig takes the scene over. The beam has 0.35 mrad, 7 mm and 4 ns. The view has lines of `pulses`, from line_start
+ * to line_stop, and spreads them over the pan's range in `lines`. */
 struct beam_view {
     double line_start_deg, line_stop_deg, pan_start_deg, pan_stop_deg;
     uint32_t lines, pulses;
@@ -57,15 +58,15 @@ struct beam_view {
 int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double station_m[3], const struct beam_view *view,
                   struct sh_err *err);
 void beam_rig_close(struct beam_rig *rig);
-/* 128 sub-rays for a pulse, in place of 1,000, where they hit nothing but one smooth surface: ranges within 5 mm. Then
- * they are the reference, and this returns 1. 48 of them run around the rim, so that several lie in whatever an edge
- * cuts off with 1 % of the energy (beyond 0.87 of the radius at most); the others 0.2 radii apart. Bodies that fit
- * between those, such as wires, are not for this. */
+/* Casts 128 sub-rays for a pulse, in place of 1,000. Where they hit nothing but one smooth surface, with ranges within
+ * 5 mm, they are the reference, and this returns 1. 48 of them run around the rim. So several lie in whatever an edge
+ * cuts off with 1 % of the energy (beyond 0.87 of the radius at most). The others are 0.2 radii apart. Bodies that fit
+ * between those, such as wires, need the 1,000. */
 int beam_ref_plain(const struct beam_rig *rig, const double dir[3], struct beam_ref *out);
-/* mode SINGLE: no beam. */
+/* The mode SINGLE has no beam. */
 void beam_rig_mode(struct beam_rig *rig, enum beam_mode mode, uint32_t rings);
 uint32_t beam_rig_line(struct beam_rig *rig, uint32_t line);
-/* Directions of the line's pulses. */
+/* Writes the directions of the line's pulses. */
 void beam_rig_directions(struct beam_rig *rig, uint32_t line, double *dx, double *dy, double *dz);
 
 #endif

@@ -65,7 +65,7 @@ int chart_remove_folder(void **state)
     return rmdir(folder);
 }
 
-/* ---- by hand: which texel lies at a coordinate */
+/* ---- the texel that lies at a coordinate, worked out by hand */
 
 static double wrapped(double x, enum texture_wrap wrap)
 {
@@ -75,13 +75,13 @@ static double wrapped(double x, enum texture_wrap wrap)
     return wrap == TEXTURE_REPEAT ? part : x >= 0.0 && x <= 1.0 ? x : (double)NAN;
 }
 
-/* Too near to a border of texels, or of the image, for coordinates that a mesh has as floats. */
+/* Coordinates so near to a border of texels, or of the image, may fall on either side: a mesh has them as floats. */
 int chart_is_near(double x, int n)
 {
     return fabs(x * n - round(x * n)) < 1e-4;
 }
 
-/* The texel's column and row; 0: a decal, and beyond it. */
+/* Writes the texel's column and row. Returns 0 beyond a decal. */
 int chart_texel_of(double u, double v, const enum texture_wrap wrap[2], int *column, int *row)
 {
     const double x = wrapped(u, wrap[0]), y = wrapped(v, wrap[1]);
@@ -100,7 +100,7 @@ struct scene *chart_load(const char *file, enum scene_up up)
     return scene;
 }
 
-/* A square upright across the y axis; with y_m below 0 it is behind the head. */
+/* The square stands upright across the y axis. With y_m below 0 it is behind the head. */
 struct scene *chart_load_board(const char *image, const char *options, double y_m, const char *more)
 {
     char text[1024];
@@ -115,7 +115,7 @@ struct scene *chart_load_board(const char *image, const char *options, double y_
     return chart_load("board.obj", SCENE_UP_Z);
 }
 
-/* The image as its decoder has it: of a JPEG alone it is not the chart. */
+/* Returns the image as its decoder has it. Only a JPEG's differs from the chart. */
 const chart_texels *chart_decoded(const char *name)
 {
     static chart_texels texels;

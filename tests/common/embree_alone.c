@@ -93,7 +93,7 @@ int embree_alone_rays(struct embree_alone *e, const float *fx, const float *fy, 
     return e->prim != NULL && e->t != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "Embree alone: no memory for %u rays", n);
 }
 
-/* Members that the cast of a packet leaves alone are set once. Misaligned packets or masks make Embree crash. */
+/* Members that the cast of a packet does not change are set once. Misaligned packets or masks make Embree crash. */
 #define PACKET_FUNCTIONS(W)                                                                                           \
     static void set_##W(struct RTCRayHit##W *p, const struct embree_alone *e)                                         \
     {                                                                                                                 \
@@ -168,7 +168,7 @@ PACKET_FUNCTIONS(4)
 PACKET_FUNCTIONS(8)
 PACKET_FUNCTIONS(16)
 
-/* One ray at a time is only a foil: always from the arrays. */
+/* One ray at a time only serves for comparison, so it always reads from the arrays. */
 static void pass_1(const struct embree_alone *e, uint32_t first, uint32_t n)
 {
     CONTEXT(context);

@@ -5,9 +5,9 @@
 
 #include "core/scene.h"
 
-/* About n_triangles: a height field on side_m x side_m about centre_m, rough by rough_m, a second one as ceiling at
- * 0.3 side_m, and walls between them; closed without a crack. Heights are hashed from seed, so the same call gives the
- * same scene. The ground stays within +/- 0.6 rough_m of 0. */
+/* Makes about n_triangles: a height field on side_m x side_m about centre_m, rough by rough_m, a second one as ceiling
+ * at 0.3 side_m, and walls between them. It is closed without a crack. Heights are hashed from the seed, so the same
+ * call gives the same scene. The ground stays within +/- 0.6 rough_m of 0. */
 int generate_terrain(uint32_t n_triangles, double side_m, double rough_m, const double centre_m[2], uint64_t seed,
                      struct scene **out, struct sh_err *err);
 
@@ -17,11 +17,12 @@ struct generate_bar {
     double diameter_m;
     uint16_t label; /* from 1; label 0 is the backdrop */
 };
-/* Bars in front of a closed box of 2 half_m wide about the origin. */
+/* Makes bars in front of a closed box of 2 half_m wide about the origin. */
 int generate_bars(const struct generate_bar *bar, uint32_t n_bars, double half_m, struct scene **out,
                   struct sh_err *err);
 
-/* Leaves, single triangles of about size_m, turned at random, within a ball; label 1. Behind them the same box. */
+/* Makes leaves, with label 1: single triangles of about size_m, turned at random, within a ball. The same box is behind
+ * them. */
 struct generate_crown {
     double centre_m[3], radius_m, size_m;
     uint32_t n_leaves;

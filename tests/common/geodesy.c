@@ -12,7 +12,7 @@ void geodesy_ecef(double lat_deg, double lon_deg, double height_m, const double 
     p[2] = (n * (1 - GEODESY_E2) + h) * sa + ca * north + sa * u;
 }
 
-/* Fixed point with a factor of e^2 a step. */
+/* The fixed point gains a factor of e^2 a step. */
 static struct geodesy geodesy_locate(const long double p[3])
 {
     long double flat = hypotl(p[0], p[1]), lat = atan2l(p[2], flat * (1 - GEODESY_E2));
@@ -69,7 +69,7 @@ void geodesy_utm(struct geodesy at, int zone, long double *x, long double *y)
     *y = creall(arc);
 }
 
-/* From the pole, scaled by 0.994. */
+/* Distances count from the pole, scaled by 0.994. */
 static void geodesy_ups(struct geodesy at, int north, long double *x, long double *y)
 {
     long double e = sqrtl(GEODESY_E2), sign = north ? 1 : -1;

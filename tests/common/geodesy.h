@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* WGS 84 in long double, from definitions and sharing nothing with GeographicLib: what tests hold our positions
- * against.
+/* WGS 84 in long double, from definitions. It shares nothing with GeographicLib, and our positions are compared with
+ * it.
  *
- * Ellipsoid: NIMA TR8350.2. Transverse Mercator: the Gauss-Krueger projection is the analytic function that is the
- * meridian's arc on the central meridian, evaluated at complex isometric latitude (psi + i lambda): fixed point for the
- * complex latitude, the arc by Gauss-Legendre quadrature. Polar stereographic: its closed form. About 20 us a point. */
+ * Ellipsoid: NIMA TR8350.2. Transverse Mercator: the Gauss-Krueger projection is the analytic function that equals the
+ * meridian's arc on the central meridian. It is evaluated at the complex isometric latitude (psi + i lambda): a fixed
+ * point gives the complex latitude, and Gauss-Legendre quadrature the arc. Polar stereographic: its closed form. A
+ * point takes about 20 us. */
 #ifndef TESTS_COMMON_GEODESY_H
 #define TESTS_COMMON_GEODESY_H
 
@@ -20,18 +21,19 @@ struct geodesy {
     long double lat_rad, lon_rad, height_m;
 };
 
-/* lat and lon in degrees; d east, north, up from there. */
+/* lat and lon are degrees; d is east, north and up from there. */
 void geodesy_ecef(double lat_deg, double lon_deg, double height_m, const double d[3], long double p[3]);
 
 enum { GEODESY_NODES = 20 };
 
-/* Easting from the central meridian and northing from the equator, scaled by 0.9996. */
+/* Writes the easting from the central meridian and the northing from the equator, scaled by 0.9996. */
 void geodesy_utm(struct geodesy at, int zone, long double *x, long double *y);
 
-/* By EPSG code (4978, 4979, 326zz, 327zz, 32661, 32761), with false origin: metres, or degrees and metres. */
+/* Writes the position in a system by its EPSG code (4978, 4979, 326zz, 327zz, 32661, 32761), with false origin: metres,
+ * or degrees and metres. */
 void geodesy_position(int epsg, const long double p_ecef[3], long double out[3]);
 
-/* Distance on the ground of anchor + d from a position as above. */
+/* Returns the distance on the ground between anchor + d and such a position. */
 double geodesy_error_m(int epsg, const double anchor[3], const double d[3], const long double p_ecef[3]);
 
 #endif

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A limit for each test program: one that waits for ever is ended, and says where. It is linked with every test
- * program.
+/* This is a limit for each test program. It ends a program that waits for ever, and prints where that waits. It is
+ * linked with every test program.
  *
- * The limit is TEST_LIMIT_S seconds (run_tap.sh sets it to its own; 0: none; else DEFAULT_S). It only catches a
- * hang, and no result depends on it: where more want to run than there are processors, it is longer by that ratio.
- * The main thread gets the signal of a timer. It prints the running test as failed and where each thread is, and
- * ends the program with status 124, as timeout(1) does. A SIGALRM of a test's own alarm() does the same at once. */
+ * The limit is TEST_LIMIT_S seconds, else DEFAULT_S; 0 sets none. run_tap.sh sets the variable to its own limit. The
+ * limit only catches a hang, and no result depends on it. If more processes want to run than there are processors,
+ * it is longer by that ratio. The main thread gets the signal of a timer. It prints the running test as failed and
+ * where each thread is, and ends the program with status 124, as timeout(1) does. A SIGALRM of a test's own alarm()
+ * does the same at once. */
 #include <errno.h>
 #include <execinfo.h>
 #include <fcntl.h>
@@ -27,18 +28,18 @@
 
 enum { DEFAULT_S = 600, MOST_S = 1000000, MAX_FRAMES = 64, MAX_THREADS = 256, ANSWER_MS = 2000 };
 
-extern const char __executable_start, etext; /* of the linker: where the program's own code is */
+extern const char __executable_start, etext; /* the linker's: they bound the program's own code */
 
 static long limit_s;
 static struct timespec began;
 static const struct CMUnitTest *asked; /* the tests of the group that runs, as the program gave them */
 static volatile size_t n_begun;
-static volatile sig_atomic_t ended_one; /* a thread has begun to say where all are */
+static volatile sig_atomic_t ended_one; /* a thread has begun to print where all are */
 static volatile sig_atomic_t answered;
 
 #ifdef SH_SANITIZE
-/* The address sanitizer's marks of memory stay mapped, and are written anew: to unmap them and to fault them in
- * again takes a quarter of the time of a test that makes large arrays often. */
+/* The address sanitizer keeps its marks of memory mapped and writes them anew. To unmap them and fault them in again
+ * takes a quarter of the time of a test that often makes large arrays. */
 const char *__asan_default_options(void);
 const char *__asan_default_options(void)
 {
@@ -46,7 +47,7 @@ const char *__asan_default_options(void)
 }
 #endif
 
-/* ---- what a signal handler may do: write(2) */
+/* ---- output in a signal handler, which may only use write(2) */
 
 __attribute__((format(printf, 1, 2))) static void say(const char *format, ...)
 {
@@ -60,7 +61,7 @@ __attribute__((format(printf, 1, 2))) static void say(const char *format, ...)
         if ((w = write(STDOUT_FILENO, text + done, (size_t)(n - done))) < 0) return;
 }
 
-/* Processes that want to run, in percent of the processors: of the last minute. */
+/* Returns how many processes want to run, in percent of the processors, as the mean of the last minute. */
 static long load_percent(void)
 {
     char text[64] = "";
@@ -81,7 +82,7 @@ static long elapsed_s(void)
     return (long)(now.tv_sec - began.tv_sec);
 }
 
-/* Lines of the program's own frames; without addr2line their addresses alone are there. */
+/* Prints the source lines of the program's own frames. Without addr2line only their addresses are known. */
 static void say_lines(void *const *frames, int n)
 {
     char command[128 + 20 * MAX_FRAMES];
@@ -114,7 +115,7 @@ static void say_where(void)
     if (n > 2) say_lines(frames + 2, n - 2);
 }
 
-/* Each other thread says where it is, one after the other. */
+/* Each other thread prints where it is, one after the other. */
 static void ask_threads(void)
 {
     DIR *dir = opendir("/proc/self/task");
@@ -151,7 +152,7 @@ static void on_alarm(int number, siginfo_t *info, void *context)
     _exit(124);
 }
 
-/* ---- which test runs: each begins with its name */
+/* ---- the running test: each begins with a call that sets its name */
 
 int __real__cmocka_run_group_tests(const char *group, const struct CMUnitTest *tests, size_t n, CMFixtureFunction setup,
                                    CMFixtureFunction teardown);
@@ -190,7 +191,7 @@ __attribute__((constructor)) static void set_limit(void)
         fprintf(stderr, "TEST_LIMIT_S=%s: allowed are whole seconds from 0 (no limit) to %d\n", text, MOST_S);
         _exit(2);
     }
-    setvbuf(stdout, NULL, _IOLBF, 0); /* what has passed is said before the end */
+    setvbuf(stdout, NULL, _IOLBF, 0); /* results so far are printed before the end */
     void *frame;
     backtrace(&frame, 1); /* loads what it needs now, and not in the handler */
     struct sigaction action = {.sa_sigaction = on_alarm, .sa_flags = SA_SIGINFO | SA_RESTART};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A reader of NMEA 0183 of the tests' own: fields, checksum, angles. */
+/* This is the tests' own reader of NMEA 0183: fields, checksum, angles. */
 #ifndef TESTS_COMMON_NMEA_READER_H
 #define TESTS_COMMON_NMEA_READER_H
 
@@ -18,10 +18,10 @@ struct nmea_line {
     int n;
 };
 
-/* One sentence of len bytes with its CR LF; type "" and n_fields 0: any. */
+/* Reads one sentence of len bytes with its CR LF. A type "" or n_fields 0 accepts any. */
 void read_line(const char *text, size_t len, const char *type, int n_fields, struct nmea_line *line);
 
-/* ddmm.mmm and its letter, of which there are two: degrees. */
+/* Returns the degrees of ddmm.mmm and its letter; `letters` are the two that are allowed. */
 double read_angle(const char *text, const char *letter, int degree_digits, const char letters[2]);
 
 #endif

@@ -6,8 +6,8 @@
 
 #include "core/vec3.h"
 
-/* How far off the place may be where the ray meets the plane of a triangle, over the sine of the angle: 8 units of double
- * of its farthest corner's distance and of the coordinates. */
+/* Returns how wrong the place may be where the ray meets the plane of a triangle. Over the sine of the angle it is 8
+ * units of double of the distance of its farthest corner and of the coordinates. */
 static double blur_m(const struct scene *scene, uint32_t triangle, const double at_m[3], const double dir[3])
 {
     double v[3][3], e1[3], e2[3], n[3], far_m = 0.0;
@@ -19,13 +19,13 @@ static double blur_m(const struct scene *scene, uint32_t triangle, const double 
     vec3_sub(v[1], v[0], e1);
     vec3_sub(v[2], v[0], e2);
     vec3_cross(e1, e2, n);
-    const double sliver = vec3_length(e1) * vec3_length(e2) / vec3_length(n); /* what a thin one loses of its normal */
+    const double sliver = vec3_length(e1) * vec3_length(e2) / vec3_length(n); /* a thin one has a less precise normal */
     return 8.0 * 0x1p-53 * far_m * sliver * vec3_length(n) / fabs(vec3_dot(n, dir));
 }
 
-/* Whether the ray passes outside of a triangle by no more than rounding, across the line of each edge that it is outside
- * of. Beyond the tip of a needle the lines of two edges are as near to each other: reference_is_undecidable, which looks at
- * the edges alone, does not know that. */
+/* Returns whether the ray passes outside of a triangle by no more than rounding, across the line of each edge that it
+ * is outside of. Beyond the tip of a needle the lines of two edges are that near to each other.
+ * reference_is_undecidable looks at the edges alone, and does not know that. */
 static int is_beside_lines(const struct scene *scene, uint32_t triangle, const double at_m[3], const double dir[3])
 {
     long double v[3][3], side[3], all = 0.0L;
@@ -49,7 +49,7 @@ static int is_beside_lines(const struct scene *scene, uint32_t triangle, const d
     return 1;
 }
 
-/* Where the claimed triangle is not known, it is enough that the place is beside any of them. */
+/* If the claimed triangle is not known, the place may be beside any of them. */
 static int is_beside_any(const struct scene *scene, const struct odd_shot *shot)
 {
     if (shot->triangle < scene->n_triangles) return is_beside_lines(scene, shot->triangle, shot->at_m, shot->dir);

@@ -14,7 +14,7 @@ struct odd_tally {
     double largest_m;     /* error of a range that is right */
 };
 
-/* A ray, and the hit that is claimed for it. */
+/* A ray, and the hit that a caster claims for it. */
 struct odd_shot {
     const double *at_m, *dir; /* [3], prcs */
     double range_m;           /* NaN: none */
@@ -22,8 +22,8 @@ struct odd_shot {
     double most_m;            /* hits beyond it may be missing; 0: none may */
 };
 
-/* Returns whether the hit is right, or can't be told; else prints what it is. bound_m: of the range's error, for a true
- * range. */
+/* Returns whether the hit is right, or double precision can't decide; else prints the difference. bound_m is the bound
+ * of the range's error, for a true range. */
 int odd_judge(const struct scene *scene, const struct reference *reference, const struct odd_shot *shot,
               double (*bound_m)(long double range_m), struct odd_tally *tally);
 

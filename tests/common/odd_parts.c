@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Parts: in units of their size, about their centre. */
+/* Parts of odd scenes. Their coordinates are in units of the part's size, about its centre. */
 #include "tests/common/odd_maker.h"
 
 #include <math.h>
@@ -17,7 +17,7 @@ static void add_needles(struct odd_maker *m)
     }
 }
 
-/* The third corner almost, or but for rounding, on the line of the others. */
+/* The third corner lies almost on the line of the others, or apart from it only by rounding. */
 static void add_slivers(struct odd_maker *m)
 {
     for (int i = 1 + odd_pick(m, 5); i > 0; i--) {
@@ -42,7 +42,7 @@ static void add_random(struct odd_maker *m)
     }
 }
 
-/* One face and others above it, by next to nothing or nothing at all: the same corners, or shifted in the
+/* One face, and others above it by next to nothing or nothing at all. They have the same corners, or are shifted in the
  * plane. */
 static void add_stack(struct odd_maker *m)
 {
@@ -81,7 +81,7 @@ static void add_sheets(struct odd_maker *m)
     }
 }
 
-/* Blades about one corner, level or raised by a little or a lot; closed or open. */
+/* Blades about one corner, level or raised by a little or a lot. They are closed or open. */
 static void add_fan(struct odd_maker *m)
 {
     int n = 3 + odd_pick(m, 10);
@@ -98,7 +98,7 @@ static void add_fan(struct odd_maker *m)
     }
 }
 
-/* Triangles side by side, folded each time by an angle between next to nothing and right back. */
+/* Triangles side by side. Each fold is an angle between next to nothing and right back. */
 static void add_strip(struct odd_maker *m)
 {
     double p[3][3], along[2] = {1.0, 0.0}, at[2] = {0.0, 0.0}, step = 0.5 * m->size_m;
@@ -165,7 +165,7 @@ static void add_ball(struct odd_maker *m)
     }
 }
 
-/* Through each other, along one line or in one point. */
+/* Triangles that cross each other, along one line or in one point. */
 static void add_crossing(struct odd_maker *m)
 {
     for (int i = 2 + odd_pick(m, 4), one_line = odd_pick(m, 2); i > 0; i--) {
@@ -225,7 +225,7 @@ static void add_folded_corner(struct odd_maker *m)
     }
 }
 
-/* Of those that are there, some once more. */
+/* Some of the triangles that are there stand twice. */
 static void add_twins(struct odd_maker *m)
 {
     const struct odd_scene *odd = m->odd;
@@ -237,7 +237,7 @@ static void add_twins(struct odd_maker *m)
     }
 }
 
-/* Up to 1e6 m, below, above or beside the station; with dwarfs of 1e-6 m and more upon it. */
+/* A triangle of up to 1e6 m lies below, above or beside the station, with dwarfs of 1e-6 m and more upon it. */
 static void add_giant(struct odd_maker *m)
 {
     double p[3][3], size_m = odd_decades(m, 2.0, 6.0), to_m = odd_decades(m, -2.0, 2.0);
@@ -259,7 +259,7 @@ static void add_giant(struct odd_maker *m)
     }
 }
 
-/* Small ones, near the station. */
+/* Small triangles near the station. */
 static void add_near(struct odd_maker *m)
 {
     for (int i = 1 + odd_pick(m, 4); i > 0; i--) {
@@ -273,7 +273,7 @@ static void add_near(struct odd_maker *m)
     }
 }
 
-/* Halves that meet along a line, in other cells each: corners of one on edges of the other. */
+/* Two halves meet along a line, in different cells: corners of one lie on edges of the other. */
 static void add_junctions(struct odd_maker *m)
 {
     for (int half = 0; half < 2; half++) {

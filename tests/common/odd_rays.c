@@ -37,7 +37,7 @@ static void any_direction(struct odd_rays *r, double d[3])
     d[2] = z;
 }
 
-/* Corner i of a triangle, from the station. */
+/* Corner i of a triangle, as seen from the station. */
 static void corner_of(const struct odd_rays *r, uint32_t triangle, uint32_t i, double out[3])
 {
     vec3_sub(r->scene->vertex_m[r->scene->triangle[triangle][i % 3]], r->station_m, out);
@@ -61,7 +61,7 @@ static int32_t few(struct odd_rays *r)
     return (int32_t)pick(r, 9) - 4;
 }
 
-/* A little beside where it goes: not at all, by units in the last place, or by up to a millionth. */
+/* Shifts the direction a little: not at all, by units in the last place, or by up to a millionth. */
 static void nudge(struct odd_rays *r, double d[3])
 {
     uint32_t how = pick(r, 3);
@@ -107,7 +107,7 @@ static void inside(struct odd_rays *r, double d[3])
 
 /* ---- the cube */
 
-/* A border between cells, or of the face. */
+/* Gives a direction on a border between cells, or of the face. */
 static double border(struct odd_rays *r)
 {
     double x = 2.0 * (double)pick(r, r->cells + 1) / (double)r->cells - 1.0;
@@ -162,7 +162,7 @@ static void at_axis(struct odd_rays *r, double d[3])
 
 /* ---- planes */
 
-/* The plane through the station and an edge. */
+/* Gives a direction in the plane through the station and an edge. */
 static void edge_plane(struct odd_rays *r, double n[3])
 {
     uint32_t t = any_triangle(r), i = pick(r, 3);
@@ -197,7 +197,7 @@ static void in_plane(struct odd_rays *r, double d[3])
         d[k] = x * e[k] + y * f[k];
 }
 
-/* Where an edge of one triangle meets the plane of another. */
+/* Gives the point where an edge of one triangle meets the plane of another. */
 static void to_meeting(struct odd_rays *r, double d[3])
 {
     uint32_t t = any_triangle(r), other = any_triangle(r), i = pick(r, 3);
@@ -222,7 +222,7 @@ static void (*const AIM[ODD_KINDS])(struct odd_rays *r, double d[3]) = {
     [ODD_CROSSINGS] = to_crossing,  [ODD_PLANES] = in_plane,      [ODD_MEETINGS] = to_meeting,
 };
 
-/* A line through what there is to see, in steps of a thousandth of a degree up to three. */
+/* Makes a line through the scene, in steps of a thousandth of a degree up to three degrees. */
 static void line(struct odd_rays *r, uint32_t n, double *x, double *y, double *z)
 {
     double from[3], to[3], across[3];

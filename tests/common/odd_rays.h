@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays from a station where they are hard to decide: at corners and edges, where outlines cross, within planes,
- * at the borders of the cells that a sight has (core/sight.h), along the axes; and lines as a scan has them. */
+/* Rays from a station that are hard to decide: at corners and edges, where outlines cross, within planes, along the
+ * axes, and at the borders of the cells that a sight has (core/sight.h). There are also lines, as a scan has them. */
 #ifndef TESTS_COMMON_ODD_RAYS_H
 #define TESTS_COMMON_ODD_RAYS_H
 
@@ -33,9 +33,9 @@ enum odd_kind {
     ODD_KINDS,
 };
 
-/* n unit vectors of one kind; x, y, z are arrays of n. */
+/* Writes n unit vectors of one kind; x, y and z are arrays of n. */
 void odd_rays_fill(struct odd_rays *rays, enum odd_kind kind, uint32_t n, double *x, double *y, double *z);
-/* Runs of all kinds, the last quarter without order: each ray of another kind. */
+/* Writes runs of all kinds. In the last quarter each ray is of another kind. */
 void odd_rays_mix(struct odd_rays *rays, uint32_t n, double *x, double *y, double *z);
 
 #endif

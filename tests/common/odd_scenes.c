@@ -9,7 +9,7 @@
 #include "core/vec3.h"
 #include "tests/common/odd_maker.h"
 
-/* Onto a grid of powers of two: much then lies in one plane, or on one line, exactly. */
+/* Rounds to a grid of powers of two. Many corners then lie in one plane, or on one line, exactly. */
 static void snap(struct odd_scene *odd, double grid_m)
 {
     double *x = odd->corner[0][0];
@@ -24,7 +24,7 @@ static void shift(struct odd_scene *odd, const double by_m[3])
             odd->corner[i / 3][i % 3][k] += by_m[k];
 }
 
-/* The station relative to a triangle: on it, beside its edge, in its plane, at a corner. */
+/* Places the station relative to a triangle: on it, beside its edge, in its plane, or at a corner. */
 static void stand(struct odd_maker *m)
 {
     struct odd_scene *odd = m->odd;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Scenes of a few triangles, put together at random from parts that are hard to cast correctly: needles, slivers, faces
- * that overlap, cross, stand twice or lie next to each other, folds, boxes in boxes, giants beside dwarfs; and a
- * station, now and then on a face, in its plane, or in line with an edge. */
+/* Scenes of a few triangles, put together at random from parts that are hard to cast correctly. There are needles,
+ * slivers, folds, boxes in boxes, giants beside dwarfs, and faces that overlap, cross, stand twice or lie next to each
+ * other. The station is now and then on a face, in its plane, or in line with an edge. */
 #ifndef TESTS_COMMON_ODD_SCENES_H
 #define TESTS_COMMON_ODD_SCENES_H
 
@@ -20,10 +20,11 @@ struct odd_scene {
     char stands[24]; /* where the station is */
 };
 
-/* The same number gives the same scene. at_most: triangles, up to ODD_MOST; the last part may be cut short. */
+/* Makes a scene; the same number gives the same one. at_most is its number of triangles, up to ODD_MOST; the last part
+ * may be cut short. */
 void odd_scene_make(uint64_t number, uint32_t at_most, struct odd_scene *out);
 const char *odd_part_name(int part);
-/* Its triangles, those without area left out. weld: equal corners become one vertex. */
+/* Makes its scene without the triangles that have no area. With `weld` equal corners become one vertex. */
 int odd_scene_build(const struct odd_scene *odd, int weld, struct scene **out, struct sh_err *err);
 
 #endif

@@ -68,7 +68,7 @@ static void hang_up(void *ctx)
     ((struct protocol_rig *)ctx)->hung_up = 1;
 }
 
-/* A fix each full second of device time. */
+/* There is a fix for each full second of device time. */
 static int64_t next_fix_ns(void *ctx, int64_t t_ns)
 {
     const int64_t second_ns = 1000000000;
@@ -242,7 +242,7 @@ void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end)
     give(rig, frame, native_encode_line_end(frame, sizeof frame, end, rig->scan_t0_ns));
 }
 
-/* Exactly, as the head does. */
+/* The rig computes it exactly, as the head does. */
 static int64_t firing_ns(const struct native_emitter *e, uint64_t pulse)
 {
     return (int64_t)(pulse * e->sequence_ns_num / e->sequence_ns_den);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A protocol driven from bytes to bytes: a host that keeps what the protocol sends and calls, and native frames of
- * heads that spin, made from ranges by hand. */
+/* A protocol is driven from bytes to bytes. The rig is its host, and keeps the bytes that the protocol sends and the
+ * calls that it makes. Native frames of heads that spin are made from ranges by hand. */
 #ifndef TESTS_COMMON_PROTOCOL_RIG_H
 #define TESTS_COMMON_PROTOCOL_RIG_H
 
@@ -23,8 +23,8 @@ struct protocol_rig {
     size_t room; /* for further bytes; a unit that is longer is refused. SIZE_MAX at first */
     int hung_up;
     uint64_t count[PROTOCOL_N_COUNTS];
-    /* what it called: lines, and what is answered: the reply of the first row that is a prefix of the line (the last
-     * row's is {NULL, ...}), "OK" where there is none */
+    /* lines of the calls that it made, and the answers: the reply of the first row whose prefix begins the line (the
+     * last row is {NULL, ...}), or "OK" where there is none */
     char line[RIG_LINES][64];
     uint32_t n_lines;
     const struct protocol_rig_reply {
@@ -44,19 +44,19 @@ struct protocol_rig {
     uint32_t seq;
 };
 
-/* model as in the profile. The rig is large: make it static. Asserts. */
+/* `model` is the profile's. The rig is large: allocate it, or make it static. It asserts that the protocol opens. */
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model);
 void protocol_rig_close(struct protocol_rig *rig);
-/* Forgets what was sent and called. */
+/* Forgets all bytes and calls so far. */
 void protocol_rig_clear(struct protocol_rig *rig);
 void protocol_rig_input(struct protocol_rig *rig, const char *text);
 
-/* The head: before protocol_rig_describe. Range counts of 1e-6 m, 2^32 counts a turn. */
+/* Sets the head; call it before protocol_rig_describe. Range counts are 1e-6 m, and a turn has 2^32 counts. */
 void protocol_rig_planar(struct protocol_rig *rig, uint32_t steps, int first, int last, int front, int turn,
                          uint32_t lines_hz);
-/* A VLP-16: 16 beams in 55,296 ns. */
+/* Sets a VLP-16: 16 beams in 55,296 ns. */
 void protocol_rig_beams(struct protocol_rig *rig, uint32_t lines_hz);
-/* Descriptor and emitter frames. */
+/* Feeds the descriptor and emitter frames. */
 void protocol_rig_describe(struct protocol_rig *rig, int64_t t_ns);
 
 /* Echoes of one pulse, in order of range. */
@@ -65,8 +65,8 @@ struct protocol_rig_shot {
     double range_m[3];
     int16_t refl_cdb[3], amplitude_cdb[3];
 };
-/* One points frame of consecutive pulses of one line; with attributes where the rig has some. turn: pan of each
- * pulse, mirror_turn: elevation. */
+/* One points frame of consecutive pulses of one line, with attributes where the rig has some. mirror_turn is the
+ * elevation of each pulse, and pan_turn its pan. */
 struct protocol_rig_run {
     uint32_t frame, line;
     uint64_t pulse0;
@@ -78,8 +78,8 @@ struct protocol_rig_run {
 };
 void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run);
 void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end);
-/* A whole turn of a planar head, shots of the steps first..last, in frames of `part` pulses, and its line end; then
- * time() of the turn's end. line from 0. */
+/* Feeds a whole turn of a planar head: shots of the steps first..last, in frames of `part` pulses, and the line end.
+ * Then it calls time() with the turn's end. `line` counts from 0. */
 void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part);
 
 #endif

@@ -47,7 +47,7 @@ const struct reach_case REACH_CASE[] = {
 };
 const int REACH_CASES = sizeof REACH_CASE / sizeof REACH_CASE[0];
 
-/* Where the head is: in the living room of the house; and a ball that it sees in its first 24 degrees. */
+/* The head is in the living room of the house. A ball is in its first 24 degrees. */
 static const double HEAD_M[3] = {5.5, 2.2, 1.6}, BALL_M[3] = {6.1, 4.2, 1.6}, BALL_RADIUS_M = 0.7;
 
 /* ---- files */
@@ -179,7 +179,7 @@ static double process_s(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Poses that come from outside: a way as slow as a trajectory's, so that all see nearly the same. */
+/* Poses that come from outside. The way is as slow as a trajectory's, so that all see nearly the same. */
 static void walk(struct reach_run *run)
 {
     for (int i = 0; i < 2; i++) {

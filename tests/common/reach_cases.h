@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Cases with moving heads and bodies, far stations, and heads with long ways. Each may cost no more than a head that
- * stands near what it scans. Each is a whole configuration, loaded as for a run, so that all that loading sets up is in
- * it. Metres and seconds. */
+ * stands near the scene. Each is a whole configuration, loaded as for a run, so that it includes all that loading sets
+ * up. Units are metres and seconds. */
 #ifndef TESTS_COMMON_REACH_CASES_H
 #define TESTS_COMMON_REACH_CASES_H
 
@@ -24,8 +24,8 @@ struct reach_case {
 extern const struct reach_case REACH_CASE[];
 extern const int REACH_CASES;
 
-/* Where the files of the cases are; and the mesh that they scan, NULL: a room of 10,000 triangles. All stand in the middle
- * of 1.2 km of ground. */
+/* The folder of the cases' files, and the mesh that they scan; NULL is a room of 10,000 triangles. All stand in the
+ * middle of 1.2 km of ground. */
 struct reach_folder {
     char path[64];
     const char *house;
@@ -49,13 +49,13 @@ struct reach_run {
     uint32_t packet;             /* rays of one */
     uint32_t triangles;          /* of all that stands and moves */
 };
-/* Release with reach_close, also after an error. */
+/* The caller must release it with reach_close, also after an error. */
 int reach_open(const struct reach_folder *folder, const struct reach_case *of, struct reach_run *out,
                struct sh_err *err);
 void reach_close(struct reach_run *run);
 /* Casts line l of REACH_LINES. Returns its pulses. */
 uint32_t reach_cast(struct reach_run *run, uint32_t l);
-/* Leaves that a packet is tested against, and pairs a ray that are looked at by themselves. */
+/* The leaves that a packet is tested against, and the pairs per ray that are decided one by one. */
 double reach_leaves(const struct reach_run *run);
 double reach_decided(const struct reach_run *run);
 

@@ -40,7 +40,7 @@ static int comes_before(const ext a[3], const ext b[3])
     return 0;
 }
 
-/* dir . (a x b), with the corners in one order, so that both triangles of an edge get the same number. */
+/* Returns dir . (a x b), with the corners in one order, so that both triangles of an edge get the same number. */
 static ext side_of(const ext a[3], const ext b[3], const ext dir[3])
 {
     int swap = comes_before(b, a);
@@ -60,8 +60,8 @@ static void look(const struct reference *r, uint32_t triangle, const double orig
         view->side[i] = side_of(view->corner[i], view->corner[(i + 1) % 3], dir);
 }
 
-/* In double, with a margin of twice its rounding: sure that the ray misses? Saves nearly all of the long
- * double work. */
+/* Returns whether the ray surely misses, in double with a margin of twice its rounding. This saves nearly all of the
+ * long double work. */
 static int surely_misses(const struct reference *r, uint32_t triangle, const double origin[3], const double dir[3])
 {
     double v[3][3], side[3], size = 0.0;
@@ -108,7 +108,7 @@ static void try_triangle(const struct reference *r, uint32_t triangle, const dou
 
 /* ---- the grid */
 
-/* Calls add for each cell that the widened triangle touches. */
+/* Calls `add` for each cell that the widened triangle touches. */
 static void each_cell(struct reference *r, uint32_t triangle,
                       void (*add)(struct reference *r, uint32_t cell, uint32_t tri))
 {
@@ -151,7 +151,7 @@ static void put(struct reference *r, uint32_t cell, uint32_t triangle)
     r->list[r->start[cell]++] = triangle;
 }
 
-/* About two cells per triangle, as cubic as whole numbers allow. */
+/* Makes about two cells per triangle, as cubic as whole numbers allow. */
 static uint32_t lay_out(struct reference *r)
 {
     double max_m[3], extent = 0.0, volume = 1.0;
@@ -218,7 +218,7 @@ void reference_free(struct reference *r)
     free(r);
 }
 
-/* Where the walk stands: the cell, and the ranges at which the ray leaves it along each axis. */
+/* This is the state of the walk: the cell, and the ranges at which the ray leaves it along each axis. */
 struct walk {
     int32_t at[3], step[3];
     double leave_m[3], cell_along_m[3];
@@ -282,8 +282,8 @@ double reference_error(const struct reference_hit *truth, double range_m)
     return isnan(range_m) ? INFINITY : (double)fabsl(truth->range_m - (ext)range_m);
 }
 
-/* By how much the ray passes outside of the triangle (negative: inside), and what double precision can tell
- * of that. */
+/* Writes by how much the ray passes outside of the triangle (negative: inside), and how finely double precision can
+ * tell that. */
 static ext gap_of(const struct view *v, ext *blur_m)
 {
     ext sum = v->side[0] + v->side[1] + v->side[2], gap = -INFINITY, far2 = 0;

@@ -108,7 +108,7 @@ static void cast_part(struct sight_beside *beside, uint32_t n, const struct vec3
     struct bvh_rays rays = rays_of(beside, n, dir, range_max_m, &bvh);
     bvh_hits(beside->bvh_work, beside->bvh, &rays);
     rays = rays_of(beside, n, dir, range_max_m, sight);
-    memset(sight, 0x5a, sizeof *sight); /* what is not written differs */
+    memset(sight, 0x5a, sizeof *sight); /* unwritten bytes differ then */
     sight_hits(beside->work, beside->bvh_work, beside->sight, &rays);
     compare(beside, n, dir, &bvh, sight);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Thin things in front of a backdrop: wires and railings, leaves. */
+/* Thin bodies in front of a backdrop: wires and railings, leaves. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -70,7 +70,7 @@ static void add_box(struct builder *b, double half_m)
     }
 }
 
-/* Two axes across the bar's. */
+/* Two axes at right angles to the bar's. */
 static void across(const double axis[3], double e1[3], double e2[3])
 {
     const double other[3] = {fabs(axis[2]) < 0.9 ? 0.0 : 1.0, 0.0, fabs(axis[2]) < 0.9 ? 1.0 : 0.0};
@@ -129,7 +129,7 @@ static double between(uint64_t key, uint64_t i)
     return 2.0 * (double)(int64_t)(rng_u64(key, i) >> 11) * 0x1p-53 - 1.0;
 }
 
-/* A triangle about a point in the crown: uniform in the ball, by rejection. */
+/* Makes a triangle about a point in the crown. The point is uniform in the ball, by rejection. */
 static void add_leaf(struct builder *b, const struct generate_crown *crown, uint64_t key, uint64_t *counter)
 {
     double p[3], r2;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How deep a test goes: everything in full depth with THOROUGH=1 in the environment, less without. */
+/* How deep a test goes: in full depth with THOROUGH=1 in the environment, less deep without. */
 #ifndef TESTS_COMMON_THOROUGH_H
 #define TESTS_COMMON_THOROUGH_H
 
@@ -14,15 +14,15 @@ enum { SANITIZED = 1 };
 enum { SANITIZED = 0 };
 #endif
 
-/* A share of n turns where sanitizers are in, one at least; else n. */
+/* Returns a share of n turns in a build with sanitizers, at least one; else n. */
 static inline int fewer(int n)
 {
     return SANITIZED ? (n + 9) / 10 : n;
 }
 
-/* full where THOROUGH=1 is in the environment, else quick: counts of cases, rays, seconds. Bounds that depend on the
- * count have to be computed from what this returned. Beside other threads only while none of them changes the
- * environment. */
+/* Returns `full` where THOROUGH=1 is in the environment, else `quick`: counts of cases, rays, seconds. Bounds that
+ * depend on the count have to be computed from the returned value. Other threads may not change the environment
+ * meanwhile. */
 static inline int thorough(int full, int quick)
 {
     const char *text = getenv("THOROUGH");

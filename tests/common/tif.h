@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Values of cells, and what tags say of them. Zero: one that isn't written, or the usual. */
+/* Values of cells and of tags. A tag of zero isn't written, or has its usual value. */
 struct tif {
     uint32_t width, height;
     const double *value;                                               /* [height][width] */
@@ -20,7 +20,7 @@ struct tif {
     uint32_t kind;    /* NewSubfileType of the first one */
 };
 
-/* EPSG:32632, cells of 2 x 3 m, the corner at 690000, 5336000; 32-bit floats. */
+/* Returns EPSG:32632 with cells of 2 x 3 m, the corner at 690000, 5336000, and 32-bit floats. */
 struct tif tif_of(uint32_t width, uint32_t height, const double *value);
 void tif_write(const char *path, const struct tif *tif);
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Fuzzing: a libFuzzer program for each input of the head. They need clang; tests/fuzz/README.md says the rest.
+# There is a libFuzzer program for each input of the head. They need clang, and tests/fuzz/README.md says the rest.
 #   make fuzz S=600           each for so many seconds, JOBS at a time; then a table
 #   make fuzz N=1000000       each for so many executions; with S as well: what comes first
 #   make fuzz F=config        that one alone
@@ -13,9 +13,10 @@ FUZZ_CXX ?= $(CACHED)clang++
 QUICK ?=
 FUZZ_BUILD ?= $(BUILD)/fuzz$(if $(QUICK),-quick)
 FUZZ_RUNS ?= $(BUILD)/fuzz/runs
-# Coverage as libFuzzer wants it: a counter an edge (inline-8bit-counters,pc-table), and comparisons (trace-cmp).
-# Processor time by compiler and flags, all with the address and undefined sanitizers. Compiling: ten files of all
-# folders, median of three. Running: test_native_damage.
+# This is coverage as libFuzzer wants it: a counter an edge (inline-8bit-counters,pc-table), and comparisons
+# (trace-cmp).
+# The table has processor time by compiler and flags, all with the address and undefined sanitizers. Compile times are
+# for ten files of all folders, the median of three. Run times are those of test_native_damage.
 #   gcc -Og                                    compiles in 2.9 s   runs in 0.97 s
 #   clang -O1                                  5.9                 0.88
 #   clang -O1, counters                        5.7                 0.73
@@ -25,10 +26,10 @@ FUZZ_RUNS ?= $(BUILD)/fuzz/runs
 #   (clang -O0 for warnings, no sanitizer:     1.1)
 FUZZ_OPT ?= -O1
 FUZZ_COVER ?= $(if $(QUICK),-fsanitize-coverage=inline-8bit-counters$(comma)pc-table,-fsanitize=fuzzer-no-link)
-# Without vptr: that check needs clang++ to link, for one file.
+# vptr is left out, because that check needs clang++ to link, for one file.
 FUZZ_SAN ?= -fsanitize=address,undefined -fno-sanitize=vptr -fno-sanitize-recover=all $(FUZZ_COVER)
 FUZZ_FLAGS ?= -w -g1
-# gold warns of each symbol that clang exports for the sanitizer; lld is as fast, where it is.
+# gold warns of each symbol that clang exports for the sanitizer. lld is as fast, if it is there.
 FUZZ_LD = $(if $(shell command -v ld.lld),-fuse-ld=lld)
 FUZZ_MAKE = $(MAKE) --no-print-directory -j$(JOBS) BUILD=$(FUZZ_BUILD) CC="$(FUZZ_CC)" CXX="$(FUZZ_CXX)" \
 	OPT=$(FUZZ_OPT) WERROR= CPPFLAGS=-DSH_SANITIZE CFLAGS="$(FUZZ_FLAGS)" CXXFLAGS="$(FUZZ_FLAGS)" SAN="$(FUZZ_SAN)"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Captures and recordings that are replayed: .pcapng by its reader, in pieces; then as a recording, frame by frame
- * with its times. Input: a byte (how it is cut, which ending), then the file. All bytes are taken, or the reader
- * says at which byte it stops. */
+/* This fuzzes captures and recordings that are replayed: .pcapng by its reader, in pieces, and then as a recording,
+ * frame by frame with its times. The input is a byte (how it is cut, which ending), then the file. The reader must give
+ * the same packets in pieces as at once, and must refuse in one line. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ struct sums {
     int rc;
 };
 
-/* The reader gets `piece` bytes more each time it wants some. */
+/* Gives the reader `piece` bytes more each time it wants some. */
 static struct sums read_all(const uint8_t *data, size_t size, size_t piece)
 {
     struct pcapng_reader reader = {0};

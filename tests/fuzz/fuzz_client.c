@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The client library talking to a head that may say anything. Input: a byte, then records: bytes that come, a
- * command, a frame that is asked for. A reply fits its room and is one line; the library never waits longer than it
- * was told. */
+/* This fuzzes the client library with a head that may say anything. The input is a byte, then records: bytes that come,
+ * a command, or a frame that is asked for. A reply must fit its room and be one line. The library must never wait
+ * longer than it was told. */
 #include <stdlib.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Recorded clouds and streams, as `report` and `view` read them. Input: a byte that says the ending and the columns,
- * then the file. What is read has points that are finite, or empty shots; what is refused is refused in a line. */
+/* This fuzzes recorded clouds and streams, as `report` and `view` read them. The input is a byte that says the ending
+ * and the columns, then the file. A file that is read must have finite points or empty shots. A file that is refused
+ * must be refused in one line. */
 #include <math.h>
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The command set: bytes as a client sends them, through the collector of lines, into the head's state machine.
- * Input: records of one byte (session, state event) and bytes up to the next NUL. Whatever comes, a line gets one
- * reply of one line, an error changes nothing, and the settings stay within the limits. */
+/* This fuzzes the command set: bytes as a client sends them, through the collector of lines, into the head's state
+ * machine. The input is records of one byte (session, state event) and bytes up to the next NUL. A line must get one
+ * reply of one line, an error must change nothing, and the settings must stay within the limits. */
 #include <string.h>
 
 #include "tests/fuzz/rig.h"

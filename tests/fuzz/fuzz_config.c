@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Configurations: a YAML file, with the settings of --set as its comments `#set KEY=VALUE`, and faults as FAULt:ADD
- * has them as `#fault {...}`. What is refused is refused in lines; what is taken has values within the limits that
- * later stages count on. */
+/* This fuzzes configurations. The input is a YAML file, with the settings of --set as its comments `#set KEY=VALUE`,
+ * and faults in the form of FAULt:ADD as `#fault {...}`. A refusal must be in lines. Values that are taken must be
+ * within the limits that later stages count on. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +19,7 @@ static struct {
     int n;
 } sets;
 
-/* The lines that begin with `#set `. */
+/* Finds the lines that begin with `#set `. */
 static void find_sets(const char *text)
 {
     sets.n = 0;
@@ -34,7 +34,7 @@ static void find_sets(const char *text)
     }
 }
 
-/* Each line that begins with `#fault `, for a head with this configuration. */
+/* Reads each line that begins with `#fault `, for a head with this configuration. */
 static void add_faults(const struct config *cfg, const char *text)
 {
     static struct fault fault;

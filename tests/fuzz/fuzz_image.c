@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Images that lie on meshes: PNG, JPEG, TGA, BMP, and texels as a mesh's file holds them. Input: four bytes, then
- * the image. What is decoded has all its texels, and a hole is asked of any coordinate. */
+/* This fuzzes images that lie on meshes: PNG, JPEG, TGA, BMP, and texels as a mesh's file holds them. The input is
+ * three bytes, then the image. A decoded image must have all its texels, and must answer about a hole at any
+ * coordinate. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +9,7 @@
 #include "core/texture.h"
 #include "tests/fuzz/rig.h"
 
-/* A bomb of some kilobytes may ask for 2^26 texels; those are honest, and slow. */
+/* Asks for holes at coordinates of all kinds, some of them infinite. */
 static void ask_holes(const struct texture_image *image, unsigned how, struct sh_err *err)
 {
     static const double uv[][2] = {{0, 0},     {0.999999, 0.5}, {-1e300, 1e300}, {1, 1},
@@ -24,6 +25,8 @@ static void ask_holes(const struct texture_image *image, unsigned how, struct sh
     free(mask);
 }
 
+/* A small file may ask for 2^26 texels, and reading them all takes too long. So this reads about 4,096 bytes and the
+ * last one. */
 static unsigned sum_of(const struct texture_image *image)
 {
     unsigned sum = 0;

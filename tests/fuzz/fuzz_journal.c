@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Journals, and the manifests of campaigns. Input: the file. A journal that is read is sorted by tick, and written
- * anew gives the same commands. */
+/* This fuzzes journals and the manifests of campaigns. The input is the file. A journal that is read must be sorted by
+ * tick, and must give the same commands when it is written anew. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

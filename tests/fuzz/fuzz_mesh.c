@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes by our own readers: .obj with its library of materials, .ply, .stl, and what of an .ifc and a .tif we read ourselves. Input:
- * a byte (which, how), then the file; of an .obj what follows the line `#mtl` is its library in.mtl. A scene that is
- * made is whole; what is refused is refused in a line that names the file. */
+/* This fuzzes the program's own mesh readers: .obj with its library of materials, .ply, .stl, and the parts of .ifc and
+ * .tif that it reads itself. The input is a byte (which, how), then the file. For an .obj the text after the line
+ * `#mtl` is its library in.mtl. A scene that is made must be whole. A refusal must be one line that names the file. */
 #include <math.h>
 #include <string.h>
 
@@ -94,7 +94,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     case 2:
         load(fuzz_file(".stl", in.p, in.n), how);
         break;
-    default: /* their first bytes tell them apart */
+    default: /* their first bytes tell .tif and .ifc apart */
         if (in.n > 1 && in.p[0] == in.p[1])
             load_tif(in.p, in.n);
         else

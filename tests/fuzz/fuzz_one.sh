@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-# For the scripts of this folder, to be sourced. $build: where the targets are built.
+# The scripts of this folder source this. $build is the folder with the built targets.
 
-# fuzz_one NAME FOLDER OPTION...: runs a target, from its seeds, what was found before and $FOLDER/corpus. FOLDER gets its
-# `log`, its exit `status`, and in `crash/` the input that made it fail.
+# fuzz_one NAME FOLDER OPTION...: runs a target, from its seeds, from inputs that were found before, and from
+# $FOLDER/corpus. FOLDER gets its `log`, its exit `status`, and in `crash/` the input that made it fail.
 fuzz_one() {
     fuzz_name=$1 fuzz_to=$2
     shift 2
     mkdir -p "$fuzz_to/corpus" "$fuzz_to/crash"
-    # Files in memory: of streams, half as many executions again.
+    # Files lie in memory, which gives half as many executions again for streams.
     fuzz_tmp=$(mktemp -d /dev/shm/scanhead-fuzz.XXXXXX 2>/dev/null) || { fuzz_tmp=$fuzz_to/tmp && mkdir -p "$fuzz_tmp"; }
     for fuzz_dir in tests/fuzz/seeds/$fuzz_name tests/fuzz/found/$fuzz_name; do
         [ ! -d "$fuzz_dir" ] || set -- "$@" "$fuzz_dir"
@@ -21,12 +21,12 @@ fuzz_one() {
     rm -rf "$fuzz_tmp"
 }
 
-# fuzz_stat FOLDER NAME: a figure of libFuzzer's at the end.
+# fuzz_stat FOLDER NAME: prints a figure that libFuzzer gives at the end.
 fuzz_stat() {
     sed -n "s/^stat::$2: *//p" "$1/log" | tail -n 1
 }
 
-# fuzz_say FOLDER: why it failed, in short.
+# fuzz_say FOLDER: says in short why it failed.
 fuzz_say() {
     grep -a -E 'ERROR|SUMMARY|runtime error|claim does not hold|Test unit written|^ *#[0-9]+ ' "$1/log" | head -n 24 | cut -c -200
     ls "$1/crash" | sed 's/^/input: crash\//'

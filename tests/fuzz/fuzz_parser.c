@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The native stream's parser and decoders. Input: a byte, how it is cut into pieces, then the stream. The same bytes
- * in other pieces give the same frames, lines, notices and counts; and each byte is in one item, or counted as bad. */
+/* This fuzzes the native stream's parser and decoders. The input is a byte that says how the stream is cut into pieces,
+ * then the stream. The same bytes in other pieces must give the same frames, lines, notices and counts. Each byte must
+ * be in one item, or be counted as bad. */
 #include <string.h>
 
 #include "drivers/protocol/native.h"
 #include "tests/fuzz/rig.h"
 #include "tests/fuzz/seal.h"
 
-/* What came out: a sum of all items and notices, in their order. */
+/* This is the parser's output: a sum of all items and notices, in their order. */
 struct outcome {
     uint64_t sum, item_bytes, notice_bytes;
     struct native_stats stats;
@@ -36,7 +37,7 @@ static void name(void *ctx, uint32_t label, const char *object, const char *mate
     *sum = mix(*sum, &label, sizeof label) + strlen(object) + strlen(material);
 }
 
-/* All that a payload can be taken for, whatever its type: decoders check for themselves. */
+/* Decodes the payload in every way, whatever its type, because decoders check for themselves. */
 static uint64_t decode(const uint8_t *payload, size_t len)
 {
     static union {

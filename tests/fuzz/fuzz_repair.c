@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --repair`: what a killed recorder has left, of any format. Input: a byte (ending, whether as FILE.part),
- * then the file. What is repaired is whole: a second repair finds nothing to do. What is refused is as it was. */
+/* This fuzzes `record --repair`, on files as a killed recorder leaves them, of any format. The input is a byte (ending,
+ * whether as FILE.part), then the file. A repaired file must be whole, so a second repair finds nothing to do. A
+ * refused file must stay as it was. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,7 @@ enum { MAX_INPUT = 1 << 15, E57_PAGE = 1024, E57_DATA = 1020 };
 static const char *const endings[] = {".ply", ".las", ".ptx", ".e57", ".pcapng", ".shs", ".obj", ".poses.csv"};
 enum { N_ENDINGS = 8, AT_E57 = 3, AT_PCAPNG = 4, AT_SHS = 5 };
 
-/* E57 ends each page with its checksum, the first byte of it first. */
+/* E57 ends each page with its checksum, with the most significant byte first. */
 static void seal_pages(uint8_t *bytes, size_t size)
 {
     for (size_t at = 0; at + E57_PAGE <= size; at += E57_PAGE) {

@@ -4,9 +4,9 @@
 #
 #   S=600 N=0 JOBS=2 FUZZ_BUILD=build/fuzz bash tests/fuzz/fuzz_run.sh NAME...
 #
-# S: seconds a target; N: executions a target, counted over all runs; with both, what comes first. JOBS targets run at a time.
-# What is found on the way stays in $FUZZ_RUNS/NAME/corpus, and the next run goes on from there. An input that fails is
-# copied to tests/fuzz/found/NAME, and named; then the exit status is 1.
+# S gives seconds a target, and N executions a target, counted over all runs. With both, the first to be reached ends a
+# target. JOBS targets run at a time. New inputs stay in $FUZZ_RUNS/NAME/corpus, and the next run goes on from there. An
+# input that fails is copied to tests/fuzz/found/NAME and named, and then the exit status is 1.
 set -u
 build=${FUZZ_BUILD:-build/fuzz}
 runs=${FUZZ_RUNS:-$build/runs}
@@ -22,7 +22,7 @@ for name; do
 done
 . tests/fuzz/fuzz_one.sh
 declare -A running=()
-# The round of a target, and its program.
+# This ends the round of each target, and its program.
 stop_all() {
     local round
     for round in "${!running[@]}"; do kill "$round" $(ps -o pid= --ppid "$round") 2>/dev/null; done
@@ -30,7 +30,7 @@ stop_all() {
 trap stop_all EXIT
 trap 'exit 130' INT TERM
 
-# Rounds go on until S or N is reached: libFuzzer holds all that it has found in memory, and a restart gives that back.
+# Rounds go on until S or N is reached. libFuzzer holds all its finds in memory, and a restart gives that memory back.
 run_target() {
     local to=$runs/$1 end=$((SECONDS + ${S:-100000000})) left done_now
     mkdir -p "$to"
@@ -39,7 +39,7 @@ run_target() {
     while :; do
         left=$((end - SECONDS))
         [ $left -gt 0 ] || break
-        # Inputs that take longer are tried less often: up to ten times as many executions.
+        # Inputs that take longer are tried less often, which gives up to ten times as many executions.
         set -- "$1" "$to" -entropic_scale_per_exec_time=1 -max_total_time=$((left < 3600 ? left : 3600))
         if [ -n "$N" ]; then
             done_now=$((N - $(cat "$to/executions")))
@@ -53,8 +53,8 @@ run_target() {
     done
 }
 
-# edges FOLDER NAME: edges and functions that the corpus covers, of all in the files that it reaches. Each check of the undefined
-# behaviour sanitizer is an edge, too, which sound code never takes.
+# edges FOLDER NAME: prints the edges and functions that the corpus covers, and how many the files that it reaches have.
+# Each check of the undefined behaviour sanitizer is an edge, too, and sound code never takes that.
 edges() {
     local dirs="$1/corpus" d
     for d in tests/fuzz/seeds/$2 tests/fuzz/found/$2; do [ ! -d "$d" ] || dirs="$dirs $d"; done

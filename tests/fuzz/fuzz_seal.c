@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults that no checksum shows: content() and reseal() of each protocol, on any bytes. Input: a byte (which), then
- * the unit. What may be changed lies in the unit; a unit sealed twice is as sealed once; and a change of content,
- * sealed, is sealed. */
+/* This fuzzes faults that no checksum shows: content() and reseal() of each protocol, on any bytes. The input is a byte
+ * (which), then the unit. Changes must lie in the unit, a unit sealed twice must equal one sealed once, and content()
+ * must change nothing. */
 #include <stdlib.h>
 #include <string.h>
 

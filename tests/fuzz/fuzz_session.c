@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Sessions of the protocols that are other heads': nmea, scip, cola, velodyne with its position packets and its
- * pages. Input: a byte (which), a byte (how), then records: bytes from the client, points and events of a head that
- * spins, time, frames lost, a client that reads nothing. No unit is longer than the protocol says, and commands to
- * the head are lines. */
+/* This fuzzes sessions of the protocols that are other heads': nmea, scip, cola, velodyne with its position packets and
+ * its pages. The input is a byte (which), a byte (how), then records: bytes from the client, points and events of a
+ * head that spins, time, lost frames, or a client that reads nothing. No unit may be longer than the protocol says, and
+ * commands to the head must be lines. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ static int send_unit(void *ctx, const void *unit, size_t len)
     return 0;
 }
 
-/* As the head answers: by the command set itself. */
+/* Answers as the head does, by the command set itself. */
 static int run_command(void *ctx, const char *line, char *reply, size_t cap)
 {
     struct command_result out;
@@ -72,7 +72,7 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
     return (t_ns + 999999999) / 1000000000 * 1000000000;
 }
 
-/* Without clearing the rig's megabytes. */
+/* Opens a session without clearing the rig's megabytes. */
 static void open_session(enum protocol_id id, unsigned how)
 {
     static const char *const models[] = {"UTM-30LX-EW", "UST-20LX", "URG-04LX", "TiM571",
@@ -115,7 +115,7 @@ static void open_session(enum protocol_id id, unsigned how)
     if (rig.ops->open != NULL) rig.ops->open(rig.protocol, 0);
 }
 
-/* An event of the head: scans begin and end, settings change, pulses are lost. */
+/* Gives an event of the head: scans begin and end, settings change, pulses are lost. */
 static void give_event(unsigned how, int64_t t_ns)
 {
     uint8_t frame[256];
@@ -126,7 +126,7 @@ static void give_event(unsigned how, int64_t t_ns)
     if (rig.ops->frame != NULL) rig.ops->frame(rig.protocol, frame, len);
 }
 
-/* A stretch of a turn, with echoes as the byte says. */
+/* Gives points for a part of a turn, with echoes as the byte says. */
 static void give_points(unsigned how, uint32_t *line)
 {
     enum { N = 96 };

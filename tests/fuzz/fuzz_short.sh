@@ -1,12 +1,12 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The short form of fuzzing, for `make test`: each target runs its seeds and what was found before, then new inputs made of
-# them for some seconds. Prints TAP, one test a target.
+# This is the short form of fuzzing, for `make test`. Each target runs its seeds and the inputs that were found before,
+# then new inputs made of them for some seconds. It prints TAP, one test a target.
 #
 #   FUZZ_BUILD=build/fuzz sh tests/fuzz/fuzz_short.sh [NAME...]      without names: all targets
 #
-# FUZZ_SHORT_S: seconds a target, default 1. The seed of the random numbers is fixed; how far it comes depends on the machine.
-# JOBS targets run at a time.
+# FUZZ_SHORT_S gives the seconds a target, 1 by default. The seed of the random numbers is fixed, but the machine
+# decides how many inputs are tried. JOBS targets run at a time.
 set -u
 build=${FUZZ_BUILD:-build/fuzz}
 seconds=${FUZZ_SHORT_S:-1}

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The native stream through the client library, with recorders behind it. Input: three bytes of choices, then the
- * stream, whose checksums are made right. Whatever comes, each recorder makes a file or says in a line why it can't. */
+/* This fuzzes the native stream through the client library, with recorders behind it. The input is three bytes of
+ * choices, then the stream, whose checksums are made right. Whatever comes, each recorder must make a file or say in a
+ * line why it can't. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,8 +17,8 @@ static const char *const names[] = {"out.ply", "out.las", "out.ptx",  "out.e57",
                                     "out.shs", "out.obj", "out.gltf", "out.glb", "out.fbx"};
 enum { N_NAMES = sizeof names / sizeof names[0] };
 
-/* Between two checks lies a piece of work that may be long: --sparse makes millions of points of a damaged grid that
- * is kilometres wide. Whoever records such a stream ends it, too. */
+/* A piece of work between two checks may be long: --sparse makes millions of points of a damaged grid that is
+ * kilometres wide. A user who records such a stream ends it, too. */
 static int n_checks;
 
 static int is_enough(void *ctx)
@@ -70,7 +71,7 @@ static void close_output(struct output *out, int keep)
     unlink(part);
 }
 
-/* What else a client asks of a frame and of the stream so far. */
+/* Asks for everything else that a client may want of a frame and of the stream so far. */
 static void ask(struct scanhead *sh, const struct scanhead_frame *frame)
 {
     static struct scanhead_point point[SOME_POINTS];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Trajectories: samples and way-points as CSV. Input: a byte, then the file. What is read gives finite poses over
- * its span, and knots that rise in time. */
+/* This fuzzes trajectories: samples and way-points as CSV. The input is a byte, then the file. A trajectory that is
+ * read must give finite poses over its span, and knots that rise in time. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -21,7 +21,7 @@ static void check_at(const struct trajectory *t, double t_s)
 static void check_knots(const struct trajectory *t, double first_s, double last_s)
 {
     static const struct pose mount = {.quat = {1, 0, 0, 0}};
-    /* Few knots: a file of two lines may be 4e9 s long. */
+    /* The span is short to have few knots, because a file of two lines may be 4e9 s long. */
     const double end_s = last_s < first_s + 10 ? last_s : first_s + 10;
     const struct pose_knot_rules rules = {first_s, end_s, 1e-3, 100000000, 1.0};
     struct pose_path path = {0};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The USB device core with the head on it, in each of its looks: what a host does, as records of bytes. Input: a
- * byte (look, speeds), then records: control transfers, bulk and interrupt transfers, cancellations, resets,
- * suspend, faults. Each transfer comes back once, and nothing is written beyond the room that the host gave. */
+/* This fuzzes the USB device core with the head on it, in each of its looks. The input is a byte (look, speeds), then
+ * records of a host's acts: control transfers, bulk and interrupt transfers, cancellations, resets, suspend, faults.
+ * Each transfer must come back once, and nothing may be written beyond the room that the host gave. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ struct host {
     uint64_t next_id;
 };
 
-/* A transfer of its own, so that the sanitizer sees its bounds. */
+/* Each transfer has memory of its own, so that the sanitizer sees its bounds. */
 struct own_transfer {
     struct usb_transfer transfer;
     uint8_t *bytes;
@@ -79,7 +79,7 @@ static void submit(struct host *host, struct fuzz_bytes *in)
     usb_device_submit(host->head.device, &own->transfer);
 }
 
-/* The function's side: it reads what has come, and writes. */
+/* This is the function's side: it reads the bytes that have come, and writes. */
 static void serve(struct host *host, unsigned how)
 {
     const struct usb_session_row *row = &host->head.look->session[how % (unsigned)host->head.look->n_sessions];

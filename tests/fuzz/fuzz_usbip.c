@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* USB/IP: what a host sends over its connection. Input: a byte (look, whether the device is imported already), then
- * the bytes, which come in pieces. What is wrong ends the connection; nothing is left of it. */
+/* This fuzzes USB/IP: the bytes that a host sends over its connection. The input is a byte (look, whether the device is
+ * imported already), then the bytes, which come in pieces. A wrong byte ends the connection, and nothing of it may be
+ * left. */
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -29,7 +30,7 @@ static void serve(struct scanhead_usb *head)
     scanhead_usb_update(head);
 }
 
-/* What was answered, so that the socket does not fill up. */
+/* Reads the answers away, so that the socket does not fill up. */
 static void drain(int fd)
 {
     static uint8_t bytes[1 << 16];

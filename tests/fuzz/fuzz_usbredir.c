@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* usbredir: what a virtual machine sends over its channel. Input: a byte (look, how ids are written), then the
- * bytes; the hello that all channels begin with is put before them, unless the byte says no. */
+/* This fuzzes usbredir: the bytes that a virtual machine sends over its channel. The input is a byte (look, how ids are
+ * written), then the bytes. All channels begin with a hello, which is put before the bytes unless the first byte says
+ * no. */
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,7 +48,7 @@ static void turn(const struct usb_backend_ops *ops, void *backend, struct scanhe
     ops->flush(backend);
 }
 
-/* Packet: u32 type, u32 length, u32 id, then: version as text of 64 bytes, capabilities. */
+/* A packet is u32 type, u32 length, u32 id, then the version as text of 64 bytes, and the capabilities. */
 static void send_hello(int fd, unsigned how)
 {
     uint8_t hello[12 + HELLO_LEN] = {0};

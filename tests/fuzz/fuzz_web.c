@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The web link: bytes of one client, over a socket of this machine. Input: a byte, then the bytes: a request, and
- * after an upgrade WebSocket frames; `@HOST@` becomes the link's own address. The link goes on, and the client's
- * session ends with it. libwebsockets itself is not instrumented; what is ours around it is. */
+/* This fuzzes the web link with the bytes of one client, over a socket of this machine. The input is a byte, then a
+ * request, and after an upgrade WebSocket frames. `@HOST@` becomes the link's own address. The link must go on, and the
+ * client's session must end with it. libwebsockets itself is not instrumented, but our code around it is. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <stdio.h>
@@ -55,7 +55,7 @@ static int dial(void)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)web.port)};
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const struct linger abort_it = {1, 0}; /* so that no address stays taken for a minute */
+    const struct linger abort_it = {1, 0}; /* keeps no address in use for a minute */
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     while (fd >= 0 && connect(fd, (struct sockaddr *)&at, sizeof at) != 0) {
         const int is_alarm = errno == EINTR; /* libFuzzer's own clock */
@@ -70,7 +70,7 @@ static int dial(void)
     return fd;
 }
 
-/* One turn of the link: what it has for the owner is read, and answered. */
+/* Runs one turn of the link: reads what it has for the owner, and answers. */
 static int turn(void)
 {
     struct link_event event[LINK_MAX_EVENTS];

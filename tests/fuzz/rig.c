@@ -18,7 +18,7 @@ static struct memory_file {
     int fd;
 } file[ENDINGS];
 
-/* Only what lies in it directly; targets make no folders. */
+/* Removes only the files in the folder itself, because targets make no folders. */
 static void remove_folder(void)
 {
     DIR *dir = getpid() == owner ? opendir(folder) : NULL;
@@ -43,7 +43,7 @@ const char *fuzz_folder(void)
     return folder;
 }
 
-/* A link in the folder to a descriptor of this process, so that a child that reads the file finds it, too. */
+/* Makes a link in the folder to a descriptor of this process, so that a child that reads the file finds it, too. */
 static void open_memory(struct memory_file *f, const char *ending)
 {
     char target[64];
@@ -150,7 +150,7 @@ static void warn(void *ctx, const char *text)
 
 const struct sh_report fuzz_report = {.warn = warn};
 
-/* What reaches the disk is of no interest here, and waiting for it takes most of the time. */
+/* Nobody needs these files on the disk, and waiting for that takes most of the time. */
 int fsync(int fd);
 int fsync(int fd)
 {

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Checksums that fuzzing would never guess: makes those of all frames in a stream right. */
+/* Fuzzing would never guess checksums, so this makes those of all frames in a stream right. */
 #ifndef TESTS_FUZZ_SEAL_H
 #define TESTS_FUZZ_SEAL_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* From each byte that begins a frame on, the header is taken as it stands; a length that reaches beyond the end is cut to
- * what is there. A frame with the flag 0x80 stays as it is, without that flag, so that hurt frames come, too. The search goes
- * on after the frame. */
+/* Each byte that begins a frame begins a header, which is taken as it stands. A length that reaches beyond the end is
+ * cut to the bytes that are there. A frame with the flag 0x80 stays as it is, without that flag, so that hurt frames
+ * come, too. The search goes on after the frame. */
 void fuzz_seal(uint8_t *stream, size_t len);
 
 #endif

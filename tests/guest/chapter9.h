@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Chapter 9 of the USB specification asked of a head, over libusb and through a real kernel: every standard request,
- * wrong lengths and indices, halted endpoints, zero-length packets, transfers cancelled at each stage, resets back to
- * back.
+/* This puts the questions of chapter 9 of the USB specification to a head, over libusb and through a real kernel. The
+ * tests try every standard request, wrong lengths and indices, halted endpoints, zero-length packets, transfers
+ * cancelled at each stage, and resets back to back.
  *
- * After each test the head must still answer a command, with nothing lost or garbled: a device that survives a wrong
+ * After each test the head must still answer a command, with nothing lost or garbled. A device that survives a wrong
  * request but is out of step afterwards has failed. Expected values come from the specification and from the device's
  * own descriptors, compared with each other.
  *
- * CHAPTER9_KERNEL=1: the device's kernel (composite gadget, FunctionFS) answers the standard requests, not the program;
- * what the specification leaves open is then not asked. */
+ * With CHAPTER9_KERNEL=1 the device's kernel (composite gadget, FunctionFS) answers the standard requests, not the
+ * program. The tests then do not ask what the specification leaves open. */
 #ifndef TESTS_GUEST_CHAPTER9_H
 #define TESTS_GUEST_CHAPTER9_H
 
@@ -43,13 +43,13 @@ int control(int type, int request, int value, int index, void *data, int len);
 
 int get_descriptor(int type, int index, int lang, void *data, int len);
 
-/* ---- the session: a command out, its reply in between the frames */
+/* ---- the session: a command goes out, and its reply comes between the frames */
 
 void session(int open);
 
 void send_bytes(const void *data, int len);
 
-/* The next reply line, within some reads; every frame in between with right checksums. */
+/* Takes the next reply line, within some reads. Every frame before it must have right checksums. */
 void expect_reply(const char *begin);
 
 void open_session(void);

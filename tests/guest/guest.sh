@@ -1,8 +1,10 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# All guest tests as one TAP program; results come one after the other. `tests/guest/guest.sh usbip` runs one of them.
-# A guest has one processor and waits for its bus half of the time: so there is one more at a time than this machine has
-# processors, those that take longest first. All at once they only make each other late.
+# This runs all guest tests as one TAP program, and prints their results one after the other. `tests/guest/guest.sh
+# usbip` runs one of them.
+#
+# A guest has one processor and waits for its bus half of the time. So one more guest runs at a time than this machine
+# has processors, those that take longest first. If all run at once, they only make each other late.
 . tests/guest/lib.sh
 guest_prepare
 export GUEST_KERNEL="$kernel"
@@ -16,7 +18,7 @@ if [ $# -eq 0 ]; then
         case " $longest " in *" ${name#test_kernel_} "*) ;; *) set -- "$@" "${name#test_kernel_}" ;; esac
     done
 fi
-declare -A running=() # process: name of its guest
+declare -A running=() # maps each process to the name of its guest
 trap 'kill "${!running[@]}" 2>/dev/null || :' EXIT
 status=0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: the kernel's gadget at high and at super speed. Sourced by init.
+# This runs inside the guest: it tests the kernel's gadget at high and at super speed. init sources it.
 . /in_usb.sh
 export CONSOLE=/dev/ttyACM0 CHAPTER9_KERNEL=1
 is_gadget=1 # the kernel's gadgets speak Microsoft OS 1.0, not 2.0
@@ -11,7 +11,8 @@ gadgets=/sys/kernel/config/usb_gadget
 head_start "" --pace fast
 record_reference
 head_stop
-# Unbound from its controller the gadget is off the bus. (soft_connect won't do: dummy_hcd of 6.1 answers nothing after it.)
+# A gadget that is unbound from its controller is off the bus. (soft_connect won't do: dummy_hcd of 6.1 answers nothing
+# after it.)
 echo "echo >\$(echo $gadgets/*/UDC)" >unplug.sh
 echo "echo dummy_udc.0 >\$(echo $gadgets/*/UDC)" >plug.sh
 ends_soon() {

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: a gadget at the speed $speed. Sourced by in_functionfs.sh.
+# This runs inside the guest: it tests a gadget at the speed $speed. in_functionfs.sh sources it.
 packet=512 replugs=$often
-[ $speed = high ] || packet=1024 replugs=2 # the speed is no matter of plugs: only that it is there again
+[ $speed = high ] || packet=1024 replugs=2 # at the second speed the tests only show that a replug works
 if [ $speed = high ]; then
     sed "\$alinks: [{type: usb, backend: functionfs, speed: super}]" /head.yaml >fast.yaml
     scanhead run fast.yaml --duration 0.01 2>fast.err
@@ -22,7 +22,7 @@ wait_for 10 is_plugged
 REPLUGS=$replugs UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
 note "streamed at $(uptime_s) s"
 head_stop
-if [ $speed = high ]; then # a reset is the same without a pause
+if [ $speed = high ]; then # a reset is the same, but without a pause
     printf 'faults:\n  - {kind: unplug, at: 100, count: 1, for_ms: 200}\n  - {kind: usb_reset, at: 200, count: 1}\n' >faults.yaml
     head_start "{type: usb, backend: functionfs, speed: high}" --set head.prr_hz=4000 --set loop.tick_hz=100 \
         --scenario faults.yaml --truth truth.json
@@ -39,12 +39,13 @@ if [ $speed = high ]; then # a reset is the same without a pause
 fi
 head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
 wait_for 10 is_plugged
-# Without a configuration a head has nothing to do on its bus: it rests, and is there again with the next one.
+# Without a configuration a head has nothing to do on its bus. It rests then, and is there again with the next
+# configuration.
 cpu_ticks() {
     awk '{print $14 + $15}' /proc/$head_pid/stat
 }
-# Of 100: a loop takes all, in each of five seconds; the head's ticks without a scan take below 10, and more only while the
-# emulated machine itself stands still.
+# One second has 100 ticks. A busy loop takes all of them in each of five seconds. The head's ticks without a scan stay
+# below 10, and are more only while the emulated machine itself stands still.
 rests() {
     for second in 1 2 3 4 5; do
         before=$(cpu_ticks)
@@ -67,14 +68,14 @@ note "chapter 9 at $(uptime_s) s"
 device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
 echo 0 >$device/bConfigurationValue
 check "$speed: ends without a configuration" ends_soon
-[ $speed = high ] || return 0 # once is enough
+[ $speed = high ] || return 0 # one speed is enough for the rest
 check_hokuyo "$speed" "backend: functionfs, speed: $speed"
 check_sick "$speed" "backend: functionfs, speed: $speed"
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 wait_for 10 is_plugged
 head_kill
 check "$speed: a killed head leaves its gadget" test "$(ls $gadgets | wc -l)" = 1
-mkdir $gadgets/scanhead-1-123456789-0 # of one whose number, 1, is that of another process now
+mkdir $gadgets/scanhead-1-123456789-0 # the gadget of a head whose process number, 1, now belongs to another process
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 check "$speed: the next one takes it away" test "$(ls $gadgets | wc -l)" = 1
 check "$speed: and is there" wait_for 10 is_plugged

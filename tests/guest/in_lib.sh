@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: results for the host, as TAP on descriptor 3. Sourced by init before the test's script.
+# This runs inside the guest: it reports results to the host, as TAP on descriptor 3. init sources it before the test's
+# script.
 tests=0
 
-# load MODULE [OPTION...]: with what it needs.
+# load MODULE [OPTION...]: loads the module with the modules that it needs.
 load() {
     module=$1
     shift
@@ -33,7 +34,7 @@ fail() {
     echo "not ok $tests - $1" >&3
 }
 
-# check NAME COMMAND...: passes when the command does; else what it wrote is shown.
+# check NAME COMMAND...: passes when the command succeeds. Otherwise it shows what the command wrote.
 check() {
     name=$1
     shift
@@ -45,9 +46,9 @@ check() {
     fi
 }
 
-# wait_for SECONDS COMMAND...: until the command succeeds; 1 when it never did. A guest that shares its processor with other
-# tests has ten times as long: only what hangs reaches that. Each look starts two processes, which are dear here: so it
-# looks ten times a second, not more often.
+# wait_for SECONDS COMMAND...: waits until the command succeeds, and returns 1 if it never did. It allows ten times as
+# long, because a guest shares its processor with other tests, and only a hang reaches that. Each look starts two
+# processes, which are slow here, so it looks only ten times a second.
 wait_for() {
     left=$(($1 * 100))
     shift
@@ -58,14 +59,15 @@ wait_for() {
     done
 }
 
-# A word to the host; its line back.
+# Sends words to the host and prints the line that comes back.
 ask_host() {
     echo "HOST $*" >&3
     read -r answer <&3
     echo "$answer"
 }
 
-# tap PREFIX PROGRAM...: a program of cmocka; its results under our numbers, what it skips left out.
+# tap PREFIX PROGRAM...: runs a cmocka program and gives its results numbers of ours. Results that it skips are left
+# out.
 tap() {
     prefix=$1
     shift

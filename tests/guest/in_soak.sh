@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: `scanhead soak` with a head that is plugged into the virtual host controller, scenario by scenario.
+# This runs inside the guest: it calls `scanhead soak`, scenario by scenario, with a head on the virtual host
+# controller.
 . /soak_of.sh
 load vhci-hcd
-# Seven of its eight controllers only cost time: each look at the bus reads their hubs too.
+# Seven of its eight controllers only cost time, because each look at the bus reads their hubs too.
 for i in 1 2 3 4 5 6 7; do echo vhci_hcd.$i >/sys/bus/platform/drivers/vhci_hcd/unbind; done
 cp /room.obj /usb.yaml .
 [ -n "$scenarios" ] || scenarios=$(ls /config/faults | sed -n 's/\.yaml$//p')

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: a head on the bus, and what is asked of it. Sourced by the scripts of the tests.
+# This runs inside the guest: it puts a head on the bus and asks it things. The tests' scripts source it.
 . /often.sh
 
-# head_start YAML [OPTION...]: a head with these links, and TCP on 5025 beside them. head_stop ends it.
+# head_start YAML [OPTION...]: starts a head with these links, and with TCP on 5025 beside them. head_stop ends it.
 head_start() {
     links="{type: tcp, port: 5025}${1:+, $1}"
     shift
     head_start_of head "$links" "$@"
 }
 
-# head_start_of NAME YAML [OPTION...]: the head of NAME.yaml with just these links.
+# head_start_of NAME YAML [OPTION...]: starts the head of NAME.yaml with just these links.
 head_start_of() {
     sed "\$alinks: [$2]" "/$1.yaml" >/tmp/config.yaml
     shift 2
@@ -30,7 +30,8 @@ head_kill() {
     wait "$head_pid" 2>/dev/null
 }
 
-# By what the kernel shows, in the shell: a look with lsusb costs an emulated processor a tenth of a second.
+# This reads what the kernel shows, in the shell, because lsusb costs an emulated processor a tenth of a second each
+# time.
 is_plugged() {
     for file in /sys/bus/usb/devices/*/idVendor; do
         ! read -r vendor <"$file" || [ "$vendor" != "${1:-1209}" ] || return 0
@@ -46,7 +47,8 @@ tty_is_there() {
     test -c /dev/ttyACM0
 }
 
-# What lsusb shows of the head is what the class specifications want. check_enumeration PREFIX BYTES: of a bulk packet.
+# check_enumeration PREFIX BYTES: checks that lsusb shows of the head what the class specifications want. BYTES is the
+# size of a bulk packet.
 check_enumeration() {
     check "$1: enumerated" wait_for 20 is_plugged
     check "$1: the stock driver makes a tty of it" wait_for 10 tty_is_there
@@ -75,7 +77,7 @@ sha256_of() {
     sed -n 's/.*"stream_sha256": "\([0-9a-f]*\)".*/\1/p' "$1"
 }
 
-# The same two scans over TCP: what every other wire must give. Into tcp1 and tcp2.
+# This records the same two scans over TCP, into tcp1 and tcp2. Every other wire must give the same.
 record_reference() {
     check "the scans over TCP" scanhead record tcp:127.0.0.1:5025 --stats tcp1.json --quiet
     records_only || scanhead record tcp:127.0.0.1:5025 --stats tcp2.json --quiet
@@ -83,14 +85,15 @@ record_reference() {
     records_only || tcp2=$(sha256_of tcp2.json)
 }
 
-# The recorder: a head's first scan over USB, its second through the plain tty.
+# The recorder takes a head's first scan over USB and its second through the plain tty.
 check_record() {
     rm -f usb.json tty.json
     check "$1: scanhead list shows it" sh -c "scanhead list | grep '^usb:1209:0001:'"
     check "$1: scanhead record usb" scanhead record usb --wait 120 -o usb.ply --stats usb.json --quiet
     check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
-    # A tty has no flow control: where an emulated processor is too slow for a head as fast as it computes, the kernel's
-    # tty buffers (640 KiB) run over, and bytes are gone. Seen with a million pulses, never with a few thousand.
+    # A tty has no flow control. An emulated processor can be too slow for a head as fast as it computes. Then the
+    # kernel's tty buffers (640 KiB) run over and bytes are gone. That happens with a million pulses, and never happened
+    # with a few thousand.
     if ! records_only; then
         check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 120 -o tty.ply --stats tty.json --quiet
         check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
@@ -99,31 +102,31 @@ check_record() {
     check "$1: as many points in the file as pulses" grep "element vertex $(sed -n 's/.*"points": \([0-9]*\).*/\1/p' usb.json)\$" usb.ply
 }
 
-# Just the stream of another head's first scan.
+# Records only the stream of another head's first scan.
 record_again() {
     check "$1: scanhead record usb" scanhead record usb --wait 120 --stats again.json --quiet
     check "$1: the stream is the same as over TCP" test "$(sha256_of again.json)" = "$tcp1" -a -n "$tcp1"
 }
 
-# The recorder that follows a scan says about once a second how far it has come.
+# A recorder that follows a scan says about once a second how far it has come.
 has_points() {
     grep -q 'recording: 0\.[0-9]*[1-9]' "$1"
 }
 
-# The head is back, and more points have come than before.
+# The head is back, and more points have come than before it went.
 goes_on() {
     awk '/recording: / { if (!back) before = $3; else if ($3 != before) more = 1 } /is back/ { back = 1 }
          END { exit !more }' "$1"
 }
 
-# A recorder when its head goes in the middle of a scan: killed itself, left alone, and told to wait for the head. Needs a
-# head in real time, plug.sh and unplug.sh.
+# One recorder is killed in the middle of a scan. Another one loses its head and ends, and a third one was told to wait
+# for the head. This needs a head in real time, plug.sh and unplug.sh.
 check_cut_records() {
     scanhead record usb --wait 120 --frames 100 -o cut.ply 2>killed.err &
     wait_for 20 has_points killed.err
     kill -9 $!
     wait $! 2>/dev/null
-    scanhead record --repair cut.ply || rm -f cut.ply.part # within a second it may have left too little
+    scanhead record --repair cut.ply || rm -f cut.ply.part # the recorder may have written too little within a second
     scanhead record usb --wait 120 --listen -o cut.ply 2>cut.err &
     client=$!
     check "$1: another recorder after one was killed" wait_for 20 has_points cut.err
@@ -147,7 +150,8 @@ check_cut_records() {
     check "$1: with the count" grep '"replugs": 1,' again.json
 }
 
-# A recorder whose bus is reset by another program: not unplugged, and with --replug it goes on.
+# Another program resets the bus of a recorder. The recorder must not call that an unplugging, and goes on with
+# --replug.
 check_reset() {
     scanhead record usb --wait 120 --frames 100 --replug 60 -o reset.ply --stats reset.json 2>reset.err &
     client=$!
@@ -163,7 +167,7 @@ check_reset() {
     check "$1: the head says so, too" grep 'stays plugged in' /tmp/head.err
 }
 
-# A head that is to its host a Hokuyo. check_hokuyo PREFIX YAML: of its link, without type and protocol
+# check_hokuyo PREFIX YAML: checks a head that shows itself as a Hokuyo. YAML is its link, without type and protocol.
 check_hokuyo() {
     head_start_of hokuyo "{type: usb, protocol: scip, $2}"
     check "$1: the stock driver makes a tty of a Hokuyo" wait_for 20 tty_is_there
@@ -174,7 +178,8 @@ check_hokuyo() {
     note "$1: Hokuyo at $(uptime_s) s"
 }
 
-# A head that is to its host a SICK TiM561: libusb finds it. check_sick PREFIX YAML: of its link, without type and protocol
+# check_sick PREFIX YAML: checks a head that shows itself as a SICK TiM561, which libusb finds. YAML is its link,
+# without type and protocol.
 check_sick() {
     head_start_of sick "{type: usb, protocol: cola, $2}"
     tap "$1" test_cola
@@ -183,13 +188,14 @@ check_sick() {
     note "$1: TiM at $(uptime_s) s"
 }
 
-# What the USB specification wants of a device. check_chapter9 PREFIX
+# check_chapter9 PREFIX: asks what the USB specification wants of a device.
 check_chapter9() {
     tap "$1" test_chapter9
     tap "$1" test_chapter9_transfers
 }
 
-# What the kernel and the recorder make of faults on request. check_faults PREFIX YAML: of the link. Needs plug.sh.
+# check_faults PREFIX YAML: checks how the kernel and the recorder take faults on request. YAML is the link. It needs
+# plug.sh.
 check_faults() {
     cat >/tmp/faults.yaml <<'END'
 faults:

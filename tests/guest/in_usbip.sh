@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: the kernel's virtual host controller, without a tool and with the stock one. Sourced by init.
+# This runs inside the guest: it tests the kernel's virtual host controller, without a tool and with the stock tool.
+# init sources it.
 . /in_usb.sh
 export CONSOLE=/dev/ttyACM0
 load vhci-hcd
 load cdc-acm
 vhci=/sys/devices/platform/vhci_hcd.0
-# Seven of its eight controllers only cost time: each look at the bus reads their hubs too.
+# Seven of its eight controllers only cost time, because each look at the bus reads their hubs too.
 for i in 1 2 3 4 5 6 7; do echo vhci_hcd.$i >/sys/bus/platform/drivers/vhci_hcd/unbind; done
 head_start "" --pace fast
 record_reference

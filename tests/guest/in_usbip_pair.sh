@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: a head that plugs itself in. Sourced by in_usbip.sh.
+# This runs inside the guest: it tests a head that plugs itself in. in_usbip.sh sources it.
 head_start "{type: usb, attach: on}" --pace fast
 check_enumeration "socket pair" 512
 check_record "socket pair"
@@ -14,7 +14,7 @@ records_only && return
 head_start "{type: usb, attach: on}" --set head.prr_hz=4000 --set loop.tick_hz=100
 wait_for 10 is_plugged
 echo "echo 0 >$vhci/detach" >unplug.sh
-# Plugs itself in again.
+# The head plugs itself in again, so PLUG has nothing to do.
 REPLUGS=$often UNPLUG="sh unplug.sh" PLUG=: tap "socket pair" test_stream
 check "socket pair: says that it is back" grep 'plugged in again' /tmp/head.err
 note "replugged at $(uptime_s) s"

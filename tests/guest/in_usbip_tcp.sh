@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Inside the guest: a head that the stock tool plugs in. Sourced by in_usbip.sh.
+# This runs inside the guest: it tests a head that the stock tool plugs in. in_usbip.sh sources it.
 head_start "{type: usb}" --pace fast
 check "usbip list shows it" sh -c "usbip list -r 127.0.0.1 2>/dev/null | grep 1209:0001"
 check "usbip attach" usbip attach -r 127.0.0.1 -b 1-1

@@ -23,7 +23,7 @@ ask_host start_sick >/dev/null
 PATIENT=1 tap "usbredir" test_cola
 ask_host stop >/dev/null
 note "TiM at $(uptime_s) s"
-# Each time the process is killed with the stream in full flow, and another one takes its place.
+# Each time the process is killed while the stream flows, and another process takes its place.
 ask_host start --set head.prr_hz=4000 --set loop.tick_hz=100 >/dev/null
 check "usbredir: plugged in again" wait_for 10 is_plugged
 echo ". /in_lib.sh; ask_host kill >/dev/null" >unplug.sh

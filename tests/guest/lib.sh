@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
-# The host's side of the guest tests: a real kernel in QEMU, and what it says as TAP. Sourced by tests/guest/test_kernel_*.sh.
+# This is the host's side of the guest tests. It boots a real kernel in QEMU and prints its results as TAP.
+# tests/guest/test_kernel_*.sh source it.
 #
 #   guest_prepare                  kernel, modules and libraries into $BUILD/guest; skips the test where that can't be
 #   guest_add FILE [TARGET]        a file of this test into the guest (default: the root folder)
 #   guest_boot SCRIPT LIMIT_S [QEMU_OPTION...]
 #                                  boots, runs SCRIPT in the guest and prints its results as TAP
 #
-# The kernel is Debian's stock one out of its package, not installed. All that takes time is kept in $BUILD/guest, by the
-# package's version and by what the libraries are. The guest has two serial lines: the console, of which the log is kept,
-# and one for results (init, in_*.sh), on which it may also ask the host for something: `HOST word...` calls the function
-# host_request, and the guest waits for the line that this prints.
+# The kernel is Debian's stock one, taken out of its package and not installed. All that takes time to make is kept in
+# $BUILD/guest, named after the package's version and a sum of the libraries. The guest has two serial lines: the
+# console, whose log is kept, and one for results (init, in_*.sh). On the second the guest may also ask the host for
+# something. `HOST word...` calls the function host_request, and the guest waits for the line that this prints.
 set -eu
 
 guest_build=${BUILD:-build}
@@ -20,7 +21,7 @@ guest_name=$(basename "$0" .sh)
 guest_work=$guest_cache/run/$guest_name
 guest_pid=
 
-# Modules that the scripts may load; what these need is taken as well.
+# These are the modules that the scripts may load. The modules that they need are taken as well.
 GUEST_MODULES="xhci-pci vhci-hcd dummy_hcd usb_f_fs usb_f_acm cdc-acm"
 GUEST_TOOLS="busybox qemu-system-x86_64 cpio depmod lsusb usbreset usbip xz dpkg-deb"
 
@@ -40,8 +41,8 @@ guest_end() {
 trap guest_end EXIT
 trap 'exit 130' INT TERM
 
-# Name and version of the kernel that the stock package stands for; without lists, of the one that is here already. apt
-# takes a second for an answer, so guest.sh asks it once for all guests.
+# Prints name and version of the kernel that the stock package stands for. Without package lists it prints those of the
+# kernel that is here already. apt takes a second for an answer, so guest.sh asks it once for all guests.
 guest_kernel_name() {
     name=${GUEST_KERNEL:-$(apt-cache show --no-all-versions linux-image-amd64 2>/dev/null |
         sed -n 's/^Depends: \(linux-image-[0-9][^ ,]*-amd64\) (= \([^ )]*\)).*/\1=\2/p')}
@@ -52,16 +53,16 @@ guest_kernel_name() {
     fi
 }
 
-# vmlinux and the modules of the package $1 into the new folder $2.
+# Puts vmlinux and the modules of the package $1 into the new folder $2.
 guest_unpack_kernel() {
     mkdir -p "$2/deb" "$2/tree"
     (cd "$2/deb" && apt-get download -q "$1" >../download.log 2>&1) || return 1
-    # Debian 13 has them in usr/lib, and packed.
+    # Debian 13 has the modules in usr/lib, and compressed.
     dpkg-deb --fsys-tarfile "$2"/deb/*.deb | tar -x -C "$2/tree" --wildcards './boot/*' './*lib/modules/*' || return 1
     [ -e "$2/tree/lib" ] || ln -s usr/lib "$2/tree/lib"
     rm -rf "$2/deb"
     release=$(ls "$2/tree/lib/modules")
-    # An xz stream lies inside the image and has other things after it; the uncompressed kernel boots 3 s faster.
+    # An xz stream lies inside the image, with other things after it. The uncompressed kernel boots 3 s faster.
     for at in $(LC_ALL=C grep -obUaP '\xfd7zXZ\x00' "$2/tree/boot/vmlinuz-$release" | cut -d: -f1); do
         tail -c +$((at + 1)) "$2/tree/boot/vmlinuz-$release" | xz -dc --single-stream >"$2/vmlinux" 2>/dev/null || :
         [ "$(head -c 4 "$2/vmlinux" | tail -c 3)" != ELF ] || break
@@ -77,7 +78,7 @@ guest_unpack_kernel() {
     rm -rf "$2/tree" "$2/order"
 }
 
-# guest_take_module FILE FOLDER: unpacked, as busybox loads it.
+# guest_take_module FILE FOLDER: copies a module, unpacked, because busybox loads only that.
 guest_take_module() {
     case $1 in
     *.xz) xz -dc "$1" >"$2/$(basename "$1" .xz)" ;;
@@ -85,7 +86,8 @@ guest_take_module() {
     esac
 }
 
-# guest_module_order FOLDER MODULE: the files of the module and of those it needs, each after what it needs itself.
+# guest_module_order FOLDER MODULE: prints the files of the module and of those that it needs. Each comes after the ones
+# that it needs itself.
 guest_module_order() {
     awk -v wanted="$2" '
         { file = $1; sub(/:$/, "", file); name = file; sub(/.*\//, "", name); sub(/\.ko.*/, "", name); gsub(/-/, "_", name)
@@ -106,7 +108,7 @@ guest_pack() {
     (cd "$1" && find . | LC_ALL=C sort | cpio -o -H newc -R 0:0 --quiet)
 }
 
-# Shared libraries of some programs, and their loader, at the places where the programs look for them.
+# Prints the shared libraries of some programs, and their loader, at the places where the programs look for them.
 guest_libraries() {
     for program; do ldd "$program"; done | sed -n 's/.*=> \(\/[^ ]*\).*/\1/p; s/^[[:space:]]*\(\/[^ ]*ld-linux[^ ]*\).*/\1/p' |
         LC_ALL=C sort -u
@@ -130,7 +132,7 @@ guest_prepare_kernel() {
     fi
 }
 
-# The test programs for the guest that make has built: tests/guest/test_*.c.
+# Prints the test programs for the guest that make has built (tests/guest/test_*.c).
 guest_test_programs() {
     for source in tests/guest/test_*.c; do
         name=$(basename "$source" .c)
@@ -175,8 +177,8 @@ guest_add() {
     cp "$1" "$guest_work/root/${2:-}"
 }
 
-# The head of the tests, and what the scripts in the guest know of it. GUEST_PAN_DEG_S makes its scan longer (0.4: a
-# million pulses); then only records are made of it.
+# Adds the head of the tests and the scripts' settings. GUEST_PAN_DEG_S makes its scan longer (0.4 gives a million
+# pulses), and then the tests only record it.
 guest_add_head() {
     guest_add tests/guest/in_usb.sh
     guest_add tests/guest/room.obj
@@ -184,14 +186,14 @@ guest_add_head() {
     guest_add tests/guest/sick.yaml
     sed "s/pan_deg_s: .*/pan_deg_s: ${GUEST_PAN_DEG_S:-60}/" tests/guest/head.yaml >"$guest_work/root/head.yaml"
     [ -z "${GUEST_PAN_DEG_S:-}" ] || : >"$guest_work/root/records_only"
-    echo "often=${GUEST_REPLUGS:-20}" >"$guest_work/root/often.sh" # how often it is unplugged
+    echo "often=${GUEST_REPLUGS:-20}" >"$guest_work/root/often.sh" # `often` says how often the head is unplugged
 }
 
 host_request() {
     echo "nothing to be had here: $*"
 }
 
-# The guest's lines, until it is done or gone.
+# Reads the guest's lines until it is done or gone.
 guest_follow() {
     done=
     while [ -z "$done" ] && read -r line <&3; do
@@ -213,12 +215,12 @@ guest_follow() {
 
 guest_boot() {
     cp "$1" "$guest_work/root/script.sh"
-    limit_s=${GUEST_LIMIT_S:-$((6 * $2))} # that of a quiet machine; a busy one has six times as long
+    limit_s=${GUEST_LIMIT_S:-$((6 * $2))} # a quiet machine needs $2; a busy one is given six times as long
     shift 2
     { cat "$guest_base"; guest_pack "$guest_kernel/root"; guest_pack "$guest_work/root"; } >"$guest_work/initrd"
     mkfifo "$guest_work/results.in" "$guest_work/results.out"
     exec 3<>"$guest_work/results.out" 4<>"$guest_work/results.in"
-    # No KVM, and one CPU: a second one makes small transfers ten times slower on two host cores.
+    # There is no KVM, and one CPU, because a second CPU makes small transfers ten times slower on two host cores.
     (
         exec 3<&- 4<&-
         timeout -k 5 "$limit_s" qemu-system-x86_64 -accel tcg -cpu Nehalem -smp 1 -m 768 -M q35 -nodefaults -no-user-config \

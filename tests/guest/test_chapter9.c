@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Chapter 9 of the USB specification: standard requests, wrong lengths and indices. */
+/* Tests of chapter 9 of the USB specification: standard requests, wrong lengths and indices. */
 #include "tests/guest/chapter9.h"
 
 static void test_descriptor_lengths(void **state)
@@ -24,7 +24,7 @@ static void test_descriptor_lengths(void **state)
         assert_int_equal(get_descriptor(LIBUSB_DT_CONFIG, 0, 0, buf, len), len);
 }
 
-/* The descriptors of a configuration follow each other by their lengths, and their counts are what comes. */
+/* The descriptors of a configuration follow each other by their lengths, and their counts match what comes. */
 static void check_config(const uint8_t *p, int total)
 {
     int interfaces = 0, endpoints = 0, declared = 0, at = 0;
@@ -60,7 +60,7 @@ static void test_configuration_descriptor(void **state)
     (void)state;
     int total = get_descriptor(LIBUSB_DT_CONFIG, 0, 0, buf, 4096);
     assert_int_equal(buf[1], LIBUSB_DT_CONFIG);
-    assert_int_equal(buf[7] & 0x9f, 0x80); /* bit 7 is 1, bits 4 to 0 are 0 */
+    assert_int_equal(buf[7] & 0x9f, 0x80); /* bit 7 is 1, and bits 4 to 0 are 0 */
     check_config(buf, total);
 }
 
@@ -85,7 +85,7 @@ static void test_strings(void **state)
 static void test_speeds(void **state)
 {
     (void)state;
-    int dual = t.speed == LIBUSB_SPEED_HIGH; /* another speed can be told of: full */
+    int dual = t.speed == LIBUSB_SPEED_HIGH; /* it can then describe another speed, full speed */
     int n = get_descriptor(6, 0, 0, buf, 64);
     assert_int_equal(n, t.speed == LIBUSB_SPEED_FULL && n > 0 ? 10 : dual ? 10 : STALL);
     if (n > 0) assert_int_equal(buf[8], 1);
@@ -142,7 +142,7 @@ static void test_configurations(void **state)
     assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, 99, 0, NULL, 0), STALL);
     assert_int_equal(control(EP0_IN, LIBUSB_REQUEST_GET_CONFIGURATION, 0, 0, &value, 1), 1);
     assert_int_equal(value, t.config->bConfigurationValue);
-    /* behind the host's back: unconfigured there are no interfaces and no endpoints */
+    /* This happens behind the host's back: an unconfigured device has no interfaces and no endpoints. */
     assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, 0, 0, NULL, 0), 0);
     assert_int_equal(control(EP0_IN, LIBUSB_REQUEST_GET_CONFIGURATION, 0, 0, &value, 1), 1);
     assert_int_equal(value, 0);
@@ -150,7 +150,8 @@ static void test_configurations(void **state)
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 1, t.interface.number, NULL, 0), STALL);
     assert_int_equal(get_descriptor(LIBUSB_DT_DEVICE, 0, 0, buf, 18), 18);
     assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, t.config->bConfigurationValue, 0, NULL, 0), 0);
-    /* the same once more begins anew: endpoints unhalted, data toggles at 0 on both sides */
+    /* A reset sets the same configuration again, and that begins anew: no endpoint is halted, and data toggles are 0 on
+     * both sides. */
     assert_int_equal(libusb_release_interface(t.dev, t.interface.number), 0);
     assert_int_equal(libusb_reset_device(t.dev), 0);
     assert_int_equal(libusb_claim_interface(t.dev, t.interface.number), 0);
@@ -168,8 +169,8 @@ static void test_interfaces(void **state)
     assert_int_equal(value, 0);
 }
 
-/* usbfs does not let a request to an interface or endpoint out that the configuration does not have; those of the
- * device and of types that it does not look into go out as they are. */
+/* usbfs lets no request out to an interface or endpoint that the configuration does not have. Requests to the device,
+ * and those of types that usbfs does not look into, go out as they are. */
 static void test_refused(void **state)
 {
     static const struct {
@@ -178,7 +179,7 @@ static void test_refused(void **state)
         {EP0_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, 0x7700, 0, 64}, /* no such type */
         {EP0_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, 0x0205, 0, 64}, /* no such configuration */
         {EP0_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, 0x0400, 0, 64}, /* interface descriptors are not asked for alone */
-        {EP0_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, 0x0500, 0, 64}, /* nor endpoints */
+        {EP0_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, 0x0500, 0, 64}, /* neither are endpoint descriptors */
         {DEV_OUT, LIBUSB_REQUEST_SET_FEATURE, 77, 0, 0},        /* no such feature */
         {DEV_OUT, LIBUSB_REQUEST_CLEAR_FEATURE, 77, 0, 0},
         {DEV_OUT, LIBUSB_REQUEST_SET_DESCRIPTOR, 0x0100, 0, 18}, /* optional, and not offered */
@@ -198,8 +199,7 @@ static void test_refused(void **state)
         if (rc != STALL)
             print_message("request %02x %02x %04x: %d\n", wrong[i].type, wrong[i].request, wrong[i].value, rc);
         assert_int_equal(rc, STALL);
-        assert_int_equal(get_descriptor(LIBUSB_DT_DEVICE, 0, 0, buf, 18),
-                         18); /* the stall is over with the next setup */
+        assert_int_equal(get_descriptor(LIBUSB_DT_DEVICE, 0, 0, buf, 18), 18); /* the stall ends with the next setup */
     }
 }
 
@@ -212,10 +212,10 @@ static void test_session_request(void **state)
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 1, number, buf, 4), STALL);
     assert_int_equal(control(0xc1, USB_REQUEST_SESSION, 1, number, buf, 4), STALL);
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION + 1, 1, number, NULL, 0), STALL);
-    session(0); /* closed already: nothing happens */
+    session(0); /* the session is closed already, so nothing happens */
     open_session();
     ask();
-    open_session(); /* opened again: begins anew */
+    open_session(); /* a session that is opened again begins anew */
     ask();
     session(0);
     session(0);

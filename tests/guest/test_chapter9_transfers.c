@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Halted endpoints, zero-length packets, transfers cancelled at each stage, resets back to back. */
+/* Tests of halted endpoints, zero-length packets, transfers cancelled at each stage, and resets back to back. */
 #include "tests/guest/chapter9.h"
 
 /* ---- endpoints */
@@ -27,7 +27,7 @@ static void test_halt(void **state)
             assert_int_equal(libusb_clear_halt(t.dev, endpoint[i]), 0);
             assert_int_equal(is_halted(endpoint[i]), 0);
         }
-        assert_int_equal(libusb_clear_halt(t.dev, endpoint[i]), 0); /* not halted: allowed */
+        assert_int_equal(libusb_clear_halt(t.dev, endpoint[i]), 0); /* this is allowed without a halt, too */
     }
     ask();
     if (!t.has_kernel) /* dummy_hcd takes any feature of an endpoint for a halt */
@@ -43,12 +43,12 @@ static void test_zero_length(void **state)
     for (int i = 0; i < 20; i++)
         send_bytes("", 0);
     ask();
-    send_bytes("*ID", 3); /* a command in pieces, empty packets in between */
+    send_bytes("*ID", 3); /* the command comes in pieces, with empty packets between them */
     send_bytes("", 0);
     send_bytes("N", 1);
     send_bytes("?\n", 2);
     expect_reply("scanhead,");
-    /* a whole number of packets, then its zero-length packet: 128 commands of 8 bytes */
+    /* 128 commands of 8 bytes fill a whole number of packets, and a zero-length packet follows. */
     for (int i = 0; i < 1024; i += 8)
         memcpy(line + i, "  *IDN?\n", 8);
     send_bytes(line, 1024);
@@ -72,7 +72,7 @@ static void wait_done(int *done)
         assert_int_equal(libusb_handle_events_timeout_completed(t.ctx, &second, done), 0);
 }
 
-/* One transfer, cancelled after some events were handled; how it ended. */
+/* Cancels one transfer after some events were handled. Returns how it ended. */
 static enum libusb_transfer_status cancel_one(uint8_t endpoint, int len, int wait_us)
 {
     int done = 0;
@@ -83,7 +83,7 @@ static enum libusb_transfer_status cancel_one(uint8_t endpoint, int len, int wai
     struct timeval wait = {.tv_usec = wait_us};
     if (wait_us > 0) libusb_handle_events_timeout_completed(t.ctx, &wait, &done);
     int rc = libusb_cancel_transfer(transfer);
-    assert_true(rc == 0 || rc == LIBUSB_ERROR_NOT_FOUND); /* it was done just before */
+    assert_true(rc == 0 || rc == LIBUSB_ERROR_NOT_FOUND); /* it may have been done just before */
     wait_done(&done);
     enum libusb_transfer_status status = transfer->status;
     libusb_free_transfer(transfer);
@@ -98,7 +98,7 @@ static void test_cancel_without_session(void **state)
         assert_int_equal(cancel_one(t.interface.in, 16384, 500 * (i % 4)), LIBUSB_TRANSFER_CANCELLED);
 }
 
-/* With a session frames come at any time: a read may be cancelled before, within or after its data. */
+/* In a session frames come at any time, so a read may be cancelled before, within or after its data. */
 static void test_cancel_reads(void **state)
 {
     (void)state;
@@ -112,7 +112,8 @@ static void test_cancel_reads(void **state)
     session(0);
 }
 
-/* Many reads at once, cancelled from the last to the first, from the first to the last, and every other one. */
+/* Many reads run at once. They are cancelled from the last to the first, from the first to the last, or every other one
+ * first. */
 static void test_cancel_many(void **state)
 {
     enum { N = 16 };
@@ -140,7 +141,7 @@ static void test_cancel_many(void **state)
     }
 }
 
-/* Half a command cancelled on its way must not be glued to the first of the next session. */
+/* Half a command that was cancelled on its way must not be glued to the first command of the next session. */
 static void test_cancel_writes(void **state)
 {
     (void)state;
@@ -184,7 +185,7 @@ static void test_resets(void **state)
         assert_int_equal(libusb_reset_device(t.dev), 0);
     open_session();
     ask();
-    for (int i = 0; i < 3; i++) { /* with the session open and frames on the way */
+    for (int i = 0; i < 3; i++) { /* the session is open, and frames are on the way */
         assert_int_equal(libusb_reset_device(t.dev), 0);
         open_session();
         ask();

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that shows itself as a SICK TiM561: what its users' programs find and do over libusb.
+/* Tests of a head that shows itself as a SICK TiM561: what its users' programs find and do over libusb.
  *
- * The sequence is sick_tim's: open by ids, claim interface 0, bulk OUT 02h and bulk IN 81h with reads of 65535 bytes;
- * a command, then one read, which must be its reply; events after sEN. One transfer must hold one telegram. Layouts:
- * CoLa-A is STX, fields with a blank between, ETX; CoLa-B is four STX, the length (big-endian), the payload and its
- * XOR. The distances must be those of the room, at the right angles: -45 to 225 deg counter-clockwise, 90 ahead. */
+ * The sequence is sick_tim's: open by ids, claim interface 0, bulk OUT 02h, and bulk IN 81h with reads of 65535 bytes.
+ * A command is followed by one read, which must be its reply, and events come after sEN. One transfer must hold one
+ * telegram. CoLa-A is STX, fields with a blank between, and ETX. CoLa-B is four STX, the length (big-endian), the
+ * payload and its XOR. The distances must be those of the room, at the right angles: -45 to 225 deg counter-clockwise,
+ * with 90 ahead. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -19,7 +20,7 @@
 
 #include "tests/guest/plan_room.h"
 
-/* Ample for an emulated machine: only a head that hangs reaches it. */
+/* This is ample for an emulated machine, so only a head that hangs reaches it. */
 enum { WAIT_MS = 240000, MOST = 65535, BEAMS = 811, OUT = 0x02, IN = 0x81 };
 
 static libusb_context *ctx;
@@ -31,7 +32,8 @@ static int open_device(void **state)
 {
     const struct timespec pause = {.tv_nsec = 50000000};
     (void)state;
-    /* Each time anew: without a udev daemon, as in the guest, a context knows what there was when it was made. */
+    /* The context is made anew each time. Without a udev daemon, as in the guest, it knows only the devices that were
+     * there when it was made. */
     for (int i = 0; i < WAIT_MS / 50 && dev == NULL; i++) {
         if (i > 0) nanosleep(&pause, NULL);
         if (ctx != NULL) libusb_exit(ctx);
@@ -56,7 +58,7 @@ static void send(const void *bytes, int len)
     assert_int_equal(n, len);
 }
 
-/* One read, as the clients do it. Returns libusb's status; what came is in `in`, with a NUL after it. */
+/* Reads once, as the clients do, and returns libusb's status. The bytes are in `in`, with a NUL after them. */
 static int receive(unsigned timeout_ms)
 {
     n_in = 0;
@@ -65,7 +67,7 @@ static int receive(unsigned timeout_ms)
     return rc;
 }
 
-/* The transfer is one telegram of CoLa-A: from its STX to its ETX, and no other in between. */
+/* The transfer must be one telegram of CoLa-A, from its STX to its ETX, with no other one in it. */
 static void check_telegram(void)
 {
     assert_true(n_in > 2);
@@ -89,7 +91,7 @@ static void ask(const char *command, const char *reply)
     expect_reply(reply);
 }
 
-/* ---- what it is */
+/* ---- identity */
 
 static void test_identity(void **state)
 {
@@ -121,13 +123,13 @@ static void test_identity(void **state)
 static void test_start(void **state)
 {
     (void)state;
-    assert_int_equal(receive(100), LIBUSB_ERROR_TIMEOUT); /* nothing comes unasked */
+    assert_int_equal(receive(100), LIBUSB_ERROR_TIMEOUT); /* nothing comes without a request */
     assert_int_equal(n_in, 0);
     ask("sRI0", "sRA 0 6 TiM561 ");
     ask("sRN SerialNumber", "sRA SerialNumber ");
     ask("sRN FirmwareVersion", "sRA FirmwareVersion ");
     ask("sRN SCdevicestate", "sRA SCdevicestate 1");
-    send("\002sRN SCdev", 10); /* a telegram in pieces */
+    send("\002sRN SCdev", 10); /* the telegram comes in pieces */
     send("icestate\003", 9);
     expect_reply("sRA SCdevicestate 1");
 }
@@ -172,9 +174,9 @@ static void end_events(void)
     while (memcmp(in + 1, "sEA LMDscandata 0", 17) != 0);
 }
 
-/* Each telegram is there, counted by itself (field 7), also with reads that are given up again and again. Not so
- * with PATIENT in the environment: over usbredir a telegram was lost once, presumably as its answer crossed the read's
- * cancellation on the socket. */
+/* Each telegram is there and carries its own count (field 7), even if the client gives up reads again and again. With
+ * PATIENT in the environment no read is given up: over usbredir a telegram was lost once, presumably because its answer
+ * crossed the read's cancellation on the socket. */
 static void test_events(void **state)
 {
     const int patient = getenv("PATIENT") != NULL;
@@ -183,7 +185,8 @@ static void test_events(void **state)
     int given_up = 0, whole = 0;
     (void)state;
     ask("sEN LMDscandata 1", "sEA LMDscandata 1");
-    /* On a busy machine the next telegram may have come whenever a read begins: then it goes on until one is given up. */
+    /* On a busy machine the next telegram may be there whenever a read begins. So the loop goes on until one read was
+     * given up. */
     for (int i = 0; i < N_SCANS || (!patient && given_up == 0 && i < 50 * N_SCANS);) {
         const int impatient = !patient && i >= N_SCANS / 2, rc = receive(impatient ? IMPATIENT_MS : WAIT_MS);
         if (rc == LIBUSB_ERROR_TIMEOUT && n_in == 0 && impatient) {
@@ -205,7 +208,7 @@ static void test_events(void **state)
     assert_int_equal(receive(200), LIBUSB_ERROR_TIMEOUT);
 }
 
-/* Also after a failure, so that the next test finds a head that is still. */
+/* This runs after a failure, too, so that the next test finds a head that is still. */
 static int no_events(void **state)
 {
     (void)state;
@@ -235,7 +238,7 @@ static int poll_binary(uint8_t *frame)
     return 9 + n;
 }
 
-/* Beams from the first on, 1/3 deg each, so that n of them are sent. */
+/* Selects beams from the first on, 1/3 deg each, so that n of them are sent. */
 static void set_beams(int n)
 {
     char text[96];
@@ -244,9 +247,9 @@ static void set_beams(int n)
     ask(text, "sWA LMPoutputRange");
 }
 
-/* In CoLa-B the length is 119 + 3 n for n beams with an 8-bit RSSI: 512 with 131 and 2048 with 643 beams are whole
- * packets at full and at high speed, those beside them are not. A read of 65535 bytes ends there only by the packet of
- * no bytes. */
+/* In CoLa-B the length is 119 + 3 n for n beams with an 8-bit RSSI. 131 beams (512 bytes) and 643 beams (2048 bytes)
+ * make whole packets at full and at high speed, and their neighbours do not. A read of 65535 bytes ends there only by
+ * the packet of no bytes. */
 static void test_whole_packets(void **state)
 {
     static const int beams[] = {130, 131, 132, 643, 644};

@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The head as a gadget of the kernel at high and then at super speed, on a device controller that dummy_hcd makes up.
+# This tests the head as a gadget of the kernel, at high and then at super speed. dummy_hcd makes up the device
+# controller.
 . tests/guest/lib.sh
 guest_prepare
 guest_add_head

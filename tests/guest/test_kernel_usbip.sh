@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The head on this machine's virtual host controller: by socket pair and without any tool; then as a USB/IP server, by TCP
-# with the stock tool.
+# This tests the head on the guest's virtual host controller: first by socket pair and without any tool, then as a
+# USB/IP server, by TCP with the stock tool.
 . tests/guest/lib.sh
 guest_prepare
 guest_add_head

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The head as a device of a virtual machine: its process on the host, usbredir between the two. The guest says when the
-# process is to be killed and started again.
+# This tests the head as a device of a virtual machine. Its process runs on the host, and usbredir connects the two. The
+# guest says when the process is to be killed and started again.
 . tests/guest/lib.sh
 guest_prepare
 guest_add_head
@@ -12,7 +12,7 @@ speed=high
 name=head
 protocol=native
 
-# head_start [OPTION...]: the head on the host; its TCP port into tcp_port.
+# head_start [OPTION...]: starts the head on the host and sets tcp_port.
 head_start() {
     rm -f "$guest_work/ready"
     sed "\$alinks: [{type: tcp, port: 0}, {type: usb, protocol: $protocol, backend: usbredir, path: usb, serial: SIM-0001, speed: $speed}]" \
@@ -53,14 +53,14 @@ host_request() {
 }
 
 trap 'head_end -TERM; guest_end' EXIT
-# The same two scans over TCP, by a head of their own: what the guest must get.
+# A head of its own gives the same two scans over TCP. The guest must get the same.
 head_start --pace fast
 {
     echo "tcp1=$(hash_over_tcp)"
     echo "tcp2=$(hash_over_tcp)"
 } >"$guest_work/root/hashes.sh"
 head_end -TERM
-# QEMU 9.2 has another name for it, and will forget the old one.
+# QEMU 9.2 gave the option another name, and will drop the old one.
 reconnect=reconnect=1
 version=$(qemu-system-x86_64 --version | sed -n 's/.* version \([0-9]*\)\.\([0-9]*\).*/\1 \2/p')
 version=${version:-0 0}

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that shows itself as a Hokuyo URG-04LX: what its users' programs find and do, through the system's own driver.
+/* Tests of a head that shows itself as a Hokuyo URG-04LX: what its users' programs find and do, through the system's
+ * own driver.
  *
- * The sequence is urg_library's: open without waiting, set the line, throw away what is there, a bare line end, QT,
- * PP, then measurements. Layouts: SCIP 2.0 (a reply is echo, status with sum, lines with sums, an empty line; a sum
- * is 30h plus the low six bits; a distance has three characters of six bits, the highest first, each plus 30h). The
- * distances must be those of the room, at the right angles: counter-clockwise from step 384, 1024 steps a turn.
+ * The sequence is urg_library's: open without waiting, set the line, throw away what is there, a bare line end, QT, PP,
+ * then measurements. The layouts are those of SCIP 2.0: a reply is echo, status with sum, lines with sums, and an empty
+ * line. A sum is 30h plus the low six bits. A distance has three characters of six bits, the highest first, each plus
+ * 30h. The distances must be those of the room, at the right angles: counter-clockwise from step 384, 1024 steps a
+ * turn.
  *
- * From the environment: TTY (default /dev/ttyACM0). */
+ * The environment gives TTY (default /dev/ttyACM0). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -23,7 +25,7 @@
 
 #include "tests/guest/plan_room.h"
 
-/* Ample for an emulated machine: only a head that hangs reaches it. */
+/* This is ample for an emulated machine, so only a head that hangs reaches it. */
 enum { WAIT_MS = 240000 };
 enum { FIRST = 44, LAST = 725, FRONT = 384, STEPS = 1024, DMIN = 20, DMAX = 5600, SCAN_MS = 100, SCANS = 5 };
 
@@ -63,7 +65,7 @@ static void send(const char *text)
     assert_int_equal(write(tty, text, strlen(text)), strlen(text));
 }
 
-/* A line without its end; "" is an empty one. */
+/* Returns a line without its end. "" is an empty line. */
 static const char *take_line(void)
 {
     static char line[256];
@@ -79,7 +81,7 @@ static const char *take_line(void)
     return line;
 }
 
-/* The last character of a line is the sum of those before. */
+/* The last character of a line is the sum of the characters before it. */
 static void check_sum(const char *line, size_t n)
 {
     unsigned sum = 0;
@@ -97,7 +99,7 @@ static void expect_status(const char *echo, const char *status)
     check_sum(line, 2);
 }
 
-/* Lines KEY:VALUE;S up to the empty one; how many. The value of key into value. */
+/* Takes lines KEY:VALUE;S up to the empty one, and returns how many there were. Puts the value of key into value. */
 static int take_keys(const char *key, char *value, size_t len)
 {
     int n = 0;
@@ -122,7 +124,7 @@ static void ask_key(const char *command, const char *key, const char *want, int 
     assert_string_equal(value, want);
 }
 
-/* ---- what the system shows of it */
+/* ---- the attributes that the system shows */
 
 static void expect_attribute(const char *name, const char *want)
 {
@@ -145,17 +147,17 @@ static void test_identity(void **state)
     expect_attribute("idProduct", "0000");
     expect_attribute("manufacturer", "Hokuyo Data Flex for USB");
     expect_attribute("product", "URG-Series USB Driver");
-    expect_attribute("serial", ""); /* it has none */
+    expect_attribute("serial", ""); /* it has no serial number */
     expect_attribute("bNumInterfaces", "2");
 }
 
-/* ---- what urg_library asks */
+/* ---- the questions of urg_library */
 
 static void test_start(void **state)
 {
     (void)state;
     open_tty(B115200);
-    send("\n"); /* answered by nothing */
+    send("\n"); /* no reply comes */
     send("QT\n");
     expect_status("QT", "00");
     assert_string_equal(take_line(), "");
@@ -164,7 +166,7 @@ static void test_start(void **state)
     ask_key("VV", "PROT", "SCIP 2.0", 5);
 }
 
-/* It tries one rate after the other. */
+/* urg_library tries one rate after the other. */
 static void test_rates(void **state)
 {
     static const speed_t speeds[] = {B19200, B57600, B115200, B500000};
@@ -183,7 +185,7 @@ static uint32_t decode(const char *text, int n)
     return value;
 }
 
-/* Distances of the blocks that follow, in mm, at most max; how many. */
+/* Takes the distances of the blocks that follow, in mm, at most max of them. Returns how many there were. */
 static int take_distances(uint32_t *mm, int max)
 {
     static char data[3 * (LAST - FIRST + 1) + 64];
@@ -202,7 +204,7 @@ static int take_distances(uint32_t *mm, int max)
     return (int)n / 3;
 }
 
-/* Half a millimetre of rounding, and as much again for a ray that meets a corner: no noise is configured. */
+/* No noise is configured. Rounding takes half a millimetre, and a ray that meets a corner as much again. */
 static void check_room(const uint32_t *mm)
 {
     int measured = 0;
@@ -232,7 +234,8 @@ static void test_scans(void **state)
         assert_int_equal(strlen(line), 5);
         check_sum(line, 4);
         const uint32_t ms = decode(line, 4);
-        if (left < SCANS - 1) assert_in_range(ms - before_ms, SCAN_MS - 1, SCAN_MS + 1); /* none between is missing */
+        if (left < SCANS - 1)
+            assert_in_range(ms - before_ms, SCAN_MS - 1, SCAN_MS + 1); /* no scan between them is missing */
         before_ms = ms;
         assert_int_equal(take_distances(mm, LAST - FIRST + 1), LAST - FIRST + 1);
         check_room(mm);

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The client's side of a head on a real bus: console, a scan with every frame looked at, and unplugging in its middle.
+/* Tests of the client's side of a head on a real bus: the console, a scan with every frame looked at, and unplugging in
+ * its middle.
  *
- * From the environment: SOURCE (default usb), CONSOLE (a tty), PLUG and UNPLUG (shell
- * commands that do it), REPLUGS (how often). What isn't given is skipped. */
+ * The environment gives SOURCE (default usb), CONSOLE (a tty), PLUG and UNPLUG (the shell commands that do it), and
+ * REPLUGS (how often). A test whose values are missing is skipped. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,7 +16,7 @@
 
 #include "drivers/host/scanhead.h"
 
-/* Ample for an emulated machine: only a head that hangs reaches it. */
+/* This is ample for an emulated machine, so only a head that hangs reaches it. */
 enum { WAIT_MS = 240000 };
 
 static const char *env(const char *name)
@@ -34,7 +35,7 @@ static const char *source(void)
     return value != NULL ? value : "usb";
 }
 
-/* Opened within the time: a device that was plugged in just now takes a moment. */
+/* Tries until the time is over, because a device that was plugged in just now takes a moment. */
 static struct scanhead *open_head(const char *name)
 {
     struct scanhead *sh = NULL;
@@ -69,8 +70,8 @@ static void wait_idle(struct scanhead *sh)
     if (strcmp(reply, "idle") != 0) fail_msg("the head stays %s", reply);
 }
 
-/* ---- every frame looked at: pulses that are missing must have been announced before, as a gap in the sequence numbers
- * or as ones that the head could not compute */
+/* ---- every frame is looked at. Missing pulses must have been announced before, as a gap in the sequence numbers or as
+ * pulses that the head could not compute. */
 
 struct watch {
     uint64_t frames, pulses, next_pulse, announced, scan_pulses;
@@ -106,7 +107,8 @@ static int next(struct watch *w, struct scanhead *sh)
     return rc;
 }
 
-/* Starts a scan and waits for its beginning: a gadget's tty first brings what it holds of an earlier session. */
+/* Starts a scan and waits for its beginning, because a gadget's tty first brings what it holds of an earlier
+ * session. */
 static void start_scan(struct scanhead *sh)
 {
     char reply[512];
@@ -155,7 +157,7 @@ static void test_console(void **state)
     (void)state;
     snprintf(command, sizeof command, "tty:%s", tty);
     struct scanhead *sh = open_head(command);
-    for (int i = 0; i < 100; i++) { /* each its own reply, none of the one before */
+    for (int i = 0; i < 100; i++) { /* each command gets its own reply, and none of an earlier one */
         tell(sh, "*IDN?", reply);
         assert_int_equal(strncmp(reply, "scanhead,", 9), 0);
         snprintf(command, sizeof command, "SCAN:FRAM %d", 1 + i % 7);
@@ -164,7 +166,7 @@ static void test_console(void **state)
         assert_int_equal(atoi(reply), 1 + i % 7);
     }
     do_command(sh, "SCAN:FRAM 1");
-    memset(command, ' ', 250); /* the longest that is allowed: several packets at full speed */
+    memset(command, ' ', 250); /* the longest command allowed takes several packets at full speed */
     strcpy(command + 250, "*IDN?");
     tell(sh, command, reply);
     assert_int_equal(strncmp(reply, "scanhead,", 9), 0);
@@ -173,7 +175,7 @@ static void test_console(void **state)
     assert_int_equal(strncmp(reply, "ERR -113,", 9), 0);
     tell(sh, "SYST:ERR?", reply);
     assert_non_null(strstr(reply, "-113,"));
-    do_command(sh, "SYST:CONT:REL"); /* a gadget's console is not seen to be closed at once */
+    do_command(sh, "SYST:CONT:REL"); /* the head does not see at once that a gadget's console is closed */
     scanhead_close(sh);
 }
 
@@ -219,7 +221,7 @@ static void unplug_in_the_middle(struct scanhead *sh, struct watch *w)
     w->over = 0;
     tell(sh, "HEAD:STAT?", reply);
     if (strcmp(reply, "idle") == 0) {
-        w->have_pulse = 0; /* another scan */
+        w->have_pulse = 0; /* this is another scan */
         do_command(sh, "SCAN:STAR");
     }
     uint64_t pulses = w->pulses;
@@ -236,7 +238,7 @@ static void unplug_in_the_middle(struct scanhead *sh, struct watch *w)
     tell(sh, "*IDN?", reply);
     scanhead_get_stats(sh, &after);
     assert_int_equal(after.bad_payload, 0);
-    /* at most one frame was cut, and its bytes are all that were thrown away */
+    /* At most one frame was cut, and only its bytes were thrown away. */
     assert_true(after.bad_bytes - before.bad_bytes < 65536);
 }
 
@@ -263,7 +265,7 @@ static void test_replug(void **state)
     scanhead_close(sh);
 }
 
-/* A head that still scans for somebody who has gone is stopped: the tests begin with one at rest. */
+/* Stops a head that still scans for a client that has gone, so that the tests begin with a head at rest. */
 static int settle(void **state)
 {
     char reply[512];

@@ -1,14 +1,14 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# 64-bit ARM: cross-built with the libraries of an arm64 Debian, under qemu-aarch64
+# This tests 64-bit ARM: the programs are cross-built with the libraries of an arm64 Debian and run under qemu-aarch64.
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"
 case $PWD/$at in *[[:space:]]*) leave "there is a blank in the path of $at, which the compiler's options can't have" ;; esac
 need aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
 need aarch64-linux-gnu-g++ g++-aarch64-linux-gnu
 need qemu-aarch64-static qemu-user-static
-# Packages are unpacked and no more, so nothing of ARM runs while the root is made. The compilers of this machine link with
-# the libraries of the root: its Debian has to be the same.
+# Packages are only unpacked, so nothing of ARM runs while the root is made. The compilers of this machine link with the
+# libraries of the root, so its Debian has to be the same.
 . /etc/os-release
 make_root "${VERSION_CODENAME:-bookworm}" --variant=extract --arch=arm64 --include=libc6-dev,libstdc++-$(aarch64-linux-gnu-gcc -dumpversion)-dev,libembree-dev,libassimp-dev,libgeographiclib-dev,libproj-dev,libyaml-dev,libpng-dev,libstb-dev,nettle-dev,libusb-1.0-0-dev,libusbredirparser-dev,libwebsockets-dev,libjansson-dev,libwebp-dev,libtiff-dev,libmeshoptimizer-dev,libcmocka-dev
 root=$(cd "$at/root" && pwd)
@@ -17,7 +17,7 @@ find "$root/usr/lib" "$root/lib" -type l -lname '/*' | while read -r link; do
     to=$(readlink "$link")
     case $to in "$root"/*) ;; *) ln -sfn "$root$to" "$link" ;; esac
 done
-# The emulator looks for every path in the root first: devices are those of this machine.
+# The emulator looks for every path in the root first, but the devices must be those of this machine.
 rm -rf "$root/dev"
 pc=$root/usr/lib/aarch64-linux-gnu/pkgconfig:$root/usr/share/pkgconfig
 echo "    building for ARM"

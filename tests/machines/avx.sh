@@ -1,4 +1,4 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# x86 without AVX2 (Sandy Bridge): the programs of this machine, under qemu-x86_64
+# This tests x86 without AVX2 (Sandy Bridge): it runs the programs of this machine under qemu-x86_64.
 exec sh "$(dirname "$0")/x86.sh" "$1" "$2" SandyBridge AVX

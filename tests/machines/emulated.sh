@@ -1,8 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# One test program under an emulator, for run_tap.sh: sh tests/machines/emulated.sh PROGRAM EMULATOR...
-# A program that isn't done within $LIMIT_S seconds of processor time, and had no failure until then, is skipped and says so.
-# What can't be had under an emulator, as PROGRAM reason:
+# This runs one test program under an emulator, for run_tap.sh: sh tests/machines/emulated.sh PROGRAM EMULATOR... A
+# program that isn't done within $LIMIT_S seconds of processor time, and had no failure until then, is skipped and says
+# so.
+# The lines below name programs that can't run under an emulator, each with the reason:
 # not emulated: test_functionfs QEMU's user mode has none of the kernel's asynchronous I/O (io_setup)
 program=$1
 shift
@@ -12,7 +13,7 @@ out=$(mktemp) || exit 1
 trap 'rm -f "$out"' EXIT
 (ulimit -S -t "$LIMIT_S" && exec "$@" "$program") >"$out"
 status=$?
-# Ended by SIGXCPU, or killed.
+# The program was ended by SIGXCPU, or killed.
 if { [ $status -eq 152 ] || [ $status -eq 137 ]; } && ! grep -q '^not ok' "$out"; then
     echo "1..0 # SKIP more than $LIMIT_S s under the emulator; $(grep -c '^ok' "$out") of its tests passed until then"
     exit 0

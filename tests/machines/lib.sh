@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: MIT
-# What the machines share; sourced by their scripts with $build, and $at: the folder of this machine, which is kept.
+# The machines share this. Their scripts source it with $build, and with $at, the folder of this machine, which is kept.
 set -u
 nicely="nice -n 5"
 
-# leave WHY: nothing can be done here.
+# leave WHY: ends the script because nothing can be done here.
 leave() {
     echo "$*" >"$at/skipped.txt"
     echo "    skipped: $*"
     exit 0
 }
 
-# need PROGRAM PACKAGE: or leave.
+# need PROGRAM PACKAGE: leaves if the program is missing.
 need() {
     command -v "$1" >/dev/null || leave "no $1 (package $2)"
 }
 
-# Address of the Debian archive that apt uses here, and whatever apt was told about the way there.
+# The first prints the address of the Debian archive that apt uses here. The second prints apt's settings for the way
+# there.
 debian_archive() {
     apt-get indextargets --format '$(REPO_URI) $(LABEL)' 'Created-By: Packages' 2>/dev/null |
         sed -n 's/ Debian$//p' | head -n 1
@@ -24,7 +25,8 @@ apt_ways() {
     apt-config dump | grep -i -E '^Acquire::.*(proxy|Check-|Verify|CaInfo|Retries).* ".+";$'
 }
 
-# make_root SUITE [OPTION...]: Debian in $at/root by mmdebstrap, once; the option is part of what is asked for.
+# make_root SUITE [OPTION...]: makes a Debian in $at/root by mmdebstrap, once. Another suite or other options make it
+# anew.
 make_root() {
     asked="$*"
     [ "$(cat "$at/root.is" 2>/dev/null)" != "$asked" ] || return 0
@@ -43,8 +45,8 @@ make_root() {
     echo "$asked" >"$at/root.is"
 }
 
-# in_root COMMAND...: in the root, with its own processes and mounts, which end with it. What this machine trusts is trusted
-# there, npm included.
+# in_root COMMAND...: runs a command in the root, with its own processes and mounts, which end with it. The root trusts
+# the certificates that this machine trusts, and npm there does, too.
 in_root() {
     $nicely unshare -m -p -f --kill-child --propagation private sh -c '
         root=$1
@@ -58,34 +60,35 @@ in_root() {
             NODE_EXTRA_CA_CERTS="/$trusted" "$@"' sh "$at/root" "$@"
 }
 
-# The project's files into the folder $1, with their times; what was built there stays.
+# Copies the project's files into the folder $1, with their times. Results of a build there stay.
 copy_tree() {
     mkdir -p "$1"
     find "$1" -mindepth 1 -maxdepth 1 ! -name build -exec rm -rf {} +
     tar -c $(ls -d Makefile README.md LICENSE config core drivers firmware_sim tests 2>/dev/null) | tar -x -C "$1"
 }
 
-# built HOW FILE: after a build that went well, of which FILE is what make printed.
+# built HOW FILE: notes a build that went well. FILE has the text that make printed.
 built() {
     echo "$1, $(grep -c '^[^ ]*: warning:' "$2") warnings" >"$at/built.txt"
 }
 
-# build_here TARGET LOG: the programs of this machine, with the options of `make test`; what is there stays.
+# build_here TARGET LOG: builds the programs of this machine with the options of `make test`. Files that are built
+# already stay.
 build_here() {
     echo "    building for this machine"
     $nicely ${MAKE:-make} -j"${JOBS:-2}" DEPS=no BUILD="$build/test" WERROR=-Werror CFLAGS=-g1 CXXFLAGS=-g1 "$1" >"$2" 2>&1 ||
         { echo "    it does not build: $2"; return 1; }
 }
 
-# ---- tests under an emulator: $emulate is its command
+# ---- tests under an emulator, whose command is $emulate
 
-# emulated_programs BUILD: the programs of unit, accuracy and stability there.
+# emulated_programs BUILD: prints the paths there of the programs of unit, accuracy and stability.
 emulated_programs() {
     ls tests/accuracy/test_*.c tests/stability/test_*.c tests/unit/test_*.c | sed "s|^|$1/|; s|\\.c\$||"
 }
 
-# test_emulated BUILD: its programs of unit, accuracy and stability, $LIMIT_S seconds of processor time each. Beside others'
-# work these may take twenty times as long.
+# test_emulated BUILD: runs its programs of unit, accuracy and stability, for $LIMIT_S seconds of processor time each.
+# Beside other work these may take twenty times as long.
 test_emulated() {
     rm -rf "$at/run"
     from=$1/tests
@@ -103,13 +106,14 @@ test_emulated() {
     grep -v -E '^(ok|    )' "$at/tests.txt" | sed 's/^/    /'
 }
 
-# ---- the short record: 30,000 pulses into the room with glass and a mirror, with noise; each shot with its range
+# ---- the short record: 30,000 pulses go into the room with glass and a mirror, with noise, and each shot has its range
 
 RECORD="record config/glass.yaml --crs local --duration 0.1 --ascii --empty-shots --ply-columns range,time,echo
     --quiet --no-hash"
 
-# compare_record FILE: beside that of this machine. The same arithmetic gives the same ranges; a ray along an edge may meet the
-# other side of it where packets of rays are narrower: one shot on each of a dozen edges, twice.
+# compare_record FILE: compares it with the record of this machine. The same arithmetic gives the same ranges. But a ray
+# along an edge may meet the other side of it if packets of rays are narrower. That allows one shot on each of a dozen
+# edges, twice.
 compare_record() {
     ref=$build/machines/record.ply
     rm -f "$ref"

@@ -1,14 +1,14 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The tests on other machines: sh tests/machines/run.sh BUILD MACHINE...   (make machines)
+# This runs the tests on other machines: sh tests/machines/run.sh BUILD MACHINE... (make machines)
 #
-# A machine is a script of this folder, MACHINE.sh. It is given the folder BUILD/machines/MACHINE, which is kept: its root
-# and what was built there make the next run short. It leaves there
+# A machine is a script of this folder, MACHINE.sh. It is given the folder BUILD/machines/MACHINE, which is kept, so
+# that its root and its built files make the next run short. It leaves there
 #   tests.txt      what tests/run_tap.sh printed
 #   record.txt     what became of the short record, beside that of this machine
 #   built.txt      one line: how it was built, and how many warnings that gave; a file that is missing: it was not built
 #   skipped.txt    one line: why nothing could be done
-# At the end a table of all. Exit status 1 when anything failed, 2 for wrong usage.
+# At the end this prints a table of all. The exit status is 1 if anything failed, and 2 for wrong usage.
 set -u
 here=$(dirname "$0")
 [ $# -ge 2 ] || { echo "usage: $0 BUILD MACHINE... (make machines M=...); allowed are trixie, avx, sse, aarch64" >&2; exit 2; }
@@ -27,7 +27,7 @@ for name; do
     [ -n "$known" ] && [ -e "$known" ] || { echo "M=$name: no such machine; allowed are trixie, avx, sse, aarch64" >&2; exit 2; }
 done
 
-# row MACHINE: its line of the table; fails when anything of it did.
+# row MACHINE: prints its line of the table, and fails if any part of it failed.
 row() {
     at=$build/machines/$1
     if [ -e "$at/skipped.txt" ]; then
@@ -44,7 +44,7 @@ row() {
     return 1
 }
 
-# Nothing of the make that called this one counts in a root.
+# The settings of the make that called this script must not count in a root.
 unset MAKEFLAGS MFLAGS MAKELEVEL MAKEOVERRIDES
 for name; do
     at=$build/machines/$name

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Debian 13 in a root of its own: Embree 4, gcc 14, clang 19; all of make test
+# This tests Debian 13 in a root of its own, with Embree 4, gcc 14 and clang 19: it runs all of make test.
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"
 make_root trixie --variant=important --include=ca-certificates,make
@@ -13,7 +13,7 @@ in_root sh -c 'cd /scanhead && apt-get update -qq && make deps' >"$at/deps.txt" 
     leave "its packages could not be installed: $at/deps.txt"
 echo "    make test"
 in_root sh -c "cd /scanhead && make test JOBS=${JOBS:-2}" >"$at/build.txt" 2>&1
-# What run_tap.sh prints begins with its first program.
+# The output of run_tap.sh begins with its first program.
 sed -n '/^\(ok\|FAIL\)  *[a-z]/,$p' "$at/build.txt" >"$at/tests.txt"
 [ ! -s "$at/tests.txt" ] || built "make test" "$at/build.txt"
 grep -v -E '^(ok|    )' "$at/tests.txt" | sed 's/^/    /'

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """One way to build the copy: as shipped, with sanitizers, or with marks of coverage.
 
-All of the product is one shared library, so that a mutant costs one object, or those that include a header, and one run of the
+All of the product is one shared library. So a mutant costs one object, or the ones that include a header, and one run of the
 linker. Programs find the library by LD_LIBRARY_PATH. A mutant's file lies in a folder of its worker, `changed`, which the compiler
 searches first.
 """
@@ -17,7 +17,7 @@ LIBRARY = "libmodules.so"
 
 class Build:
     def __init__(self, tree, name, settings, link, tests=()):
-        """`settings` are make's, `link` what links a program. `tests` are the sources of tests that are compiled, too."""
+        """`settings` are make's, `link` is the linker's command, and `tests` are sources of tests that are compiled, too."""
         self.tree, self.name, self.link_words = tree, name, shlex.split(link)
         self.folder, self.work = f"build/{name}", f"{tree.path}/build/{name}"  # programs find readers of IFC above their own folder
         self.commands, self.deps, self.codes, self.locks, self.lock = {}, {}, {}, {}, threading.Lock()
@@ -33,11 +33,11 @@ class Build:
             self.link_program([self.object(MAIN)], f"{self.work}/scanhead")
 
     def read_commands(self, text):
-        """make prints how it compiles; a mutant is compiled in the same way."""
+        """Reads the commands that make prints, because a mutant is compiled by the same ones."""
         for line in text.splitlines():
             words = shlex.split(line) if " -c " in line and " -o " in line else []
             name = words[words.index("-c") + 1] if words else ""
-            if words and words[words.index("-o") + 1] == self.object(name):  # main.c has a second object, scanheadd's
+            if words and words[words.index("-o") + 1] == self.object(name):  # main.c has a second object for scanheadd
                 self.commands[name] = words
 
     def read_deps(self):
@@ -82,7 +82,7 @@ class Build:
         return target
 
     def program_with(self, header, worker, name):
-        """Does the same with a mutant. A test that includes its file is compiled again. None: it does not compile."""
+        """Does the same with a mutant. A test that includes its file is compiled again. Returns None if it does not compile."""
         users = self.deps.get(header, ())
         own, common = ([source for source in sources if source in users] for sources in (self.tree.sources_of(name), self.tree.common()))
         if not own and not common:
@@ -98,7 +98,7 @@ class Build:
     # ---- compiling
 
     def compile(self, name, worker):
-        """Compiles a source with the worker's mutant. None: it does not compile, or the compiler warns, which `make test` sees."""
+        """Compiles a source with the worker's mutant. Returns None if that fails or warns, because `make test` sees both."""
         words, target, changed = list(self.commands[name]), f"{worker}/{self.name}/{name}.o", f"{worker}/changed"
         if os.path.exists(f"{changed}/{name}"):
             words[words.index("-c") + 1] = f"{changed}/{name}"
@@ -110,13 +110,13 @@ class Build:
         return target if os.path.exists(target) else None
 
     def code_before(self, name):
-        """Returns the hash of a source's object without a mutant, found out once."""
+        """Returns the hash of a source's object without a mutant. It is computed once."""
         if name not in self.codes:
             self.codes[name] = self.code_of(self.object(name))
         return self.codes[name]
 
     def code_of(self, name):
-        """Hashes an object without what debuggers need, which has lines and columns of the source."""
+        """Hashes an object without its debug information, because that has lines and columns of the source."""
         bare = f"{self.work}/bare-{threading.get_ident()}"
         self.tree.call(["strip", "--strip-debug", "-o", bare, name])
         code = hashlib.sha256(read(bare)).hexdigest()

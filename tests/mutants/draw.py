@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Draws mutants from a seed: a line, then an operator that fits it, then a place in the line.
 
-An operator yields new texts of a line. It is given the line, and the same with comments and strings blanked out, so that places
+An operator yields new texts of a line. It is given the line, and a copy with comments and strings blanked out, so that places
 are the same in both. A mutant is {"operator", "file", "line", "old", "edits"}, the edits by the number of their line.
 """
 import random
@@ -10,7 +10,7 @@ import re
 RELATIONS = {"<": ["<=", ">"], "<=": ["<"], ">": [">=", "<"], ">=": [">"], "==": ["!="], "!=": ["=="]}
 TOKEN = re.compile(r"[A-Za-z_]\w*|0[xX][0-9a-fA-F]+[uUlL]*|(?:\d+\.\d*|\.\d+|\d+)(?:[eE][-+]?\d+)?[uUlLfF]*|<<=|>>=|->|\+\+|--|"
                    r"<<|>>|[-+*/%&|^<>=!]=|&&|\|\||[^\sA-Za-z_0-9]")
-ENOUGH_IN_VAIN = 1000  # draws one after the other that brought nothing new
+ENOUGH_IN_VAIN = 1000  # ends after so many draws one after the other that brought nothing new
 KEYWORDS = {"return", "if", "else", "for", "while", "do", "switch", "case", "default", "break", "continue", "goto", "sizeof", "typedef"}
 
 
@@ -89,7 +89,7 @@ def condition(line, code):
 
 
 def parts_of(code, begin):
-    """Finds where the list after an open bracket begins, its commas, and where it ends. The result is empty where its end is in another line."""
+    """Finds where the list after an open bracket begins, its commas, and where it ends. The result is empty if the end is in another line."""
     depth, cuts = 1, [begin]
     for at in range(begin, len(code)):
         depth += code[at] in "([{"
@@ -120,7 +120,7 @@ def arguments(line, code):
 
 
 def is_statement(code):
-    """Drops a statement that is whole in its line, and declares nothing."""
+    """Drops a statement that is whole in its line and declares nothing."""
     text = code.strip()
     if not text.endswith(";") or text.count("(") != text.count(")") or text.count(";") != 1:
         return False
@@ -140,7 +140,7 @@ OPERATORS = {f.__name__: f for f in (relation, connective, sign, bound, constant
 
 
 def drop_lock(lines, codes, number):
-    """Drops the lock of a line, and its unlocks up to the function's end. None: there is no lock."""
+    """Drops the lock of a line, and its unlocks up to the function's end. Returns None if there is no lock."""
     found = re.search(r"pthread_mutex_lock\((.*)\);", codes[number])
     if found is None or not is_statement(codes[number]):
         return None
@@ -173,7 +173,7 @@ def mutants_of(source, number):
 
 
 def draw(places, seed):
-    """Draws the line first, each alike; then the operator; then the place in it. No mutant comes twice. Ends where no more are found."""
+    """Draws the line first, each with equal chance, then the operator, then the place. No mutant comes twice."""
     rng, sources, seen, in_vain = random.Random(seed), {}, set(), 0
     while in_vain < ENOUGH_IN_VAIN:
         in_vain += 1

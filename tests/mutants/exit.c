@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* This is part of the library with marks of coverage: a child process that ends by _exit() writes what it reached,
- * too. */
+/* This is part of the library with marks of coverage. With it a child process that ends by _exit() also writes the
+ * lines that it reached. */
 #include <sys/syscall.h>
 #include <unistd.h>
 

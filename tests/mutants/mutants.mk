@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Small changes of the product, drawn by rule from a seed: do the tests see them? N has its default in the Makefile.
+# This draws small changes of the product by rule from a seed, and asks whether the tests see them. The Makefile has the
+# default of N.
 SEED ?= 1
 ONLY ?=
 LINK_SANITIZED = clang $(ASAN_FLAGS) $(LLD) $(LINK_LIMIT)

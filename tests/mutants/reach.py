@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Which test reaches which line: one run of all tests, with clang's marks of coverage in the product.
+"""This finds out which test reaches which line: all tests run once, with clang's marks of coverage in the product.
 
-Each test's lines are kept in BUILD/mutants/lines/ while the product and the test's own sources stay as they are.
+Each test's lines are kept in BUILD/mutants/lines/ as long as the product and the test's own sources stay as they are.
 """
 import concurrent.futures
 import glob
@@ -62,8 +62,8 @@ class Reach:
                 self.lines.setdefault((name, line), set()).add(program)
 
     def tests_of(self, name, line):
-        """The quickest first. A line that has no code of its own, such as one of a table, is reached by who reaches its file; a line
-        of a header by who reaches a file that includes it."""
+        """Returns the tests that reach a line, the quickest first. A line without code of its own, such as one of a table, counts as
+        reached by the tests that reach its file. A line of a header counts as reached by those that reach a file with it."""
         if (name, line) in self.code:
             found = self.lines.get((name, line), set())
         else:
@@ -83,7 +83,7 @@ class Reach:
                 for i, (program, status, took_s) in enumerate(pool.map(lambda program: self.run_one(marked, program, keys[program]), missing)):
                     self.say(f"[{i + 1:3}/{len(missing)}] {program} {took_s:.1f} s{'' if status == 0 else ', fails there'}")
             except BaseException:
-                self.tree.children.end_all()  # those that wait for a thread end at once, too
+                self.tree.children.end_all()  # tests that wait for a thread end at once, too
                 raise
 
     def run_one(self, marked, program, key):
@@ -100,7 +100,7 @@ class Reach:
         return program, status, took_s
 
     def lines_of(self, marked, work):
-        """{FILE: lines that were reached}. A file `code` has all lines that there are, as FILE:LINE."""
+        """Returns {FILE: lines that were reached}. The file `code` gets all lines that have code, as FILE:LINE."""
         profiles = glob.glob(f"{work}/*.profraw")
         if not profiles:
             return {}

@@ -4,11 +4,11 @@
 
     run.py [options] BUILD
 
-The environment has LINK, what links a program, LIBS, and SHIPPED, settings for make; the same with sanitizers, LINK_SANITIZED and
-SANITIZED, may be missing.
-A mutant is found when a test that reaches its line fails, fails again, and passes without it. One that does not compile is drawn
-again. One whose object code stays the same is equivalent, and drawn again, too. BUILD/mutants/SEED.json has all that is known.
-Exit status: 0 at least 90 % found, 1 fewer, 2 wrong usage or no result.
+The environment has LINK, the command that links a program, LIBS, and SHIPPED, the settings for make. LINK_SANITIZED and
+SANITIZED are the same with sanitizers, and may be missing.
+A mutant is found if a test that reaches its line fails, fails again, and passes without it. A mutant that does not compile is
+replaced by another one. A mutant whose object code stays the same is equivalent, and is replaced, too. BUILD/mutants/SEED.json
+has all results. The exit status is 0 if at least 90 % are found, 1 for fewer, and 2 for wrong usage or no result.
 """
 import argparse
 import collections
@@ -28,7 +28,7 @@ from build import Build
 from reach import Reach
 
 LEAST = 0.9
-LIMIT_S, LIMIT_TIMES = 30, 10  # of a test, beside and times what it took once: the machine may be busy, and only what never ends needs it
+LIMIT_S, LIMIT_TIMES = 30, 10  # for a test, beside and times its usual time, as only an endless one must reach that
 JUDGED = ("found", "survived", "unreached")
 
 
@@ -63,7 +63,7 @@ class Judge:
         return mutant
 
     def judge(self, mutant, worker):
-        """Returns the verdict, and the test that found it, or all that reach it."""
+        """Returns the verdict, and the test that found the mutant, or all tests that reach it."""
         name = mutant["file"]
         lines = draw.Source(f"{self.tree.path}/{name}").lines
         for number, text in mutant["edits"].items():
@@ -85,7 +85,7 @@ class Judge:
         if not tests:
             return "unreached", []
         units, others = ([test for test in tests if test.startswith("unit/") == is_unit] for is_unit in (True, False))
-        rounds = [(self.shipped, units), (self.sanitized, units), (self.shipped, others)]  # the others take longest
+        rounds = [(self.shipped, units), (self.sanitized, units), (self.shipped, others)]  # the last take longest
         for build, some in rounds:
             if build is None or not some:
                 continue
@@ -110,7 +110,7 @@ class Judge:
         return None
 
     def fails(self, build, test, program, log, env):
-        """Tells whether a test fails because of the mutant: it fails twice, and passes without. What does not end is not tried again."""
+        """Tells whether a test fails because of the mutant: it fails twice, and passes without it. A test that hangs is not run again."""
         limit_s = LIMIT_S + LIMIT_TIMES * self.reach.tests[test]
         status, _ = self.tree.run_test(program, limit_s, log, **env)
         if status == 0 or (status is not None and self.tree.run_test(program, limit_s, log, **env)[0] == 0):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The copy of the sources that mutants are tried in, and the processes that run there. The copy itself is never changed."""
+"""This is the copy of the sources that mutants are tried in, with its processes. The copy itself is never changed."""
 import fcntl
 import glob
 import os
@@ -13,7 +13,7 @@ FOLDERS = ("unit", "accuracy", "stability", "wire")
 PRODUCT = ("core", "drivers", "firmware_sim")
 PARTS = ("Makefile", "README.md", "LICENSE", ".clang-format", "config", *PRODUCT, "tests")
 MAIN = "firmware_sim/main.c"
-MOST_MEMORY, MOST_FILE = 8 << 30, 2 << 30  # of one process of a test: a mutant may ask without end
+MOST_MEMORY, MOST_FILE = 8 << 30, 2 << 30  # for one process of a test, because a mutant may ask without end
 
 
 class Failed(Exception):
@@ -21,13 +21,13 @@ class Failed(Exception):
 
 
 class Children:
-    """The processes that run. Each has a group of its own, so that they can be ended with all that they started."""
+    """The running processes. Each has a group of its own, so that it can be ended with all that it started."""
 
     def __init__(self):
         self.lock, self.groups, self.is_over = threading.Lock(), set(), False
 
     def run(self, command, limit_s=None, output=subprocess.PIPE, **more):
-        """(status, what it printed); the status is None where it did not end in time."""
+        """Returns (status, output). The status is None if the process did not end in time."""
         with self.lock:
             if self.is_over:
                 raise Failed("interrupted")
@@ -98,7 +98,7 @@ class Tree:
             self.rigs.setdefault(program.removeprefix("tests/"), []).append(rig)
 
     def copy(self):
-        """Only what differs is written, so that make builds no more than that."""
+        """Writes only files that differ, so that make builds no more than those."""
         wanted = {name for part in PARTS if os.path.exists(part) for name in files_below(part)}
         for part in PARTS:
             for name in files_below(f"{self.path}/{part}"):
@@ -120,7 +120,7 @@ class Tree:
     # ---- what is in it
 
     def programs(self):
-        """Returns FOLDER/test_NAME of all."""
+        """Returns FOLDER/test_NAME of all test programs."""
         return [os.path.relpath(name, f"{self.path}/tests")[:-2]
                 for folder in FOLDERS for name in sorted(glob.glob(f"{self.path}/tests/{folder}/test_*.c"))]
 
@@ -136,7 +136,7 @@ class Tree:
         return self.children.run(command, cwd=self.path, env=self.env)
 
     def call(self, command):
-        """Returns the output. A command that fails ends all."""
+        """Runs a command and returns its output. A command that fails ends everything."""
         status, said = self.attempt(command)
         if status != 0:
             raise Failed(f"{' '.join(command)[:200]}: {said.strip()[-2000:]}")
@@ -146,7 +146,7 @@ class Tree:
         return self.call(["make", "--no-print-directory", f"-j{self.jobs}", "DEPS=no", *words])
 
     def run_test(self, program, limit_s, log, **env):
-        """(status, seconds): 0 passes, None did not end in time."""
+        """Returns (status, seconds). Status 0 means that the test passed, and None that it did not end in time."""
         data = "unlimited" if "ASAN_OPTIONS" in env else MOST_MEMORY  # a sanitizer maps more than any machine has
         begin = time.monotonic()
         with open(log, "w", encoding="utf-8") as file:

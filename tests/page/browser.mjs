@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-// Chromium without a window, told what to do by the DevTools protocol over a pipe: it ends with this program, however that
-// ends, and opens no port for it. Its profile is its own; no address but 127.0.0.1 is found.
+// This runs Chromium without a window, by the DevTools protocol over a pipe. So it ends with this program, however that ends,
+// and opens no port. Its profile is its own, and it finds no address but 127.0.0.1.
 import {spawn, spawnSync} from 'node:child_process';
 import {accessSync, constants, mkdirSync, writeFileSync} from 'node:fs';
 import {folder, forget, remember} from './work.mjs';
 
 const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
-const DEADLINE_MS = 90000; // for what hangs; a busy machine is many times slower than a quiet one
+const DEADLINE_MS = 90000; // only a hang reaches this, because a busy machine is many times slower than a quiet one
 
-/** The program's path, or null. $CHROMIUM names another. */
+/** Returns the browser's path, or null. $CHROMIUM names another browser. */
 export function findBrowser() {
   if (process.env.CHROMIUM) return process.env.CHROMIUM;
   for (const folder of (process.env.PATH ?? '').split(':')) {
@@ -16,7 +16,7 @@ export function findBrowser() {
       try {
         accessSync(`${folder}/${name}`, constants.X_OK);
         return `${folder}/${name}`;
-      } catch { /* not there */ }
+      } catch { /* it is not there */ }
     }
   }
   return null;
@@ -24,11 +24,11 @@ export function findBrowser() {
 
 export class Browser {
   #next = 1;
-  #waiting = new Map(); // number of a command: [resolve, reject, its name]
-  #pages = new Map(); // session: page
+  #waiting = new Map(); // maps the number of a command to [resolve, reject, its name]
+  #pages = new Map(); // maps a session to its page
   #rest = [];
 
-  /** nice: of all its processes. size: of its window. */
+  /** nice applies to all its processes, and size to its window. */
   constructor({nice = 0, size = [1280, 900]} = {}) {
     mkdirSync(`${folder}/profile`, {recursive: true});
     const flags = ['--headless=new', '--remote-debugging-pipe', `--user-data-dir=${folder}/profile`, '--use-angle=swiftshader',
@@ -47,7 +47,7 @@ export class Browser {
     this.child.stdio[4].on('data', (bytes) => this.#read(bytes)).on('error', () => {});
   }
 
-  /** A command of the protocol; its result. */
+  /** Sends a command of the protocol and returns its result. */
   send(method, params = {}, sessionId = undefined) {
     return new Promise((resolve, reject) => {
       if (this.child.exitCode !== null) throw new Error('the browser has ended');
@@ -58,7 +58,7 @@ export class Browser {
     });
   }
 
-  /** A page of its own. size: of the view, in CSS pixels; before: a program that runs before those of the page. */
+  /** Opens a page of its own. size is that of the view, in CSS pixels. before is a program that runs before the page's own. */
   async open(url, {size = [1280, 900], dark = false, before = ''} = {}) {
     const {targetId} = await this.send('Target.createTarget', {url: 'about:blank'});
     const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});
@@ -71,11 +71,11 @@ export class Browser {
     return page;
   }
 
-  /** Ends it and everything that it has started. */
+  /** Ends the browser and everything that it has started. */
   async end() {
     try {
       process.kill(-this.child.pid, 'SIGKILL');
-    } catch { /* ended already */ }
+    } catch { /* it has ended already */ }
     await this.ended;
     forget(-this.child.pid);
   }
@@ -113,7 +113,7 @@ export class Browser {
 
 class Page {
   sent = []; // text that the page has sent by WebSocket
-  faults = []; // errors of its scripts, and what the console had as an error
+  faults = []; // errors of its scripts, and error messages on its console
   failed = []; // {url, why} of requests that got no answer
   #urls = new Map();
   #loaded = () => {};
@@ -144,14 +144,14 @@ class Page {
     await loaded;
   }
 
-  /** The value of an expression, or what its promise resolves to. */
+  /** Returns the value of an expression, or the result of its promise. */
   async eval(expression) {
     const {result, exceptionDetails: wrong} = await this.send('Runtime.evaluate', {expression, awaitPromise: true, returnByValue: true});
     if (wrong) throw new Error(`${expression}: ${wrong.exception?.description ?? wrong.text}`);
     return result.value;
   }
 
-  /** Waits until the expression is true, which the page itself looks after every 20 ms. The value it then has. */
+  /** Waits until the expression is true and returns its value. The page itself looks every 20 ms. */
   async until(expression, what = expression) {
     const limit_ms = DEADLINE_MS - 5000; // the page answers before send() gives up
     const answer = await this.send('Runtime.evaluate', {awaitPromise: true, returnByValue: true, expression: `new Promise((done, fail) => {
@@ -168,7 +168,7 @@ class Page {
     return answer.result.value;
   }
 
-  /** Middle of the first element that a selector finds, scrolled into view: once it rests, and nothing else lies there. */
+  /** Scrolls the first element that a selector finds into view. Returns its middle once it rests and nothing covers it. */
   where(selector) {
     return this.until(`(() => {
       const e = document.querySelector(${JSON.stringify(selector)});
@@ -192,7 +192,7 @@ class Page {
     await this.mouse('mouseReleased', at);
   }
 
-  /** Presses what a selector finds. What comes meanwhile may have moved it: where nothing was pressed instead, once more. */
+  /** Clicks the element that a selector finds. It may have moved meanwhile. If the click hit no control, it clicks again. */
   async click(selector) {
     for (let tries = 1; ; tries++) {
       const at = await this.where(selector);
@@ -205,13 +205,13 @@ class Page {
     }
   }
 
-  /** The same, once it may be pressed. */
+  /** Does the same once the element may be pressed. */
   async press(selector) {
     await this.until(`!document.querySelector(${JSON.stringify(selector)}).disabled`, `${selector} stays disabled`);
     await this.click(selector);
   }
 
-  /** From one place to another in steps, as a hand does. */
+  /** Drags from one place to another in steps, as a hand does. */
   async drag(from, to, steps = 8) {
     await this.mouse('mouseMoved', from);
     await this.mouse('mousePressed', from, 1);
@@ -226,7 +226,7 @@ class Page {
     await this.send('Input.dispatchKeyEvent', {type: 'keyUp', key, modifiers, windowsVirtualKeyCode: code});
   }
 
-  /** Another text into a field, and Enter. */
+  /** Puts another text into a field and presses Enter. */
   async fill(selector, text) {
     await this.click(selector);
     await this.eval(`document.querySelector(${JSON.stringify(selector)}).select?.()`);
@@ -247,7 +247,7 @@ class Page {
     writeFileSync(file, Buffer.from(data, 'base64'));
   }
 
-  /** What the page knows of its head, the newest events first, and what went wrong in it: for a test that failed. */
+  /** Returns the page's knowledge of its head, the newest events first, and its errors. A failed test shows this. */
   async knows() {
     const words = await this.eval(`(() => {
       const {head, cloud} = window.scanhead ?? {}, all = head?.figures();
@@ -265,7 +265,7 @@ class Page {
   }
 }
 
-/** Name and version, for tables. */
+/** Returns name and version, for tables. */
 export function browserVersion() {
   return spawnSync(findBrowser(), ['--version'], {encoding: 'utf8'}).stdout.trim().replace(/ built on.*/, '');
 }

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What a recording (.shs) holds, for a page to be compared with: prints JSON with the number of echoes and shots, the
-bounds of all echoes in the scene's frame, and the hash over all records of the points frames: counts.py FILE.shs
+"""This counts a recording (.shs), so that a page can be compared with it: counts.py FILE.shs. It prints JSON with the
+number of echoes and shots, the bounds of all echoes in the scene's frame, and the hash over all records of the points
+frames.
 
-Frames and places are the Python client's (drivers/host/python), the hash that of tests/unit/point_hash.py.
+The Python client (drivers/host/python) gives the frames and positions, and tests/unit/point_hash.py the hash.
 """
 import json
 import os

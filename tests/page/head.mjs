@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-// The program under test: heads with their ready line, recordings, and a client by TCP that shares nothing with the page.
+// This runs the program under test: heads with their ready line, and recordings. Its TCP client shares nothing with the page.
 import {spawn, spawnSync} from 'node:child_process';
 import {createConnection} from 'node:net';
 import {forget, remember} from './work.mjs';
 
 export const PROGRAM = process.env.SCANHEAD || 'build/scanhead';
-const DEADLINE_MS = 90000; // for what hangs
+const DEADLINE_MS = 90000; // only a hang reaches this
 
-/** Starts the program (`run`, `view`) and waits for its ready line. It dies with this program. */
+/** Starts the program (`run`, `view`) and waits for its ready line. The program ends with this one. */
 export async function start(args, {nice = 0} = {}) {
   const child = spawn('nice', ['-n', String(nice), 'setpriv', '--pdeathsig', 'KILL', PROGRAM, ...args, '--ready-fd', '3'],
     {stdio: ['ignore', 'pipe', 'pipe', 'pipe']});
@@ -29,25 +29,25 @@ export async function start(args, {nice = 0} = {}) {
   return head;
 }
 
-/** The endpoint of its first link of a type. */
+/** Returns the endpoint of the head's first link of a type. */
 export function endpoint(head, type) {
   return head.ready.endpoints.find((link) => link.type === type).endpoint;
 }
 
-/** Ends it with a signal; its exit status, or the signal that ended it. */
+/** Ends the head with a signal. Returns its exit status, or the signal that ended it. */
 export function end(head, signal = 'SIGTERM') {
   head.child.kill(signal);
   return head.ended;
 }
 
-/** Runs the program to its end; its output. A status other than 0 is an error. */
+/** Runs the program to its end and returns its output. A status other than 0 is an error. */
 export function run(...args) {
   const {status, stdout, stderr} = spawnSync(PROGRAM, args, {encoding: 'utf8'});
   if (status !== 0) throw new Error(`${args.join(' ')}: ${stderr}`);
   return stdout;
 }
 
-/** A client of the head: command lines and their replies; frames are skipped by their length. */
+/** A client of the head. It sends command lines and takes their replies, and skips frames by their length. */
 export class Client {
   #rest = Buffer.alloc(0);
   #waiting = [];
@@ -70,7 +70,7 @@ export class Client {
     });
   }
 
-  /** Asks until the reply satisfies: each answer comes from the head, a little after the one before. */
+  /** Asks again until the reply satisfies. There is a short pause between two questions. */
   async until(line, satisfies, limit_ms = DEADLINE_MS) {
     const last = Date.now() + limit_ms;
     for (;;) {

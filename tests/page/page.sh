@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The page in a real browser: what it shows beside what was recorded, and what it does to its head. Prints TAP; skipped where
-# the browser or node is missing. $SCANHEAD: the program. CHROMIUM=... names another browser.
+# This tests the page in a real browser: its content beside the record, and its effect on the head. It prints TAP, and
+# is skipped if the browser or node is missing. $SCANHEAD names the program. CHROMIUM=... names another browser.
 set -u
 cd "$(dirname "$0")/../.." || exit 1
 skip() {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-// make page-pictures: the page of a scan in progress, of that scan done, and of its recording, in three widths and both
-// themes, to be looked at.   node tests/page/pictures.mjs [--out FOLDER] [--only WORD] [--best FILE]
-// --best: the picture of the first page alone: config/demo.yaml from its three stations, 1280 x 900.
+// make page-pictures: this makes pictures of the page in three widths and both themes, for people to look at. They show a
+// scan in progress, that scan when it is done, and its recording.
+//   node tests/page/pictures.mjs [--out FOLDER] [--only WORD] [--best FILE]
+// --best makes only the picture of the first page: config/demo.yaml from its three stations, 1280 x 900.
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
 import {parseArgs} from 'node:util';
 import {Browser} from './browser.mjs';
@@ -16,7 +17,7 @@ const links = ['--set', `links.0.path=${folder}/pty`];
 if (values.best === undefined) mkdirSync(values.out, {recursive: true});
 const browser = new Browser();
 
-// Pace step: the scan stands where it is, for as long as the pictures take. The page grants the time, as it has control.
+// With pace step the scan stands still as long as the pictures take. The page grants the time, as it has control.
 const head = await start(['run', 'config/demo.yaml', '--quiet', '--pace', 'step', '--view', ...links]);
 
 async function shots(name) {
@@ -33,7 +34,7 @@ async function shots(name) {
   }
 }
 
-// All points are drawn, and what the page asks for once a second has come.
+// Waits until all points are drawn and the page has its once-a-second answers.
 async function settled() {
   await page.eval('new Promise((done) => setTimeout(done, 1500))');
   await page.eval('scanhead.view.screenshotReady()');

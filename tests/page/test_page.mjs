@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The page of a head, of a recording, and of a head that goes: in one browser. What is expected is computed by others:
-// `record`, the Python client, and a client by TCP.
+// This tests the page of a head, of a recording, and of a head that goes, in one browser. Other programs compute the expected
+// values: `record`, the Python client, and a client by TCP.
 import {createServer} from 'node:http';
 import {connect} from 'node:net';
 import {readFileSync} from 'node:fs';
@@ -10,18 +10,18 @@ import {both, CONFIG, recorded} from './rig.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
-giveUpAfter(1100); // before run_tap.sh does
+giveUpAfter(1100); // run_tap.sh would give up later
 
-// A head, its page, and somebody else who asks it.
+// Opens a head, its page, and another client that asks the head.
 async function open(browser, ...more) {
   const head = await start(['run', CONFIG, '--quiet', '--pace', 'fast', ...more]);
   const page = await browser.open(endpoint(head, 'web'), {size: SIZE});
   await page.until('scanhead.head.isOpen && scanhead.head.state === "idle" && document.querySelector("#knob-head-lines")?.value');
-  await page.until('document.querySelector("#model").textContent && document.querySelector("#station-2-x_m")?.value'); // all is in its place
+  await page.until('document.querySelector("#model").textContent && document.querySelector("#station-2-x_m")?.value'); // all is in place
   return {head, page, other: new Client(endpoint(head, 'tcp'))};
 }
 
-// Presses Start, and waits until the page has all of the scan: its end comes after its points.
+// Presses Start and waits until the page has the whole scan. The scan's end comes after its points.
 async function scan(page) {
   const before = await page.eval('scanhead.head.figures().pulses');
   await page.press('#start');
@@ -34,14 +34,15 @@ const counts = (page) => page.eval(`(() => {
     bounds: scanhead.cloud.bounds};
 })()`);
 
-// Positions are held as floats relative to the first point: half a unit in the last place of the room's diagonal.
+// The page holds positions as floats relative to the first point. So the tolerance is half a unit in the last place of the
+// room's diagonal.
 function sameBounds(bounds, {min, max}) {
   const tolerance = Math.hypot(...max.map((v, k) => v - min[k])) * 2 ** -24;
   min.forEach((v, k) => near(bounds.min[k], v, tolerance, `lower bound ${k}`));
   max.forEach((v, k) => near(bounds.max[k], v, tolerance, `upper bound ${k}`));
 }
 
-// As the picture says it, when a station is let go.
+// This is the event that the picture sends when the user drops a station.
 const dragged = ([x, y, z]) => `scanhead.view.dispatchEvent(new CustomEvent('move', {detail: {station: 1, x: ${x}, y: ${y}, z: ${z}, heading_deg: 30}}))`;
 const IS_RED = `getComputedStyle(document.querySelector('#banner')).color === (() => {
   const probe = document.body.appendChild(document.createElement('i'));
@@ -51,8 +52,8 @@ const IS_RED = `getComputedStyle(document.querySelector('#banner')).color === ((
   return color;
 })()`;
 
-// In a page, before its scripts: a pixel of each canvas of WebGL at the end of the task that made it, or changed its size;
-// the browser shows it as it is then.
+// This runs in a page before its scripts. It notes a pixel of each WebGL canvas at the end of the task that made it, or changed
+// its size. The browser shows the canvas as it is then.
 function seesBlack() {
   window.seen = [];
   const look = (canvas) => queueMicrotask(() => {
@@ -115,7 +116,7 @@ await test('a scan: points, bounds and hash are those of the recording', async (
   equal(has.total, wanted.points, 'points of the cloud');
   equal(has.hash, wanted.hash, 'hash over all records');
   sameBounds(has.bounds, wanted);
-  await page.eval('scanhead.view.show({points: false})'); // from here on counts are enough
+  await page.eval('scanhead.view.show({points: false})'); // counts are enough for the rest
 });
 
 await test('a page that is opened later, or again, has the same points', async () => {
@@ -185,7 +186,7 @@ await test('control is given back by the button, and then anybody may have it', 
   await other.until('SYST:CONT?', (reply) => reply === '0');
   equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
   await page.until('scanhead.head.controller !== 0 && document.querySelector("#control").disabled');
-  const wanted = `${other.name} has control`; // its kind of link and its address
+  const wanted = `${other.name} has control`; // the name has its kind of link and its address
   await page.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);
   const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
   await late.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// A folder of one's own and what was started, both gone at the end, whatever kind of end it is; and TAP.
+// This keeps a folder and the started processes, which are gone at the end, whatever kind of end it is. It also prints TAP.
 import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 
@@ -10,13 +10,13 @@ process.on('exit', () => {
   for (const pid of started) {
     try {
       process.kill(pid, 'SIGKILL');
-    } catch { /* ended already */ }
+    } catch { /* it has ended already */ }
   }
   rmSync(folder, {recursive: true, force: true, maxRetries: 5});
 });
 for (const [signal, status] of [['SIGINT', 130], ['SIGTERM', 143], ['SIGHUP', 129]]) process.on(signal, () => process.exit(status));
 
-/** pid: of a process; negative: of its group. */
+/** pid is that of a process, or the negative one of its group. */
 export function remember(pid) {
   started.add(pid);
 }
@@ -25,7 +25,7 @@ export function forget(pid) {
   started.delete(pid);
 }
 
-/** Writes a file into the folder; its path. */
+/** Writes a file into the folder and returns its path. */
 export function write(name, text) {
   writeFileSync(`${folder}/${name}`, text);
   return `${folder}/${name}`;
@@ -37,12 +37,12 @@ const comment = (text) => String(text).split('\n').slice(0, 20).forEach((line) =
 
 let explain = async () => '';
 
-/** After a test that failed this is asked, and its text shown. */
+/** After a failed test this function is asked, and its text is shown. */
 export function whenFailed(ask) {
   explain = ask;
 }
 
-/** Runs one test; it fails by throwing. One that fails does not end the others. */
+/** Runs one test, which fails by throwing. A failed test does not end the others. */
 export async function test(name, body) {
   results++;
   try {
@@ -56,13 +56,13 @@ export async function test(name, body) {
   }
 }
 
-/** The plan, at the end; the exit status. */
+/** Prints the plan at the end and exits with the status. */
 export function finish() {
   console.log(`1..${results}`);
   process.exit(failures > 0 ? 1 : 0);
 }
 
-/** After so long it gives up, and says so. */
+/** After so many seconds the program gives up and says so. */
 export function giveUpAfter(limit_s) {
   setTimeout(() => {
     console.log(`Bail out! not at its end after ${limit_s} s`);

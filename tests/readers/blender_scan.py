@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A panorama in Blender: an independent synthetic scanner, made of geometry nodes, to compare scanhead's points with.
+"""This scans a panorama in Blender with geometry nodes. scanhead's points are compared with this independent scanner.
 
     blender -b --factory-startup -P blender_scan.py -- SCENE.obj STEP_DEG OUT STATION...
 
@@ -12,11 +12,11 @@ station:
     Raycast from the station along each direction onto the scene -> hit, position, normal
     Store Named Attribute: these, and whether the tripod hides the direction
 
-This is for Blender 3.4 to 3.6: later ones have other names for some of it, and the exit status is then 77.
+This is for Blender 3.4 to 3.6. Later versions have other names for some nodes, and then the exit status is 77.
 
 OUT has, for each station and each direction in Blender's order (the upper pole, then ring by ring downward,
 counter-clockwise from x, then the lower pole), eight floats of 4 bytes in the machine's order: hit, hidden (0 or 1),
-position, normal. All of it is what the nodes have computed, in single precision.
+position, normal. The nodes have computed all of it, in single precision.
 """
 import array
 import math
@@ -35,7 +35,7 @@ class Tree:
         self.tree.outputs.new("NodeSocketGeometry", "Geometry")
 
     def node(self, kind, inputs=(), **settings):
-        """A node; `inputs` by number: another node's output, or a value."""
+        """Adds a node. `inputs` gives, by number, another node's output or a value."""
         node = self.tree.nodes.new(kind)
         for name, value in settings.items():
             setattr(node, name, value)
@@ -54,7 +54,7 @@ class Tree:
 
 
 def socket(sockets, name, kind):
-    """Nodes of several data types have a socket of that name for each of them; the enabled one is meant."""
+    """A node of several data types has a socket of that name for each type. The enabled one is meant."""
     return next(s for s in sockets if s.name == name and s.type == kind and s.enabled)
 
 
@@ -69,7 +69,7 @@ def raycast(t, target, source, direction):
 
 
 def hidden_by(t, target, at, direction, leg, opening_deg):
-    """1 where the direction's cosine with straight down is above that of the opening."""
+    """Gives 1 if the direction's cosine with straight down is above that of the opening."""
     down = t.vector((0.0, 0.0, -1.0))
     below = raycast(t, target, at, down)
     least = math.cos(math.radians(opening_deg))
@@ -81,7 +81,7 @@ def hidden_by(t, target, at, direction, leg, opening_deg):
 
 
 def attitude(heading_deg, pitch_deg, roll_deg):
-    """The head's frame in the scene's: heading clockwise from y, then nose up, then right side down."""
+    """Turns the head's frame into the scene's: heading clockwise from y, then nose up, then right side down."""
     turn = mathutils.Matrix.Rotation
     z, x, y = (math.radians(a) for a in (-heading_deg, pitch_deg, roll_deg))
     return (turn(z, 3, "Z") @ turn(x, 3, "X") @ turn(y, 3, "Y")).to_euler("XYZ")
@@ -114,7 +114,7 @@ def scanner(scene, step_deg, station):
 
 
 def figures(mesh):
-    """The attributes of each vertex, one after the other."""
+    """Returns the attributes of each vertex, one after the other."""
     n = len(mesh.vertices)
     out = array.array("f", bytes(4 * 8 * n))
     for name, first, width in (("hit", 0, 1), ("hidden", 1, 1), ("position_m", 2, 3), ("facing", 5, 3)):

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Writes the points of an E57 file as web-e57 reads them, each scan's pose applied.
+// This writes the points of an E57 file as web-e57 reads them, with each scan's pose applied.
 import fs from 'node:fs';
 import {convertE57} from 'web-e57';
 

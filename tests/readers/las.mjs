@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Prints what @loaders.gl/las reads of a LAS file: count, bounds by the header (min, max of x, y, z), then the points.
+// This prints a LAS file as @loaders.gl/las reads it: count, bounds by the header (min, max of x, y, z), then the points.
 import fs from 'node:fs';
 import {parse} from '@loaders.gl/core';
 import {LAZRsLoader} from '@loaders.gl/las';

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Writes x, y, z of a PLY file's vertices, read by its header alone (Python's struct module); with a third name, the corners
-# of its faces there.
+# This writes x, y, z of a PLY file's vertices. It reads the file by its header alone (Python's struct module). A third
+# name gets the corners of its faces.
 import struct
 import sys
 
@@ -15,7 +15,7 @@ with open(sys.argv[1], "rb") as ply, open(sys.argv[2], "w") as out:
             element = word[1]
             names[element], layout[element], count[element] = [], "<", int(word[2])
         if word[:2] == ["property", "list"]:
-            # triangles alone: three corners after their number
+            # faces are triangles, so three corners follow their number
             layout[element] += TYPES[word[2]] + 3 * TYPES[word[3]]
             names[element] += ["n", 0, 1, 2]
         elif word[:1] == ["property"]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Clients of the long soak: those that read all, come and go, stall, or misbehave, one class a kind.
 
-Each is a thread. `visits` counts how often it came, `good` how often it got what a client should get, `turned_away` how often
-the connection was closed before; a visit that sends noise alone gets nothing and is none of these. What must never happen is
-a line in `wrong`: a head that says nothing for half a minute, too.
+Each is a thread. `visits` counts its visits, `good` those that got a right answer, and `turned_away` those whose connection was
+closed before. A visit that only sends noise gets nothing and counts as neither. Each thing that must never happen is a line in
+`wrong`, and a head that says nothing for half a minute is one, too.
 """
 import base64
 import os
@@ -18,7 +18,7 @@ import time
 import tty
 
 CHUNK = 1 << 16
-PATIENCE_S = 30.0  # a loaded machine answers late; one that never answers is found all the same
+PATIENCE_S = 30.0  # a loaded machine answers late, and a head that never answers is found all the same
 
 
 class Client(threading.Thread):
@@ -39,9 +39,9 @@ class Client(threading.Thread):
                 self.good += bool(self.visit())
             except TimeoutError:
                 self.wrong.append(f"no answer within {PATIENCE_S:g} s")
-            except OSError:  # a full or busy head closes; the head's end is found by its process
+            except OSError:  # a full or busy head closes, and its process shows whether the head has ended
                 self.turned_away += 1
-            except Exception as error:  # what came has not the form that it has to have
+            except Exception as error:  # the reply has not the form that it must have
                 self.wrong.append(f"{type(error).__name__}: {error}")
             self.stop.wait(self.pause_s * self.rng.uniform(0.2, 1.8))
 
@@ -80,7 +80,7 @@ class Client(threading.Thread):
         return bytes(data)
 
     def drink(self, fd, seconds, most=1 << 30):
-        """Takes what comes for some seconds; the bytes."""
+        """Reads for some seconds. Returns how many bytes came."""
         until_s, n = time.monotonic() + seconds, 0
         while n < most and not self.stop.is_set():
             left_s = until_s - time.monotonic()
@@ -95,13 +95,13 @@ class Client(threading.Thread):
 
     @staticmethod
     def reset(sock):
-        """Closed by RST instead of FIN, as a process that is killed with bytes unread."""
+        """Closes by RST instead of FIN, as a process does that is killed with bytes unread."""
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         sock.close()
 
 
 class ComesAndGoes(Client):
-    """A native client over TCP: asks who is there, reads for a moment, goes in good order or not."""
+    """A native client over TCP. It asks for the identity, reads for a moment, and closes in good order or not."""
 
     def visit(self):
         with self.connect() as sock:
@@ -124,7 +124,7 @@ class Stalls(Client):
 
 
 class Misbehaves(Client):
-    """Sends what no client should: noise, lines without end, half commands, each with a close of its own."""
+    """Sends things that no client should: noise, lines without end, half commands. Each has its own way to close."""
 
     def visit(self):
         with self.connect() as sock:
@@ -174,7 +174,7 @@ class Nmea(Client):
                     data += os.read(fd, 4096)
         finally:
             os.close(fd)
-        lines = data.split(b"\r\n")[1:-1]  # the first may have begun before
+        lines = data.split(b"\r\n")[1:-1]  # the first line may have begun earlier
         for line in lines:
             match = re.fullmatch(rb"\$([^*]*)\*([0-9A-F]{2})", line)
             total = 0
@@ -186,7 +186,7 @@ class Nmea(Client):
 
 
 class Page(Client):
-    """A browser's part: the page, then messages of a WebSocket; sometimes a request that is none."""
+    """Asks as a browser does for the page, or for messages of a WebSocket. Sometimes it sends noise instead."""
 
     def visit(self):
         with self.connect() as sock:
@@ -198,7 +198,7 @@ class Page(Client):
             if kind == 1:
                 sock.sendall(b"GET / HTTP/1.1\r\n" + host + b"Connection: close\r\n\r\n")
                 self.expect(self.until(sock, b"\r\n"), b"200")
-                return False  # the messages are what it comes for
+                return False  # the visit is only for the messages
             key = base64.b64encode(self.rng.randbytes(16))
             sock.sendall(b"GET /ws HTTP/1.1\r\n" + host + b"Upgrade: websocket\r\nConnection: Upgrade\r\n"
                          b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: scanhead-native-1\r\n"
@@ -236,7 +236,7 @@ class UsbIp(Client):
             listing = self.exactly(sock, 12 + 312)
             if struct.unpack(">I", listing[8:12])[0] != 1:
                 raise ValueError("not one device")
-            bus_id = listing[12 + 256:12 + 288]  # its number depends on the heads beside it
+            bus_id = listing[12 + 256:12 + 288]  # the bus id's number depends on the heads beside it
         with self.connect() as sock:
             sock.sendall(struct.pack(">HHI", 0x0111, 0x8003, 0) + bus_id)
             status = struct.unpack(">HHI", self.exactly(sock, 8))[2]
@@ -269,7 +269,7 @@ class UsbIp(Client):
 
 
 class Redir(Client):
-    """A virtual machine's usbredir socket, whose other end says hello, or nothing that has sense."""
+    """A virtual machine's usbredir socket. It says hello, or sends bytes that mean nothing."""
 
     def visit(self):
         with self.connect() as sock:
@@ -282,7 +282,7 @@ class Redir(Client):
 
 
 class Scip(Client):
-    """A client of a Hokuyo: scans after BM and GE, with sums; then QT."""
+    """A client of a Hokuyo. It sends QT, VV and BM, then asks for scans by GD and checks their sums."""
 
     def visit(self):
         with self.connect() as sock:
@@ -302,7 +302,7 @@ class Scip(Client):
 
 
 class Cola(Client):
-    """A client of a SICK: a telegram asked for, or one after the other."""
+    """A client of a SICK. It asks for the identity and for telegrams as they come, and sometimes sends noise at the end."""
 
     def visit(self):
         with self.connect() as sock:
@@ -319,7 +319,7 @@ class Cola(Client):
 
 
 class Datagrams(Client):
-    """Takes a VLP-16's data packets; each has its size and its twelve blocks."""
+    """Takes a VLP-16's data packets. Each must have its size and its twelve blocks."""
 
     size = 1206
 
@@ -343,7 +343,7 @@ class Datagrams(Client):
 
 
 class Positions(Datagrams):
-    """Takes its position packets; each has a sentence of GPS."""
+    """Takes a VLP-16's position packets. Each must have a GPS sentence."""
 
     size = 512
 
@@ -352,10 +352,10 @@ class Positions(Datagrams):
 
 
 class Http(Client):
-    """Asks a VLP-16 for its pages, sets what is set already, or asks for what is not there."""
+    """Asks a VLP-16 for its pages, sets a value that is set already, or asks for a page that is not there."""
 
     REQUESTS = [(b"GET /cgi/status.json", b"", b"200"), (b"GET /cgi/info.json", b"", b"200"), (b"GET /nothing", b"", b"404"),
-                (b"POST /cgi/setting", b"rpm=600", b"200 409")]  # 409: another client has control
+                (b"POST /cgi/setting", b"rpm=600", b"200 409")]  # 409 means that another client has control
 
     def visit(self):
         with self.connect() as sock:

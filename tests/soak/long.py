@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The long soak: python3 tests/soak/long.py --seconds S --scanhead PROGRAM --out FOLDER
 
-A head of 2.2 million pulses a second on every kind of link, and one of each maker whose protocol we speak. Clients come,
-go, stall and misbehave; faults strike. At the end is shown, for each head: memory and descriptors are flat, each pulse
-that was due was fired and counted, and pulses and clock did not drift apart. Status 1 when one of these does not hold.
+One head of 2.2 million pulses a second runs on every kind of link, and one head for each maker whose protocol we speak.
+Clients come, go, stall and misbehave, and faults strike. At the end this shows, for each head, that memory and
+descriptors are flat, that each due pulse was fired and counted, and that pulses and clock did not drift apart. The status
+is 1 if one of these does not hold.
 """
 import argparse
 import atexit
@@ -23,10 +24,10 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1] / "drivers/host/python"))
 import scanhead  # noqa: E402
 
-SETTLE = 0.25  # of the time, before memory is looked at: buffers have then been as full as they get
-RSS_GROWTH_KIB = 4096  # what malloc's arenas of the threads of sessions come and go by
+SETTLE = 0.25  # share of the time before memory is looked at, because buffers are then as full as they get
+RSS_GROWTH_KIB = 4096  # the arenas of malloc for sessions' threads come and go by so much
 PATIENCE_S = 120  # a loaded machine answers late
-TICK_NS, PRR_HZ = 1000000, 2200000  # of long.yaml
+TICK_NS, PRR_HZ = 1000000, 2200000  # values of long.yaml
 
 
 class Head:
@@ -70,10 +71,10 @@ class Head:
 
 
 class Clock:
-    """Device time beside the clock of this machine, asked while the head rests. The answer is the time of the last tick. So
-    what the clock was then lies between the arrival of the answer and a tick before the question; of many answers the one
-    that is most ahead says most: they are spread over seconds, in which a head that was held up catches up. The width of
-    this is the bound of the error. And the times of the scan's events, in device time."""
+    """This compares device time with the clock of this machine, while the head rests. The answer is the time of the last
+    tick. So it belongs to a moment between a tick before the question and the arrival of the answer. The most advanced one
+    of many answers says most. They are spread over seconds, in which a head that was held up catches up. The length of that
+    interval is the bound of the error. The class also keeps the times of the scan's events, in device time."""
 
     def __init__(self, endpoint):
         self.endpoint, self.marks, self.scan_ns = endpoint, [], {}
@@ -90,7 +91,7 @@ class Clock:
         self.marks.append((best[0] + best[1] // 2, best[1]))
 
     def command(self, line, event, is_before):
-        """A client for one command, which goes once the event has come: what it does not read is counted as left out."""
+        """Sends a command by a client that closes after the event. Frames that it does not read count as left out."""
         with scanhead.open(self.endpoint, PATIENCE_S) as head:
             if is_before:
                 while head.query("HEAD:STATe?", PATIENCE_S) == "boot":
@@ -112,7 +113,7 @@ class Clock:
 
 
 class Sheet:
-    """What was looked at, line by line; `bad` counts what does not hold."""
+    """Prints the checks, one a line. `bad` counts those that do not hold."""
 
     def __init__(self):
         self.bad = 0
@@ -123,7 +124,7 @@ class Sheet:
 
 
 def flat(sheet, head):
-    """Memory and descriptors of the last three quarters: the middle of their last third beside that of their first."""
+    """Compares memory and descriptors of the last three quarters: the medians of their first and their last third."""
     kept = head.samples[int(SETTLE * len(head.samples)):]
     third = max(1, len(kept) // 3)
     middle = [[sorted(s[k] for s in part)[len(part) // 2] for part in (kept[:third], kept[-third:])] for k in (1, 2, 3)]
@@ -147,7 +148,7 @@ def sums(sheet, head):
 
 
 def wait_gone(head, first, deadline_s=60):
-    """Until the head has noticed that its clients are gone."""
+    """Waits until the head has noticed that its clients are gone."""
     until_s = time.monotonic() + deadline_s
     while True:
         head.rest = head.look()
@@ -264,7 +265,7 @@ def report(sheet, args, heads, threads, recorder, clock, seconds):
         sums(sheet, head)
     record = json.loads((args.out / "record.json").read_text())
     s = main_head.stats
-    fired, got = s["fired_pulses"], record["pulses"]  # what the head lost was fired, too
+    fired, got = s["fired_pulses"], record["pulses"]  # pulses that the head lost were fired, too
     lost, missing = record["lost_pulses"], record["missing_pulses"]
     sheet.line(got + lost + missing == fired, "recorder: got + lost by head + left out for it = due",
                f"{got} + {lost} + {missing} = {fired}")

@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# An hour of device time at 10 kHz, recorded, replayed at pace fast over TCP, and recorded again: sh tests/soak/replay_hour.sh
-# SECONDS BUILD. Both files must be the same bytes, with the same hash and as many pulses. Of an hour they have 880 MB each.
+# This records an hour of device time at 10 kHz, replays it at pace fast over TCP, and records it again: sh
+# tests/soak/replay_hour.sh SECONDS BUILD. Both files must be the same bytes, with the same hash and as many pulses. For
+# an hour they have 880 MB each.
 set -eu
 [ $# -eq 2 ] || { echo "usage: $0 SECONDS BUILD" >&2; exit 2; }
 seconds=$1
@@ -20,7 +21,7 @@ trap 'exit 1' HUP INT TERM
 now() {
     date +%s.%N
 }
-value() { # FILE KEY: of its JSON, the first one
+value() { # value FILE KEY: prints the first value of the key in a JSON file.
     sed -n "s/^ *\"$2\": \"*\([^\",]*\)\"*,*$/\1/p" "$1" | head -n 1
 }
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Every scenario of config/faults over each kind of link, with our own client; usb in an emulated machine, where it can
-# be had. At the end a table: some ten minutes.
+# This runs every scenario of config/faults over each kind of link, with our own client. usb runs in an emulated machine
+# if there is one. A table comes at the end. It takes some ten minutes.
 SOAK_S ?= 30
 #? soak              long runs that are judged at their end
 soak: soak-scenarios soak-long
@@ -8,23 +8,23 @@ soak-scenarios: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh tests/soak/soak.sh $(SOAK_S) $(BUILD)
 
-# An hour of device time at 10 kHz, recorded, replayed at pace fast and recorded again: half a minute, and 1.8 GB in
-# build/ meanwhile.
+# This records an hour of device time at 10 kHz, replays it at pace fast, and records it again. That takes half a
+# minute, and 1.8 GB in build/ meanwhile.
 REPLAY_S ?= 3600
 #? replay-hour       an hour of a recording, replayed
 replay-hour: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh tests/soak/replay_hour.sh $(REPLAY_S) $(BUILD)
 
-# Ten minutes of 2.2 million pulses a second on all links, and a head of each maker, with clients that come, go, stall and
-# misbehave, and faults: SOAK_LONG_S=3600 once for an hour. At the end it is judged.
+# For ten minutes one head gives 2.2 million pulses a second on all links, beside a head of each maker. Clients come,
+# go, stall and misbehave, and faults strike. It is judged at the end. SOAK_LONG_S=3600 runs it for an hour.
 SOAK_LONG_S ?= 600
 soak-long: deps-build
 	$(call install_missing,python3)
 	@$(MAKE) --no-print-directory -j2 all
 	@python3 tests/soak/long.py --seconds $(SOAK_LONG_S) --scanhead $(BUILD)/scanhead --out $(BUILD)/soak-long
 
-# 10^9 rays aimed at edges and corners: none may leak. `make test` aims 10^6.
+# This aims 10^9 rays at edges and corners, and none may leak. `make test` aims 10^6.
 LEAKS ?= 1e9
 #? leaks             LEAKS=1e9 rays aimed at edges and corners: none may pass
 leaks: deps-build

@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak/soak.sh SECONDS BUILD. At the end a
-# table. Status 1 when a verdict is bad. Two heads run at a time. Then the same over usb, one by one, in a guest.
+# This runs each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak/soak.sh SECONDS BUILD.
+# Two heads run at a time. Then it runs the same over usb, one by one, in a guest. A table follows at the end. The
+# status is 1 if a verdict is bad.
 set -u
 [ $# -eq 2 ] || { echo "usage: $0 SECONDS BUILD" >&2; exit 2; }
 seconds=$1
@@ -26,7 +27,8 @@ soak() {
 for file in config/faults/*.yaml; do
     name=$(basename "$file" .yaml)
     echo "soak: $name, $seconds s"
-    # Without what a head of 16 beams, or one that nobody can command, can't go through.
+    # The head of udp.yaml has 16 beams, and nobody can command it. So it leaves out the scenarios that it could not go
+    # through.
     if ! grep -q 'mirror_\|power_cycle\|unplug\|self_test' "$file"; then soak "$file" tests/soak/udp.yaml "$name-udp" & fi
     soak "$file" tests/soak/room.yaml "$name" --set "links.1.path=$out/port"
     wait
@@ -37,7 +39,7 @@ echo "soak: usb, in a guest"
 SCANHEAD=$build/scanhead BUILD=$build sh tests/guest/soak.sh "$seconds" >"$out/guest.log" 2>&1
 guest=$?
 sed -n 's/^# FILE //p' "$out/guest.log" | while read -r name text; do
-    : >>"$out/${name%.*}.err" # which may be empty
+    : >>"$out/${name%.*}.err" # this makes the file, which may stay empty
     printf '%s\n' "$text" >>"$out/$name"
 done
 skipped=$(sed -n 's/^1\.\.0 # SKIP //p' "$out/guest.log")
@@ -52,7 +54,7 @@ for file in "$out"/*.txt; do
         verdict=BAD
         cat "$file" "$out/$name.err"
     fi
-    # Of the rows of faults: the kind may have a blank in it, so the figures are taken by their columns.
+    # This prints the rows of faults. The kind may have a blank in it, so the figures are taken by their columns.
     awk -v name="$name" -v verdict="$verdict" '
         /^[0-9]+ / && substr($0, 41, 8) ~ /^ *[0-9]+$/ {
             link = $2

@@ -126,7 +126,7 @@ static double edge_m(const struct mesh *mesh, uint32_t i, uint32_t j)
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-/* Of 12 vertices of an icosahedron: all triples that lie an edge's length apart. */
+/* Adds the sides of an icosahedron: of its 12 vertices, all triples that lie an edge's length apart. */
 static void add_sides(struct mesh *mesh, uint32_t first, double length_m, uint16_t label)
 {
     const double upto_m = 1.01 * length_m;

@@ -115,7 +115,7 @@ void rig_look(struct rig *rig)
     }
 }
 
-/* For as many rays as a quick scan has. */
+/* A quick scan has as many rays. */
 static void check_sight(struct rig *rig)
 {
     struct sight_beside beside;

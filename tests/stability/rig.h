@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One scene seen from one station by ours and by the reference, and what rays of it come to. */
+/* The rig holds one scene, seen from one station by our cast and by the reference, and the errors of its rays. */
 #ifndef TESTS_STABILITY_RIG_H
 #define TESTS_STABILITY_RIG_H
 
@@ -19,7 +19,7 @@ struct rig {
     struct caster *caster;
     struct reference *reference;
     double station_m[3];
-    /* Rays: add with rig_aim or rig_direct, then rig_look. */
+    /* Rays are added with rig_aim or rig_direct. rig_look comes after them. */
     uint32_t n, capacity;
     double *dx, *dy, *dz, *range_m;
     uint32_t *triangle;
@@ -34,41 +34,41 @@ struct rig_errors {
     uint64_t undecidable; /* would be wrong, but double precision can't tell; in no figure above */
 };
 
-/* Takes the scene. Fails the running test where anything can't be had. */
+/* Takes the scene over. It fails the running test where anything can't be made. */
 void rig_open(struct rig *rig, struct scene *scene, const double station_m[3]);
 void rig_close(struct rig *rig);
-/* Another BVH over the same scene and rays. */
+/* Makes another BVH of the same scene, for the same rays. */
 void rig_rebuild(struct rig *rig, unsigned threads);
 
-/* A ray from the station towards a point, or along a direction of any length. */
+/* Adds a ray from the station towards a point, or along a direction of any length. */
 void rig_aim(struct rig *rig, const double point_m[3]);
 void rig_direct(struct rig *rig, double x, double y, double z);
 void rig_aim_at_sphere(struct rig *rig, uint32_t n, uint64_t seed); /* all directions alike */
 void rig_clear(struct rig *rig);
 
-/* The true ranges. */
+/* Finds the true ranges. */
 void rig_look(struct rig *rig);
-/* Casts all rays: range_m, triangle. By the BVH, and once more by a sight of the station (core/sight.h): the
- * running test fails where a bit differs. */
+/* Casts all rays and writes range_m and triangle, by the BVH and once more by a sight of the station (core/sight.h).
+ * The running test fails where a bit differs. */
 void rig_cast(struct rig *rig);
 void rig_cast_naive(struct rig *rig, const double origin_m[3], int robust, unsigned packet);
-/* Of the last cast. judge: leave out what double precision can't tell (for ours alone: no mercy for the naive
- * method). */
+/* Returns the errors of the last cast. With `judge` it leaves out the rays that double precision can't decide. That is
+ * for our cast; the naive method is counted in full. */
 struct rig_errors rig_errors_of(const struct rig *rig, int judge);
 
-/* Casts both ways: ours, and float packets of 16 (robust) about naive_origin_m; a row of the largest errors
- * in metres. */
+/* Casts both ways: with ours, and with float packets of 16 (robust) about naive_origin_m. Prints a row of the largest
+ * errors in metres. */
 void rig_row_of_ranges(struct rig *rig, const char *regime, const double naive_origin_m[3], double bound_m);
-/* The same as a row of the number of rays: ours that are off by more than a micrometre; of the naive ones
- * only those which are off by more than a centimetre, so that they count as another surface and not for their
- * float range. */
+/* The same as a row of the number of wrong rays. Ours are wrong by more than a micrometre. Naive rays count only if
+ * they are wrong by more than a centimetre: they met another surface, and it is not their float range that makes them
+ * wrong. */
 void rig_row_of_rays(struct rig *rig, const char *regime, const double naive_origin_m[3]);
 
 /* A line of pulses straight ahead (y), half a degree up and down. */
 enum { RIG_LINE_PULSES = 400 };
 void rig_line_ahead(struct schedule_segment *segment, struct schedule_line *line, struct schedule_run *run);
 
-/* Uniform in 0..1, from a counter. */
+/* Returns a number that is uniform in 0..1, from a counter. */
 double rig_unit(uint64_t seed, uint64_t i);
 
 #endif

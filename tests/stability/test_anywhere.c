@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Rays that begin anywhere: at the station, within the scene, on faces, at corners, and from a thousand to a million
- * times as far away as the scene is large, up to 1e7 m. Scenes are of what is hard (odd_scenes.h), a third of them at UTM. Beside the reference in long
- * double; and a ray by itself, among others from the same point, and among rays from elsewhere meets the same, to the
- * bit.
+ * times as far away as the scene is large, up to 1e7 m. Scenes are odd ones (odd_scenes.h), a third of them at UTM.
+ * They are compared with the reference in long double. A ray also meets the same, to the bit, by itself, among others
+ * from the same point, and among rays from elsewhere.
  *
  * ANYWHERE_SCENES: how many (default 300, THOROUGH=1: 1000). */
 #include <math.h>
@@ -30,7 +30,7 @@ static const char *const place_name[PLACES] = {"at the station", "within", "on a
 
 struct tally {
     struct odd_tally odd;
-    uint64_t differ; /* by the rays that they were cast with */
+    uint64_t differ; /* rays whose result depends on the others that they are cast with */
 };
 
 static struct shot {
@@ -78,7 +78,8 @@ static void draw_rays(const struct odd_scene *odd, const struct scene *scene, ui
     }
 }
 
-/* Way 0: each from its own point, in packets across the points; 1: point by point; 2: one by one. */
+/* Way 0 casts each ray from its own point, in packets across the points. Way 1 casts point by point, and way 2 ray by
+ * ray. */
 static void cast(const struct bvh *bvh, struct bvh_work *work, int way)
 {
     const int step = way == 0 ? RAYS : EACH;
@@ -97,7 +98,8 @@ static void cast(const struct bvh *bvh, struct bvh_work *work, int way)
     }
 }
 
-/* Half of the wire's finest count; over a long range 16 roundings of it, at an incidence of a thousandth. */
+/* The bound is half of the wire's finest count. Over a long range it is 16 roundings of the range, at an incidence of a
+ * thousandth. */
 static double bound_m(long double range_m)
 {
     return 5e-7 + 16.0 * 0x1p-53 * 1e3 * (double)range_m;
@@ -116,7 +118,7 @@ static void judge(const struct scene *scene, const struct reference *reference, 
         printf("# %s, ray %d\n", place_name[i / EACH % PLACES], i);
 }
 
-/* Where a scene lies that is measured in UTM: every third one. */
+/* Every third scene is moved to where one lies that is measured in UTM. */
 static void move_to_utm(struct odd_scene *odd)
 {
     static const double UTM_M[3] = {391431.9, 5819708.6, 110.3};

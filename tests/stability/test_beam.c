@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Footprints where a beam of few sub-rays goes wrong: thin things. */
+/* Thin bodies, where a beam of few sub-rays goes wrong. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@
 
 static const double STATION_M[3] = {0.0, 0.0, 0.0};
 
-/* Pulses of all that have another number of echoes than 1,000 sub-rays give, in percent of those that are mixed. */
+/* Pulses with another number of echoes than 1,000 sub-rays give, in percent of the mixed pulses. */
 static void wrong_counts(struct beam_rig *rig, const struct beam_view *view, double percent[2])
 {
     double *d = malloc(3 * view->pulses * sizeof *d);

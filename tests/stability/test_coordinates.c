@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where plain float coordinates fail: large ones, short and long ranges, grazing incidence. */
+/* Large coordinates, short and long ranges, and grazing incidence, where plain float coordinates fail. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,7 +20,7 @@ struct place {
     double rotation[9], offset_m[3];
 };
 
-/* Local east, north, up to ECEF at 52.5 N 13.4 E, an ordinary place with coordinates of several thousand
+/* Turns local east, north and up to ECEF at 52.5 N 13.4 E, an ordinary place with coordinates of several thousand
  * kilometres. */
 static void to_ecef(struct place *place)
 {
@@ -32,7 +32,7 @@ static void to_ecef(struct place *place)
         place->offset_m[k] = earth_m * rotation[3 * k + 2];
 }
 
-/* The test's own vertices, whole multiples of 2^-10 m: ten decimals hold them exactly. */
+/* The test's own vertices are whole multiples of 2^-10 m, so that ten decimals hold them exactly. */
 static void make_site(const struct place *place, struct mesh *mesh)
 {
     const double centre[2] = {0.0, 0.0};
@@ -74,7 +74,7 @@ static void write_ply_text(FILE *f, const struct mesh *m)
 static void write_ply_binary(FILE *f, const struct mesh *m)
 {
     const unsigned char three = 3;
-    write_ply_head(f, m, "binary_little_endian"); /* as the machines this runs on */
+    write_ply_head(f, m, "binary_little_endian"); /* the byte order of the machines this runs on */
     fwrite(m->vertex, sizeof *m->vertex, m->n_vertices, f);
     for (uint32_t i = 0; i < m->n_triangles; i++) {
         fwrite(&three, 1, 1, f);
@@ -82,7 +82,7 @@ static void write_ply_binary(FILE *f, const struct mesh *m)
     }
 }
 
-/* A triangle is enough: it is refused. */
+/* One triangle is enough, as the file is refused. */
 static void write_collada(FILE *f, const struct mesh *m)
 {
     const double *v[3];
@@ -111,9 +111,9 @@ static int load_site(const struct mesh *mesh, const char *ending, void (*write)(
     return rc;
 }
 
-/* Ranges go up to 42 m and rays meet the ground at up to about 89.9 degrees. Ours: vertices minus station are
- * exact (both are multiples of 2^-10 m), so the double arithmetic after them errs by 16 x 2^-53 x 42 m / cos
- * i < 1e-10 m; the micrometre promised holds with much to spare. Naive: floats at 5.8e6 m are 0.5 m apart. */
+/* Ranges go up to 42 m, and rays meet the ground at up to about 89.9 degrees. Ours: vertices minus station are exact
+ * (both are multiples of 2^-10 m). The double arithmetic after them errs by 16 x 2^-53 x 42 m / cos i < 1e-10 m, so the
+ * promised micrometre holds with much to spare. Naive: floats at 5.8e6 m are 0.5 m apart. */
 static void site_row(const struct place *place, const struct mesh *mesh, const char *ending, const char *format,
                      void (*write)(FILE *f, const struct mesh *m))
 {
@@ -129,7 +129,7 @@ static void site_row(const struct place *place, const struct mesh *mesh, const c
     for (int k = 0; k < 3; k++) /* 3 m up in the middle */
         station_m[k] = floor((place->offset_m[k] + 3.0 * place->rotation[3 * k + 2]) * 1024.0) / 1024.0;
     rig_open(&rig, scene, station_m);
-    rig_aim_at_sphere(&rig, 1500, 21); /* each by the BVH and by a sight, which have to agree bit by bit */
+    rig_aim_at_sphere(&rig, 1500, 21); /* each ray is cast by the BVH and by a sight, which have to agree bit by bit */
     snprintf(regime, sizeof regime, "site at %s coordinates, %s", place->name, format);
     rig_row_of_ranges(&rig, regime, NOWHERE, RIG_MICROMETRE);
     rig_close(&rig);
@@ -172,10 +172,10 @@ static void test_large_coordinates(void **state)
 
 /* ---- ranges: a hull about the station, 1.2 km from the scene's origin */
 
-/* The rough hull's facets stand at up to 80 degrees to the ray. Ours: 16 x 2^-53 x R / cos i is 1e-10 m at 10
- * km; vertices about the station round by 2^-53 x 1.2 km before. So the micrometre holds throughout, 10 km
- * included. Naive: floats at 1.2 km are 6e-5 m off whatever the range, and 5e-4 m at 10 km. The BVH's own frame is about
- * the scene's middle: in the middle of the hull, or with a triangle beside the hull, more than 1.2 km from there. */
+/* The rough hull's facets stand at up to 80 degrees to the ray. Ours: 16 x 2^-53 x R / cos i is 1e-10 m at 10 km, and
+ * vertices about the station round by 2^-53 x 1.2 km before. So the micrometre holds throughout, at 10 km too. Naive:
+ * floats at 1.2 km are wrong by 6e-5 m at any range, and by 5e-4 m at 10 km. The BVH's own frame is about the scene's
+ * middle. That is the middle of the hull or, with a triangle beside the hull, more than 1.2 km from there. */
 static void range_row(double radius_m, double rough, int beside)
 {
     const double centre[3] = {1000.0, -700.0, 30.0};
@@ -216,7 +216,7 @@ static void test_ranges(void **state)
 
 static const double UTM_E_M = 391431.0, UTM_N_M = 5819712.0;
 
-/* Of cells of cell_m, which divides 200 m and 2200 m; of two triangles where it is 0. */
+/* The slope has cells of cell_m, which divides 200 m and 2200 m. It has two triangles where cell_m is 0. */
 static struct scene *make_slope(double cell_m)
 {
     struct mesh mesh = {0};
@@ -236,8 +236,7 @@ static struct scene *make_slope(double cell_m)
     return scene;
 }
 
-/* From (0, 0) on the slope, lifted along its normal so that points at range_m are met at the given incidence.
- */
+/* Stands at (0, 0) on the slope, lifted along its normal so that points at range_m are met at the given incidence. */
 static void stand_on_slope(double range_m, double incidence_deg, double station_m[3])
 {
     const double normal_length = sqrt(1.0 + 1.0 / 64.0 + 1.0 / 16.0);
@@ -257,7 +256,8 @@ static void aim_along_slope(struct rig *rig, double range_m)
     }
 }
 
-/* The plane's range by its formula, in long double from the very station and direction that were cast. */
+/* Returns the error against the plane's range by its formula. That is in long double from the same station and
+ * direction that were cast. */
 static double slope_error_m(const struct rig *rig)
 {
     long double z = (rig->station_m[0] - (long double)UTM_E_M) / 8 + (rig->station_m[1] - (long double)UTM_N_M) / 4;
@@ -270,11 +270,11 @@ static double slope_error_m(const struct rig *rig)
     return worst_m;
 }
 
-/* Range = h / cos i, with n . dir and n . v0 as sums of three products in double: each off by at most 3
- * roundings of its largest product (below range x |n|), n itself by 2 more: 8 x 2^-53 x R / cos i, twice
- * (numerator and denominator). v0 is counted from the BVH's origin, up to half of the slope's length away. A normal is
- * tilted by the rounding of its edges, 4 x 2^-53 of the longest side / cos i. The corners are differences of UTM
- * coordinates, exact here. Up to 89.9 degrees that must stay below the micrometre promised. */
+/* Range = h / cos i, with n . dir and n . v0 as sums of three products in double. Each is wrong by at most 3 roundings
+ * of its largest product (below range x |n|), and n itself by 2 more: 8 x 2^-53 x R / cos i, twice (numerator and
+ * denominator). v0 counts from the BVH's origin, up to half of the slope's length away. A normal is tilted by the
+ * rounding of its edges, 4 x 2^-53 of the longest side / cos i. The corners are differences of UTM coordinates, and are
+ * exact here. Up to 89.9 degrees that must stay below the promised micrometre. */
 static double incidence_bound_m(double cell_m, double range_m, double incidence_deg)
 {
     const double longest_m = cell_m > 0.0 ? 1.5 * cell_m : 2300.0, origin_m = 1150.0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Firing times and azimuths of a head with a firing table over an hour: pulse periods that are rounded or added
- * up, and angles that are added up. The truth is whole nanoseconds: 55296 a sequence, 2304 a firing. */
+/* Firing times and azimuths of a head with a firing table over an hour. Naive methods round or add up pulse periods,
+ * and add up angles. The truth is whole nanoseconds: 55296 a sequence, 2304 a firing. */
 #include <math.h>
 #include <stdio.h>
 
@@ -38,8 +38,8 @@ static uint64_t drawn(uint64_t i)
     return n - rng_u64(21, i) % (i % 2 == 0 ? n : 100000);
 }
 
-/* An even schedule at the table's rate, which is set in whole micro-hertz. The last firing of a sequence comes 17.3 us
- * before an even one would. The rounding of the rate adds up to 2 ns in an hour. */
+/* An even schedule at the table's rate, which is set in whole micro-hertz. In it the last firing of a sequence comes
+ * 17.3 us later than by the table. The rounding of the rate adds up to 2 ns in an hour. */
 static void even_row(const struct schedule_segment *seg)
 {
     const struct schedule_spec spec = {
@@ -57,7 +57,7 @@ static void even_row(const struct schedule_segment *seg)
     table_row("first of a sequence, an hour", "rate in whole micro-hertz", drift_ns, ours_ns, 0.0, "ns");
 }
 
-/* Sums of the two gaps of a sequence, in float and in double seconds: each addition rounds. */
+/* The two gaps of a sequence are summed, in float and in double seconds. Each addition rounds. */
 static void sum_row(const struct schedule_segment *seg)
 {
     const uint64_t sequences = HOUR_NS / SEQUENCE_NS;
@@ -92,8 +92,8 @@ static double turns_apart(double a, double b)
     return 360.0 * fabs(d - floor(d + 0.5));
 }
 
-/* The wire of such heads has 0.01 degree. Ours: the place in the turn is a ratio of whole numbers, rounded once, and
- * times a reciprocal that is rounded: 2^-52 of a turn. */
+/* Angles on the wire of such heads have 0.01 degree. Ours: the place in the turn is a ratio of whole numbers, rounded
+ * once, times a reciprocal that is rounded: 2^-52 of a turn. */
 static void test_azimuths(void **state)
 {
     (void)state;

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Footprints that one ray stands for, or few: ground under grazing incidence, and edges with every step up to and
- * beyond the pulse's width. The plain ways: the ray in the centre alone, and sub-rays whose returns go into a waveform
- * of bins.
- */
+/* Footprints that one ray stands for, or few: ground under grazing incidence, and edges with every step up to the
+ * pulse's width and beyond. There are two naive methods: the ray in the centre alone, and sub-rays whose returns go
+ * into a waveform of bins. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +20,8 @@ static void open_rig(struct beam_rig *rig, struct scene *scene, const struct bea
     if (beam_rig_open(rig, scene, STATION_M, view, &err) != 0) fail_msg("%s", err.text);
 }
 
-/* 37 sub-rays into bins of 0.25 ns: the energy-weighted mean of the bins, of those up to limit_m behind the first. */
+/* Sorts 37 sub-rays into bins of 0.25 ns. Returns the energy-weighted mean of the bins up to limit_m after the
+ * first. */
 static double binned_mean(const struct beam_rig *rig, const struct beam_pattern *pattern, const double dir[3],
                           double limit_m)
 {
@@ -98,8 +98,8 @@ static struct off off_on_ground(double height_m, double incidence_deg)
     return off;
 }
 
-/* A tripod's height above the ground: 1.8 m away at 0 deg, 1031 m at 89.9 deg. Ours casts one ray. The bound is what is
- * asked of a wall; where the footprint is small the ray in the centre keeps it, too. */
+/* A head at a tripod's height above the ground: 1.8 m away at 0 deg, 1031 m at 89.9 deg. Ours casts one ray. The bound
+ * is the one for a wall. If the footprint is small, the ray in the centre keeps it, too. */
 static void one_ray_stands_for_the_ground(void **state)
 {
     (void)state;
@@ -119,7 +119,7 @@ static void one_ray_stands_for_the_ground(void **state)
 
 static const double DOOR_M = 20.0;
 
-/* What is right of the middle is deeper by step_m. */
+/* The right half of the view is deeper by step_m. */
 static struct scene *door(double step_m)
 {
     double vertex[8][3];
@@ -138,7 +138,8 @@ static struct scene *door(double step_m)
     return scene;
 }
 
-/* Energy of the Gaussian footprint beyond a line h from its centre (in radii): the sum over small cells. */
+/* Returns the energy of the Gaussian footprint beyond a line h from its centre (in radii), as a sum over small
+ * cells. */
 static double energy_beyond(double h)
 {
     enum { RADII = 400, PARTS = 720 };
@@ -154,7 +155,7 @@ static double energy_beyond(double h)
 
 enum { EDGE_PULSES = 12, EDGE_STEPS = 61 };
 
-/* Of one step, each pulse along the line across the edge. */
+/* One step of the edge, with each pulse along the line across it. */
 struct edge {
     double dir_y[EDGE_PULSES], behind[EDGE_PULSES]; /* energy on the surface behind */
     uint32_t n[EDGE_PULSES];
@@ -184,15 +185,15 @@ static void look_at_edge(double step_m, struct edge *e)
     beam_rig_close(&rig);
 }
 
-/* Steps of 1 mm, then each 15 mm up to one and a half times the pulse's width (0.60 m). */
+/* Steps of 1 mm, then every 15 mm up to one and a half times the pulse's width (0.60 m). */
 static double edge_step_m(int k)
 {
     return k == 0 ? 0.001 : 0.015 * k;
 }
 
-/* One echo at the mean up to the resolution, which moves by the share of each step, without a jump; then two, each at
- * its surface. Bounds: footprints of neighbouring pulses are not quite alike at 20 m and behind it, 1e-3 of the energy;
- * the wire's micrometre. */
+/* Up to the resolution there is one echo at the mean, which moves by its share of each step, without a jump. Beyond it
+ * there are two, each at its surface. Bounds: footprints of neighbouring pulses differ a little between 20 m and the
+ * deeper surface, by 1e-3 of the energy; and the wire's micrometre. */
 static void an_edge_moves_without_a_jump(void **state)
 {
     (void)state;

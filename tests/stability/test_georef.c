@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Where common shortcuts on the way to the Earth fail: poles, the antimeridian, zones' borders and exceptions, heights,
- * distance from the anchor. Truth is tests/common/geodesy.h, which shares nothing with GeographicLib. */
+/* Common shortcuts on the way to the Earth, and places where they fail: poles, the antimeridian, zones' borders and
+ * exceptions, heights, distance from the anchor. The truth is tests/common/geodesy.h, which shares nothing with
+ * GeographicLib. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,7 +34,7 @@ static void add_metres(const struct georef_spec *spec, const struct georef *geor
     memcpy(out, d, 3 * sizeof *d);
 }
 
-/* Convergence and scale, as they are on the ellipsoid. */
+/* This shortcut uses convergence and scale as they are on the ellipsoid. */
 static void turn_and_scale(const struct georef_spec *spec, const struct georef *georef, const double d[3],
                            double out[3])
 {
@@ -60,7 +61,7 @@ static void exactly(const struct georef *georef, const double d[3], double out[3
     georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&out[0], &out[1], &out[2]});
 }
 
-/* Positions as floats. */
+/* This shortcut has positions as floats. */
 static void in_float(const struct georef_spec *spec, const struct georef *georef, const double d[3], double out[3])
 {
     (void)spec;
@@ -71,7 +72,7 @@ static void in_float(const struct georef_spec *spec, const struct georef *georef
         out[k] = (double)(float)(anchor[k] + out[k]) - anchor[k];
 }
 
-/* Degrees per metre at the station. */
+/* This shortcut has fixed degrees per metre at the station. */
 static void degrees_per_metre(const struct georef_spec *spec, const struct georef *georef, const double d[3],
                               double out[3])
 {
@@ -82,7 +83,7 @@ static void degrees_per_metre(const struct georef_spec *spec, const struct geore
     out[2] = d[2];
 }
 
-/* Longitudes in -180..180, subtracted as they are, in counts of 1e-6 m, which end at 2^31. */
+/* This shortcut subtracts longitudes in -180..180 without wrapping them, in counts of 1e-6 m, which end at 2^31. */
 static void subtract_longitude(const struct georef_spec *spec, const struct georef *georef, const double d[3],
                                double out[3])
 {
@@ -93,7 +94,7 @@ static void subtract_longitude(const struct georef_spec *spec, const struct geor
     out[1] = count_deg * fmin(fmax(counts, -2147483647.0), 2147483647.0);
 }
 
-/* Each point in the zone where it lies. */
+/* This shortcut puts each point into the zone where it lies. */
 static void zone_by_point(const struct georef_spec *spec, const struct georef *georef, const double d[3], double out[3])
 {
     double anchor[3];
@@ -112,7 +113,7 @@ static void zone_by_point(const struct georef_spec *spec, const struct georef *g
     out[2] = at.height_m - anchor[2];
 }
 
-/* Six degrees each, everywhere. */
+/* This shortcut gives each zone six degrees everywhere, without the exceptions. */
 static void zone_by_longitude(const struct georef_spec *spec, const struct georef *georef, const double d[3],
                               double out[3])
 {
@@ -144,7 +145,7 @@ static void point(const struct row *row, uint64_t i, double d[3])
     d[2] = row->height_m * (2.0 * spread(i, 2) - 1.0);
 }
 
-/* The default for the row's extent. */
+/* Plans the default for the row's extent. */
 static struct georef *plan(const struct row *row, struct plan_row *planned)
 {
     const struct plan_georef_need need = {.radius_m = RADIUS_M, .height_m = row->height_m, .tolerance_m = TOLERANCE_M};
@@ -157,7 +158,7 @@ static struct georef *plan(const struct row *row, struct plan_row *planned)
     return georef;
 }
 
-/* Of ours, and of the naive method from the exact one. */
+/* Prints the errors of ours and of the naive method, both against the exact one. */
 static void show(const struct row *row, double bound_m)
 {
     struct plan_row planned;
@@ -209,7 +210,7 @@ static const struct row POLES[] = {
     {"geodetic, 1.5 km from the pole", "order 1", GEODETIC(AT(89.9865, -100.0, 0.0)), 500.0, order1, 4979},
 };
 
-/* What rounding to counts costs in latitude and height, on the ground. */
+/* Returns the error by rounding to counts in latitude and height, on the ground. */
 static double rounding_m(const struct georef *georef, const double scale[3], double reach_m)
 {
     const double unit_m[3] = {111694.0, 0.0, 1.0}; /* of a degree of latitude, where it is longest */
@@ -226,7 +227,8 @@ static double rounding_m(const struct georef *georef, const double scale[3], dou
     return most_m;
 }
 
-/* Only degrees of longitude need longer counts where all of them are near: half a micrometre elsewhere. */
+/* If all points are near the pole, only degrees of longitude need longer counts. The others have half a
+ * micrometre. */
 static void test_counts_at_the_pole(void **state)
 {
     (void)state;
@@ -251,7 +253,7 @@ static void test_poles(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof POLES / sizeof POLES[0]; i++)
         show(&POLES[i], TOLERANCE_M);
-    /* At the pole itself there is no polynomial, and exact is what it does: 20 nm. */
+    /* At the pole itself there is no polynomial. The exact way is used, and is good to 20 nm. */
     const struct row pole = {
         "geodetic, at the pole", "degrees per metre", GEODETIC(AT(90.0, 0.0, 3.0)), 500.0, degrees_per_metre, 4979};
     struct plan_row planned;
@@ -308,7 +310,7 @@ static void test_heights(void **state)
 static const struct georef_place ANCHOR = {48.0, 11.0, 500.0};
 static const double FAR_M[3] = {90000.0, -45000.0, -300.0};
 
-/* Largest error of points about FAR_M; d is from the georef's centre, which is centre_m. */
+/* Returns the largest error of points about FAR_M; d counts from the georef's centre, which is centre_m. */
 static double far_error_m(const struct georef *georef, const double centre_m[3], const struct row *row, int naive)
 {
     double worst_m = 0.0, anchor[3];
@@ -347,7 +349,7 @@ static void test_far_from_anchor(void **state)
     assert_int_equal(geoframe_set_tangent(&frame, origin, &ANCHOR, 0.0, &err), SH_OK);
     assert_int_equal(geoframe_fill(&frame, origin, &spec, &err), SH_OK);
     assert_int_equal(georef_create(&spec, &at_anchor, &err), SH_OK);
-    /* From there: no polynomial is taken, the one that is asked for is refused, and so are counts of 1 um. */
+    /* From there no polynomial is taken. One that is asked for is refused, and so are counts of 1 um. */
     assert_int_equal(plan_georef(at_anchor, &need, &method, &planned, &err), SH_OK);
     assert_int_equal(method, GEOREF_EXACT);
     double naive_m = far_error_m(at_anchor, origin, &row, 1);
@@ -358,7 +360,7 @@ static void test_far_from_anchor(void **state)
     table_note("order 3 asked for: %s", err.text);
     assert_int_equal(georef_scale(at_anchor, 1e-6, need.radius_m, scale, &err), SH_EINPUT);
     table_note("counts of 1 um: %s", err.text);
-    /* Re-anchored: order 3 and counts of 1e-6 m as anywhere. */
+    /* With a new anchor order 3 and counts of 1e-6 m are enough, as anywhere. */
     need = (struct plan_georef_need){.radius_m = RADIUS_M, .height_m = 500.0, .tolerance_m = TOLERANCE_M};
     assert_int_equal(georef_recentre(at_anchor, FAR_M, &moved, &err), SH_OK);
     assert_int_equal(plan_georef(moved, &need, &method, &planned, &err), SH_OK);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Behind a pane: where a second ray that sets out a fixed step behind a float hit meets the pane again. */
+/* These tests look at a scene behind a pane. A second ray that sets out a fixed step after a float hit meets the pane
+ * again. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,8 +12,8 @@
 enum { PULSES = RIG_LINE_PULSES };
 static const double PANE_M = 0.004, WALL_M = 3.0;
 
-/* Both sides of a pane that the beam ahead meets at `away_m` under the incidence i, and a wall behind, all parallel;
- * around a place on the UTM grid. */
+/* Both sides of a pane that the beam ahead meets at `away_m` under the incidence i, and a wall behind, all parallel.
+ * They stand about a place on the UTM grid. */
 static struct scene *make_window(double away_m, double incidence_rad, const double at[3])
 {
     const double s = sin(incidence_rad), c = cos(incidence_rad), behind[3] = {0.0, PANE_M, PANE_M + WALL_M};
@@ -36,7 +37,7 @@ static struct scene *make_window(double away_m, double incidence_rad, const doub
     return scene;
 }
 
-/* True ranges of the three surfaces along pulse i. */
+/* Writes the true ranges of the three surfaces along pulse i. */
 static void truth(const struct schedule_segment *segment, const struct schedule_line *line, uint32_t i, double away_m,
                   double incidence_rad, double range_m[3], double dir[3])
 {
@@ -49,7 +50,7 @@ static void truth(const struct schedule_segment *segment, const struct schedule_
     range_m[2] = range_m[1] + WALL_M / along;
 }
 
-/* Pulses that don't have three echoes, or one that is off by more than allowed. */
+/* Returns how many pulses don't have three echoes, or have one that is wrong by more than allowed. */
 static uint32_t wrong_of_ours(const struct scene *scene, double away_m, double incidence_rad, const double at[3],
                               double allowed_m)
 {
@@ -97,7 +98,7 @@ static uint32_t wrong_of_ours(const struct scene *scene, double away_m, double i
     return wrong;
 }
 
-/* The plain way: each next ray begins a tenth of a millimetre behind the float hit. */
+/* The naive way: each next ray begins a tenth of a millimetre after the float hit. */
 static uint32_t wrong_of_naive(const struct scene *scene, double away_m, double incidence_rad, const double at[3])
 {
     struct schedule_segment segment;
@@ -125,8 +126,8 @@ static uint32_t wrong_of_naive(const struct scene *scene, double away_m, double 
     return wrong;
 }
 
-/* Ours: to a micrometre across the surfaces; vertices on the UTM grid are rounded to 1e-9 m. The plain way is only
- * asked for the right surfaces, a millimetre across. */
+/* Ours is right to a micrometre across the surfaces; vertices on the UTM grid are rounded to 1e-9 m. The naive way only
+ * has to find the right surfaces, to a millimetre across. */
 static void a_pane_is_met_once_a_side(void **state)
 {
     (void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays aimed at edges and vertices of closed and of nested closed meshes, 2.5 x 10^6 in all with THOROUGH=1, a quarter of
- * them else: none may come out. With none among so many the share of leaks is below 1.2, or 5, in a million at 95 %; `make
- * bench` tries 10^8. Each edge of a mesh is hit some nine times, or twice, and the naive casts, which leak some ten in a
- * million rays or more, get 70,000 of a row either way. */
+/* Rays are aimed at edges and vertices of closed and of nested closed meshes: 2.5 x 10^6 with THOROUGH=1, a quarter of
+ * them else. None may come out. With none among so many the share of leaks is below 1.2, or 5, in a million at 95 %.
+ * `make bench` tries 10^8. Each edge of a mesh is hit some nine times, or twice. The naive casts, which leak some ten
+ * in a million rays or more, get 70,000 of a row either way. */
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -18,7 +18,7 @@
 
 enum { BATCH = 4096, THREADS = 2 };
 
-/* Of the rays, one in so many is for the naive casts, too. */
+/* One in so many of the rays is for the naive casts, too. */
 #define NAIVE_SHARE ((uint64_t)thorough(4, 1))
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
@@ -28,9 +28,9 @@ enum { BATCH = 4096, THREADS = 2 };
 #define RAYS_PER_ROW ((uint64_t)thorough(280000, 70000))
 #endif
 
-/* A closed inner mesh with the station inside; rays are aimed at its edges or vertices. Whatever goes through
- * it comes to nothing, or to the outer mesh around it. Where the hits of the inner mesh can lie tells leaks,
- * exactly and at no cost: within a ball, or a box, each widened by a part in 10^9. */
+/* A closed inner mesh with the station inside. Rays are aimed at its edges or vertices. One that leaks through it meets
+ * nothing, or the outer mesh around it. The hits of the inner mesh lie within a ball, or a box, each widened by a part
+ * in 10^9. A hit beyond it is a leak, which is exact and costs nothing. */
 struct cage {
     struct mesh mesh;
     uint32_t n_inner; /* triangles of the inner mesh: the first */
@@ -87,7 +87,7 @@ static int is_out(const struct cage *cage, const double dir[3], double range_m)
     return cage->radius_m != 0.0 && sqrt(d2) > inside * cage->radius_m;
 }
 
-/* What float ranges lack in precision is no leak: on a naive cast, a millimetre less. */
+/* The imprecision of float ranges is no leak: on a naive cast, ranges count as a millimetre shorter. */
 static uint64_t count_leaks(const struct job *job, uint32_t n, double less_m)
 {
     uint64_t leaks = 0;
@@ -194,7 +194,7 @@ static void make_spheres(struct cage *cage, int nested)
         cage->station_m[k] = centre[k] + off[k];
 }
 
-/* Ground, walls and ceiling of 20,000 triangles; the same half as large again around it. */
+/* Ground, walls and ceiling of 20,000 triangles, with the same half as large again around them. */
 static void make_terrain(struct cage *cage, int nested)
 {
     const double middle[2] = {0.0, 0.0}, side_m = 200.0, rough_m = 6.0;
@@ -243,7 +243,7 @@ static void test_terrain(void **state)
     rows_of(make_terrain, "a terrain box", "nested terrain boxes");
 }
 
-/* The BVH's frame is about the scene's middle: with a ball beside the box, some 60 m from the station. */
+/* The BVH's frame is about the scene's middle. With a ball beside the box that is some 60 m from the station. */
 static void test_far_from_the_middle(void **state)
 {
     (void)state;

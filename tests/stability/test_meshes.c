@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes as they come: needles, triangles without area, T-junctions, unwelded soups, faces twice over. */
+/* Meshes of poor quality: needles, triangles without area, T-junctions, soups that are not welded, faces that stand
+ * twice. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,8 +10,8 @@
 #include "tests/common/thorough.h"
 #include "tests/stability/rig.h"
 
-/* Each ray is cast by the BVH and looked up in a sight: two ways that have to agree bit by bit. So half as many rays as
- * one way had are as many chances to be wrong. */
+/* Each ray is cast by the BVH and looked up in a sight, and the two ways have to agree bit by bit. So half as many rays
+ * give as many chances of an error as one way with all of them. */
 #ifdef SH_SANITIZE
 #define RAYS 20000u
 #else
@@ -26,9 +27,8 @@ static void turn(struct mesh *mesh)
     mesh_move(mesh, 0, rotation, NOWHERE);
 }
 
-/* A screen that covers what lies behind it; what is met farther than it has leaked. Rays are aimed at points
- * of triangles of label 0 by their barycentric parts; `corner` draws them to edges (1) or to corners (2), 0
- * anywhere. */
+/* A screen covers all that lies behind it, so a hit farther away has leaked. Rays are aimed at points of triangles of
+ * label 0 by their barycentric parts. `corner` draws them to edges (1) or to corners (2); 0 is anywhere. */
 static void aim_at_screen(struct rig *rig, uint32_t n, int corner, uint64_t seed)
 {
     const struct scene *scene = rig->scene;
@@ -53,7 +53,7 @@ static void aim_at_screen(struct rig *rig, uint32_t n, int corner, uint64_t seed
     }
 }
 
-/* Rays that end at label 7, the wall behind, or nowhere. */
+/* Counts the rays that end at label 7, the wall behind, or nowhere. */
 static uint64_t count_through(const struct rig *rig)
 {
     uint64_t through = 0;
@@ -62,8 +62,8 @@ static uint64_t count_through(const struct rig *rig)
     return through;
 }
 
-/* Two screens have exactly the border of the other's cells, so rays at the screen's own border are left out
- * by `inner`: the screens are larger than what is aimed at. */
+/* Two screens have exactly the border of the other's cells, so `inner` leaves out rays at the screen's own border. The
+ * screens are larger than the part that is aimed at. */
 static void leak_row(struct rig *rig, const char *regime)
 {
     rig_cast_naive(rig, rig->station_m, 1, 16);
@@ -96,9 +96,10 @@ static void add_needles(struct mesh *mesh)
     }
 }
 
-/* Rounding of the corners, 2^-53 x 65 m, over the height of a needle turns its plane by 1e-10 rad about its
- * long side, and about its short side by the same over 100 m: normals are off by 2^-53 x |e1||e2|, which over
- * 100 m displaces the plane by 2^-53 x 100 m x 10^6 = 1e-8 m. A micrometre holds. */
+/* Rounding of the corners, 2^-53 x 65 m, over the height of a needle turns its plane by 1e-10 rad about its long side,
+ * and about its short side by the same over 100 m. Normals are wrong by 2^-53 x |e1
+ *
+ * e2|, which over 100 m displaces the plane by 2^-53 x 100 m x 10^6 = 1e-8 m. A micrometre holds. */
 static void test_needles(void **state)
 {
     (void)state;
@@ -133,8 +134,8 @@ static void test_needles(void **state)
     table_check();
 }
 
-/* A fan of needles in a full turn: all their points in one. What goes through is wrong by 100 m. Float ranges
- * err by 1e-5 m, double ones as above. */
+/* A fan of needles in a full turn, with all their points in one place. A ray that goes through is wrong by 100 m. Float
+ * ranges err by 1e-5 m, double ones as above. */
 static void test_fan(void **state)
 {
     (void)state;
@@ -166,9 +167,9 @@ static void test_fan(void **state)
 
 /* ---- seams */
 
-/* Halves of a screen that meet at x = 0 with 7 and 64 cells a side: corners of one lie on edges of the other,
- * as far as doubles go. They miss them by up to 2^-53 of their coordinates, below what double precision tells
- * at that distance, and must hold. */
+/* Halves of a screen that meet at x = 0 with 7 and 64 cells a side. Corners of one lie on edges of the other, as far as
+ * doubles go. They miss them by up to 2^-53 of their coordinates, below the resolution of double precision at that
+ * distance, so no ray may pass. */
 static void test_t_junctions(void **state)
 {
     (void)state;
@@ -214,9 +215,9 @@ static void test_soup(void **state)
     table_check();
 }
 
-/* ---- faces twice over: which of the labels? */
+/* ---- faces that stand twice: one of the labels is always chosen */
 
-/* What one way of casting says of each ray, by label. */
+/* The results of one way of casting, by label. */
 struct labels {
     uint16_t *label;
     uint32_t n;
@@ -279,8 +280,8 @@ static void label_row(struct rig *rig, const char *regime)
     free(naive.label);
 }
 
-/* A sphere of 1280 triangles twice (labels 0 and 1), and a screen of two different tessellations in one plane
- * (2 and 3). The same ray has to give the same label in any packet, cut and BVH. */
+/* A sphere of 1280 triangles stands twice (labels 0 and 1). A screen has two different tessellations in one plane (2
+ * and 3). The same ray has to give the same label in any packet, cut and BVH. */
 static void add_sphere_twice(struct mesh *mesh, int swapped)
 {
     const double centre[3] = {0.1, 0.2, 0.3};

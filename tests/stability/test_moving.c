@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that moves: what becomes of points when the pose is held for a line or a tick, or its path cut short. */
+/* A head that moves. The naive ways hold the pose for a line or a tick, or cut its path short. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +12,7 @@ enum { LINES = 100, LINE_PULSES = 3000, KNOTS = 102 };
 
 static const double RATE = 1.0, SPEED_M_S = 10.0; /* a car in a bend of 10 m */
 
-/* On the circle at t, leaning with its road. */
+/* Gives the pose on the circle at t, leaning with its road. */
 static void car_at(double t, struct pose *pose)
 {
     const double r = SPEED_M_S / RATE;
@@ -33,7 +33,7 @@ static double distance(const double a[3], const double b[3])
 }
 
 struct ride {
-    double ours_m, line_m, tick_m; /* farthest a point lies from where the true ray meets the mesh */
+    double ours_m, line_m, tick_m; /* farthest distance of a point from where the true ray meets the mesh */
     uint64_t pulses, leaks;
 };
 
@@ -113,7 +113,7 @@ static void drive(struct ride *ride)
     mesh_free(&mesh);
 }
 
-/* A line head of 100 lines/s in a car. Ours: ranges are whole counts of 1e-7 m, of which a half is rounding. */
+/* A line head of 100 lines/s in a car. Ours: ranges are whole counts of 1e-7 m, and rounding is half of one. */
 static void test_pose_of_each_pulse(void **state)
 {
     (void)state;
@@ -128,8 +128,8 @@ static void test_pose_of_each_pulse(void **state)
     table_check();
 }
 
-/* A trajectory of 10 Hz, as a navigation filter gives it: between its samples by chords, or by the cubic. The bound is
- * that of tests/unit/test_pose.c, R (rate step)^3 / 62 in the level, for the climb as much again. */
+/* A trajectory of 10 Hz, as a navigation filter gives it. Between its samples the way goes by chords, or by the cubic.
+ * The bound is that of tests/unit/test_pose.c, R (rate step)^3 / 62 in the level, and as much again for the climb. */
 static void test_between_samples(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Moving heads among moving bodies: odd scenes (odd_scenes.h), some of them at UTM, with up to three bodies that turn
- * and shift, each an odd scene of its own, and a head that moves through all of it. The caster's points stand beside
+/* Moving heads among moving bodies. Scenes are odd ones (odd_scenes.h), some of them at UTM. Up to three bodies turn
+ * and shift, each an odd scene of its own, and a head moves through all of it. The caster's points are compared with
  * the reference in long double, which has the bodies' triangles where they are at the time.
  *
  * MOVING_SCENES: how many (default 200, THOROUGH=1: 1000). */
@@ -20,7 +20,7 @@
 
 enum { PULSES = 1024, RUNS = 8, BODIES = 3, KNOTS = 9, STILL = 40, OF_A_BODY = 30 };
 
-/* A count of the range, and of labels: those of body k follow the scene's. */
+/* A count of the range. Labels count on: those of body k follow the scene's. */
 static const double COUNT_M = 1e-7;
 _Static_assert(STILL + BODIES * OF_A_BODY <= ODD_MOST, "all of it in one scene");
 
@@ -34,7 +34,7 @@ struct part {
 struct stage {
     struct part still, body[BODIES];
     uint32_t n_bodies;
-    double at_m[3], size_m; /* around which bodies and head move */
+    double at_m[3], size_m; /* bodies and head move around this place */
     struct pose_knot knot[KNOTS];
     struct cast_setup setup;
 };
@@ -61,7 +61,7 @@ static void close_part(struct part *part)
     memset(part, 0, sizeof *part);
 }
 
-/* The head goes about the station by up to a fifth of the scene, and turns. */
+/* The head moves about the station by up to a fifth of the scene, and turns. */
 static void draw_path(struct stage *stage, uint64_t *random)
 {
     for (int i = 0; i < KNOTS; i++) {
@@ -88,7 +88,7 @@ static int open_stage(uint64_t number, struct stage *stage)
                                 &stage->body[stage->n_bodies]);
     draw_path(stage, &random);
     stage->setup = (struct cast_setup){.bvh = stage->still.bvh,
-                                       .range_max_m = 400.0, /* what fits into 32 bits of counts */
+                                       .range_max_m = 400.0, /* 32 bits of counts hold that range */
                                        .mirror_counts = 0x1p32,
                                        .pan_counts = 0x1p32,
                                        .layout = LINE_POLAR,
@@ -106,7 +106,7 @@ static void close_stage(struct stage *stage)
         close_part(&stage->body[i]);
 }
 
-/* Another pose of each body: it stands about the head's path, turned anyhow. */
+/* Moves each body to another pose: it stands about the head's path, in a random attitude. */
 static void move_bodies(struct stage *stage, uint64_t *random)
 {
     for (uint32_t k = 0; k < stage->n_bodies; k++) {
@@ -128,7 +128,7 @@ static void move_bodies(struct stage *stage, uint64_t *random)
     }
 }
 
-/* All triangles where they are, as one scene. */
+/* Makes one scene of all triangles where they are. */
 static struct scene *all_of(const struct stage *stage)
 {
     static struct odd_scene all;
@@ -154,14 +154,14 @@ static struct scene *all_of(const struct stage *stage)
     return scene;
 }
 
-/* Half a count; 16 roundings of what a range is made of, at an incidence of a thousandth; and coordinates at UTM, which
- * are good to 1e-9 m, at one of a twentieth. */
+/* The bound is half a count; 16 roundings of what a range is made of, at an incidence of a thousandth; and coordinates
+ * at UTM, which are good to 1e-9 m, at an incidence of a twentieth. */
 static double bound_m(long double range_m)
 {
     return 0.5 * COUNT_M + 16.0 * 0x1p-53 * 1e3 * (double)range_m + 20.0 * 1e-9;
 }
 
-/* Whether an echo has the label of a part that is as near as the nearest. */
+/* Returns whether an echo has the label of a part that is as near as the nearest. */
 static int is_of_a_nearest(const struct scene *scene, const struct reference *reference, const struct odd_shot *shot,
                            uint32_t part)
 {
@@ -214,7 +214,8 @@ static void judge_run(const struct stage *stage, const struct schedule_segment *
 
 static void one_stage(uint64_t number, struct caster *caster, struct line_block *block, struct odd_tally *tally)
 {
-    /* A line of 1,024 pulses a microsecond apart, all around; in 8 runs, each with other poses of the bodies. */
+    /* A line of 1,024 pulses a microsecond apart, all around. It is cast in 8 runs, each with other poses of the
+     * bodies. */
     static const struct schedule_spec spec = {.prr_uhz = 200000000000,
                                               .lines_uhz = 195312500,
                                               .fov_min_udeg = -180000000,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the head stands and what it stands in: against a wall, in a solid, in a face's plane, among
- * kilometres and millimetres, before surfaces that cross. */
+/* Places of the head: against a wall, in a solid, in a face's plane, among kilometres and millimetres, before surfaces
+ * that cross. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +12,8 @@
 #ifdef SH_SANITIZE
 #define RAYS 2000u
 #else
-#define RAYS ((uint32_t)thorough(8000, 3000)) /* each by the BVH and by a sight, which have to agree bit by bit */
+/* Each ray is cast by the BVH and by a sight, which have to agree bit by bit. */
+#define RAYS ((uint32_t)thorough(8000, 3000))
 #endif
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
@@ -29,11 +30,11 @@ static void turn_about(struct mesh *mesh, const double station_m[3], double turn
     mesh_free(&point);
 }
 
-/* A room 8 m wide, 1 km from the scene's origin, the head 1 mm from a wall of 2 m cells: ranges from 1 mm,
- * incidence to 90 degrees. Ours: 16 x 2^-53 x (range + 1 km) / cos i with range x cos i = 1 mm at least on
- * that wall, so a ray that meets it at 8 m stands at cos i = 1.2e-4: below 2e-8 m. Naive: the wall and the
- * head round by 3e-5 m each in the scene's own coordinates, 3 % of what the head measures. The BVH's frame is about
- * the scene's middle: in the room, or 1 km from there, with a ball as far away on the other side. */
+/* A room 8 m wide, 1 km from the scene's origin, with the head 1 mm from a wall of 2 m cells: ranges from 1 mm,
+ * incidence to 90 degrees. Ours: 16 x 2^-53 x (range + 1 km) / cos i, with range x cos i = 1 mm at least on that wall.
+ * A ray that meets it at 8 m stands at cos i = 1.2e-4: below 2e-8 m. Naive: the wall and the head round by 3e-5 m each
+ * in the scene's own coordinates, 3 % of the range. The BVH's frame is about the scene's middle: in the room, or 1 km
+ * from there, with a ball as far away on the other side. */
 static void against_wall(const char *regime, int beside)
 {
     const double walls_m[2][3] = {{700.0, 700.0, 10.0}, {708.0, 706.0, 13.0}}, off_m[3] = {1e-3, 2.2, 1.1};
@@ -67,9 +68,8 @@ static void test_against_wall(void **state)
     table_check();
 }
 
-/* Inside of a closed body that stands in a closed room: its inner side is what the head sees. Naive: a cast
- * that skips the first millimetre, as such casts do against hits on their own surface, with the head 0.5 mm
- * from the body's skin. */
+/* The head is inside of a closed body that stands in a closed room, and sees the body's inner side. Naive: a cast that
+ * skips the first millimetre, to avoid hits on its own surface, with the head 0.5 mm from the body's skin. */
 static void test_inside_solid(void **state)
 {
     (void)state;
@@ -88,10 +88,10 @@ static void test_inside_solid(void **state)
     table_check();
 }
 
-/* ---- rays within the plane of faces: the head at the height of a table's top, looking level. The ray may
- * meet the top, whose edge-on plane double precision can't tell from the ray: anywhere between its near and
- * its far edge; or pass over it to the wall. Nothing else is right. `turned`: about no axis in particular, so
- * that the plane holds the ray up to rounding alone. */
+/* ---- rays within the plane of faces: the head is at the height of a table's top, and looks level. The ray may meet
+ * the top anywhere between its near and its far edge, as double precision can't tell the edge-on plane from the ray. Or
+ * it may pass over it to the wall. Nothing else is right. `turned` turns all about an arbitrary axis, so that only
+ * rounding separates the plane from the ray. */
 struct level {
     double near_m, end_m, wall_m; /* along the ray */
 };
@@ -108,7 +108,7 @@ static double along_face_error(const struct rig *rig, const struct level *level)
     return worst_m;
 }
 
-/* Double arithmetic is good to 1e-14 m here; the naive float range of a wall at 140 m to 1e-5 m. */
+/* Double arithmetic is good to 1e-14 m here. The naive float range of a wall at 140 m is good to 1e-5 m. */
 static void along_face_row(int turned)
 {
     struct mesh mesh = {0};
@@ -150,9 +150,9 @@ static void test_along_face(void **state)
     table_check();
 }
 
-/* ---- kilometres and millimetres: the head of a screw, 2 mm wide, 0.5 mm high, stands out of a slope of 4 km
- * made of two triangles, 5 m from the head. Embree meets the slope with floats of kilometres, off by tenths
- * of a millimetre. */
+/* ---- kilometres and millimetres: the head of a screw, 2 mm wide and 0.5 mm high, stands out of a slope of 4 km made
+ * of two triangles, 5 m from the head. Embree meets the slope with floats of kilometres, which are wrong by tenths of a
+ * millimetre. */
 static void test_mixed_sizes(void **state)
 {
     (void)state;
@@ -181,8 +181,8 @@ static void test_mixed_sizes(void **state)
     table_check();
 }
 
-/* ---- surfaces that cross: a pole through a floor. Both are met near the line where they cross, at ranges
- * nearer to each other than floats can order. */
+/* ---- surfaces that cross: a pole through a floor. Near the line where they cross, both are met at ranges nearer to
+ * each other than floats can order. */
 static void crossing_row(double distance_m)
 {
     struct mesh mesh = {0}, spot = {0};
@@ -218,7 +218,7 @@ static void test_crossing(void **state)
     table_check();
 }
 
-/* A plate seen from the front, its back so near behind that floats can't tell which comes first. */
+/* The plate is seen from the front. Its back is so near behind that floats can't tell which comes first. */
 static void test_thin_plate(void **state)
 {
     (void)state;

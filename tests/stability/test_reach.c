@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Where rays begin, and how large the scene around a body is, does not make them dear: counted in leaves that a packet
- * is tested against, and in triangles that are looked at one by one. No clock is read.
+/* The cost of a ray does not depend on where it begins, nor on how large the scene around a body is. Cost is counted in
+ * leaves that a packet is tested against, and in triangles that are decided one by one. No clock is read.
  *
- * A head whose float triangles are widened for its place, over the cosine as seen from there, has the cliff here: at a
- * ball of 5,120 triangles 800 m away it took 2,000 times as long for a ray as a head beside the ball. */
+ * Some casts widen their float triangles for the head's place, over the cosine as seen from there. At a ball of 5,120
+ * triangles 800 m away such a cast took 2,000 times as long for a ray as beside the ball. */
 #include <math.h>
 #include <string.h>
 
@@ -15,13 +15,13 @@
 enum { RAYS = BVH_CHUNK, PACKET = 16 };
 static const double BALL_M = 1.5;
 
-/* The cost of a packet. */
+/* This is the cost of a packet. */
 struct cost {
     double leaves, decided;
     uint32_t hits;
 };
 
-/* A ball, on ground that goes about so far, and further to one side; 0: without ground. */
+/* A ball on ground that reaches about so far, and further to one side. There is no ground with 0. */
 static struct bvh *ball_on_ground(double ground_m, struct scene **scene)
 {
     static const double centre[3] = {0.0, 0.0, 0.0};
@@ -38,7 +38,7 @@ static struct bvh *ball_on_ground(double ground_m, struct scene **scene)
     return bvh;
 }
 
-/* Lines across the ball, from so far away. moves: each ray begins a millimetre beside the one before. */
+/* Casts lines across the ball, from so far away. With `moves` each ray begins a millimetre beside the one before. */
 static struct cost cost_of(const struct bvh *bvh, double from_m, int moves)
 {
     static double x[RAYS], y[RAYS], z[RAYS], px[RAYS], py[RAYS], pz[RAYS], range_m[RAYS];
@@ -83,8 +83,9 @@ static struct cost in_scene(double ground_m, double from_m, int moves)
     return cost;
 }
 
-/* The ball's leaves are 0.1 m large; at 1 km boxes are larger than them by 0.5 mm, so a packet that is as wide meets one
- * in a hundred more on each side. Few rays of a thousand pass an edge within what single precision leaves of it there. */
+/* The ball's leaves are 0.1 m large. At 1 km boxes are larger than them by 0.5 mm, so a packet that is as wide meets
+ * one in a hundred more on each side. A few rays in a thousand pass an edge there more closely than single precision
+ * can tell. */
 static void far_away_costs_as_near_by(void **state)
 {
     (void)state;
@@ -112,7 +113,7 @@ static void ground_around_costs_little(void **state)
     }
 }
 
-/* Ranges count from the BVH's origin: it is where triangles are, whatever vertices the file has besides. */
+/* Ranges count from the BVH's origin. It is among the triangles, even where the file has other vertices. */
 static void vertices_of_nothing_do_not_move_the_origin(void **state)
 {
     (void)state;

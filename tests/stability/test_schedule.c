@@ -23,9 +23,9 @@ static struct schedule_spec spec_of(int64_t prr_uhz, int64_t lines_uhz)
 
 /* ---- a day */
 
-/* Adds a period n times, without n additions: while the sum stays within one power of two each addition
- * rounds to the same multiple of its last place (ties too, once the sum's last bit is even), so two real
- * additions tell the step of all. */
+/* Adds a period n times, without n additions. While the sum stays within one power of two, each addition rounds to the
+ * same multiple of its last place (ties too, once the sum's last bit is even). So two real additions give the step of
+ * all. */
 static double add_up(double period, uint64_t n)
 {
     double sum = 0.0;
@@ -44,7 +44,7 @@ static double add_up(double period, uint64_t n)
     return sum;
 }
 
-/* Ends where time stands still: where the period is below half of the sum's last place. */
+/* The sum ends where time stands still: where the period is below half of the sum's last place. */
 static float add_up_float(float period, uint64_t n)
 {
     float sum = 0.0f;
@@ -53,7 +53,7 @@ static float add_up_float(float period, uint64_t n)
     return sum;
 }
 
-/* The shortcut above is what the loop does. */
+/* The shortcut above gives the same as the loop. */
 static void test_shortcut(void **state)
 {
     (void)state;
@@ -65,8 +65,8 @@ static void test_shortcut(void **state)
     }
 }
 
-/* Pulse n of each second fires at that second exactly, and any pulse at the floor of its own time in whole
- * nanoseconds: told here from the quotient by seconds, not from the program's formula. */
+/* Pulse n of each second fires at that second exactly, and any pulse at the floor of its own time in whole nanoseconds.
+ * The truth follows from the quotient by seconds, and not from the program's formula. */
 static double worst_time_ns(const struct schedule_segment *seg, uint64_t prr_hz)
 {
     double worst_ns = 0.0;
@@ -104,8 +104,7 @@ static void test_day(void **state)
 
 /* ---- changes in mid-scan */
 
-/* Rates whose periods are n/231 of 10000 ns, so that the sum of all pulses so far is a whole number of parts.
- */
+/* Rates whose periods are n/231 of 10000 ns. The sum of all pulses so far is then a whole number of parts. */
 static const uint64_t PART = 231; /* 3 x 7 x 11 */
 static const int64_t CHANGE_PRR_HZ[] = {2200000, 300000, 700000, 550000, 2100000, 100000};
 enum { CHANGES = 100000, N_RATES = 6 };
@@ -115,10 +114,10 @@ static uint64_t parts_of(int64_t prr_hz)
     return PART * 1000000000 * 10 / (uint64_t)prr_hz; /* period in 1/2310 ns: whole for each of the rates */
 }
 
-/* Ours: a change cuts the rest of a nanosecond to a part in prr_uhz, 1e-11 ns at the least of these rates, so
- * 10^5 changes make 1e-6 ns; where the true time is a whole number of nanoseconds or just above, the floor of
- * ours is then one less. No drift, but a bound of 1 ns. Naive: each segment's length in float seconds, or
- * periods in whole nanoseconds. */
+/* Ours: a change cuts the rest of a nanosecond to a part in prr_uhz, at least 1e-11 ns with these rates, so 10^5
+ * changes make 1e-6 ns. If the true time is a whole number of nanoseconds or just above, the floor of ours is then
+ * one less. There is no drift, but a bound of 1 ns. Naive: each segment's length in float seconds, or periods in whole
+ * nanoseconds. */
 static void test_changes(void **state)
 {
     (void)state;
@@ -150,9 +149,9 @@ static void test_changes(void **state)
 
 /* ---- lines that do not divide the pulses */
 
-/* Mirror angle after an hour against k * lines / pulses modulo 1 in whole numbers. Ours: the ratio r/den and
- * two products round by 2^-53 of a turn each: 4 x 2^-53 turns = 2.8e-15 rad. Naive: the line has the nearest
- * whole number of pulses; or the mirror's step is added up in double. */
+/* The mirror angle after an hour is compared with k * lines / pulses modulo 1 in whole numbers. Ours: the ratio r/den
+ * and two products round by 2^-53 of a turn each: 4 x 2^-53 turns = 2.8e-15 rad. Naive: the line has the nearest whole
+ * number of pulses, or the mirror's step is added up in double. */
 static void line_row(int64_t prr_hz, int64_t lines_uhz)
 {
     const double turn_rad = 2.0 * acos(-1.0);

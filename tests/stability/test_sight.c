@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a standing station sees, by a map as one would first write it: a face of a cube in cells, of each cell which
- * triangles may be seen there, and rays decided by the sides of edges. Three ways to see the wrong triangle. */
+/* A visibility map of a station, as one would first write it: a face of a cube in cells, for each cell the triangles
+ * that may be seen there, and rays decided by the sides of edges. It sees the wrong triangle in three ways. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -30,7 +30,7 @@ struct naive_map {
     uint32_t n;
 };
 
-/* of_corners: an edge as a x b, as one finds it in books; else as a x (b - a). */
+/* With of_corners an edge is a x b, as in books; else a x (b - a). */
 static void make_map(const struct rig *rig, int of_corners, struct naive_map *map)
 {
     assert_true(rig->scene->n_triangles <= MOST);
@@ -55,7 +55,7 @@ static void make_map(const struct rig *rig, int of_corners, struct naive_map *ma
     }
 }
 
-/* Four directions around a ray: the corners of its cell, which is looked up in float. */
+/* Four directions around a ray: the corners of its cell. The cell is looked up in float. */
 static void cell_of(const double dir[3], double corner[4][3])
 {
     const float f[3] = {(float)dir[0], (float)dir[1], (float)dir[2]};
@@ -98,8 +98,8 @@ static int is_inside(const struct naive_triangle *it, const double dir[3])
     return vec3_dot(it->edge[0], dir) >= 0.0 && vec3_dot(it->edge[1], dir) >= 0.0 && vec3_dot(it->edge[2], dir) >= 0.0;
 }
 
-/* What the map says of the cell: a triangle that covers it and hides all others; else the ray is decided among those
- * that may be seen in it. (The cell is looked at when it is asked for, which makes no difference.) */
+/* Returns the map's answer for the cell: a triangle that covers it and hides all others, else the nearest one that may
+ * be seen in it and is met. The cell is looked at when it is asked for, which makes no difference. */
 static uint32_t naive_look(const struct naive_map *map, const double dir[3])
 {
     double corner[4][3], best = 0.0;
@@ -126,7 +126,7 @@ static uint32_t naive_look(const struct naive_map *map, const double dir[3])
 
 /* ---- rays */
 
-/* Towards a place on an edge of triangle t, and off it by off_m. */
+/* Aims towards a place on an edge of triangle t, and past it by off_m. */
 static void aim_beside_edge(struct rig *rig, uint32_t t, uint64_t seed, double off_m)
 {
     const uint32_t *corner = rig->scene->triangle[t];
@@ -141,7 +141,7 @@ static void aim_beside_edge(struct rig *rig, uint32_t t, uint64_t seed, double o
     rig_direct(rig, p[0] + scale * across[0], p[1] + scale * across[1], p[2] + scale * across[2]);
 }
 
-/* Triangles that are not the true one, beyond what double precision can tell; slipped: rays that meet none. */
+/* Counts wrong triangles, beyond the resolution of double precision. `slipped` counts rays that meet none. */
 struct wrong {
     uint32_t triangles, slipped;
 };
@@ -159,7 +159,7 @@ static struct wrong judge(const struct rig *rig)
     return wrong;
 }
 
-/* The sight of the rig's station is asked along with its BVH (rig_cast): ours are both. */
+/* rig_cast asks the sight of the rig's station and its BVH. Ours are both. */
 static void look_both_ways(struct rig *rig, int of_corners, struct wrong *naive, struct wrong *ours)
 {
     static struct naive_map map;
@@ -184,8 +184,8 @@ static void open_at_utm(struct rig *rig, struct mesh *mesh)
 
 /* ---- where it breaks */
 
-/* a x b loses |a| / |b - a| of its precision: small triangles far off. Rays pass their edges by more than double
- * precision leaves in doubt, 16 x 2^-53 of the distance. */
+/* a x b loses |a| / |b - a| of its precision, at small triangles far away. Rays pass their edges by more than the doubt
+ * of double precision, 16 x 2^-53 of the distance. */
 static void test_edges_of_corners(void **state)
 {
     (void)state;
@@ -212,8 +212,8 @@ static void test_edges_of_corners(void **state)
     table_check();
 }
 
-/* Each triangle has the side of a common edge from its own corners, and rounds it its own way. Where both say outside,
- * the ray slips out of a closed mesh. */
+/* Each triangle gets the side of a common edge from its own corners, and rounds it in its own way. If both say
+ * outside, the ray slips out of a closed mesh. */
 static void test_no_doubts(void **state)
 {
     (void)state;
@@ -232,8 +232,8 @@ static void test_no_doubts(void **state)
     table_check();
 }
 
-/* A sheet whose edges lie a hair beside the borders of cells: what float takes for the next cell is still this side of
- * the edge. */
+/* A sheet whose edges lie a hair beside the borders of cells. A place that float puts into the next cell is still on
+ * this side of the edge. */
 static void test_no_pad(void **state)
 {
     (void)state;

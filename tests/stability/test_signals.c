@@ -12,7 +12,7 @@
 
 static const double PULSE_S = 4e-9, LIGHT_M_S = 299792458.0;
 
-/* Upright planes across the view, from near to far, each with the label of its place. */
+/* Upright planes across the view, from near to far. Each has the label of its place. */
 static struct scene *planes(const double *away_m, uint32_t n)
 {
     enum { MOST = 2 };
@@ -48,7 +48,8 @@ struct shot {
     double along[RIG_LINE_PULSES]; /* cosine of each pulse with the line ahead */
 };
 
-/* A line of pulses onto the planes, `times` over; the last one stays. each, NULL: called after every line. */
+/* Casts a line of pulses onto the planes, `times` over; the last line stays. `each` is called after every line, or is
+ * NULL. */
 static void shoot(struct scene *scene, const struct surface_table *table, const struct cast_detect *asked,
                   struct shot *out, uint32_t times, void (*each)(void *ctx, const struct shot *shot), void *ctx)
 {
@@ -102,7 +103,7 @@ static void set_up_signal(int sharp, struct detect_signal *signal)
     if (detect_signal_set_up(&spec, signal, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Where the leading edge of a Gaussian pulse of that amplitude crosses the threshold, before its middle. */
+/* Returns where the leading edge of a Gaussian pulse of that amplitude crosses the threshold, before its middle. */
 static double edge_before_m(double amplitude)
 {
     double sigma_s = PULSE_S / 2.3548200450309493;
@@ -126,9 +127,10 @@ static void add_spread(void *ctx, const struct shot *shot)
     s->n += RIG_LINE_PULSES;
 }
 
-/* Range, reflectance and range noise of a foil of 300. Plain ways: time taken where the leading edge crosses the
- * threshold, with the offset that is right for white paper; reflectance as a fraction of a white target; noise as the
- * inverse of the signal, without an end. The spread of 20,000 pulses is 0.5 % off itself, four times that allowed. */
+/* This gives range, reflectance and range noise of a foil of 300. Naive ways: time taken where the leading edge crosses
+ * the threshold, with the offset that is right for white paper; reflectance as a fraction of a white target; noise as
+ * the inverse of the signal, without a lower limit. The spread of 20,000 pulses has an error of 0.5 %, and four times
+ * that is allowed. */
 static void a_foil_is_where_it_is(void **state)
 {
     (void)state;
@@ -180,8 +182,9 @@ static void a_foil_is_where_it_is(void **state)
 
 /* ---- a pane in front of a wall */
 
-/* At every gap up to one and a half times the pulse's width: one echo at the mean, weighted by what comes back, up to
- * the resolution; two beyond, each where it is. Plain: each surface an echo of its own, however near. */
+/* Gaps go up to one and a half times the pulse's width. Up to the resolution there is one echo at the mean, weighted by
+ * the returned light. Beyond it there are two, each where it is. Naive: each surface has an echo of its own, however
+ * near. */
 static void a_pane_runs_into_the_wall(void **state)
 {
     (void)state;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays that pass the outline of something in front of something else so closely that floats see the wrong
- * one. */
+/* Rays that pass the outline of one thing in front of another so closely that floats see the wrong one. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,8 +14,8 @@ enum { RAYS = 20000 };
 enum { RAYS = 30000 };
 #endif
 
-/* Places between `from` and `to`, and off them by up to 1e-7 of the distance, across the ray: half of them
- * evenly, half by powers of ten down to 1e-17, where double precision ends. */
+/* Adds rays to places between `from` and `to`, beside them by up to 1e-7 of the distance, across the ray. Half of the
+ * offsets are even, half by powers of ten down to 1e-17, where double precision ends. */
 static void aim_beside_edge(struct rig *rig, const double from[3], const double to[3], uint32_t n, uint64_t seed)
 {
     for (uint32_t i = 0; i < n; i++) {
@@ -38,14 +37,14 @@ static void aim_beside_edge(struct rig *rig, const double from[3], const double 
     }
 }
 
-/* A wall far behind, in cells; facing the station, which looks along y from the origin. */
+/* Adds a wall far behind, in cells. It faces the station, which looks along y from the origin. */
 static void add_wall(struct mesh *mesh, double y)
 {
     const double corner[3] = {-0.5 * y, y, -0.5 * y}, u[3] = {y, 0.0, 0.0}, v[3] = {0.0, 0.0, y};
     mesh_sheet(mesh, corner, u, v, 20, 20, 7);
 }
 
-/* Turns the mesh to no axis in particular, to UTM coordinates; the station stays where y begins. */
+/* Turns the mesh about an arbitrary axis and moves it to UTM coordinates. The station stays where y begins. */
 static void open_turned(struct rig *rig, struct mesh *mesh, const double station_m[3])
 {
     struct mesh point = {0};
@@ -58,7 +57,7 @@ static void open_turned(struct rig *rig, struct mesh *mesh, const double station
     mesh_free(&point);
 }
 
-/* Edges of the mesh between triangles of a label, as seen: all of them, outline or not. */
+/* Aims at edges of the mesh between triangles of a label, whether they are outlines or not. */
 static void aim_beside_all_edges(struct rig *rig, const struct mesh *mesh, uint16_t label, uint32_t rays)
 {
     uint32_t edges = 0, at = 0;
@@ -82,9 +81,8 @@ static void row(struct mesh *mesh, uint16_t label, const double station_m[3], co
 
 static const double STATION_M[3] = {0.0, 0.0, 0.0};
 
-/* The bound of all rows is 0 rays that are wrong, other than those which pass an edge within 16 x 2^-53 of
- * the distance of its farther end: there the reference in long double may see the other side of the edge than
- * any double arithmetic. */
+/* The bound of all rows is 0 wrong rays. Those do not count which pass an edge within 16 x 2^-53 of the distance of its
+ * farther end. There the reference in long double may see the other side of the edge than any double arithmetic. */
 static void test_solids(void **state)
 {
     (void)state;
@@ -105,8 +103,8 @@ static void test_solids(void **state)
     table_check();
 }
 
-/* The top of a table from hardly above it: its far edge stands at 89 degrees to the ray, the wall is 20 m
- * behind. */
+/* The head sees the top of a table from hardly above it. Its far edge stands at 89 degrees to the ray, and the wall is
+ * 20 m behind. */
 static void test_grazed_edge(void **state)
 {
     (void)state;
@@ -129,7 +127,7 @@ static void test_grazed_edge(void **state)
     table_check();
 }
 
-/* Edges without a neighbour: a sheet with a hole cut out, and fins, thinner as they go. */
+/* Edges without a neighbour: a sheet with a hole cut out, and fins that get thinner. */
 static void test_open_edges(void **state)
 {
     (void)state;
@@ -155,8 +153,8 @@ static void test_open_edges(void **state)
     table_check();
 }
 
-/* A roof: its crest goes away from the station, the rays look almost along it. Whatever rounding makes of a ray that is
- * aimed at the crest, it does not end at the wall behind. */
+/* A roof whose crest goes away from the station, with rays that look almost along it. A ray that is aimed at the crest
+ * is rounded, but does not end at the wall behind. */
 static void test_crests(void **state)
 {
     (void)state;

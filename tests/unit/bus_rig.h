@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A head on the played bus of fake_libusb.h: its stream by script, opening and closing it with nothing left behind. */
+/* A head on the scripted bus of fake_libusb.h: its stream by script, and opening and closing it with nothing left
+ * behind. */
 #ifndef TESTS_UNIT_BUS_RIG_H
 #define TESTS_UNIT_BUS_RIG_H
 

@@ -8,7 +8,7 @@
 
 extern const double ORIGIN[3]; /* prcs, m */
 
-/* Surfaces 0 and 1; label NULL: all are of surface 0. */
+/* Makes a scene with surfaces 0 and 1. With label NULL all triangles are of surface 0. */
 struct scene *scene_of(const double (*vertex)[3], uint32_t n_vertices, const uint32_t (*triangle)[3], uint32_t n,
                        const uint16_t *label);
 

@@ -29,13 +29,13 @@ struct cast_rig {
     struct line_block block;
 };
 
-/* A box from lo to hi; labels 0..5 are the walls x-, x+, y-, y+, z-, z+. */
+/* Makes a box from lo to hi; labels 0..5 are the walls x-, x+, y-, y+, z-, z+. */
 struct scene *box_scene(const double lo[3], const double hi[3]);
 
-/* Range from o along d to the box's inside, and the wall met. */
+/* Returns the range from o along d to the box's inside, and writes the wall. */
 long double box_range(const double lo[3], const double hi[3], const double o[3], const long double d[3], int *wall);
 
-/* Takes the scene over. Polar layout, 10 um, ideal encoders, no noise. */
+/* Takes the scene over. The layout is polar with 10 um, ideal encoders and no noise. */
 struct cast_rig *cast_rig_open(struct scene *scene, const double station_m[3]);
 
 void cast_rig_close(struct cast_rig *rig);
@@ -46,11 +46,11 @@ uint32_t cast_some(struct cast_rig *rig, const struct schedule_line *line, uint6
 /* Casts the whole of line n. */
 uint32_t cast_line(struct cast_rig *rig, uint64_t n, struct schedule_line *line);
 
-/* Angles of pulse k of the scan in turns, from the spec alone (a scan without changes). */
+/* Writes the angles of pulse k of the scan in turns, from the spec alone (a scan without changes). */
 void true_angles(const struct schedule_spec *spec, uint64_t k, long double *mirror, long double *pan);
 
-/* Direction in the scene of a beam at these angles of a head with this heading: clockwise from the scene's y
- * axis. */
+/* Writes the direction in the scene of a beam at these angles, for a head with this heading: clockwise from the scene's
+ * y axis. */
 void true_direction(long double mirror_turn, long double pan_turn, long double heading_rad, long double d[3]);
 
 #endif

@@ -93,7 +93,7 @@ void cola_stream(int is_b)
         cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
 }
 
-/* ---- the reader. `at` walks over the values; next() gives one of so many bytes. */
+/* ---- the reader. `at` walks over the values; next() returns one of so many bytes. */
 
 static const uint8_t *at;
 static int is_b;

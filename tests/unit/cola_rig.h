@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* For tests of CoLa: a TiM571 or LMS111 in a rig, requests and answers, and a reader of LMDscandata that is written
- * from the layout of its public description alone. */
+ * from its public description alone. */
 #ifndef TESTS_UNIT_COLA_RIG_H
 #define TESTS_UNIT_COLA_RIG_H
 
@@ -17,25 +17,25 @@
 
 extern struct protocol_rig cola;
 
-/* A session with a scanner that scans; its geometry is known. TiM: 1080 steps a turn, 0 to 810 cast, 15 Hz.
+/* Opens a session with a scanner that scans; its geometry is known. TiM: 1080 steps a turn, 0 to 810 cast, 15 Hz.
  * LMS111: 1440, 0 to 1080 cast, 25 Hz. */
 void cola_open_tim(const char *model);
 void cola_open_lms(void);
 void cola_close(void);
-/* The head's answers to SCPI lines: state is that of HEAD:STATE?. */
+/* Sets the head's answers to SCPI lines: state is that of HEAD:STATE?. */
 void cola_head_state(const char *state);
 
-/* One request in CoLa-A; the one answer without its frame. */
+/* Sends one request in CoLa-A. Returns the one answer without its frame. */
 const char *cola_ask(const char *request);
 void cola_expect(const char *request, const char *answer);
-/* The same in CoLa-B. Payloads without marks, length and check byte. */
+/* Does the same in CoLa-B. The payloads have no marks, length and check byte. */
 void cola_expect_b(const void *request, size_t len, const void *answer, size_t answer_len);
 #define EXPECT_B(request, answer) cola_expect_b(request, sizeof(request) - 1, answer, sizeof(answer) - 1)
 /* Adds marks, length and check byte. */
 size_t cola_frame_b(uint8_t *dst, const void *payload, size_t len);
 void cola_input(const void *bytes, size_t len);
 void cola_authorise(void);
-/* sEN LMDscandata 1 */
+/* Sends sEN LMDscandata 1. */
 void cola_stream(int is_b);
 
 /* A telegram LMDscandata as read back. */
@@ -58,10 +58,10 @@ struct cola_lmd {
     char name[40];
     uint32_t date[7]; /* year .. second, us */
 };
-/* Unit i of what was sent, in the form that it has. */
+/* Reads sent unit i, in its form. */
 void cola_read_lmd(uint32_t unit, struct cola_lmd *out);
 
-/* A turn whose ranges are `base_m` and 1 cm more with each step; amplitude 20 dB. */
+/* Feeds a turn whose ranges are `base_m` and 1 cm more with each step, with an amplitude of 20 dB. */
 void cola_turn(uint32_t line, double base_m);
 
 #endif

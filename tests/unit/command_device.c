@@ -8,7 +8,7 @@ static const struct command_place first_places[3] = {{{1, 2, 3, 0, 0, 0}}, {{4, 
 static const struct command_place places[3] = {
     {{1, 2, 3, 0, 0, 0}}, {{-0.1, 5e-7, 1e9, 359.5, -90, 1.0 / 3.0}}, {{7, 8, 9, 0, 0, 0}}};
 
-/* Faults as a head has them that was given two, of which it has one yet. */
+/* Faults of a head that was given two and still has one. */
 static int add_fault(void *owner, const char *text, uint32_t *number, char *why, size_t len)
 {
     (void)owner;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The device the command tests talk to: round limits, so that expected values can be worked out by hand. */
+/* The device of the command tests. Its limits are round, so that expected values can be worked out by hand. */
 #ifndef TESTS_UNIT_COMMAND_DEVICE_H
 #define TESTS_UNIT_COMMAND_DEVICE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Cases of test_config.c: edits of a configuration that loads, which must not. */
+/* Cases of test_config.c: edits that make a loading configuration fail. */
 #ifndef TESTS_UNIT_CONFIG_CASES_H
 #define TESTS_UNIT_CONFIG_CASES_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of the configuration: one that loads, edits of it in a folder of their own, and what they load as. Run from
- * the top of the source tree. */
+/* For tests of the configuration: one that loads, edits of it in a folder of their own, and the results of loading
+ * them. Run from the top of the source tree. */
 #ifndef TESTS_UNIT_CONFIG_RIG_H
 #define TESTS_UNIT_CONFIG_RIG_H
 
@@ -35,7 +35,7 @@ int load_sets(const char *const *sets, int n);
 
 int load_text(const char *text);
 
-/* base with its first `old` replaced by `with` */
+/* Returns base with its first `old` replaced by `with`. */
 char *edited(const char *old, const char *with);
 
 int load_edited(const char *old, const char *with);

@@ -66,7 +66,7 @@ struct scene *cover_l_room(void)
         vertex[i][1] = at[i % 6][1];
         vertex[i][2] = i < 6 ? 0.0 : L_HEIGHT_M;
     }
-    for (uint32_t i = 0; i < 6; i++) { /* seen from within: the other way round */
+    for (uint32_t i = 0; i < 6; i++) { /* seen from within, so in the other order */
         const uint32_t a = i, b = (i + 1) % 6, wall[2][3] = {{b, a, a + 6}, {b, a + 6, b + 6}};
         memcpy(triangle[n++], wall[0], sizeof wall[0]);
         memcpy(triangle[n++], wall[1], sizeof wall[1]);
@@ -85,7 +85,7 @@ static int64_t micro(double value)
     return llround(1e6 * value);
 }
 
-/* A line a step of the pan, a pulse a step of the line. */
+/* Each step of the pan is a line, and each step of the line a pulse. */
 void cover_scan(const struct cover *c, const double station_m[3], const struct cover_sweep *w,
                 struct coverage_scan *scan)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A device without threads: a small scene, a configuration made for the test, ticks claimed and filled one by
- * one. */
+/* A device without threads: a small scene, a configuration made for the test, and ticks that are claimed and filled one
+ * by one. */
 #ifndef TESTS_UNIT_DEVICE_RIG_H
 #define TESTS_UNIT_DEVICE_RIG_H
 
@@ -22,7 +22,7 @@
 extern char folder[64];
 extern char journal_path[96];
 
-/* N boxes without a lid, the first around the station, as objects of their own. */
+/* Writes N boxes without a lid, the first around the station, as objects of their own. */
 int write_scene(uint32_t n_objects);
 
 int write_profile(void);
@@ -47,21 +47,21 @@ struct rig *rig_open(const struct device_options *options, const char *const *se
 
 void rig_close(struct rig *rig);
 
-/* Claims the next tick. 0: there is none. */
+/* Claims the next tick. Returns 0 where there is none. */
 int rig_claim(struct rig *rig);
 
 /* Claims until `tick` is the next. */
 void rig_go_to(struct rig *rig, uint64_t tick);
 
-/* Makes the last tick claimed; it is good until the next call. */
+/* Makes the last claimed tick; it is good until the next call. */
 const struct ring_tick *rig_fill(struct rig *rig);
 
-/* A command that must be taken, as of `released`; the reply is good until the next call. */
+/* Gives a command that must be accepted, as of `released`. The reply is good until the next call. */
 const char *rig_tell(struct rig *rig, const char *line, uint64_t released);
 
 const char *rig_state(struct rig *rig, uint64_t released);
 
-/* The event with this code in the last tick, or NULL. */
+/* Returns the event with this code in the last tick, or NULL. */
 const struct native_event *rig_event(const struct rig *rig, enum native_event_code code);
 
 /* Claims until the last tick holds the event; at most `most` ticks. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* E57 files by a small reader of their own: pages, sections, packets and bit streams as ASTM E2807 has them. It shares
- * nothing with the project's writer. One file at a time. */
+/* A small reader of E57 files: pages, sections, packets and bit streams of ASTM E2807. It shares nothing with the
+ * project's writer, and holds one file at a time. */
 #ifndef TESTS_UNIT_E57_RIG_H
 #define TESTS_UNIT_E57_RIG_H
 
@@ -19,9 +19,9 @@ extern char *e57rig_xml; /* the XML section, as a string */
 
 /* Checks the CRCs and the file's header, and finds the XML. */
 void e57rig_read(const char *path);
-/* Scan k of the file, from 0, by what the XML says of it. */
+/* Reads scan k of the file, from 0, by the XML. */
 void e57rig_scan(int k, int empty_shots, int coloured);
-/* The value of the first such element. */
+/* Returns the value of the first such element. */
 double e57rig_number(const char *from, const char *tag);
 void e57rig_free(void);
 

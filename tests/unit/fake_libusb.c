@@ -56,7 +56,7 @@ int libusb_hotplug_register_callback(libusb_context *ctx, int events, int flags,
     return 0;
 }
 
-/* Whether udev runs: without it libusb has no events, and does not know. */
+/* Answers whether udev runs: without it libusb has no events, and does not know. */
 int access(const char *path, int mode)
 {
     assert_string_equal(path, "/run/udev/control");
@@ -275,7 +275,7 @@ static void fake_complete(int i, enum libusb_transfer_status status, const void 
     transfer->callback(transfer);
 }
 
-/* One thing that was to happen; 0: nothing. Writes go through unless the script has something else for them. */
+/* Carries out one scripted step. Returns 0 where there is none. Writes succeed unless the script says otherwise. */
 static int fake_happen(void)
 {
     for (int i = 0; i < bus.n_flying; i++) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* A bus in place of libusb's: its functions, defined here, come before the library's when a test program is linked. One
- * thread, no time of its own: what is scripted happens when events are handled, and when nothing is scripted, `idle` is
- * called, where the test may plug and unplug. What the library would not forgive ends the test: a transfer freed or
- * sent off while it is under way, anything left behind. */
+/* A scripted bus in place of libusb's. Its functions, defined here, come before the library's when a test program is
+ * linked. It has one thread, and no time of its own: scripted steps happen when events are handled. When nothing is
+ * scripted, `idle` is called, where the test may plug and unplug. Errors that the library does not forgive end the
+ * test: a transfer that is freed or submitted while it is under way, and anything left behind. */
 #ifndef TESTS_UNIT_FAKE_LIBUSB_H
 #define TESTS_UNIT_FAKE_LIBUSB_H
 
@@ -30,7 +30,7 @@ struct libusb_context {
 
 struct libusb_device {
     int present, other_class;             /* on the bus; not a head */
-    int open_rc;                          /* what opening it gives */
+    int open_rc;                          /* the result of opening it */
     const char *maker, *product, *serial; /* NULL: none */
 };
 
@@ -38,7 +38,7 @@ struct libusb_device_handle {
     struct libusb_device *device;
 };
 
-/* What happens to the oldest transfer of an endpoint when events are handled next. */
+/* The next step for the oldest transfer of an endpoint, when events are handled. */
 struct fake_step {
     uint8_t endpoint;
     enum libusb_transfer_status status;
@@ -54,13 +54,13 @@ struct fake_bus {
     int n_steps, done;
     void (*idle)(void);
     int no_hotplug, no_udev, gone, init_rc; /* gone: every device that is open has been unplugged */
-    int clear_halt_rc, submit_rc;           /* what these give while not 0 */
+    int clear_halt_rc, submit_rc;           /* the results of these while not 0 */
     int submit_fails;                       /* for so many times; < 0: always */
     int submit_room;                        /* how many reads may be under way; 0: any number */
     int will_not_cancel, hold_writes;
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
-    char written[4096]; /* what has come of commands */
+    char written[4096]; /* the commands so far */
     const char *answer; /* to each of them; NULL: none */
 };
 extern struct fake_bus bus;

@@ -16,13 +16,13 @@
 #include "core/georef.h"
 
 #define PI 3.14159265358979323846
-/* WGS 84, NIMA TR8350.2: a and 1/f define, the rest follows. */
+/* WGS 84, NIMA TR8350.2: a and 1/f define it, and the rest follows. */
 #define A_M 6378137.0
 #define F   (1 / 298.257223563)
 #define B_M (A_M * (1 - F))
 #define E2  (F * (2 - F))
-/* Positions are near 6.4e6 m, where doubles are 9.3e-10 m apart; a chain of some tens of operations stays
- * below ten such steps. GeographicLib states 5 nm for each direction of UTM. */
+/* Positions are near 6.4e6 m, where doubles are 9.3e-10 m apart. A chain of some tens of operations stays below ten
+ * such steps. GeographicLib states 5 nm for each direction of UTM. */
 #define TOL_M 1e-8
 
 struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, double height_m, int zone);

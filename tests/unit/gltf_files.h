@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of glTF: .glb files of a few bytes. Blocks of a buffer become buffer views, in their order; the test writes the
- * rest of the JSON. */
+/* For tests of glTF: .glb files of a few bytes. Blocks of a buffer become buffer views, in their order. The test writes
+ * the rest of the JSON. */
 #ifndef TESTS_UNIT_GLTF_FILES_H
 #define TESTS_UNIT_GLTF_FILES_H
 
@@ -9,11 +9,11 @@
 /* Empties the buffer. */
 void gltf_begin(void);
 
-/* Adds a block: the next buffer view. more: what else its JSON says, from a comma on. */
+/* Adds a block, the next buffer view. `more` is the rest of its JSON, from a comma on. */
 void gltf_block(const void *data, size_t size, const char *more);
 
-/* Blocks 0 and 1: the quad's four corners, x -2 to 2, y -1 to 1, z -2, and its texture coordinates, as floats. Accessors 0 to 2
- * are these, and the six indices of block 2. */
+/* Blocks 0 and 1 are the quad's four corners, x -2 to 2, y -1 to 1, z -2, and its texture coordinates, as floats.
+ * Accessors 0 to 2 are these, and the six indices of block 2. */
 void gltf_quad(void);
 #define GLTF_QUAD_ACCESSORS                                                    \
     "{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}," \
@@ -25,13 +25,13 @@ void gltf_quad(void);
 /* Writes a .glb whose JSON is asset, buffer views, buffers and `rest`. Its path is good until the next call. */
 const char *gltf_write(const char *name, const char *rest);
 
-/* Loads it with its textures, wherever the holes are. */
+/* Loads it with its textures, including their holes. */
 struct scene *gltf_load(const char *rest);
 
-/* The load has to fail with a line that holds `expected`. */
+/* Loading has to fail with a line that holds `expected`. */
 void gltf_refuse(const char *rest, const char *expected);
 
-/* The scene's bounds, to `within`. */
+/* The scene's bounds are these, to `within`. */
 void gltf_check_box(const struct scene *s, const double low[3], const double high[3], double within);
 
 #endif

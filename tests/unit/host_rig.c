@@ -82,7 +82,7 @@ uint32_t rig_next_seq(void)
     return rig_seq++;
 }
 
-/* The frame in `out`, with the next number. */
+/* Sends the frame in `out`, with the next number. */
 static void put_frame(int fd, size_t len)
 {
     native_seal(out, (out[3] & NATIVE_LOCAL) != 0 ? 0 : rig_next_seq());

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of libscanhead: frames of a head, written to a descriptor, and a handle at its other end. */
+/* For tests of libscanhead: frames of a head are written to a descriptor, and a handle is at its other end. */
 #ifndef TESTS_UNIT_HOST_RIG_H
 #define TESTS_UNIT_HOST_RIG_H
 
@@ -17,7 +17,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native_encode.h"
 
-/* WAIT_MS: when a test gives up, far beyond what a busy machine takes. */
+/* WAIT_MS is when a test gives up, far beyond the time of a busy machine. */
 enum { MAX_POINTS = NATIVE_MAX_POINTS, WAIT_MS = 120000 };
 
 extern uint8_t out[1 << 18];
@@ -34,7 +34,7 @@ struct line_block make_block(uint32_t n, uint64_t pulse0);
 
 void put_all(int fd, const void *data, size_t len);
 
-/* The number of the next frame: from 0 on after open_pair. Those of put_... below have it, LOCAL ones 0. */
+/* Returns the number of the next frame: from 0 on after open_pair. Frames of put_... below have it, LOCAL ones 0. */
 uint32_t rig_next_seq(void);
 
 void put_descriptor(int fd, int geo, uint32_t scan, int flags);
@@ -45,7 +45,7 @@ void put_points(int fd, uint32_t n, uint64_t pulse0);
 
 void put_event(int fd, uint32_t code, uint64_t va, uint64_t vb, uint64_t vc, int flags);
 
-/* A handle, and the head's end of its socket pair. */
+/* Opens a handle, and writes the head's end of its socket pair. */
 struct scanhead *open_pair(int *head);
 
 void expect_frame(struct scanhead *sh, int type, struct scanhead_frame *frame);

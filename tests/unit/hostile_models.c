@@ -7,8 +7,8 @@
 
 #define MODELS "/usr/share/assimp/models/"
 
-/* A wall with an opening, a body of faces, and what an IFC needs around them. The only IFC of the package is a house
- * of 4 MB, too large to be read hundreds of times. */
+/* The model has a wall with an opening, a body of faces, and the records that an IFC needs around them. The only IFC of
+ * the package is a house of 4 MB, too large to be read hundreds of times. */
 static const char IFC[] =
     "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
     "FILE_SCHEMA(('IFC2X3'));\nENDSEC;\nDATA;\n"

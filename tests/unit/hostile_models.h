@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Small whole models of the formats that Assimp reads, for breaking. */
+/* Small whole models of the formats that Assimp reads. The tests damage them. */
 #ifndef TESTS_UNIT_HOSTILE_MODELS_H
 #define TESTS_UNIT_HOSTILE_MODELS_H
 
@@ -14,11 +14,11 @@ struct hostile_model {
     size_t n;
 };
 
-/* 0: the package with some of them is missing. */
+/* Returns 0 where the package with some of them is missing. */
 int hostile_models_open(void);
 void hostile_models_close(void);
 
-/* By number: its format is number % HOSTILE_FORMATS, and of that format each model in turn. */
+/* Returns a model by number. Its format is number % HOSTILE_FORMATS, and the models of a format come in turn. */
 const struct hostile_model *hostile_model(uint64_t number);
 const char *hostile_format(int format);
 

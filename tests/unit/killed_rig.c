@@ -4,7 +4,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-/* In place of the system's: thousands of repairs would wait for the disk, and no plug is pulled here. */
+/* It replaces the system's, as thousands of repairs would wait for the disk, and power never fails here. */
 int fdatasync(int fd)
 {
     return fd >= 0 ? 0 : -1;
@@ -36,7 +36,7 @@ void killed_rig_record(const char *path, struct recorder_options options, void (
 
 void killed_rig_write(const char *path, const void *data, size_t len)
 {
-    unlink(path); /* some file systems write a file to the disk at once that was emptied */
+    unlink(path); /* some file systems write a file that was emptied to the disk at once */
     FILE *out = fopen(path, "wb");
     assert_non_null(out);
     assert_int_equal(fwrite(data, 1, len, out), len);

@@ -159,3 +159,31 @@ char *test_dir(void)
     assert_non_null(mkdtemp(dir));
     return dir;
 }
+
+void expect_refused(const struct link_spec *spec, int code, const char *part)
+{
+    struct sh_err err = {0, ""};
+    void *link = NULL;
+    assert_int_equal(link_ops_get(spec->type)->open(spec, &link, &err), code);
+    assert_null(link);
+    if (strstr(err.text, part) == NULL || strchr(err.text, '\n') != NULL) fail_msg("'%s' without '%s'", err.text, part);
+}
+
+static void fill_bytes(uint8_t *data, size_t len)
+{
+    for (size_t i = 0; i < len; i++)
+        data[i] = (uint8_t)(i ^ i >> 8);
+}
+
+void exchange(struct bench *bench, int session, int fd)
+{
+    uint8_t out[2048], back[2048];
+    fill_bytes(out, sizeof out);
+    bench_write_all(bench, session, out, sizeof out);
+    fd_read_all(fd, back, sizeof back);
+    assert_memory_equal(out, back, sizeof out);
+    memset(back, 0, sizeof back);
+    assert_int_equal(write(fd, out, sizeof out), sizeof out);
+    bench_read_all(bench, session, back, sizeof back);
+    assert_memory_equal(out, back, sizeof out);
+}

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What the link tests share: a link under test and waiting for its events. A wait ends with the event, or
- * fails the test after WAIT_MS, which no sound run comes near; nothing sleeps. Once one has failed so, those of the
- * tests after it end after a second. A poll that does not come back in that time ends the program (SIGALRM). */
+/* Shared by the link tests: a link under test, and waits for its events. A wait ends with the event, or fails the test
+ * after WAIT_MS, far beyond any sound run. Nothing sleeps. Once one wait has failed so, those of later tests end after
+ * a second. A poll that does not return in WAIT_MS ends the program (SIGALRM). */
 #ifndef TESTS_UNIT_LINK_TEST_H
 #define TESTS_UNIT_LINK_TEST_H
 
@@ -32,7 +32,7 @@ struct bench {
 
 int64_t now_ms(void);
 
-/* When a wait that begins now is given up, by now_ms; and that. */
+/* Returns when a wait that begins now is given up, by now_ms. The other function gives it up. */
 int64_t give_up_ms(void);
 void give_up(const char *what);
 
@@ -42,26 +42,31 @@ void bench_close(struct bench *bench);
 
 int bench_poll(struct bench *bench, uint32_t want_write, int timeout_ms);
 
-/* Takes the first event of the queue; only levels (READABLE, WRITABLE) before the one waited for are passed
- * over. */
+/* Takes the first event of the queue. Only levels (READABLE, WRITABLE) before it are passed over. */
 struct link_event bench_expect(struct bench *bench, enum link_event_kind kind, uint32_t want_write);
 
 void bench_write_all(struct bench *bench, int session, const void *data, size_t len);
 
 void bench_read_all(struct bench *bench, int session, void *data, size_t len);
 
-/* What is to be read within the deadline, as read(): of the link's other end. */
+/* Reads from the link's other end within the deadline, as read(). */
 ssize_t fd_read(int fd, void *data, size_t len);
 
 void fd_read_all(int fd, void *data, size_t len);
 
-/* Writes until the link takes no more, and it is calm: with a reader that does not read, poll must wait.
- * Between two refusals the kernel may still move bytes to the reader's side, so that there is room again a
- * few times. Returns the bytes written. */
+/* Writes until the link takes no more and is calm: with a reader that does not read, poll must wait. Between two
+ * refusals the kernel may still move bytes to the reader's side, so that there is room again a few times. Returns the
+ * bytes written. */
 size_t bench_fill(struct bench *bench, int session);
 
 void fd_drain(int fd, size_t len);
 
 char *test_dir(void);
+
+/* Opening the link must fail with this code, and with an error of one line that contains `part`. */
+void expect_refused(const struct link_spec *spec, int code, const char *part);
+
+/* Sends 2 KiB from the link to its other end, and 2 KiB back. */
+void exchange(struct bench *bench, int session, int fd);
 
 #endif

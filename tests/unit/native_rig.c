@@ -34,7 +34,7 @@ void check_frame(const uint8_t *frame, size_t len, int type, int flags, size_t p
 struct native_descriptor make_descriptor(void)
 {
     struct native_descriptor d;
-    memset(&d, 0xee, sizeof d); /* what stands behind a NUL must not reach the wire */
+    memset(&d, 0xee, sizeof d); /* bytes after a NUL must not reach the wire */
     strcpy(d.idn, "Maker,Model,SN1,1.0");
     memset(d.profile, 'p', 31);
     d.profile[31] = 0;

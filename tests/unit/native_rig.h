@@ -20,7 +20,7 @@
 
 enum { BLOCK_MAX = 7000 };
 
-/* The wire by shifts, apart from the code under test. */
+/* Reads the wire by shifts, apart from the code under test. */
 uint64_t wire(const uint8_t *p, size_t at, int bytes);
 
 double wire_double(const uint8_t *p, size_t at);

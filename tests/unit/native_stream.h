@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of the parser: a stream of frames and reply lines whose pieces are known, and what the parser finds in it.
- */
+/* For tests of the parser: a stream of frames and reply lines whose pieces are known, and the pieces that the parser
+ * finds in it. */
 #ifndef TESTS_UNIT_NATIVE_STREAM_H
 #define TESTS_UNIT_NATIVE_STREAM_H
 
@@ -35,7 +35,8 @@ void begin(void);
 
 void finish(void);
 
-/* Exactly the frames that [hurt_from, hurt_to) of the stream does not touch, byte by byte, in order. */
+/* The parser must find exactly the frames that [hurt_from, hurt_to) of the stream does not touch, byte by byte, in
+ * order. */
 void check_got(size_t hurt_from, size_t hurt_to);
 
 #endif

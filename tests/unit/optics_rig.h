@@ -15,23 +15,23 @@ struct optics {
     struct cast_detect detect;
 };
 
-/* Takes the scene over. Surfaces of reflectance 0.5; rays may begin within 50 m of the station. */
+/* Takes the scene over. Surfaces have a reflectance of 0.5, and rays may begin within 50 m of the station. */
 void open_optics(struct optics *o, struct scene *scene);
 void close_optics(struct optics *o);
 
-/* Direction of cast pulse i of a line. */
+/* Writes the direction of cast pulse i of a line. */
 void direction(const struct cast_rig *rig, const struct schedule_line *line, uint32_t i, long double d[3]);
 
 /* The entry has that range, to half a count. */
 void near_range(const struct cast_rig *rig, uint32_t entry, long double range_m);
 
-/* A whole line; 5 looks along y, 40 beside it. Returns its pulses. */
+/* Casts a whole line; line 5 looks along y, line 40 beside it. Returns its pulses. */
 uint32_t shoot_line(struct optics *o, uint64_t number, struct schedule_line *line);
 
-/* Squares of 60 m across y, at these places. Surfaces: window, wall, mirror. */
+/* Makes squares of 60 m across y, at these places. Surfaces: window, wall, mirror. */
 struct scene *sheets(const double y[3], const uint16_t label[3]);
 
-/* Panes at y = 2, and 2.004 m, as a box of glass has them; a wall behind. */
+/* Panes at y = 2 and 2.004 m, as a box of glass has them, with a wall behind. */
 struct scene *window(void);
 
 #endif

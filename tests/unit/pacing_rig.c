@@ -61,8 +61,8 @@ static void note(const char *name)
     if (is_pacer) find(name, -1);
 }
 
-/* The function that was replaced. Of conditions there may be an older kind, which dlsym would give; asked for a version that
- * is not there, dlvsym allocates. */
+/* Returns the function that was replaced. For conditions dlsym would return an older kind, and dlvsym allocates when
+ * asked for a missing version. */
 static void *next_of(const char *name)
 {
     const int is_condition = strncmp(name, "pthread_cond_", strlen("pthread_cond_")) == 0;
@@ -72,7 +72,7 @@ static void *next_of(const char *name)
     return f;
 }
 
-/* A function that notes its caller and does what it did. */
+/* A function that notes its caller and then does its work. */
 #define LOOKED_AT(type, name, params, args) \
     type name params;                       \
     type name params                        \
@@ -102,7 +102,7 @@ void free(void *p)
     __libc_free(p);
 }
 
-/* Who waits for a condition has its mutex. */
+/* A thread that waits for a condition holds its mutex. */
 LOOKED_AT(int, posix_memalign, (void **p, size_t align, size_t n), (p, align, n))
 LOOKED_AT(void *, aligned_alloc, (size_t align, size_t n), (align, n))
 LOOKED_AT(void *, memalign, (size_t align, size_t n), (align, n))
@@ -140,7 +140,7 @@ int pthread_mutex_lock(pthread_mutex_t *m)
     return next(m);
 }
 
-/* With arguments that are not known: they are passed on as a list. */
+/* The arguments are not known, so they are passed on as a list. */
 #define FORMATS(name, params, list_name, args) \
     int name params                            \
     {                                          \
@@ -176,7 +176,7 @@ static void load(struct filter *filter, size_t at)
     add(filter, (struct sock_filter)BPF_STMT(BPF_LD | BPF_W | BPF_ABS, (uint32_t)at));
 }
 
-/* Equal: yes ops are passed over; else: no ops. */
+/* If the value is equal, `yes` ops are skipped, and otherwise `no` ops. */
 static void compare(struct filter *filter, uint32_t value, uint8_t yes, uint8_t no)
 {
     add(filter, (struct sock_filter)BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, yes, no));
@@ -193,14 +193,15 @@ static size_t low_half(int arg)
     return __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__ ? at + 4 : at;
 }
 
-/* After the number is loaded: this call is let pass. */
+/* Lets this call pass, after its number is loaded. */
 static void let_pass(struct filter *filter, long nr)
 {
     compare(filter, (uint32_t)nr, 0, 1);
     end_with(filter, SECCOMP_RET_ALLOW);
 }
 
-/* What a semaphore uses: a wake-up, and a wait that a condition's or a mutex's is not, or which functions show. */
+/* Lets the calls of a semaphore pass: a wake-up, and a wait that is not one of a condition or mutex. Functions show
+ * those. */
 static void let_semaphores(struct filter *filter)
 {
     compare(filter, SYS_futex, 0, 6);
@@ -239,7 +240,8 @@ static int list_eventfds(int *fd)
     return n;
 }
 
-/* Of this thread alone, for ever. Returns the descriptor that shows its other calls; negative: there is no such filter. */
+/* Installs it for this thread alone, for ever. Returns the descriptor that shows its other calls; negative: there is no
+ * such filter. */
 static int install(void)
 {
     struct filter filter = {.n = 0};
@@ -259,7 +261,7 @@ static int install(void)
     return (int)syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_NEW_LISTENER, &program);
 }
 
-/* Writes down each call that the filter shows, and lets it go on, until the thread has ended. */
+/* Notes each call that the filter shows, and lets it go on, until the thread has ended. */
 static void *watch(void *arg)
 {
     struct seccomp_notif call;
@@ -313,7 +315,7 @@ void pacing_watch(void (*planted)(int sleep))
     assert_int_equal(pthread_create(&watcher, NULL, watch, NULL), 0);
 }
 
-/* What ends a thread, once it sleeps no more. */
+/* The calls that end a thread, once it sleeps no more. */
 static int is_the_end(const struct found *f)
 {
     static const int ends[] = {SYS_madvise, SYS_munmap, SYS_rt_sigprocmask, SYS_rseq, SYS_exit};

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What page_native.mjs compares notices with: page_hurt.py NAME writes streams with random faults of every kind,
-NAME-0.shs and more, and for each NAME-0.notices, what the client in Python notices and takes of it, a line each."""
+"""page_native.mjs compares its notices with the files of this program. page_hurt.py NAME writes streams with random faults
+of every kind, NAME-0.shs and more. For each it writes NAME-0.notices: a line for each notice and item of the Python client."""
 import os
 import random
 import struct
@@ -38,7 +38,7 @@ def stream(rng):
             frame = frame[:at] + bytes([frame[at] ^ 1 << rng.randrange(8)]) + frame[at + 1:]
         if fault == 4:
             frame = frame[:at]
-        if fault in (5, 6):  # it comes once more, or later
+        if fault in (5, 6):  # the frame comes once more, or later
             late.append((i + rng.randrange(20), frame))
         if fault not in (0, 6):
             parts.append(frame)
@@ -48,7 +48,7 @@ def stream(rng):
 
 
 def late_run(rng):
-    """A head that started again: with a number that came already, in another frame; and with numbers that were all
+    """The head starts again: with a number that came already, in another frame, and with numbers that were all
     missing."""
     again = [0, 3, 1, 3, 4]  # 1 is late, of what 2 is missing yet; the second 3 is of another sequence
     return b"".join(framed(rng, seq, seq) for seq in [*again, *range(6), *range(1000, 1011), *range(2, 900)])

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The page's panels without a browser: contrast of its colours, what a head says of its settings, events in words, the
-// files of a recording. Expected values are by hand.
+// The page's panels without a browser: contrast of its colours, a head's description of its settings, events in words,
+// the files of a recording. Expected values are by hand.
 import {readFileSync} from 'node:fs';
 import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';

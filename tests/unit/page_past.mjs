@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The points from before a page came (drivers/link/web/past.js): each points frame is shown once, whichever way it comes,
-// whatever the page's connections did meanwhile. TAP on standard output. The stream is made here, with a keeper of it that
-// answers as the head's does.
+// The points from before a page came (drivers/link/web/past.js). Each points frame is shown once, whichever way it
+// comes, and whatever the page's connections did meanwhile. It prints TAP on standard output. The stream is made here,
+// with a keeper of it that answers as the head's does.
 import {crc32c, LOCAL, Parser, REPEAT} from '../../drivers/link/web/native.js';
 import {Cloud} from '../../drivers/link/web/cloud.js';
 import {Losses} from '../../drivers/link/web/losses.js';
@@ -14,7 +14,7 @@ function equal(got, wanted, what) {
   if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
 }
 
-// A descriptor and an anchor of the polar layout, from the samples of the protocol.
+// This makes a descriptor and an anchor of the polar layout, from the samples of the protocol.
 const text = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
 const samples = [...text.matchAll(/```text\n(d5 [0-9a-f \n]*)```/g)].map(([, hex]) => Buffer.from(hex.replace(/\s/g, ''), 'hex'));
 const sampleOf = (type) => samples.find((s) => s[1] === type).subarray(28);
@@ -31,7 +31,7 @@ function frame(type, payload, seq, flags = 0) {
   return bytes;
 }
 
-// One shot with one echo, pulse k of the scan.
+// One shot with one echo, as pulse k of the scan.
 function shot(k) {
   const payload = Buffer.alloc(60);
   payload.writeUInt32LE(k, 8); // pulse0
@@ -42,7 +42,7 @@ function shot(k) {
   return payload;
 }
 
-// A head's stream, from a number on, and what its keeper has of it.
+// A head's stream, from a number on, and the part that its keeper has.
 class Stream {
   frames = [];
   kept = [];
@@ -61,7 +61,7 @@ class Stream {
   shots(from, to) { return Array.from({length: to - from}, (_, i) => this.push(POINTS, shot(from + i))); }
   telemetry() { return [this.push(TELEMETRY, sampleOf(TELEMETRY))]; }
 
-  // The body of /past, a frame a piece; keeps: how many frames of those that are kept it has so far.
+  // This makes the body of /past, with a frame in each piece.
   get = async (url) => {
     const at = Number(url.split('=')[1]), head = Buffer.alloc(56), end = this.keeps ?? this.kept.length;
     const piece = at < end ? this.kept[at] : Buffer.alloc(0);
@@ -77,7 +77,7 @@ class Stream {
   };
 }
 
-// A page as wire.js makes one: what is live goes through `takes`.
+// A page as wire.js makes one. Live frames go through `takes`.
 class Page {
   pulses = []; // shown, in the order in which they came
   live = 0;
@@ -101,7 +101,7 @@ class Page {
   }
   take(frames) { for (const bytes of frames) this.parser.push(new Uint8Array(bytes)); }
 
-  // Each of the pulses once, after a while; a pulse more, or one twice, fails at once.
+  // Each of the pulses is shown once, after a while. A pulse more, or one twice, fails at once.
   async shows(from, to, what) {
     const until = Date.now() + 30000;
     while (this.pulses.length < to - from && Date.now() < until) await new Promise((done) => setTimeout(done, 5));

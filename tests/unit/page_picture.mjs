@@ -87,8 +87,8 @@ test('a prefix of a block is spread evenly: one point of each stretch', () => {
     const met = new Set([...stretches].map((i) => Math.floor(i * k / BLOCK)));
     same(met.size, k, `stretches of ${BLOCK / k}`);
   }
-  // Every 512th point of lines with 512 points is one column. Here the places within lines are as if thrown: of 128 points
-  // in 512 places, 512 (1 - (1 - 1/512)^128) = 113.3 differ, sigma 3.4 (occupancy): above 95 by five sigma.
+  // Every 512th point of lines with 512 points is one column. Here the places within lines are random: of 128 points in
+  // 512 places, 512 (1 - (1 - 1/512)^128) = 113.3 differ, sigma 3.4 (occupancy): above 95 by five sigma.
   const columns = new Set([...evenOrder(BLOCK).slice(0, 128)].map((i) => i % 512));
   same(columns.size > 95, true, `${columns.size} columns`);
   same(new Set(evenOrder(1000)).size, 1000, 'a part of a block');
@@ -109,7 +109,7 @@ test('far from the origin: floats of coordinates jump, the cloud\'s do not', () 
 });
 
 test('the eye in two floats: what it sees moves as it does', () => {
-  // The eye 5 cm before a point, 900 m from the origin, goes 1,000 times by 1 um. Float's ulp there is 61 um.
+  // The eye is 5 cm before a point, 900 m from the origin, and moves 1,000 times by 1 um. Float's ulp there is 61 um.
   const p = Math.fround(900.05);
   let ours = 0, naive = 0;
   for (let i = 0; i < 1000; i++) {

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What page_native.mjs compares with: page_points.py NAME..., for each NAME.shs the files NAME.points, of each echo
-x, y, z (scene, m), t (s), range (m), reflectance, amplitude (dB), label, echo, echoes and pulse as doubles, and
-NAME.said, the hash of points and the number of shots."""
+"""page_native.mjs compares its points with the files of this program: page_points.py NAME... For each NAME.shs it writes
+NAME.points, which has for each echo x, y, z (scene, m), t (s), range (m), reflectance, amplitude (dB), label, echo, echoes
+and pulse as doubles. It also writes NAME.said, with the hash of points and the number of shots."""
 import array
 import math
 import os

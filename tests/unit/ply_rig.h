@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of the PLY and raw recorders: a stream, recorded, and the file's bytes. */
+/* For tests of the PLY and raw recorders: a stream is recorded, and the file's bytes are read. */
 #ifndef TESTS_UNIT_PLY_RIG_H
 #define TESTS_UNIT_PLY_RIG_H
 
@@ -16,7 +16,7 @@
 #include "drivers/record/recorder.h"
 #include "drivers/protocol/native_encode.h"
 
-enum { N = 5 };
+enum { N = 5, RECORD = 50 }; /* points of a stream frame; bytes of a vertex with all columns */
 
 extern char dir[];
 extern char shs_path[64], out_path[64], part_path[64];
@@ -29,7 +29,7 @@ extern int16_t refl[N];
 extern uint16_t label[N];
 extern uint8_t echo[N];
 
-/* The frame in `out`, with the next number where it has none. */
+/* Adds the frame in `out`, with the next number where it has none. */
 void put(size_t len);
 
 void put_descriptor(int geo, uint32_t scan, uint32_t n_surfaces);
@@ -42,7 +42,7 @@ void put_surfaces(uint32_t first, uint32_t n, char *name);
 
 void begin_stream(void);
 
-/* Records the stream at shs_path; the code of the call that failed, or of close. */
+/* Records the stream at shs_path. Returns the code of the call that failed, or of close. */
 int record(const char *path, struct recorder_options options, int keep, struct sh_err *err);
 
 extern char *text;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The hash of points of a recording, as drivers/link/web/README.md defines it: point_hash.py FILE.shs"""
+"""This prints the hash of points of a recording, as drivers/link/web/README.md defines it: point_hash.py FILE.shs"""
 import os
 import struct
 import sys

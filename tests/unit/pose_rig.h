@@ -15,7 +15,7 @@ extern const double DEG;
 
 double distance(const double a[3], const double b[3]);
 
-/* The knots with the rules that the program uses. */
+/* Finds the knots with the rules that the program uses. */
 int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
               struct pose_path *out, struct sh_err *err);
 

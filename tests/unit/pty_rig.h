@@ -12,7 +12,7 @@
 
 #include "tests/unit/link_test.h"
 
-/* A child that goes with us, should the test fail. */
+/* Starts a child that ends with this program, also when the test fails. */
 pid_t fork_child(void);
 
 extern const struct link_spec plain;
@@ -21,7 +21,7 @@ const char *pty_path(const struct bench *bench);
 
 int client_open(const struct bench *bench);
 
-/* 1 when nothing happens for a while: no state that keeps poll awake. */
+/* Returns 1 when nothing happens for a while: no state keeps poll awake. */
 int is_calm(struct bench *bench, uint32_t want_write);
 
 /* Reads until the session ends and returns how many bytes came. */

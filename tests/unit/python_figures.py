@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures of the client in Python that few streams show: python_figures.py numpy|plain prints "same", or "no numpy"."""
+"""This checks figures of the Python client that few streams show: python_figures.py numpy|plain prints "same" or "no numpy"."""
 import math
 import os
 import struct
@@ -12,7 +12,7 @@ import scanhead  # noqa: E402
 
 
 def geodetic(lon_deg, count, echo=1, echoes=1):
-    """A point of the geo layout, count steps of 1e-8 degrees east of the anchor."""
+    """Returns a point of the geo layout, count steps of 1e-8 degrees east of the anchor."""
     record = struct.pack("<IIIhHI", 0, count & 0xFFFFFFFF, 0, -1234, 40000, echoes << 28 | echo << 24 | 7)
     raw = scanhead._raw_columns(bytes(40) + record, 1)
     points = scanhead._common(raw, 1000, scanhead.GEO)
@@ -22,7 +22,7 @@ def geodetic(lon_deg, count, echo=1, echoes=1):
 
 
 def points():
-    """Longitudes stay within 180 degrees; counts of echoes have four bits, labels sixteen."""
+    """Longitudes stay within 180 degrees. Counts of echoes have four bits, and labels have sixteen."""
     for lon_deg, count, want in ((179.9999, 30000, -179.9998), (-179.9999, -30000, 179.9998), (9.0, -5, 9 - 5e-8)):
         p = geodetic(lon_deg, count, 14, 15)
         assert abs(p.y[0] - want) < 1e-12, (lon_deg, p.y)
@@ -31,7 +31,7 @@ def points():
 
 
 def not_finite():
-    """Each double of each frame is refused where it is infinite or no number."""
+    """Each double of each frame is refused if it is infinite or NaN."""
     for kind in (scanhead.DESCRIPTOR, scanhead.ANCHOR):
         form = scanhead._UNPACK[kind][0]
         plain = list(form.unpack(bytes(form.size)))
@@ -46,7 +46,7 @@ def not_finite():
 
 
 def turns():
-    """The short way between two poses, whatever the signs of their quaternions: 0.2 rad about z."""
+    """The turn between two poses is the short one, 0.2 rad about z, whatever the signs of their quaternions."""
     for sign in (1, -1):
         a = scanhead.Pose(0, (0, 0, 0), (1, 0, 0, 0), 0, 0)
         b = scanhead.Pose(10, (0, 0, 0), (sign * math.cos(0.1), 0, 0, sign * math.sin(0.1)), 0, 0)
@@ -55,7 +55,7 @@ def turns():
 
 
 def rings():
-    """On the wire an elevation is rounded to 1e-6 degrees; it is a multiple of the step."""
+    """On the wire an elevation is rounded to 1e-6 degrees. The client makes it a multiple of the step again."""
     e = scanhead._rings({"gaps": 7, "rings": 6, "first_ring_udeg": round(1e6 * (-90 + 180 / 7))})
     assert abs(e["first_ring_deg"] - (-90 + 180 / 7)) < 1e-12 and e["ring_step_deg"] == 180 / 7, e
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of recorders: a stream written shot by shot, recorded, and the file's bytes. */
+/* For tests of recorders: a stream is written shot by shot and recorded, and the file's bytes are read. */
 #ifndef TESTS_UNIT_RECORDER_RIG_H
 #define TESTS_UNIT_RECORDER_RIG_H
 
@@ -23,7 +23,7 @@ enum { RIG_MAX_POINTS = 4096 };
 
 extern char rig_shs[64];
 extern FILE *rig_stream;
-extern char rig_notes[2048];       /* what the recorder told, a line each */
+extern char rig_notes[2048];       /* the recorder's notes, a line each */
 extern int (*rig_stop)(void *ctx); /* asked while files are completed; NULL: never */
 
 void rig_put(const uint8_t *frame, size_t len);
@@ -32,7 +32,7 @@ extern int64_t rig_scan_t0_ns; /* device time at which the scan of rig_points be
 
 void rig_begin(void);
 
-/* 1 kHz, so that a pulse is a millisecond. Polar: 3600 counts a turn, millimetres. */
+/* The rate is 1 kHz, so that a pulse is a millisecond. Polar: 3600 counts a turn, millimetres. */
 void rig_descriptor(int geo, uint32_t scan);
 
 struct native_anchor rig_anchor_of(uint32_t crs, uint32_t epsg, uint32_t station);
@@ -46,18 +46,18 @@ struct rig_point {
     uint8_t echo, count; /* 0, 0: shot without echo */
 };
 
-/* Points of one line, whose first pulse is line_pulse0; a millisecond from pulse to pulse. */
+/* Adds points of one line, whose first pulse is line_pulse0, with a millisecond from pulse to pulse. */
 void rig_points(uint32_t line, uint64_t line_pulse0, uint64_t pulse0, const struct rig_point *p, uint32_t n);
 
-/* keep: RIG_KEEP_ALWAYS also after a failure, as `record` does with what has come. */
+/* keep: RIG_KEEP_ALWAYS keeps the received points also after a failure, as `record` does. */
 enum { RIG_KEEP = 1, RIG_KEEP_ALWAYS = 2 };
 
-/* Records the stream; the code of the call that failed, or of close. */
+/* Records the stream. Returns the code of the call that failed, or of close. */
 int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err);
 
 const char *rig_path(const char *name);
 
-/* The whole file, NUL-terminated; free() it. */
+/* Returns the whole file, NUL-terminated; free() it. */
 uint8_t *rig_read(const char *path, size_t *len);
 
 uint64_t rig_uint(const uint8_t *p, int bytes);
@@ -66,10 +66,10 @@ int32_t rig_int32(const uint8_t *p);
 
 double rig_double(const uint8_t *p);
 
-/* A stream that fails for want of space leaves what came to the disk, if the format can be repaired, else nothing: a limit on
- * the file's size stands for the full disk. */
+/* A stream that fails for want of space leaves the bytes on the disk, if the format can be repaired, else nothing. A
+ * limit on the file's size stands for the full disk. */
 void rig_check_disk_full(const char *path, rlim_t size);
-/* That of path there is PATH.part, which the recorder has said and a repair takes; or nothing. Nothing stays. */
+/* path has either PATH.part, which the recorder has reported and a repair takes, or nothing. The files are removed. */
 void rig_check_left(const char *path);
 
 int rig_set_up(void **state);

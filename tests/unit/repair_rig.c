@@ -3,7 +3,7 @@
 
 #include <sys/stat.h>
 
-/* ---- in place of libc's: thousands of small files need not reach a disk */
+/* ---- replacements of libc's: thousands of small files need not reach a disk */
 
 int fsync(int fd)
 {
@@ -11,7 +11,7 @@ int fsync(int fd)
     return 0;
 }
 
-/* ---- what a killed recorder leaves */
+/* ---- files that a killed recorder leaves */
 
 const struct repair_format repair_formats[REPAIR_FORMATS] = {
     {"a.shs", {0}, 0},          {"a.pcapng", {0}, 0},
@@ -49,7 +49,7 @@ static void put_scan(uint32_t scan)
         rig_points(i, 2 * i, 2 * i, p, 3);
 }
 
-/* Two scans, 12 points. */
+/* Writes two scans with 12 points. */
 static void put_stream(void)
 {
     rig_begin();
@@ -59,7 +59,7 @@ static void put_stream(void)
     rig_stream = NULL;
 }
 
-/* What is on the disk when all frames have come, and nothing else. */
+/* Returns the disk's contents when all frames have come, and the end has not. */
 static struct bytes leave(const struct repair_format *f)
 {
     struct scanhead *sh;

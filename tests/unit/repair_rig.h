@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of repair: what killed recorders leave, beside the whole files of the same small stream. */
+/* For tests of repair: the files that killed recorders leave, beside the whole files of the same small stream. */
 #ifndef TESTS_UNIT_REPAIR_RIG_H
 #define TESTS_UNIT_REPAIR_RIG_H
 
@@ -19,14 +19,14 @@ struct repair_format {
 };
 
 extern const struct repair_format repair_formats[REPAIR_FORMATS];
-/* Of each: FILE.part when all frames had come, and FILE. */
+/* For each format: FILE.part when all frames had come, and FILE. */
 extern struct bytes repair_left[REPAIR_FORMATS], repair_whole[REPAIR_FORMATS];
 extern struct sh_err repair_err;
 
 int repair_set_up(void **state);
 int repair_tear_down(void **state);
 
-/* The file that the test is about; its folder is the rig's. */
+/* The file of the test; its folder is the rig's. */
 extern char repair_path[160], repair_part[168];
 void repair_name(const char *file);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of the scene: files in a folder of their own, a load that collects warnings. */
+/* For tests of the scene: files in a folder of their own, and a load that collects warnings. */
 #ifndef TESTS_UNIT_SCENE_FILES_H
 #define TESTS_UNIT_SCENE_FILES_H
 
@@ -34,12 +34,12 @@ void keep_warning(void *ctx, const char *text);
 
 int load_spec(const struct scene_mesh_spec *spec, double tolerance_m, struct scene **out, struct sh_err *err);
 
-/* As it is: z up, metres, at the origin, float coordinates good to a millimetre. */
+/* Loads it unchanged: z up, metres, at the origin, float coordinates good to a millimetre. */
 struct scene *load(const char *file);
 
 struct scene *load_text(const char *name, const char *text);
 
-/* The load has to fail with a line of text that names the file and holds `expected`. */
+/* Loading has to fail with a line of text that names the file and holds `expected`. */
 void refuse(const char *name, const void *data, size_t len, const char *expected);
 
 double triangle_area(const struct scene *s, uint32_t i);

@@ -82,7 +82,7 @@ static void part(uint32_t line, int from, int to)
     protocol_rig_points(&rig, &run);
 }
 
-/* Frames of at most 150 points: firing times within a frame are below 2^24 ns. */
+/* Frames have at most 150 points, so firing times within a frame are below 2^24 ns. */
 void scip_part(uint32_t line, int from, int to)
 {
     for (; from <= to; from += 150)
@@ -106,7 +106,7 @@ void scip_line_time(uint32_t line)
     rig.ops->time(rig.protocol, rig.scan_t0_ns + line_ns(line + 1));
 }
 
-/* One line, whose last character is the sum of those before it; their number. */
+/* Reads one line, whose last character is the sum of those before it. Returns how many those are. */
 static size_t summed_line(const char **at, char line[80])
 {
     const size_t len = strcspn(*at, "\n");

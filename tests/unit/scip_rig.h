@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of SCIP: a head that spins, what its session answers, and a decoder of scans written from the
- * protocol's description alone. */
+/* For tests of SCIP: a head that spins, the answers of its session, and a decoder of scans written from the protocol's
+ * description alone. */
 #ifndef TESTS_UNIT_SCIP_RIG_H
 #define TESTS_UNIT_SCIP_RIG_H
 
@@ -20,34 +20,33 @@ enum { SCIP_STEPS = 1500 };
 extern struct protocol_rig rig;
 extern struct protocol_rig_shot shot[SCIP_STEPS]; /* of the steps first..last */
 
-/* A session of that model, whose head is described: 0.02 to 5.6 m for URG-04LX, 0.1 to 30 m else. */
+/* Opens a session of that model, whose head is described: 0.02 to 5.6 m for URG-04LX, 0.1 to 30 m else. */
 void scip_open(const char *model);
-/* The same with a head of one's own. */
+/* Does the same with a chosen head. */
 void scip_open_head(const char *model, uint32_t steps, int first, int last, int front, int turn, uint32_t lines_hz);
 void scip_close(void);
 
-/* Lines of the client, and exactly what has come for them since the last call. */
+/* Sends lines of the client. Exactly `answer` must have come since the last call. */
 void scip_ask(const char *lines, const char *answer);
 void scip_expect(const char *answer);
 
-/* All shots at one range. */
+/* Sets all shots to one range. */
 void scip_flat(double range_m);
-/* Turn number `line`, and time up to its end. */
+/* Feeds turn number `line`, and time up to its end. */
 void scip_turn(uint32_t line);
-/* Parts of a turn: the points of shots from..to, both included; its end; time up to its end. */
+/* Feeds parts of a turn: the points of shots from..to, both included; its end; time up to its end. */
 void scip_part(uint32_t line, int from, int to);
 void scip_line_end(uint32_t line, uint32_t status);
 void scip_line_time(uint32_t line);
 
-/* A scan in the bytes at *at, which then are passed. Asserts that sums, line lengths and the empty line are
- * right. */
+/* Decodes a scan at *at, and moves *at behind it. Asserts that sums, line lengths and the empty line are right. */
 struct scip_decoded {
     char echo[80], status[3];
     uint32_t time_ms, n_steps;
     uint32_t n[SCIP_STEPS], range_mm[SCIP_STEPS][3], intensity[SCIP_STEPS][3];
 };
 void scip_decode(struct scip_decoded *scan, const char **at, int n_chars, int intensity);
-/* The same, of all that has come; no byte is left. */
+/* Decodes all bytes so far as one scan; no byte may be left. */
 void scip_decode_only(struct scip_decoded *scan, int n_chars, int intensity);
 
 #endif

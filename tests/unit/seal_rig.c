@@ -23,7 +23,7 @@ uint64_t seal_count(const struct protocol_ops *ops, const uint8_t *unit, size_t 
     return n;
 }
 
-/* What a unit says, of which these bits are changed. */
+/* The contents of a unit, in which these bits are changed. */
 struct said {
     uint8_t bytes[MAX_SAID];
     size_t size;

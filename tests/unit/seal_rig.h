@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Units whose content is changed and whose checksums are made right again, for each protocol that has units: what a
- * reader that knows the protocol's description alone makes of them. */
+/* Units whose contents are changed and whose checksums are made right again, for each protocol that has units. A reader
+ * that follows the protocol's description alone must accept them. */
 #ifndef TESTS_UNIT_SEAL_RIG_H
 #define TESTS_UNIT_SEAL_RIG_H
 
@@ -14,17 +14,17 @@
 
 #include "drivers/protocol/protocol.h"
 
-/* Reads a unit, and asserts that its form and its checksums are right. Returns what it says, *size bytes. */
+/* Reads a unit, and asserts that its form and its checksums are right. Returns its contents, *size bytes. */
 typedef const void *seal_reader(const uint8_t *unit, size_t len, size_t *size);
 
-/* Bits of a unit that may be changed. */
+/* Returns how many bits of a unit may be changed. */
 uint64_t seal_count(const struct protocol_ops *ops, const uint8_t *unit, size_t len);
 
-/* Each of these bits alone, and random sets of them: the reader accepts the unit, and it says something else. */
+/* Changes each of these bits alone, and random sets of them. The reader must accept the unit, with other contents. */
 void seal_check(const struct protocol_ops *ops, const uint8_t *unit, size_t len, seal_reader *read);
 
-/* Its beginnings, each in memory of just its length, and the unit with single bytes that are anything: nothing beside
- * it is read or written (sanitizers see that), and what may change lies within it. */
+/* Tries the unit's beginnings, each in memory of just its length, and the unit with random single bytes. Nothing
+ * outside is read or written (sanitizers see that), and the changeable bits lie within it. */
 void seal_check_broken(const struct protocol_ops *ops, const uint8_t *unit, size_t len);
 
 #endif

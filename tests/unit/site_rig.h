@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests that load a site from a configuration: a folder of their own, what the load warned of. */
+/* For tests that load a site from a configuration: a folder of their own, and the warnings of the load. */
 #ifndef TESTS_UNIT_SITE_RIG_H
 #define TESTS_UNIT_SITE_RIG_H
 
@@ -23,11 +23,11 @@ extern struct config *cfg;
 extern struct sh_err err;
 extern const struct sh_report report; /* keeps warnings in warned */
 
-/* The folder, cfg, and the profiles of this tree. */
+/* Makes the folder, cfg, and the profiles of this tree. */
 int site_rig_setup(void **state);
 int site_rig_teardown(void **state);
 
-/* A file in the folder; the teardown removes it. */
+/* Writes a file in the folder; the teardown removes it. */
 void write_in(const char *name, const char *text);
 
 void clear_warned(void);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How far ahead casters are: as far as loop.ahead_ms allows, and never further. A command waits for the ticks that are
- * claimed already, and the ring has slots for so many. */
+/* Casters are ahead exactly as far as loop.ahead_ms allows. A command waits for the ticks that are claimed already, and
+ * the ring has slots for so many. */
 #include "tests/unit/device_rig.h"
 
 #include <poll.h>
@@ -9,7 +9,8 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/loop_inside.h"
 
-/* Ticks that are claimed and not released. Released is read last: it only grows, so this is never too much. */
+/* Returns how many ticks are claimed and not released. Released is read last: it only grows, so this is never too
+ * much. */
 static int64_t ahead(struct loop *loop)
 {
     pthread_mutex_lock(&loop->casters.claim_lock);
@@ -42,7 +43,7 @@ static void check_ahead(const char *const *sets, int n_sets, int64_t allowed)
     assert_int_equal(most, allowed);
 }
 
-/* ahead_ms of whole ticks, and the one at hand. */
+/* The limit is ahead_ms in whole ticks, and the current one. */
 static void casters_are_ahead_as_far_as_allowed(void **state)
 {
     (void)state;

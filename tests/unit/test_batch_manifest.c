@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Lines of a campaign's manifest: what is written is read, what isn't whole is none; files that a mesh names. */
+/* Lines of a campaign's manifest: written lines are read, and torn ones are ignored. And the files that a mesh
+ * names. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -133,7 +134,7 @@ static void test_torn(void **state)
     for (off_t left = line - 1; left >= 0; left -= left > 40 ? 37 : 1) {
         assert_int_equal(truncate(copy, left), 0);
         assert_int_equal(read_all().n, 0);
-        assert_int_equal(warnings, 0); /* of a line that is not whole, also where only its end is missing */
+        assert_int_equal(warnings, 0); /* a line that is not whole gives none, even where only its end is missing */
         add(1, 2);
         const struct seen seen = read_all();
         assert_int_equal(seen.n, 1);
@@ -160,7 +161,7 @@ static void test_folder(void **state)
     const struct seen seen = read_all();
     assert_int_equal(seen.n, 4);
     assert_true(seen.job[0] == 5 && seen.job[1] == 5 && seen.job[2] == 6 && seen.job[3] == 3);
-    assert_int_equal(warnings, 1); /* of the line in the middle */
+    assert_int_equal(warnings, 1); /* for the line in the middle */
     assert_int_equal(batch_manifest_open(dir, 1, 2, &fd, &err), SH_OK);
     assert_int_equal(batch_manifest_open(dir, 1, 2, &second, &err), SH_ESTATE);
     assert_non_null(strstr(err.text, "shard 1/2"));
@@ -198,7 +199,7 @@ static void test_other_lines(void **state)
     fclose(f);
 }
 
-/* ---- what a mesh names */
+/* ---- the files that a mesh names */
 
 static int list_name(void *ctx, const char *name, const char *path)
 {
@@ -239,9 +240,9 @@ static void test_beside(void **state)
     expect_beside("empty.obj", "");
 }
 
-/* ---- what a job is */
+/* ---- the identity of a job */
 
-/* Where a text ends matters: a value and a name are not another value and another name. */
+/* The end of each text counts: another split into name and value is another job. */
 static void test_job_texts(void **state)
 {
     static const char *const a[] = {"head.prr_hz=1", "0001", "x"}, *const b[] = {"head.prr_hz=10", "001", "x"};
@@ -256,7 +257,7 @@ static void test_job_texts(void **state)
     assert_string_equal(one.job, other.job);
 }
 
-/* Each input counts by what is in it: the mesh, the file that it names, and what that names. */
+/* Each input counts by its contents: the mesh, the file that it names, and the files that that one names. */
 static void test_inputs(void **state)
 {
     static const char *const inputs[] = {"m.obj", "first.mtl", "a.png", "faults.yaml", "head.yaml"};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a campaign varies: values, combinations in their order, stations, shards, names of files. */
+/* The variations of a campaign: values, combinations in their order, stations, shards, names of files. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +11,7 @@
 
 #include "firmware_sim/app/studio/batch/sweep.h"
 
-/* The values of one --sweep, each in brackets; or the error, after a "!". */
+/* Returns the values of one --sweep, each in brackets; or the error, after a "!". */
 static const char *values(const char *text)
 {
     static char all[1024];
@@ -83,7 +83,7 @@ static void test_order(void **state)
     }
     assert_int_equal(batch_sweeps_add(&sweeps, "a=3", &err), SH_EINPUT); /* a key twice */
     batch_sweeps_free(&sweeps);
-    /* 1,000 x 1,000 are as many as there may be; twice that are too many */
+    /* 1,000 x 1,000 are allowed; twice that are too many. */
     assert_int_equal(batch_sweeps_add(&sweeps, "a=1:1000:1", &err), SH_OK);
     assert_int_equal(batch_sweeps_add(&sweeps, "b=1:1000:1", &err), SH_OK);
     assert_int_equal(batch_sweeps_count(&sweeps, &n, &err), SH_OK);
@@ -139,7 +139,7 @@ static void test_names(void **state)
     set[0] = "f=../a\\b:c*?\"<>|\xc3\xa4\n$`'";
     batch_name(1, 4, 1, set, 1, name);
     assert_string_equal(name, "0001_station-1_f=.._a_b_c____________");
-    /* long ones differ where their ends do */
+    /* Long ones differ where their ends do. */
     memset(value, 'x', sizeof value);
     value[sizeof value - 1] = '\0';
     set[0] = value;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Returns of a pulse -> echoes, and figures of a beam: by the definitions of core/footprint.h, in numbers that can be
- * done by hand. */
+/* From the returns of a pulse to echoes, and figures of a beam. The truth is the definitions of core/footprint.h, in
+ * numbers that can be worked out by hand. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -34,8 +34,8 @@ static void merge(struct beam_return *r, uint32_t n)
     assert_true(left_out == 0);
 }
 
-/* Ten equal returns within the resolution: two of the nearer surface, eight of the other. One echo, at the mean, of the
- * surface that most comes back from, though none of its returns is stronger. Whatever the order. */
+/* Ten equal returns within the resolution: two of the nearer surface, eight of the other. They are one echo, at the
+ * mean. Its surface is the one that returns most, though none of its returns is stronger. The order does not matter. */
 static void test_surface_of_many_returns(void **state)
 {
     (void)state;
@@ -53,8 +53,8 @@ static void test_surface_of_many_returns(void **state)
     }
 }
 
-/* A gap above the resolution begins a new echo; less than 1 % is none; returns each within the resolution of the next
- * hang together, however far the first is from the last. */
+/* A gap above the resolution begins a new echo, and less than 1 % is none. Returns that are each within the resolution
+ * of the next stay together, however far the first is from the last. */
 static void test_gaps(void **state)
 {
     (void)state;
@@ -72,7 +72,7 @@ static void test_gaps(void **state)
     }
 }
 
-/* Returns just at the resolution are one echo; numbers that floats have exactly. */
+/* Returns that are just the resolution apart are one echo. The numbers are exact in float. */
 static void test_at_the_resolution(void **state)
 {
     (void)state;
@@ -100,7 +100,8 @@ static void test_definitions(void **state)
     assert_true(beam_widening(BEAM_HALF_AT_1_E2) == 2.0);
 }
 
-/* Axes across a beam: unit vectors, at right angles, right-handed with the beam; also just above and below level. */
+/* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also just above and below
+ * level. */
 static void test_axes(void **state)
 {
     (void)state;
@@ -127,8 +128,8 @@ static double cap(double h)
     return energy;
 }
 
-/* Lines that do not meet in the footprint cut caps off: one within the other, beside each other though they look alike,
- * or on opposite sides. By the energy beyond a line. */
+/* Lines that do not meet in the footprint cut caps off. Caps may be one within the other, beside each other though they
+ * look alike, or on opposite sides. The truth is the energy beyond a line. */
 static void test_two_caps(void **state)
 {
     (void)state;
@@ -157,8 +158,8 @@ static void test_two_caps(void **state)
     }
 }
 
-/* Of more echoes than are asked for the weakest is left out, wherever it comes: what comes back counts, not the energy.
- * Of two as weak the first one goes. The others keep the numbers that they had among all. */
+/* If there are too many echoes the weakest is left out, wherever it comes. The returned light counts, not the
+ * energy. When two are equally weak, the first one goes. The others keep their numbers among all. */
 static void test_crowd(void **state)
 {
     (void)state;

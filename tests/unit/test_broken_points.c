@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams whose frames are whole and whose numbers are absurd: nothing is written that is none, and what is left out is
+/* Streams whose frames are whole and whose numbers are absurd. No such point is written, and those left out are
  * counted. Each file's reader would take infinities, or wrapped integers, for points. */
 #include "tests/unit/recorder_rig.h"
 
@@ -43,7 +43,7 @@ static void test_infinite(void **state)
     }
 }
 
-/* Finite at first; the pose takes them beyond. */
+/* It is finite at first, and the pose takes it beyond. */
 static void test_infinite_by_pose(void **state)
 {
     (void)state;
@@ -70,11 +70,11 @@ static void test_long_pose(void **state)
         a.rotation[i] = -1e300;
     assert_int_equal(record("a.ptx", &a, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "more digits"));
-    unlink(rig_path("a.ptx.part")); /* what came is kept */
+    unlink(rig_path("a.ptx.part")); /* the received part is kept */
     unlink(rig_path("a.ptx.grid"));
 }
 
-/* The angle comes from the pose taken back; where that is beyond any number, there is none. */
+/* The angle comes from the pose taken back. If that is beyond any number, there is no angle. */
 static void test_no_scan_angle(void **state)
 {
     (void)state;
@@ -113,7 +113,7 @@ static void test_far_rows(void **state)
     }
 }
 
-/* Two poses whose times are further apart than a signed difference holds: half-way is half-way. */
+/* The times of two poses are further apart than a signed difference holds. Half-way is half-way all the same. */
 static void test_poses_far_apart(void **state)
 {
     (void)state;
@@ -139,7 +139,7 @@ static void test_poses_far_apart(void **state)
     unlink(rig_path("a.ply"));
 }
 
-/* ---- every figure of an anchor as large as can be: what a file says is a number, or there is no file */
+/* ---- every figure of an anchor is as large as possible: a file has only finite numbers, or there is no file */
 
 static void expect_numbers(const char *name, const uint8_t *file, size_t len)
 {
@@ -196,7 +196,7 @@ static void test_extremes(void **state)
     }
 }
 
-/* So few counts that a turn has less than one. */
+/* There are so few counts that a turn has less than one. */
 static void test_no_counts(void **state)
 {
     (void)state;

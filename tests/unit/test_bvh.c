@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays that float misjudges: two surfaces within its resolution of each other, a sheet along the ray, one that the ray
- * begins on. */
+/* Rays that float misjudges: two surfaces within its resolution of each other, a sheet along the ray, a sheet that the
+ * ray begins on. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@
 
 enum { RAYS = 512, SMALL = 0, LARGE = 1 };
 
-/* Rays from ORIGIN, and what they meet. */
+/* Rays from ORIGIN, and their hits. */
 struct fan {
     double x[RAYS], y[RAYS], z[RAYS], range_m[RAYS];
     uint32_t triangle[RAYS], label[RAYS];
@@ -37,7 +37,7 @@ static void cast_fan(const struct bvh *bvh, struct bvh_work *work, struct fan *f
     bvh_hits(work, bvh, &rays);
 }
 
-/* Rays at the middle of the small sheet. Returns how many meet a triangle with that label. */
+/* Casts rays at the middle of the small sheet. Returns how many meet a triangle with that label. */
 static uint32_t shoot(const struct bvh *bvh, struct bvh_work *work, int want, double far_m)
 {
     static struct fan fan;
@@ -53,7 +53,7 @@ static uint32_t shoot(const struct bvh *bvh, struct bvh_work *work, int want, do
     return found;
 }
 
-/* A sheet at y = 60, and one through it: y = 60 + slope x. */
+/* One sheet lies at y = 60, and another one cuts it: y = 60 + slope x. */
 static struct scene *crossing(double slope)
 {
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {3, 4, 5}};
@@ -70,7 +70,8 @@ static struct scene *crossing(double slope)
 static uint32_t wrong_of_crossing(const struct bvh *bvh, struct bvh_work *work, double slope)
 {
     static struct fan fan;
-    const double least_m = 8.0 * 0x1p-53 * 300.0 * slope + 1e-9; /* what double leaves of the place, over the angle */
+    /* This is the resolution of double at the place, over the angle. */
+    const double least_m = 8.0 * 0x1p-53 * 300.0 * slope + 1e-9;
     int want[RAYS];
     uint64_t random = 5;
     uint32_t wrong = 0;
@@ -86,7 +87,7 @@ static uint32_t wrong_of_crossing(const struct bvh *bvh, struct bvh_work *work, 
     return wrong;
 }
 
-/* The small sheet is seen at the slant y = 9 + slope x, the large one reaches so much further than 3 km. */
+/* The small sheet is seen at the slant y = 9 + slope x. The large one reaches so much further than 3 km. */
 struct sheets {
     double slope, times;
 };
@@ -106,9 +107,9 @@ static struct scene *small_and_large(const struct sheets *s, double gap_m, int l
     return scene_of((const double(*)[3])v, 6, order[large_first], 2, label[large_first]);
 }
 
-/* A small sheet close before a large one, or behind it. Float would misjudge the large one: seen at a slant by
- * micrometres, where it is rounded hundreds of kilometres away by millimetres, and so by more than the small one. All rays
- * meet the nearer, whichever stands first in the mesh. */
+/* A small sheet is just before a large one, or behind it. Float would misjudge the large one. It is seen at a slant by
+ * micrometres, where it is rounded hundreds of kilometres away by millimetres, and so by more than the small one. All
+ * rays meet the nearer one, whichever stands first in the mesh. */
 static void a_small_sheet_at_a_large_one(void **state)
 {
     (void)state;
@@ -130,8 +131,8 @@ static void a_small_sheet_at_a_large_one(void **state)
     bvh_work_free(work);
 }
 
-/* A ray does not meet what it begins on, within half a micrometre, whichever way it goes; it does what is twice as far,
- * and what stands behind. Sheets at y = 9 and 10. */
+/* A ray does not meet a surface that it begins on, within half a micrometre, whichever way it goes. It meets one that
+ * is twice as far, and those behind. Sheets are at y = 9 and 10. */
 static void what_a_ray_begins_on_is_not_met(void **state)
 {
     (void)state;
@@ -170,8 +171,8 @@ static void what_a_ray_begins_on_is_not_met(void **state)
     scene_free(scene);
 }
 
-/* A facing sheet, and one through it at a slant of up to 1 in 20,000: rays that meet the slanted one so much before or
- * behind the other, 0.1 um to 1 cm. */
+/* A sheet faces the ray, and another one cuts it at a slant of up to 1 in 20,000. Rays meet the slanted one 0.1 um to 1
+ * cm before or behind the other. */
 static void sheets_that_cross_at_a_slant(void **state)
 {
     (void)state;
@@ -189,7 +190,7 @@ static void sheets_that_cross_at_a_slant(void **state)
     bvh_work_free(work);
 }
 
-/* Any two unit vectors at right angles. */
+/* Draws two unit vectors at right angles. */
 static void any_axes(uint64_t *random, double u[3], double v[3])
 {
     double d[3];
@@ -201,8 +202,8 @@ static void any_axes(uint64_t *random, double u[3], double v[3])
     beam_axes(d, u, v);
 }
 
-/* Rays within the plane of a sheet, as far as double precision shows, do not meet it: what stands on its edges they do.
- * Here nothing stands there. However the plane lies, for float has it at a small angle then. */
+/* Rays within the plane of a sheet, as far as double precision shows, do not meet it. They would meet surfaces on its
+ * edges, and there are none here. The plane has all directions, as float then has it at a small angle. */
 static void a_sheet_along_the_ray_is_not_met(void **state)
 {
     (void)state;
@@ -233,7 +234,7 @@ static void a_sheet_along_the_ray_is_not_met(void **state)
     bvh_work_free(work);
 }
 
-/* Rays from all over a sheet that lies anyhow, to both sides: float has them begin before it or behind it. None meets
+/* Rays begin all over a sheet of any attitude, to both sides. In float they begin before it or behind it. None meets
  * it. */
 static void nobody_meets_what_he_stands_on(void **state)
 {
@@ -272,8 +273,8 @@ static void nobody_meets_what_he_stands_on(void **state)
     scene_free(scene);
 }
 
-/* Two triangles of an edge name its corners in opposite orders: on which side a ray passes is the same number with the
- * other sign, to the last bit. Rays through the edge, where rounding is all there is. */
+/* Two triangles of an edge name its corners in opposite orders. The side on which a ray passes is then the same number
+ * with the other sign, to the last bit. Rays go through the edge, where only rounding decides. */
 static void both_triangles_of_an_edge_agree(void **state)
 {
     (void)state;
@@ -291,7 +292,7 @@ static void both_triangles_of_an_edge_agree(void **state)
     }
 }
 
-/* Plates one behind the other, which pass the ray at 1.4 cm while their boxes hold it, and a wall. */
+/* Plates stand one behind the other. They pass the ray at 1.4 cm while their boxes hold it. A wall is behind. */
 enum { PLATES = 100 };
 
 static struct scene *plates(void)
@@ -316,7 +317,7 @@ static struct scene *plates(void)
     return scene;
 }
 
-/* From the scene, and from far away. 1e-9 m: 2^-53 of 30 km is 3e-12 m. */
+/* Rays come from the scene, and from far away. 1e-9 m: 2^-53 of 30 km is 3e-12 m. */
 static void no_number_of_plates_hides_a_wall(void **state)
 {
     (void)state;

@@ -19,7 +19,7 @@ static struct scene *terrain(uint32_t n_triangles)
     return scene;
 }
 
-/* The same triangles, each with vertices of its own. */
+/* Makes the same triangles, each with vertices of its own. */
 static struct scene *torn(const struct scene *s)
 {
     double(*v)[3] = malloc((size_t)s->n_triangles * 3 * sizeof *v);
@@ -42,7 +42,7 @@ static struct scene *torn(const struct scene *s)
     return scene;
 }
 
-/* The triangle's corners are those of the leaf, one for one. */
+/* The triangle's corners are those of the leaf, one by one. */
 static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, int which)
 {
     static const int of[2][3] = {{0, 1, 2}, {1, 3, 2}};
@@ -55,7 +55,7 @@ static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, in
     }
 }
 
-/* They are at least what they stand for, and at most 1/64 and what rounding to float takes more. */
+/* They are at least the true lengths, and larger by at most 1/64 and the rounding to float. */
 static void check_lengths(const struct bvh *bvh, const struct bvh_leaf *leaf)
 {
     double far_m = 0.0, edge_m = 0.0;
@@ -89,7 +89,7 @@ static uint32_t check_leaves(const struct scene *scene)
     return n;
 }
 
-/* Triangles that lie in any order among 40, so that neighbours are up to 15 further in the list, and beyond. */
+/* Shuffles triangles among 40, so that neighbours are up to 15 further in the list, and beyond. */
 static void shuffle(struct scene *scene)
 {
     for (uint32_t i = 0; i + 1 < scene->n_triangles; i++) {
@@ -130,8 +130,8 @@ static void cast(const struct bvh *bvh, const double d[3][RAYS], double *range_m
     bvh_work_free(work);
 }
 
-/* A large surface that hangs together takes less memory, and has the same hits to the bit. In bytes a triangle: half a
- * leaf, 52; a plane, 32; and Embree's nodes: 20 of four leaves, 52 of one (measured at a million). */
+/* A large connected surface takes less memory, and has the same hits to the bit. In bytes a triangle: half a leaf, 52;
+ * a plane, 32; and Embree's nodes: 20 of four leaves, 52 of one (measured at a million). */
 static void test_memory_of_a_large_surface(void **state)
 {
     (void)state;

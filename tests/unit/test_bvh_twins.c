@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A face that stands twice in a mesh is met as the first of the two, wherever it is met, whatever its label and however
- * large it is. Where any number of faces lie within 1e-12 of the nearest range, the first is met. */
+/* A face that stands twice in a mesh is met as the first of the two, at any place and size and with any label. Where
+ * any number of faces lie within 1e-12 of the nearest range, the first is met. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -81,8 +81,8 @@ static void the_first_is_met(void **state)
 
 enum { STACK = 64, STACKS = 60 };
 
-/* Faces behind each other, a twelfth or less of what counts as the same apart: in a random order, or each one before or
- * behind the last. */
+/* Stacks faces that are apart by a twelfth or less of the distance that counts as the same. They are in a random order,
+ * or each one is before or behind the last. */
 static void stack_up(uint64_t *random, double vertex[3 * STACK][3], uint32_t face[STACK][3])
 {
     const double far_m = 1.0 + 49.0 * case_unit(random), step_m = far_m * 1e-12 / (12.0 + 40.0 * case_unit(random));
@@ -102,7 +102,7 @@ static void stack_up(uint64_t *random, double vertex[3 * STACK][3], uint32_t fac
     }
 }
 
-/* By the definition: the nearest of all, then the first that is as near. */
+/* Returns the hit by the definition: the nearest of all, then the first that is as near. */
 static uint32_t first_of_nearest(const struct bvh *bvh, const double dir[3], uint32_t *ties)
 {
     static const double at_m[3] = {0};

@@ -14,7 +14,7 @@ static struct cast_rig *room(void)
     return cast_rig_open(box_scene(LO, HI), HERE);
 }
 
-/* Any direction, evenly. */
+/* Gives any direction, evenly. */
 static void any_direction(uint64_t *seed, double d[3])
 {
     double s, c, z = 2.0 * case_unit(seed) - 1.0, r = sqrt(1.0 - z * z);
@@ -24,9 +24,9 @@ static void any_direction(uint64_t *seed, double d[3])
     d[2] = z;
 }
 
-/* Rooms of up to 200 m and a head anywhere in them, as near to a wall as 1 % of the room. Rounding:
- * coordinates within 400 m, so n.p is good to about 4 * 2^-53 * 400 m = 2e-13 m, seen at an incidence with a
- * cosine of at least 1/300 (a room's diagonal from 1 % beside a wall): 5e-11 m. The promise is 1 nm. */
+/* Rooms of up to 200 m and a head anywhere in them, as near to a wall as 1 % of the room. Rounding: coordinates are
+ * within 400 m, so n.p is good to about 4 * 2^-53 * 400 m = 2e-13 m. It is seen at an incidence with a cosine of at
+ * least 1/300 (a room's diagonal from 1 % beside a wall): 5e-11 m. The promise is 1 nm. */
 static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
 {
     (void)state;
@@ -55,8 +55,9 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
             int wall = -1;
             const long double d[3] = {dx[i], dy[i], dz[i]};
             long double error = fabsl((long double)range[i] - box_range(lo, hi, station, d, &wall));
-            /* Both terms of a plane's range are off by 8 units of 2^-53 of up to 4.3 km; the incidence's cosine is at least
-             * 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again, and more. */
+            /* Both terms of a plane's range have errors of 8 units of 2^-53 of up to 4.3 km. The incidence's cosine is
+             * at least 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again,
+             * and more. */
             if (!(error < 1e-9L)) fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
             assert_int_equal(rig->scene->label[triangle[i]], wall);
             if (error > worst) worst = error;
@@ -66,9 +67,8 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
     print_message("# rooms: worst range error %.2Lg m\n", worst);
 }
 
-/* A square tilted any way, 50 to 150 m off, its own vertices giving the plane. Its corners are up to 4.3 km
- * away: n.p is good to about 4 * 2^-53 * 4300 m = 2e-12 m, seen at an incidence with a cosine of at least
- * 0.05: 4e-11 m. */
+/* A square with any tilt, 50 to 150 m away, whose own vertices give the plane. Its corners are up to 4.3 km away: n.p
+ * is good to about 4 * 2^-53 * 4300 m = 2e-12 m, seen at an incidence with a cosine of at least 0.05: 4e-11 m. */
 static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
 {
     (void)state;
@@ -104,7 +104,7 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
             while (d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2] < 0.05);
             hits_from(rig->caster, rig->bvh, origin, 4000.0, 1, &d[0], &d[1], &d[2], &range, &hit);
             assert_true(hit < 2);
-            /* the plane of that triangle's own vertices, which rounding has moved off the square's */
+            /* The plane is that of the triangle's own vertices, which rounding has moved away from the square's. */
             const double *a = vertex[0], *b = vertex[triangle[hit][1]], *c = vertex[triangle[hit][2]];
             long double n[3], no = 0.0L, nd = 0.0L;
             for (int i = 0; i < 3; i++) {
@@ -117,8 +117,9 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
                 nd += n[i] * d[i];
             }
             long double error = fabsl((long double)range - no / nd);
-            /* Both terms of a plane's range are off by 8 units of 2^-53 of up to 4.3 km; the incidence's cosine is at least
-             * 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again, and more. */
+            /* Both terms of a plane's range have errors of 8 units of 2^-53 of up to 4.3 km. The incidence's cosine is
+             * at least 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again,
+             * and more. */
             if (!(error < 1e-9L)) fail_msg("plane %d, ray %d: range %.12g, %.3Lg m off", p, ray, range, error);
             if (error > worst) worst = error;
         }
@@ -127,8 +128,8 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
     print_message("# tilted planes: worst range error %.2Lg m\n", worst);
 }
 
-/* Other widths may choose the other triangle of a wall where a ray passes through the diagonal, and so
- * another rounding. */
+/* Other widths may choose the other triangle of a wall where a ray passes through the diagonal, and so another
+ * rounding. */
 static void the_width_of_packets_does_not_matter(void **state)
 {
     (void)state;
@@ -179,9 +180,9 @@ static void append(struct copy *copy, const struct line_block *block, uint32_t e
     copy->echoes += echoes;
 }
 
-/* One run, then the same line in pieces that end at multiples of 16 from its first pulse: bit by bit the
- * same. The cast window begins and ends within a packet; some shots are too near or too far; noise is on;
- * both layouts, with and without encoders. */
+/* A line is cast as one run, then in pieces that end at multiples of 16 from its first pulse: bit by bit the same. The
+ * cast window begins and ends within a packet. Some shots are too near or too far. Noise is on. There are both layouts,
+ * with and without encoders. */
 static void cuts_leave_no_trace(void **state)
 {
     (void)state;
@@ -220,7 +221,7 @@ static void cuts_leave_no_trace(void **state)
     cast_rig_close(rig);
 }
 
-/* The times in blocks, for rates whose period is no whole number of nanoseconds, behind changes of them. */
+/* Blocks have the schedule's times, for rates whose period is no whole number of nanoseconds, after changes of them. */
 static void blocks_carry_the_schedule_s_times(void **state)
 {
     (void)state;
@@ -252,7 +253,7 @@ static void blocks_carry_the_schedule_s_times(void **state)
     cast_rig_close(rig);
 }
 
-/* Both limits are within. */
+/* Both limits are allowed. */
 static void limits_are_allowed_ranges(void **state)
 {
     (void)state;
@@ -262,8 +263,8 @@ static void limits_are_allowed_ranges(void **state)
     assert_true(isnan(range_m[2]) && isnan(range_m[3]) && isnan(range_m[4]));
 }
 
-/* Two walls, one behind the other, seen head on. Nearer than the head can measure: the beam is blocked all
- * the same. */
+/* Two walls, one behind the other, are seen head on. A wall nearer than the head can measure blocks the beam all the
+ * same. */
 static void limits_block_or_swallow_the_echo(void **state)
 {
     (void)state;
@@ -310,8 +311,8 @@ static void limits_block_or_swallow_the_echo(void **state)
     cast_rig_close(rig);
 }
 
-/* 60,000 shots: mean and standard deviation of the noise within 4.75 standard errors (false alarms: 2e-6
- * each), the part per distance included. Counts of 10 um add (10 um)^2/12, a millionth of the variance. */
+/* 60,000 shots: mean and standard deviation of the noise are within 4.75 standard errors (false alarms: 2e-6 each), the
+ * part per distance included. Counts of 10 um add (10 um)^2/12, a millionth of the variance. */
 static void noise_has_its_sigma(void **state)
 {
     (void)state;
@@ -358,8 +359,8 @@ static struct scene *tetrahedron(const double vertex[4][3])
     return scene;
 }
 
-/* From corner 0 along d to the opposite face, by the ray's shares of the three edges that leave the corner; NaN: it
- * does not go there, INFINITY: too near to an edge to say. */
+/* Returns the range from corner 0 along d to the opposite face, by the ray's shares of the three edges that leave the
+ * corner. NaN: it does not go there. INFINITY: it is too near to an edge to decide. */
 static double opposite_range(const double vertex[4][3], const double d[3])
 {
     double e[3][3], share[3], sum = 0.0;
@@ -376,7 +377,7 @@ static double opposite_range(const double vertex[4][3], const double d[3])
     return share[0] > 0.0 && share[1] > 0.0 && share[2] > 0.0 ? 1.0 / sum : (double)NAN;
 }
 
-/* A head on a corner of a mesh: the corner is no echo. What lies across is seen, and in other directions nothing is.
+/* A head is on a corner of a mesh. The corner is no echo, the face across is seen, and in other directions nothing is.
  * The corner is also far from the BVH's origin. */
 static void what_a_ray_begins_on_is_no_hit(void **state)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Casting: what the counts on the wire mean. Angles, senses of rotation, encoders, positions, and frames far
- * from the origin. */
+/* Casting: the meaning of the counts on the wire. Angles, senses of rotation, encoders, positions, and frames far from
+ * the origin. */
 #include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"
 
@@ -11,7 +11,7 @@ static struct cast_rig *room(void)
     return cast_rig_open(box_scene(LO, HI), HERE);
 }
 
-/* Fires one pulse at whole micro-degrees, from a head with this heading, and gives its block entry. */
+/* Fires one pulse at whole micro-degrees, from a head with this heading, and writes its block entry. */
 static uint32_t fire(struct cast_rig *rig, int64_t mirror_udeg, int64_t pan_udeg, double heading_rad)
 {
     struct schedule_line line;
@@ -24,7 +24,7 @@ static uint32_t fire(struct cast_rig *rig, int64_t mirror_udeg, int64_t pan_udeg
     return cast_some(rig, &line, 0, 1);
 }
 
-/* One wall for each way the beam can go: labels are x-, x+, y-, y+, z-, z+. */
+/* There is one wall for each way the beam can go: labels are x-, x+, y-, y+, z-, z+. */
 static void the_beam_goes_where_the_angles_say(void **state)
 {
     (void)state;
@@ -43,7 +43,8 @@ static void the_beam_goes_where_the_angles_say(void **state)
     cast_rig_close(rig);
 }
 
-/* Up, and then over the zenith down to the back: the same pan, the encoder goes on counting. */
+/* The mirror turns up, and then over the zenith down to the back. The pan stays the same, and the encoder goes on
+ * counting. */
 static void beyond_90_degrees_the_beam_looks_back(void **state)
 {
     (void)state;
@@ -91,7 +92,7 @@ static void encoders_count_modulo_a_turn(void **state)
                      instrument_encoder_count(is[i].turn, is[i].counts));
 }
 
-/* The same, of points: also with negative angles and beyond a turn. */
+/* The same for points, also with negative angles and beyond a turn. */
 static void points_have_the_encoders_counts(void **state)
 {
     (void)state;
@@ -124,8 +125,8 @@ static void points_have_the_encoders_counts(void **state)
     cast_rig_close(rig);
 }
 
-/* Half a count each: range_scale/2 along the beam, pi/counts across it for each encoder. To that come 1e-9 m
- * for the range and 1e-9 turns for what rounding and the pan's 2^-24 udeg leave. */
+/* The bound is half a count each: range_scale/2 along the beam, pi/counts across it for each encoder. 1e-9 m for the
+ * range are added, and 1e-9 turns for rounding and the pan's 2^-24 udeg. */
 static void polar_counts_give_the_position_back(void **state)
 {
     (void)state;
@@ -189,8 +190,8 @@ static void check_geo_point(const struct cast_rig *rig, uint64_t k, uint32_t i, 
     assert_true(sqrtl(off_true) <= rounding + encoders);
 }
 
-/* In each coordinate reference system: the position that the encoders read within half a count of a
- * coordinate, and the true one within half a count of each encoder more. */
+/* In each coordinate reference system, the position by the encoders is right within half a count of a coordinate. The
+ * true position is within half a count of each encoder more. */
 static void geo_counts_give_the_position_back(void **state)
 {
     (void)state;
@@ -259,8 +260,8 @@ static void move(const double offset[3], double grown_m, double lo[3], double hi
     }
 }
 
-/* The room's coordinates are quarters and eighths of a metre, the offset whole centimetres rounded to 2^-10
- * m: every sum is exact, and so nothing at all may change. */
+/* The room's coordinates are quarters and eighths of a metre. The offset is whole centimetres rounded to 2^-10 m. Every
+ * sum is exact, so nothing at all may change. */
 static void a_room_at_utm_coordinates_is_the_room_at_the_origin(void **state)
 {
     (void)state;
@@ -274,9 +275,9 @@ static void a_room_at_utm_coordinates_is_the_room_at_the_origin(void **state)
     assert_memory_equal(near, far, sizeof near);
 }
 
-/* Coordinates that double rounds: at 5.8e6 m its steps are 2^-30 m, so a wall and the station are off by half
- * of that each, 9.3e-10 m at most along the wall's normal, which the incidence stretches. In float, steps
- * would be 0.5 m. */
+/* Coordinates are rounded by double: at 5.8e6 m its steps are 2^-30 m. So a wall and the station are wrong by half of
+ * that each, 9.3e-10 m at most along the wall's normal, which the incidence stretches. In float, steps would be 0.5
+ * m. */
 static void rounded_coordinates_cost_no_more_than_their_rounding(void **state)
 {
     (void)state;
@@ -302,7 +303,7 @@ static void rounded_coordinates_cost_no_more_than_their_rounding(void **state)
     assert_true(worst > 0.0);
 }
 
-/* The room, and a triangle 2 km away: the BVH's origin is the middle of that. */
+/* The scene is the room, and a triangle 2 km away. The BVH's origin is the middle of that. */
 static struct scene *room_and_far_triangle(void)
 {
     struct scene *room = box_scene(LO, HI), *both;

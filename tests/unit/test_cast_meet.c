@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What pulses meet, with the triangles: the same pulses and ranges as casting has them, in a room with a sheet of glass
- * and a mirror, with and without a model of the signal. */
+/* Pulses and the triangles that they meet. Pulses and ranges are those of casting, in a room with a sheet of glass and
+ * a mirror, with and without a model of the signal. */
 #include "tests/unit/site_rig.h"
 
 #include "core/cast.h"
@@ -34,7 +34,7 @@ static struct meet_rig *open_rig(const char *const *sets, int n)
     r->setup.layout = LINE_POLAR;
     r->n_real = r->site->scene->n_surfaces;
     if (r->setup.detect == NULL) return r;
-    r->detect = *r->setup.detect; /* returns near each other shall stay apart: hits do */
+    r->detect = *r->setup.detect; /* returns near each other shall stay separate, as hits do */
     r->detect.separation_m = 0.0;
     r->setup.detect = &r->detect;
     return r;
@@ -66,8 +66,8 @@ static void check_plane(const struct meet_rig *r, const struct cast_hit *hit)
     assert_true(fabs(vec3_dot(to, n)) <= 1e-6 * vec3_length(n));
 }
 
-/* Each echo of a real surface has its hit, and each hit its echo: same pulse, label, and range to half a count, and
- * what setting out behind a pane leaves open. Returns how many there are. */
+/* Each echo of a real surface has its hit, and each hit its echo: same pulse and label. Ranges agree to half a count,
+ * and the error of setting out behind a pane. Returns how many there are. */
 static uint32_t check_line(struct meet_rig *r, uint64_t line)
 {
     struct schedule_run run;
@@ -109,8 +109,8 @@ static void check_scan(const char *const *sets, int n_sets, uint32_t least, uint
     "beam.mode=single", "noise.range=off", "noise.angle=off", "signal.detection=sharp", "head.prr_hz=300000", \
         "head.lines_hz=200"
 
-/* 1500 pulses a sweep of 240 degrees, of which 100 are cast: 625 or 626 in each of 40 lines. Panes give echoes more, the
- * mirror fewer. */
+/* 1500 pulses a sweep of 240 degrees, of which 100 are cast: 625 or 626 in each of 40 lines. Panes add echoes, and the
+ * mirror takes some away. */
 static void test_glass_and_mirror(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that moves while it casts: each pulse from its own place, in its own direction. Against long double. */
+/* A head that moves while it casts: each pulse has its own origin and direction. The truth is in long double. */
 #include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"
 
@@ -25,7 +25,7 @@ static void make_knots(struct pose_knot knot[KNOTS])
     }
 }
 
-/* The rule of core/pose.h in long double, by the classic formula (sin((1-f)a) qa + sin(fa) qb) / sin a. */
+/* Computes the rule of core/pose.h in long double, by the classic formula (sin((1-f)a) qa + sin(fa) qb) / sin a. */
 static void true_pose(const struct pose_knot *knot, int n, int64_t t_ns, long double p[3], long double r[9])
 {
     int i = 0;
@@ -53,7 +53,7 @@ static void true_pose(const struct pose_knot *knot, int n, int64_t t_ns, long do
         p[k] = a->pose.position_m[k] + f * ((long double)b->pose.position_m[k] - a->pose.position_m[k]);
 }
 
-/* Pulse k's origin and direction in the scene. */
+/* Writes pulse k's origin and direction in the scene. */
 static void true_ray(const struct cast_rig *rig, uint64_t k, double o[3], long double d[3])
 {
     long double mirror, pan, s[3], p[3], r[9];
@@ -76,7 +76,7 @@ static struct cast_rig *open_room(struct pose_knot knot[KNOTS])
 }
 
 /* Ten lines of 10 ms, which the knots cover. The range is exact to a rounding of 1e-5 m counts; 1e-9 m is for the
- * encoders' arithmetic. Where a ray passes within 1e-9 of an edge of the room the wall may be either. */
+ * encoders' arithmetic. If a ray passes within 1e-9 of an edge of the room, the wall may be either. */
 static void test_room(void **state)
 {
     (void)state;
@@ -103,7 +103,7 @@ static void test_room(void **state)
                     on_edge += fabsl(o[i] + near * d[i] - LO[i]) < 1e-5L || fabsl(o[i] + near * d[i] - HI[i]) < 1e-5L;
                 assert_true(on_edge >= 2);
             }
-            /* One pose per line instead: what the naive method makes of it. */
+            /* The naive method has one pose per line. */
             true_pose(knot, KNOTS, line.begin_ns, p, r);
             true_angles(&rig->spec, line.cast0 + j, &mirror, &pan);
             true_direction(mirror, pan, 0.0L, s);
@@ -128,7 +128,7 @@ static uint64_t sum_block(const struct line_block *b, uint32_t from, uint32_t n,
     return sum;
 }
 
-/* near_m: of the straight way up. */
+/* near_m is that of the straight way up. */
 static void expect_same_bytes(struct cast_rig *rig)
 {
     static const uint32_t widths[] = {0, 16, 8, 4, 1}; /* 0: the native one */
@@ -151,7 +151,7 @@ static void expect_same_bytes(struct cast_rig *rig)
             }
             if (want == 0) want = sum;
             assert_int_equal(sum, want);
-            /* A static cast between: the origins of the packets are set anew. */
+            /* A static cast comes between, which sets the origins of the packets anew. */
             double d[3] = {0, 0, 1}, range;
             uint32_t hit;
             hits_from(rig->caster, rig->bvh, CENTRE, 100.0, 1, &d[0], &d[1], &d[2], &range, &hit);
@@ -160,8 +160,8 @@ static void expect_same_bytes(struct cast_rig *rig)
     }
 }
 
-/* The pose depends on the pulse's time alone: not on how runs are cut, on ray packets, or on what the caster did before.
- */
+/* The pose depends on the pulse's time alone. It does not depend on how runs are cut, on ray packets, or on earlier
+ * casts. */
 static void test_same_bytes(void **state)
 {
     (void)state;
@@ -171,7 +171,7 @@ static void test_same_bytes(void **state)
     cast_rig_close(rig);
 }
 
-/* Positions of the geo layout lie on the walls: the head's place is in them. */
+/* Positions of the geo layout lie on the walls: they include the head's place. */
 static void test_geo(void **state)
 {
     (void)state;
@@ -192,7 +192,7 @@ static void test_geo(void **state)
     cast_rig_close(rig);
 }
 
-/* A wall that moves away from a head that moves along: its range by hand. */
+/* A wall moves away from a head that moves along. Its range is worked out by hand. */
 static void test_moving_body(void **state)
 {
     (void)state;
@@ -241,8 +241,8 @@ static void test_moving_body(void **state)
     cast_rig_close(rig);
 }
 
-/* A head within the sphere around a body, whose middle lies ahead: pulses that all look back meet what of the body
- * stands there, 0.5 m from the head. A head that stands, and one that moves. */
+/* A head is within the sphere around a body, whose middle lies ahead. Pulses that all look back meet the part of the
+ * body behind it, 0.5 m from the head. The head stands, or moves. */
 static void test_inside_a_body_s_sphere(void **state)
 {
     (void)state;
@@ -281,8 +281,9 @@ static void test_inside_a_body_s_sphere(void **state)
     cast_rig_close(rig);
 }
 
-/* Of a wall and a body the nearer is met: a body behind the wall is not, one before the open sky is, wherever the head
- * is by then. The head flies 40 m to the left within a chunk of pulses; the body stands beside the end of its way. */
+/* The nearer of a wall and a body is met. A body behind the wall is not met, and one before the open sky is, wherever
+ * the head is by then. The head flies 40 m to the left within a chunk of pulses, and the body stands beside the end of
+ * its way. */
 static void test_nearer_of_wall_and_body(void **state)
 {
     (void)state;

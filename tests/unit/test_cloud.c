@@ -36,8 +36,7 @@ static void must_refuse(const void *data, size_t len, const char *expected)
         fail_msg("'%s' doesn't say '%s' in one line", err.text, expected);
 }
 
-/* The same three points in every encoding: properties out of order, some to pass over, an element before and
- * after. */
+/* The same three points in every encoding: properties out of order, some unknown ones, an element before and after. */
 #define BODY                                                                                       \
     "comment made by a test\ncomment epsg 32633\nelement camera 1\nproperty float f\n"             \
     "element vertex 3\nproperty ushort label\nproperty double z\nproperty list uchar short tags\n" \
@@ -155,7 +154,7 @@ static void what_is_missing_is_told_apart(void **state)
     cloud_free(&c);
 }
 
-/* Only where they are asked for; a second column of a name doesn't count. */
+/* They are read only where they are asked for. A second column of a name doesn't count. */
 static void columns_are_read_where_asked_for(void **state)
 {
     (void)state;
@@ -219,7 +218,7 @@ static void malformed_files_are_refused(void **state)
     assert_int_equal(cloud_read_columns(folder, 0, NULL, &c, &err), SH_EINPUT);
 }
 
-/* A few bytes of a good file changed: points or one line of error, whatever the bytes say. The sanitizers
+/* A few bytes of a good file are changed. The result is points or one line of error, for any bytes. The sanitizers
  * judge the rest. */
 static void broken_bytes_do_no_harm(void **state)
 {
@@ -242,7 +241,7 @@ static void broken_bytes_do_no_harm(void **state)
         n_refused += rc != SH_OK;
         cloud_free(&c);
     }
-    assert_in_range(n_refused, 300, 2700); /* both ways were gone */
+    assert_in_range(n_refused, 300, 2700); /* both results occurred */
 }
 
 static void losses_of_the_file_are_told(void **state)
@@ -261,7 +260,7 @@ static void losses_of_the_file_are_told(void **state)
     cloud_free(&c);
 }
 
-/* Degrees as float: 179 degrees of 111,320 m, by 6e-8 of them. */
+/* Degrees as float: 179 degrees of 111,320 m, with a relative error of 6e-8. */
 static void test_degrees_as_float(void **state)
 {
     (void)state;
@@ -279,7 +278,7 @@ static void test_degrees_as_float(void **state)
     cloud_free(&c);
 }
 
-/* CloudCompare's names of scalar fields, which our recorder writes on request. */
+/* The names are CloudCompare's for scalar fields, which our recorder writes on request. */
 static void test_scalar_names(void **state)
 {
     (void)state;

@@ -34,7 +34,7 @@ static void test_ply(void **state)
     assert_null(c.rgb);
 }
 
-/* Colours that are not bytes, or not three, are none. */
+/* Colours that are not bytes, or not three, are ignored. */
 static void test_no_colours(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Point clouds against a scene: the way back to it, distances and statistics with known answers. */
+/* Point clouds against a scene: the way back to it, and distances and statistics with known results. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -103,7 +103,8 @@ static void threads_change_nothing(void **state)
 
 static const struct georef *make_georef(enum georef_crs crs, int station)
 {
-    /* Half a degree apart, though two metres apart in the scene: a mixed-up station is kilometres off. */
+    /* The stations are half a degree apart, though two metres apart in the scene: a mixed-up station is kilometres
+     * away. */
     const struct georef_spec spec = {.crs = crs,
                                      .station_m = {1.0 + 2 * station, 2, 1.5},
                                      .utm_zone = 33,
@@ -116,7 +117,7 @@ static const struct georef *make_georef(enum georef_crs crs, int station)
     return g;
 }
 
-/* Points of two stations, 2 mm above the plate and on it, there and back. */
+/* Points of two stations, 2 mm above the plate and on it, go there and back. */
 static void check_crs(enum georef_crs crs, int epsg)
 {
     const struct georef *georef[2] = {make_georef(crs, 0), make_georef(crs, 1)};
@@ -191,7 +192,7 @@ static void coverage_is_counted(void **state)
     scene_free(s);
 }
 
-/* 1 to 1000 in a stirred order, between shots without echo: sums in closed form. */
+/* The values are 1 to 1000 in a stirred order, between shots without echo. Sums have closed forms. */
 static void statistics_of_whole_numbers(void **state)
 {
     (void)state;
@@ -246,7 +247,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Against sorting, over all magnitudes a double has. */
+/* They are compared with sorting, over all magnitudes of a double. */
 static void percentiles_are_nearest_ranks(void **state)
 {
     (void)state;
@@ -265,7 +266,7 @@ static void percentiles_are_nearest_ranks(void **state)
     }
 }
 
-/* Where adding in double drifts: a million equal values. */
+/* Adding a million equal values in double drifts. */
 static void sums_do_not_drift(void **state)
 {
     (void)state;
@@ -275,8 +276,8 @@ static void sums_do_not_drift(void **state)
         naive += d[i] = 0.1;
     struct cloud_stats s;
     cloud_stats(d, N, 1, &s);
-    assert_true(fabs(naive / N - 0.1) > 1e-13); /* or this test shows nothing */
-    /* The long double sum is off by N * 2^-64 at most, relatively: 5.4e-14; half as much below the root. */
+    assert_true(fabs(naive / N - 0.1) > 1e-13); /* else this test shows nothing */
+    /* The long double sum has a relative error of N * 2^-64 at most: 5.4e-14; half as much below the root. */
     assert_true(fabs(s.mean_m - 0.1) < 0.1 * (N * 0x1p-64 + 0x1p-52));
     assert_true(fabs(s.rms_m - 0.1) < 0.1 * (N * 0x1p-64 + 0x1p-52));
     free(d);

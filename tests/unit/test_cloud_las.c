@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* LAS files as clouds: what the recorder wrote, which other people's readers check elsewhere, and broken ones. */
+/* LAS files as clouds: recorded ones, which other people's readers check elsewhere, and broken ones. */
 #include "core/studio/cloud.h"
 #include "tests/unit/recorder_rig.h"
 
@@ -55,7 +55,8 @@ static void test_read(void **state)
     }
 }
 
-/* In degrees: the file's x is longitude, the cloud's first is latitude, as in a stream; and within -180..180. */
+/* Coordinates are degrees. The file's x is longitude, the cloud's first is latitude, as in a stream, and within
+ * -180..180. */
 static void test_degrees(void **state)
 {
     (void)state;
@@ -83,7 +84,7 @@ static void test_degrees(void **state)
     }
 }
 
-/* One byte changed, or the end cut off: what is wrong is told, with the file's name. */
+/* One byte is changed, or the end cut off. The error names the file. */
 static void test_broken(void **state)
 {
     (void)state;
@@ -124,7 +125,7 @@ static void test_broken(void **state)
     }
 }
 
-/* Longitude first in the file, latitude first in the cloud; beyond the antimeridian it is back within 180. */
+/* Longitude is first in the file, latitude first in the cloud. Beyond the antimeridian it comes back within 180. */
 static void test_geodetic(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa's commands: the sequences of real clients, both forms, log-in, errors, and what is no telegram. */
+/* CoLa's commands: the sequences of real clients, both forms, log-in, errors, and bytes that are no telegram. */
 #include "tests/unit/cola_rig.h"
 
 static int close_rig(void **state)
@@ -29,7 +29,7 @@ static void sick_tim_starts(void **state)
     assert_int_equal(cola.count[PROTOCOL_WRONG], 0);
 }
 
-/* As of a recording: the session alone begins anew. */
+/* It does so for a recording: only the session begins anew. */
 static void a_reboot_that_is_refused_ends_the_session(void **state)
 {
     (void)state;
@@ -42,7 +42,7 @@ static void a_reboot_that_is_refused_ends_the_session(void **state)
     assert_int_equal(cola.hung_up, 1);
 }
 
-/* The clock, hours and count of power-ups are those since power came last. */
+/* The clock, hours and count of power-ups count since power-up. */
 static void clocks_begin_at_power_up(void **state)
 {
     (void)state;
@@ -60,7 +60,7 @@ static void clocks_begin_at_power_up(void **state)
                         30); /* 7205 s in us, 32 bits */
 }
 
-/* sick_tim refuses firmware from 2.50 on of a TiM3xx, by this pattern; no model of ours may look like one. */
+/* sick_tim refuses firmware from 2.50 on of a TiM3xx, by this pattern. No model of ours may look like one. */
 static void no_ident_is_an_old_tim(void **state)
 {
     (void)state;
@@ -157,7 +157,7 @@ static void mrpt_starts(void **state)
     cola_expect("sWN LMDscandatacfg 01 00 0 1 0 00 00 0 0 0 0 +1", "sWA LMDscandatacfg");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.01.1970 0 0 0");
-    assert_int_equal(cola.bytes[11], '7'); /* what it looks at */
+    assert_int_equal(cola.bytes[11], '7'); /* the byte that it looks at */
 }
 
 /* ---- states and the head */
@@ -196,7 +196,7 @@ static void a_resting_head_is_started(void **state)
     assert_int_equal(cola.n_lines, 0);
     cola_head_state("fault");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
-    cola_head_state("spin-down"); /* as soon as it can */
+    cola_head_state("spin-down"); /* it stops as soon as it can */
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 200000000);
@@ -239,7 +239,7 @@ static void writing_needs_its_level(void **state)
     cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2");
     cola_expect("sMN SetAccessMode 03 81BE23AA", "sAN SetAccessMode 0");
     cola_expect("sMN SetAccessMode 05 F4724744", "sAN SetAccessMode 0");
-    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2"); /* as it was */
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2"); /* it is as it was */
     cola_expect("sMN SetAccessMode 04 81BE23AA", "sAN SetAccessMode 1");
     cola_expect("sWN EIHstCola 1", "sWA EIHstCola");
     cola_expect("sMN CheckPassword 3 F4724744", "sAN CheckPassword 1");

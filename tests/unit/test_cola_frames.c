@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa's frames: both forms on one connection, what is no telegram, and telegrams that are broken at random. */
+/* CoLa's frames: both forms on one connection, bytes that are no telegram, and telegrams that are broken at random. */
 #include "tests/unit/cola_rig.h"
 
 static int close_rig(void **state)
@@ -33,7 +33,7 @@ static void answers_have_the_form_of_the_request(void **state)
     assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], 0);
 }
 
-/* Before each of these a good request is answered, and after it; what is garbage is counted. */
+/* A good request is answered before each of these, and after it. The garbage is counted. */
 static void garbage_is_skipped_and_counted(void **state)
 {
     (void)state;
@@ -90,12 +90,12 @@ static void an_overlong_telegram_is_refused_once(void **state)
     assert_memory_equal(cola.bytes, "\2sFA 7\3", 7);
     assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], sizeof bytes + 1);
     cola_expect("sRN LCMstate", "sRA LCMstate 0");
-    memset(bytes, 2, sizeof bytes); /* marks without end */
+    memset(bytes, 2, sizeof bytes); /* endless marks */
     cola_input(bytes, sizeof bytes);
     cola_expect("sRN LCMstate", "sRA LCMstate 0");
 }
 
-/* The longest names and values that there is room for. */
+/* The longest names and values that fit. */
 static void long_requests_are_answered(void **state)
 {
     (void)state;
@@ -118,7 +118,7 @@ static uint32_t draw(uint32_t below)
     return (random_state >> 8) % below;
 }
 
-/* Telegrams broken at random, in random pieces, among scans. The head goes on, every byte is accounted for, and a good
+/* Telegrams are broken at random, in random pieces, among scans. The head goes on, every byte is counted, and a good
  * request is answered after it. */
 static void broken_telegrams_do_no_harm(void **state)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa: line rate and step of a head that has some, by mLMPsetscancfg. */
+/* CoLa: line rate and step of a head that has several, by mLMPsetscancfg. */
 #include "tests/unit/cola_rig.h"
 
 /* The head answers with the first row that fits. Tests change rows. */
@@ -43,7 +43,7 @@ static int close_rig(void **state)
 #define FINE   " 9C4 1 9C4 FFF92230 225510"   /* 25 Hz, 0.25 deg */
 #define SPARSE " 9C4 1 1388 FFF92230 225510"  /* 25 Hz, 0.5 deg */
 
-/* Lines that set something, in their order. */
+/* Checks the lines that set something, in their order. */
 static void expect_set(const char *first, const char *second, const char *third)
 {
     const char *const wanted[] = {first, second, third};
@@ -56,7 +56,7 @@ static void expect_set(const char *first, const char *second, const char *third)
     assert_true(n == 3 || wanted[n] == NULL);
 }
 
-/* It says how it is set before a scan has shown it. */
+/* It reports its settings before a scan has shown them. */
 static void a_resting_head_says_how_it_is_set(void **state)
 {
     (void)state;
@@ -81,7 +81,7 @@ static void other_pairs_are_refused(void **state)
     cola_expect("sMN mLMPsetscancfg 9C4 1 D05 0 225510", "sAN mLMPsetscancfg 3" FAST);
     cola_expect("sMN mLMPsetscancfg 9C4 2 9C4 FFF92230 225510", "sAN mLMPsetscancfg 5" FAST);
     expect_set(NULL, NULL, NULL);
-    cola_expect("sMN mLMPsetscancfg" FAST, "sAN mLMPsetscancfg 0" FAST); /* as it is */
+    cola_expect("sMN mLMPsetscancfg" FAST, "sAN mLMPsetscancfg 0" FAST); /* this changes nothing */
     cola_expect("sMN mLMPsetscancfg 1388 1 1388 -449997 +2249997", "sAN mLMPsetscancfg 0" FAST);
     expect_set(NULL, NULL, NULL);
 }
@@ -102,8 +102,7 @@ static void a_resting_head_is_set(void **state)
     cola_expect("sMN mLMPsetscancfg" FAST, "sFA 4");
 }
 
-/* A scanner that this session has not told to measure, and one that it has stopped. The answer comes once the scan has
- * ended. */
+/* The scanner measures for another session, or was stopped by this one. The answer comes once the scan has ended. */
 static void a_scan_is_stopped_first(void **state)
 {
     (void)state;
@@ -139,7 +138,7 @@ static void a_scan_is_stopped_first(void **state)
     cola_expect("sMN mLMPsetscancfg" FAST, "sFA 4");
 }
 
-/* A range that was written with the old step holds on the new grid. */
+/* A range that was written with the old step stays valid on the new grid. */
 static void the_range_stays_on_the_new_grid(void **state)
 {
     (void)state;

@@ -20,7 +20,7 @@ static void expect_field(int number, const void *values, size_t len)
     cola_expect_b(request, 12, answer, 13 + len);
 }
 
-/* sick_scan_xd asks for 30 fields of an LMS1xx, and begins anew for ever where one of them is refused. */
+/* sick_scan_xd asks for 30 fields of an LMS1xx. If one of them is refused, it starts over for ever. */
 static void an_lms_has_ten_empty_fields(void **state)
 {
     (void)state;
@@ -63,7 +63,7 @@ static void fields_wait_for_the_head(void **state)
     cola_expect("sRN LFErec", "sFA 4");
 }
 
-/* Three records of 43 bytes: sick_scan_xd says an error where there is none, or where bytes are left. */
+/* There are three records of 43 bytes. sick_scan_xd reports an error where there is none, or where bytes are left. */
 static void a_tim7_has_three_results(void **state)
 {
     (void)state;
@@ -91,7 +91,7 @@ static void a_tim7_has_five_outputs(void **state)
     cola_expect_b("sRN LIDoutputstate", 18, outputs, sizeof outputs);
 }
 
-/* Inputs without use are 2; of eleven outputs three are used. Outputs come once when they are asked for. */
+/* Unused inputs are 2, and three of eleven outputs are used. Outputs come once when they are asked for. */
 static void an_lms_says_what_is_not_used(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa: LMPoutputRange. What is written, read back, said and sent. */
+/* CoLa: LMPoutputRange, as written, read back, reported and sent. */
 #include "tests/unit/cola_rig.h"
 
 static struct cola_lmd lmd;
@@ -36,7 +36,7 @@ static void a_narrowed_range_is_narrower(void **state)
     assert_int_equal(lmd.channel[0].value[0], 1000 + 10 * 405);
 }
 
-/* The range that is read back, the one that telegrams say and the one that they hold agree. Ends off the grid are the
+/* The range that is read back, the one in telegrams' headers and their actual one agree. Ends off the grid move to the
  * nearest beams. */
 static void expect_range(uint32_t line, const char *step, int32_t start_e4, int32_t stop_e4, uint32_t first, uint32_t n)
 {
@@ -57,7 +57,7 @@ static void expect_range(uint32_t line, const char *step, int32_t start_e4, int3
     assert_int_equal(dist->step_e4, read_step);
     /* The last angle is rounded by itself; the rounded step is up to 1/2 wrong, and that adds up. */
     assert_true(labs((int32_t)stop - (dist->start_e4 + (int32_t)((n - 1) * read_step))) <= (long)n / 2 + 1);
-    assert_int_equal(((int32_t)stop - (int32_t)start) / (int32_t)read_step + 1, n); /* as clients count */
+    assert_int_equal(((int32_t)stop - (int32_t)start) / (int32_t)read_step + 1, n); /* clients count like this */
 }
 
 static void a_range_off_the_grid_goes_to_the_nearest_beams(void **state)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa's LMDscandata: what stands in it against the ranges, times and angles that went in. Read back by the public
- * layout alone (cola_rig). */
+/* The contents of CoLa's LMDscandata against the ranges, times and angles that went in. They are read back by the
+ * public layout alone (cola_rig). */
 #include <math.h>
 
 #include "drivers/protocol/native_encode.h"
@@ -125,8 +125,8 @@ static void rates_agree_as_sick_tim_asks(void **state)
     }
 }
 
-/* A head that turns clockwise seen from above is sent from its last step on: angles always grow counter-clockwise. A
- * mark at one step, 30 degrees left of the front. */
+/* A head that turns clockwise seen from above is sent from its last step on, as angles always grow counter-clockwise. A
+ * mark is at one step, 30 degrees left of the front. */
 static void a_mark_on_the_left_is_on_the_left(void **state)
 {
     (void)state;
@@ -241,7 +241,7 @@ static void signals_end_where_their_scale_ends(void **state)
     }
 }
 
-/* ---- what LMDscandatacfg adds */
+/* ---- additions by LMDscandatacfg */
 
 static void name_and_time_where_asked_for(void **state)
 {
@@ -276,7 +276,7 @@ static void give_poses(double x0_m, double x1_m, int64_t t0_ns, int64_t t1_ns)
     cola.ops->frame(cola.protocol, frame, native_encode_poses(frame, sizeof frame, pose, 2, cola.scan_t0_ns, 0));
 }
 
-/* The encoder is that of a vehicle: how far it has come, how fast it is. Here 2 m/s, then back at 1 m/s: the way grows. */
+/* The encoder is a vehicle's: its way and its speed. Here it goes at 2 m/s, then back at 1 m/s, and the way grows. */
 static void the_encoder_counts_the_way(void **state)
 {
     (void)state;
@@ -302,7 +302,7 @@ static void the_encoder_counts_the_way(void **state)
     assert_int_equal(lmd.speed, 1000);
 }
 
-/* The longest telegram there is: all channels, 16 bits, hexadecimal, everything in the tail. */
+/* The longest telegram has all channels, 16 bits, hexadecimal, and everything in the tail. */
 static void the_longest_telegram_has_room(void **state)
 {
     (void)state;
@@ -319,7 +319,7 @@ static void the_longest_telegram_has_room(void **state)
     protocol_rig_turn(&cola, 0, shots, 500);
     cola_read_lmd(0, &lmd); /* the rig has checked it against max_unit */
     assert_true(cola.len > 60000 && cola.len <= 65535);
-    /* one beam more is more than the module takes: it says so, and nothing is sent */
+    /* One beam more is more than the module takes. It says so, and nothing is sent. */
     cola.emitter.last_step = 3000;
     protocol_rig_describe(&cola, 0);
     protocol_rig_clear(&cola);

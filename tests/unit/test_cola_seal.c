@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa: LMDscandata whose values are changed on request, with a check byte that is right. Read by the public layout
- * alone (cola_rig). */
+/* CoLa: LMDscandata whose values are changed on request, with a right check byte. It is read by the public layout alone
+ * (cola_rig). */
 #include "tests/unit/cola_rig.h"
 #include "tests/unit/seal_rig.h"
 
 static struct protocol_rig_shot shots[40];
 
-/* Length and check byte of CoLa-B, which cola_read_lmd doesn't look at. */
+/* Checks length and check byte of CoLa-B, which cola_read_lmd doesn't look at. */
 static void check_frame(const uint8_t *unit, size_t len)
 {
     uint8_t check = 0;
@@ -29,7 +29,7 @@ static const void *read_scan(const uint8_t *unit, size_t len, size_t *size)
     return &lmd;
 }
 
-/* Twelve beams of a head with 48 steps; settings as LMDscandatacfg has them in CoLa-A. Returns the telegram. */
+/* Twelve beams of a head with 48 steps. The settings are those of LMDscandatacfg in CoLa-A. Returns the telegram. */
 static size_t telegram(const char *cfg, int is_b, uint8_t *unit)
 {
     protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "LMS111");
@@ -71,11 +71,11 @@ static void values_of_all_kinds(void **state)
     static const uint32_t n_bits[] = {12 * 16, 2 * 12 * (16 + 8), 2 * 12 * (16 + 16)};
     for (int i = 0; i < 3; i++) {
         check(cfg[i], 1, n_bits[i]);
-        check(cfg[i], 0, 0); /* as many as the digits have */
+        check(cfg[i], 0, 0); /* their digits give the number of bits */
     }
 }
 
-/* Other telegrams have nothing that is measured. Their check byte is made right, too. */
+/* Other telegrams have no measured values. Their check byte is made right, too. */
 static void answers_keep_their_check_byte(void **state)
 {
     (void)state;

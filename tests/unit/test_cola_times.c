@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa's LMDscandata: its times and counters, what is lost, and when it is sent. */
+/* CoLa's LMDscandata: its times and counters, lost scans, and the moment of sending. */
 #include <math.h>
 
 #include "drivers/protocol/native_encode.h"
@@ -37,7 +37,7 @@ static void ticks_count_modulo_32_bits(void **state)
 }
 
 /* sick_scan_xd fits a line through ticks and the times of arrival; here the latter are device time. Over half an hour
- * with the wrap in it the line's slope is 1, and no scan lies off it by more than the 1 us of a tick. */
+ * with the wrap in it the line's slope is 1, and no scan is farther from it than the 1 us of a tick. */
 static void ticks_are_on_a_line_with_time(void **state)
 {
     (void)state;
@@ -86,9 +86,9 @@ static void counters_count_modulo_16_bits(void **state)
     assert_int_equal(lmd.scan, 65540 % 65536);
 }
 
-/* ---- what is lost */
+/* ---- losses */
 
-/* Gives steps from `from` on, n of them, of a turn. */
+/* Feeds n steps of a turn, from `from` on. */
 static void part_of_turn(uint32_t line, uint32_t from, uint32_t n)
 {
     static const double level[1100];
@@ -131,7 +131,7 @@ static void a_scan_with_a_hole_is_not_sent(void **state)
     }
 }
 
-/* Attributes of another frame: they are not those of the points before. */
+/* Feeds attributes of another frame, which do not belong to the points before. */
 static void give_attributes(uint32_t line, uint64_t pulse0, uint32_t n)
 {
     uint8_t frame[NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN + 4 * 811] = {NATIVE_SYNC, NATIVE_ATTRIBUTES, 1};
@@ -143,7 +143,7 @@ static void give_attributes(uint32_t line, uint64_t pulse0, uint32_t n)
     cola.ops->frame(cola.protocol, frame, native_frame_len(frame));
 }
 
-/* A turn of which one frame of points has no attributes, others', or its own. */
+/* Feeds a turn in which one frame of points has no attributes, others', or its own. */
 static void attributes_of_one_frame(uint32_t line, int own, int others)
 {
     for (uint32_t from = 0; from < 811; from += 200) {
@@ -172,7 +172,7 @@ static void attributes_are_those_of_their_points(void **state)
     assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 2);
 }
 
-/* A scan is sent once it is done, also where the next one's points come before a tick's end. */
+/* A scan is sent once it is done, even where the next one's points come before a tick's end. */
 static void two_scans_in_a_tick_are_both_sent(void **state)
 {
     (void)state;
@@ -315,7 +315,7 @@ static void every_nth_scan_on_request(void **state)
     assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
 }
 
-/* Streamed telegrams have the form of the last request, or what EIHstCola says. */
+/* Streamed telegrams have the form of the last request, or that of EIHstCola. */
 static void the_stream_has_the_chosen_form(void **state)
 {
     (void)state;
@@ -329,7 +329,7 @@ static void the_stream_has_the_chosen_form(void **state)
     cola_expect("sRN EIHstCola", "sRA EIHstCola 1"); /* in the form of this request, */
     protocol_rig_clear(&cola);
     cola_turn(1, 1.0);
-    assert_memory_equal(cola.bytes, "\2sSN", 4); /* as is what follows */
+    assert_memory_equal(cola.bytes, "\2sSN", 4); /* so is the scan that follows */
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
     protocol_rig_clear(&cola);
     cola_turn(2, 1.0);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Heights that colours show of points in a CRS, beside the scene's own: georeferencing takes points there, the recorder takes
- * their heights back. */
+/* Heights that colours show of points in a CRS, beside the scene's own. Georeferencing takes points there, and the
+ * recorder takes their heights back. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -40,8 +40,8 @@ static double height_seen(enum georef_crs crs, uint32_t native_crs, double lon_d
     return colour_figure(COLOUR_HEIGHT, &t, 0);
 }
 
-/* 2 km away the Earth's surface is 0.31 m below the level of the station. Radii differ by 0.6 % from the mean one:
- * 2 mm. ECEF has no curvature to take back. */
+/* 2 km away the Earth's surface is 0.31 m below the level of the station. Radii differ by 0.6 % from the mean one: 2
+ * mm. ECEF has no curvature. */
 static void test_heights(void **state)
 {
     (void)state;

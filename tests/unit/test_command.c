@@ -22,7 +22,7 @@ static const char *say(struct command_device *dev, const char *line)
     return result.reply;
 }
 
-/* The line gives exactly one ERR reply and the same text in the queue, and changes nothing else. */
+/* The line gives exactly one ERR reply, puts the same text into the queue, and changes nothing else. */
 static void expect_error(struct command_device *dev, uint32_t session, const char *line, int number)
 {
     const struct head_settings before = dev->settings;
@@ -72,7 +72,7 @@ static void replies_of_queries(void **ctx)
     expect(&dev, "", "");
     expect(&dev, " \t ", "");
     assert_int_equal(dev.queue.count, 0);
-    assert_int_equal(dev.control, 0); /* looking is not taking */
+    assert_int_equal(dev.control, 0); /* reading takes no control */
 }
 
 static void status_byte(void **ctx)
@@ -195,7 +195,7 @@ static void a_head_without_the_time_says_so(void **ctx)
     expect_error(&dev, 1, "TIME:GPS?", CMD_E_SETTINGS);
 }
 
-/* Station 2 stands at numbers that are hard to say (command_device.c). */
+/* Station 2 has numbers that are hard to print (command_device.c). */
 static void a_place_is_read_and_said(void **ctx)
 {
     (void)ctx;
@@ -256,7 +256,8 @@ static void a_place_is_read_and_said(void **ctx)
     expect(&dev, "SITE:POSE? 1", "1,2,3,0,0,0");
 }
 
-/* What a fault is its owner knows (test_fault_config.c); here are the lines, as command_device.c answers them. */
+/* The owner of a fault knows its meaning (test_fault_config.c). These are the lines, as command_device.c answers
+ * them. */
 static void faults_are_added_listed_counted_and_cleared(void **ctx)
 {
     (void)ctx;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Headers of commands: long and short forms, in any case and from the root, nothing between or beyond them; and that
- * HELP? lists them all. */
+/* Headers of commands: long and short forms, in any case and from the root, and nothing between or beyond them. HELP?
+ * lists them all. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -135,7 +135,7 @@ static int word_of(const char *header, int k, char word[32])
     return 1;
 }
 
-/* Each word long or short, as one likes. */
+/* Returns whether each word is in its long or short form. */
 static int is_form_of(const char *header, const char *full, const char *brief)
 {
     char got[32], word[32];
@@ -173,7 +173,7 @@ static void nothing_between_or_beyond_the_forms(void **ctx)
     }
 }
 
-/* Counts the headers of a reply, each of them a command. */
+/* Counts the headers of a reply; each must be a command. */
 static size_t count_headers(struct command_device *dev, const char *line)
 {
     say(dev, line);
@@ -191,7 +191,7 @@ static size_t count_headers(struct command_device *dev, const char *line)
     return n;
 }
 
-/* Settings by HELP:SETtings?, all others by HELP?. */
+/* HELP:SETtings? lists the settings, and HELP? all others. */
 static void help_lists_every_header_in_two_lines(void **ctx)
 {
     (void)ctx;

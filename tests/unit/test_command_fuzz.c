@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* No line whatever may crash the command set, get more than one reply or one error, or leave settings that
- * the head could not run with. Fixed seeds: a failure names the line and comes again. */
+/* Random lines. None may crash the command set, get more than one reply or error, or leave settings that the head could
+ * not run with. Seeds are fixed, so a failure names the line and comes again. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -101,7 +101,7 @@ static void begin(struct command_device *dev, uint64_t seed)
 static void random_lines(void **ctx)
 {
     (void)ctx;
-    /* Half the lines of any bytes, half of those that commands are made of, which get further. */
+    /* Half of the lines have any bytes, and half those of commands, which get further. */
     static const char alphabet[] = "*:;?,. +-0123456789eEHADPRLINSTOCMZKGXU\t\"'#[]";
     static struct command_device dev;
     begin(&dev, UINT64_C(0x9e3779b97f4a7c15));
@@ -177,7 +177,7 @@ static const char *const valid[] = {
     "FAUL:LIST?",
 };
 
-/* line becomes its first `at` bytes, middle and end, as much as fits. */
+/* Writes the line as its first `at` bytes, middle and end, as much as fits. */
 static void compose(char *line, size_t size, size_t at, const char *middle, const char *end)
 {
     const char *const parts[] = {middle, end};
@@ -227,14 +227,13 @@ static void mutated_commands(void **ctx)
             mutate(line, sizeof line);
         one(&dev, line);
     }
-    /* The mill must have ground something: every effect came up, and both answers often. */
+    /* The random lines reached much: every effect occurred, and both answers often. */
     for (int effect = 0; effect <= COMMAND_RELEASE; effect++)
         assert_true(seen.effect[effect] > N_MUTATED / 10000); /* a line in 52, a state in 7, control in 3 */
     assert_true(seen.ok > N_MUTATED / 10 && seen.error > N_MUTATED / 10 && seen.changes > 1000 / SHARE);
 }
 
-/* Bytes as a line noise would give them, through the collector: what comes out is a line for command_execute.
- */
+/* Random bytes go through the collector. Each line that it gives goes to command_execute. */
 static void random_bytes_through_the_collector(void **ctx)
 {
     (void)ctx;
@@ -243,7 +242,7 @@ static void random_bytes_through_the_collector(void **ctx)
     begin(&dev, UINT64_C(0x2545f4914f6cdd1d));
     unsigned ready = 0, overrun = 0;
     for (int i = 0; i < N_BYTES; i++) {
-        /* A CR or LF comes by chance every 128 bytes: short lines; the second half has them twelve times as
+        /* A CR or LF comes by chance every 128 bytes, so lines are short. The second half has them twelve times as
          * rarely. */
         unsigned char byte = (unsigned char)random_below(256);
         if (i >= N_BYTES / 2 && (byte == '\n' || byte == '\r') && random_below(12) != 0) byte = 0;

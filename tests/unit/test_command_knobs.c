@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Ranges, noise and angular steps as settings, and settings that describe themselves. Expected values by hand. */
+/* Ranges, noise and angular steps as settings, and settings that describe themselves. Expected values are worked out by
+ * hand. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -22,7 +23,7 @@ static void expect(struct command_device *dev, const char *line, const char *rep
     if (strcmp(result.reply, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, result.reply, reply);
 }
 
-/* Refused with this number and these words, and nothing has changed. */
+/* The line is refused with this number and these words, and nothing has changed. */
 static void refuse(struct command_device *dev, const char *line, int number, const char *words)
 {
     const struct head_settings before = dev->settings;
@@ -45,7 +46,7 @@ static void ranges_keep_apart(void **ctx)
     expect(&dev, "HEAD:RANG:MAX? MAX", "800");
     refuse(&dev, "HEAD:RANG:MIN 100", CMD_E_SETTINGS, "allowed 0.5 to 99.999999999 as HEAD:RANGe:MAX is 100");
     refuse(&dev, "HEAD:RANG:MIN 0.4", CMD_E_RANGE, "HEAD:RANGe:MIN 0.4 m, allowed 0.5 to 250");
-    refuse(&dev, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* nothing would be left of a program */
+    refuse(&dev, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* no program would be left */
     refuse(&dev, "HEAD:RANG:MAX 900", CMD_E_RANGE, "allowed 2 to 800");
     refuse(&dev, "HEAD:RANG:MAX 5 DEG", CMD_E_SUFFIX, "takes M, MM or KM");
     expect(&dev, "*RST", "OK");
@@ -96,7 +97,8 @@ static void what_is_planned_rests_in_a_scan(void **ctx)
     expect(&dev, "HEAD:PRR 200000", "OK"); /* rates may */
 }
 
-/* By hand, with 300 kHz, 100 lines/s, 18 deg/s and a sweep of 360 deg: 0.12 deg in the line, 0.18 between lines. */
+/* Worked out by hand, with 300 kHz, 100 lines/s, 18 deg/s and a sweep of 360 deg: 0.12 deg in the line, 0.18 between
+ * lines. */
 static void a_line_heads_step_sets_its_rates(void **ctx)
 {
     (void)ctx;
@@ -120,9 +122,9 @@ static void a_line_heads_step_sets_its_rates(void **ctx)
     assert_true(dev.settings.lines_uhz == 100 * MICRO && dev.settings.pan_udeg_s == 18 * MICRO);
 }
 
-/* 1 to 2000 lines/s at 300 kHz: 0.0012 to 2.4 deg. The pan's 60 deg/s: 0.6 deg at 100 lines/s; of both steps the root
- * of 60 * 360 / 300000, as lines rise with the step: 0.2683281573. At 0.268328157 it would be 223.6067975 lines/s, which
- * is 223.606798, and 60.00000000001 deg/s. */
+/* 1 to 2000 lines/s at 300 kHz are 0.0012 to 2.4 deg. The pan's 60 deg/s are 0.6 deg at 100 lines/s. For both steps the
+ * limit is the root of 60 * 360 / 300000, as lines rise with the step: 0.2683281573. At 0.268328157 it would be
+ * 223.6067975 lines/s, which is 223.606798, and 60.00000000001 deg/s. */
 static void steps_stay_within_the_rates(void **ctx)
 {
     (void)ctx;
@@ -146,8 +148,8 @@ static void steps_stay_within_the_rates(void **ctx)
     expect(&dev, "SCAN:STEP:LINE 0.1", "0.1");
 }
 
-/* 60 deg/s at 100 lines/s are 0.6 deg, and of both steps 0.268328156 is the most. A number sets both steps, but this one
- * is what DEF answers. */
+/* 60 deg/s at 100 lines/s are 0.6 deg, and for both steps 0.268328156 is the most. A number sets both steps, but DEF
+ * answers with this one. */
 static void what_def_answers_can_be_set(void **ctx)
 {
     (void)ctx;
@@ -159,7 +161,7 @@ static void what_def_answers_can_be_set(void **ctx)
     expect(&dev, "SCAN:STEP 0.12", "0.12");
     assert_true(dev.settings.pan_udeg_s == 12 * MICRO);
     refuse(&dev, "SCAN:STEP 0.59", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
-    /* Not where the lines of power-up give another step: 360 * 100 / 1000 deg. */
+    /* It is not allowed where the lines of power-up give another step: 360 * 100 / 1000 deg. */
     expect(&dev, "HEAD:PRR 1000", "OK");
     expect(&dev, "SCAN:STEP:LINE? DEF", "0.12");
     refuse(&dev, "SCAN:STEP:LINE 0.12", CMD_E_SETTINGS, "allowed 0.36 to 360 as HEAD:PRR is 1000");
@@ -300,7 +302,7 @@ static void settings_describe_themselves(void **ctx)
     refuse(&dev, "HELP? HEAD", CMD_E_DATA_TYPE, "HELP? takes a header, not 'HEAD'");
 }
 
-/* What HELP? says is what MIN, MAX and DEF answer, and none of them is refused. */
+/* The limits of HELP? are the answers to MIN, MAX and DEF, and none of them is refused. */
 static void limits_are_those_that_hold(void **ctx)
 {
     (void)ctx;
@@ -332,7 +334,8 @@ static void limits_are_those_that_hold(void **ctx)
     assert_int_equal(n, settings);
 }
 
-/* Each member of the settings has a row, and HELP:SETtings? lists each row that has one. A step is that of SCAN:STEP. */
+/* Each member of the settings has a row, and HELP:SETtings? lists each row that has one. A step is that of
+ * SCAN:STEP. */
 static void every_setting_is_listed(void **ctx)
 {
     (void)ctx;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* COMMANDS.md beside the table of commands: what stands in its columns is what the commands do. */
+/* COMMANDS.md beside the table of commands: the commands do what its columns say. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -37,7 +37,7 @@ static void __attribute__((format(printf, 2, 3))) add(char text[256], const char
     va_end(ap);
 }
 
-/* The keys of a head profile behind struct head_limits. */
+/* The keys of a head profile that fill struct head_limits. */
 static const struct {
     size_t at;
     const char *key;
@@ -96,7 +96,7 @@ static int is_of_faults(const struct command_row *row)
     return strncmp(row->header, "FAULt", 5) == 0;
 }
 
-/* A line of the row that is right in itself. */
+/* Writes a line of the row that is valid by itself. */
 static void fill_line(char line[256], const struct command_row *row, int query)
 {
     size_t len = strcspn(row->header, "[");
@@ -136,7 +136,7 @@ static void add_states(char text[256], const struct command_row *row)
     add(text, "%s", n == HEAD_N_STATES ? "all" : list);
 }
 
-/* The columns of a row, up to the words of its last one. */
+/* Writes the columns of a row, up to the words of its last one. */
 static void columns(char text[256], const struct command_row *row)
 {
     text[0] = 0;
@@ -194,7 +194,7 @@ static void each_error_has_its_row(void **state)
     }
 }
 
-/* The arrows: `from -event-> to` of every change that a command or the head's own work makes. */
+/* The arrows are `from -event-> to` of every change that a command or the head's own work makes. */
 static void the_states_are_the_machines(void **state)
 {
     (void)state;

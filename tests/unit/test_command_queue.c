@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The error queue and the collector of lines. */
+/* These are tests of the error queue and of the collector of lines. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -41,7 +41,7 @@ static void first_in_first_out(void **ctx)
     expect_pop(&queue, "0,\"No error\"");
 }
 
-/* SCPI-99 21.8.1: the last entry gives way to -350, the oldest stay, a read makes room at the end. */
+/* SCPI-99 21.8.1: the last entry is replaced by -350, the oldest stay, and a read makes room at the end. */
 static void overflow_replaces_the_last_and_counts(void **ctx)
 {
     (void)ctx;
@@ -125,7 +125,7 @@ static void standard_texts(void **ctx)
     assert_string_equal(command_error_text(9999), "Device-specific error");
 }
 
-/* Feeds the bytes and writes down what came out: lines as <text>, overruns as !. */
+/* Feeds the bytes and writes the results: lines as <text>, overruns as !. */
 static void feed(struct command_lines *lines, const char *bytes, size_t len, char *log, size_t log_size)
 {
     size_t at = 0;

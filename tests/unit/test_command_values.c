@@ -109,21 +109,21 @@ static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
         snprintf(line, sizeof line, "HEAD:PRR %s", numbers[i]);
         expect_error(&dev, 1, line, CMD_E_RANGE, ", allowed 1000 to 1200000\"");
     }
-    /* The largest that 64 bits have is a number like any other, and the next one is none. */
+    /* The largest number of 64 bits is like any other, and the next one is refused. */
     dev.step_allowed = 1;
     expect_error(&dev, 1, "TIME:STEP 9223372036854775807", CMD_E_RANGE, " 9223372036854775807 ns, allowed");
     expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, " 9223372036854775808, allowed");
     dev.step_allowed = 0;
-    /* Four frames more than 2^32 must not come out as four. */
+    /* Four frames more than 2^32 must not become four. */
     expect_error(&dev, 1, "SCAN:FRAMES 4294967300", CMD_E_RANGE, "allowed 0 to 1000000");
     expect(&dev, "SCAN:FRAMES 1000000", "OK");
     expect_error(&dev, 1, "HEAD:STATION 4294967297", CMD_E_RANGE, "allowed 1 to 3");
-    /* Where one value is left, it stands alone. */
+    /* If one value is left, it is given alone. */
     dev.limits.pan_max_udeg_s = 0;
     expect_error(&dev, 1, "HEAD:PAN 1", CMD_E_RANGE, "HEAD:PAN 1 deg/s, allowed 0\"");
 }
 
-/* Each range from both ends; the values are the test profile's and the narrowing of the other setting. */
+/* Each range is tried from both ends. The values are the test profile's, narrowed by the other setting. */
 static void each_range_holds_at_both_ends(void **ctx)
 {
     (void)ctx;
@@ -178,13 +178,13 @@ static void settings_narrow_each_other(void **ctx)
     expect(&dev, "HEAD:LINES MAX", "OK");
     expect(&dev, "HEAD:LINES?", "2000");
     expect_error(&dev, 1, "HEAD:PRR 1999", CMD_E_SETTINGS, "allowed 2000 to 1200000 as HEAD:LINes is 2000");
-    /* A turn is the most that pan may span. */
+    /* A turn is the most that the pan may span. */
     expect(&dev, "SCAN:PAN:STOP 360", "OK");
     expect_error(&dev, 1, "SCAN:PAN:START -0.000001", CMD_E_SETTINGS, "allowed 0 to 359.999999");
     expect(&dev, "SCAN:PAN:STOP 100", "OK");
     expect(&dev, "SCAN:PAN:START -180", "OK");
     expect_error(&dev, 1, "SCAN:PAN:STOP 181", CMD_E_SETTINGS, "allowed -179.999999 to 180");
-    /* A default may be in conflict; then it is refused like any number. */
+    /* A default may contradict other settings; then it is refused like any number. */
     expect(&dev, "SCAN:PAN:START -180", "OK");
     expect(&dev, "SCAN:PAN:STOP -90", "OK");
     expect_error(&dev, 1, "SCAN:PAN:START DEF", CMD_E_SETTINGS, "SCAN:PAN:STARt 0 deg");
@@ -211,7 +211,7 @@ static void control_goes_to_the_first_who_changes(void **ctx)
     expect_error(&dev, 2, changing[0], CMD_E_PROTECTED,
                  "tcp 127.0.0.1:40312 has control (session 3), this is session 2");
     assert_string_equal(say(&dev, 2, "SYST:CONT:WHO?"), "\"tcp 127.0.0.1:40312\"");
-    expect_error(&dev, 2, "HEAD:PRR x", CMD_E_DATA_TYPE, "x"); /* what is no command is told first */
+    expect_error(&dev, 2, "HEAD:PRR x", CMD_E_DATA_TYPE, "x"); /* an invalid line is reported first */
     assert_string_equal(say(&dev, 2, "HEAD:PRR?"), "5000");
     assert_string_equal(say(&dev, 2, "*CLS"), "OK");
     assert_string_equal(say(&dev, 3, "HEAD:PRR 6000"), "OK");
@@ -237,7 +237,7 @@ static void the_device_itself_needs_no_control(void **ctx)
     assert_int_equal(dev.control, 2);
 }
 
-/* The answer of each state, from the state diagram: S start, P stop, R reset, B reboot; '.' refused. */
+/* The answer in each state, from the state diagram: S start, P stop, R reset, B reboot; '.' refused. */
 static void effects_follow_the_state_machine(void **ctx)
 {
     (void)ctx;
@@ -301,7 +301,7 @@ static void steps_of_time(void **ctx)
     expect_error(&dev, 1, "TIME:STEP -9300000000000000000", CMD_E_RANGE, "STEP -9300000000000000000, allowed 1 to");
 }
 
-/* A setting of words: each in short and long, DEF, and what it is not. */
+/* A setting of words takes each in short and long form, and DEF, but no other word. */
 static void words(void **state)
 {
     (void)state;
@@ -322,7 +322,7 @@ static void words(void **state)
     expect_error(&dev, 1, "SCAN:ECHOES", CMD_E_MISSING, "takes a word");
 }
 
-/* A head with fixed pulse rates takes these and no other, and its limits are among them. */
+/* A head with fixed pulse rates takes no others, and its limits are among them. */
 static void fixed_rates_are_the_only_ones(void **ctx)
 {
     (void)ctx;
@@ -353,7 +353,7 @@ static void fixed_rates_are_the_only_ones(void **ctx)
                  "HEAD:PRR 1000 Hz, allowed 1500 to 1200000 as HEAD:LINes is 1200");
     expect(&dev, "HEAD:PRR MIN", "OK");
     expect(&dev, "HEAD:PRR?", "1500");
-    /* what is no rate keeps its own range */
+    /* Settings that are no rates keep their own range. */
     expect(&dev, "HEAD:LINES? MAX", "1500");
     expect(&dev, "HEAD:LINES 77.7", "OK");
     expect(&dev, "HEAD:PAN 12.5", "OK");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The configuration: what it takes, what it refuses and where it says so. */
+/* The configuration: accepted and refused ones, and the place that an error names. */
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/config/table/value.h"
 #include "tests/common/thorough.h"
@@ -7,7 +7,7 @@
 
 /* ---- malformed configurations */
 
-/* Whether one of the faults begins with start and has the fragment. */
+/* Returns whether one of the errors begins with start and has the fragment. */
 static int is_told(const char *start, const char *fragment)
 {
     for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++)
@@ -29,7 +29,7 @@ static void malformed_configurations_are_refused(void **state)
             fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start, bad[i].fragment);
         for (uint32_t k = 0; k < faults.n; k++)
             if (strpbrk(faults.fault[k].text, "\n\r") != NULL) fail_msg("case %zu: more than one line", i);
-        /* Nothing is told that only follows from it. In a file of its own more is wrong: much is missing. */
+        /* There are no consequential errors. A file of its own has more of them, as much is missing. */
         if (bad[i].old != NULL && faults.n != 1)
             fail_msg("case %zu (%s): %u faults: %s, %s", i, bad[i].with, faults.n, faults.fault[0].text,
                      faults.fault[1].text);
@@ -194,7 +194,7 @@ static void odd_but_right_configurations_load(void **state)
     assert_loads(load_edited("output:", "noise: {range: true, seed: 18446744073709551615}\noutput:"));
     assert_int_equal(cfg->noise.range, RANGE_NOISE_ON);
     assert_true(cfg->noise.seed == UINT64_MAX);
-    /* A pan at rest, as SCPI has it, too: each line is a frame. */
+    /* A pan at rest, as in SCPI: each line is a frame. */
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 0\n"));
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 7\n"));
     assert_loads(load_edited("output:", "platform: {kind: live, port: 7000}\noutput:"));
@@ -211,7 +211,7 @@ static void places_are_taken_in_each_form(void **state)
     assert_int_equal(cfg->station[0].place, PLACE_UTM);
     assert_int_equal(cfg->station[0].utm_zone, 33);
     assert_true(cfg->station[0].north && cfg->station[0].has_instrument_height);
-    /* An anchor in UTM gives zone and hemisphere; without position_m. */
+    /* An anchor in UTM gives zone and hemisphere. There is no position_m. */
     static const char old[] = "stations:\n  - position_m: [1, 2, 3]\n    heading_deg: 90";
     assert_loads(load_edited(old, "  anchor: {source: utm, utm_zone: 33, hemisphere: north}\nstations:\n"
                                   "  - {easting_m: 5e5, northing_m: 5e6, height_m: 0}"));
@@ -219,7 +219,7 @@ static void places_are_taken_in_each_form(void **state)
     assert_true(cfg->station[0].north && !cfg->station[0].has_position);
     assert_loads(load_edited(old, "  anchor: {source: ecef}\nstations:\n  - {ecef_m: [6378137, 0, 0]}"));
     assert_int_equal(cfg->station[0].place, PLACE_ECEF);
-    /* With an anchor, one of both. */
+    /* With an anchor, one of both is given. */
     assert_int_equal(load_edited(old, "  anchor: {source: ecef}\nstations:\n"
                                       "  - {position_m: [1, 2, 3], ecef_m: [6378137, 0, 0]}"),
                      SH_EINPUT);
@@ -248,7 +248,7 @@ static uint32_t next_random(uint32_t *x) /* xorshift32, Marsaglia 2003 */
 
 enum { DAMAGED = 2000 };
 
-/* Any bytes give a configuration or faults of one line each; sanitizers look for the rest. */
+/* Any bytes give a configuration, or errors of one line each. Sanitizers check the rest. */
 static void damaged_files_never_crash(void **state)
 {
     (void)state;

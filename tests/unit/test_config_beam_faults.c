@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults that change what is measured: heads that can't have them are told why. */
+/* Faults that change the measurements. Heads that can't have them get the reason. */
 #include "tests/unit/config_rig.h"
 
-/* Of a line head without noise and signal (base), with a list of faults, and of other heads. */
+/* The cases are for a line head without noise and signal (base), with a list of faults, and for other heads. */
 static void assert_refused(const char *profile, const char *rest, const char *item, const char *says)
 {
     char with[512];

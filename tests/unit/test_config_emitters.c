@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Emitters of head profiles: what follows from them, and what is refused, with file, line and key. */
+/* Emitters of head profiles: derived figures, and refusals with file, line and key. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
-/* A shipped profile with its first `old` replaced, as heads/mine.yaml beside the configuration. */
+/* Writes a shipped profile with its first `old` replaced, as heads/mine.yaml beside the configuration. */
 static int load_changed(const char *name, const char *old, const char *with)
 {
     char path[128], text[8192], changed[8448];
@@ -53,7 +53,7 @@ struct wrong {
     const char *profile, *old, *with, *key, *fragment;
 };
 
-/* One of the faults; others may follow from the same change. */
+/* Checks one of the errors; others may follow from the same change. */
 static void check_wrong(const struct wrong *w)
 {
     char start[128], key[64];
@@ -112,7 +112,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
         check_wrong(&wrong[i]);
 }
 
-/* What settings can't be with such a head; the line is that of the configuration. */
+/* Such a head can't have these settings. The line is the configuration's. */
 static void settings_that_do_not_fit_are_refused(void **state)
 {
     (void)state;
@@ -207,7 +207,7 @@ static void lists_name_their_line(void **state)
     assert_says("has a list of directions; allowed without it");
 }
 
-/* Limits that doubles don't hold exactly are allowed themselves. */
+/* Limits that doubles don't hold exactly are allowed values. */
 static void spheres_go_to_their_limits(void **state)
 {
     (void)state;
@@ -235,7 +235,7 @@ static void spheres_go_to_their_limits(void **state)
     }
 }
 
-/* 3600 pulses a ring at a thousand rings a second; 36000 at no more than 1e7 pulses a second. */
+/* 3600 pulses a ring at a thousand rings a second are allowed; 36000 at no more than 1e7 pulses a second. */
 static void the_step_of_a_sphere_is_a_setting(void **state)
 {
     (void)state;
@@ -254,7 +254,7 @@ static void the_step_of_a_sphere_is_a_setting(void **state)
     assert_int_equal(cfg->profile.emitter.rings, 83);
 }
 
-/* A line rate, and the steps of a turn at it. */
+/* Checks a line rate, and the steps of a turn at it. */
 static void expect_geometry(const char *settings, int lines_hz, uint32_t steps)
 {
     assert_loads(load_settings("sick-lms111", settings));

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* All faults of a configuration at once, in their order, and none that only follows from another one; and
- * files that are none. */
+/* All errors of a configuration at once, in their order, without those that only follow from another one. And files
+ * that are no configuration. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
-/* The faults are these, in this order: each begins with PATH:LINE: KEY, or as it stands here. */
+/* The errors are these, in this order. Each begins with PATH:LINE: KEY, or with the text here. */
 static void assert_faults(const char *const *starts, uint32_t n)
 {
     char want[256];
@@ -37,7 +37,7 @@ static void all_faults_are_told_in_order(void **state)
                   "3: scene.meshes[0].up: ", "3: scene.meshes[0].scale: missing", "5: stations[0].position_m: ",
                   "5: stations[0].heading_deg: ", "6: links[0].address: ", "6: links[0].port: ", "7: output.utm_zone: ",
                   "7: output.heights: ", "8: loop.tick_hz: ", "--set head.frames: ", "--set gnss.quality: ");
-    /* The first is what the shorter call gives. */
+    /* The shorter call returns the first. */
     struct sh_err first;
     assert_int_equal(config_load(config_path, sets, 2, cfg, &first), SH_EINPUT);
     assert_string_equal(first.text, faults.fault[0].text);
@@ -95,7 +95,7 @@ static void twenty_are_kept_and_all_are_counted(void **state)
     assert_int_equal(faults.n, 60);
     snprintf(want, sizeof want, "surfaces[%d]", CONFIG_MAX_FAULTS - 1);
     assert_non_null(strstr(faults.fault[CONFIG_MAX_FAULTS - 1].text, want));
-    /* A fault that is found later and stands before the others takes its place before them. */
+    /* An error that is found later and stands before the others takes its place before them. */
     char *first = strstr(text, "  prr_hz: 500000");
     memcpy(first, "  prr_hz: 999999", 16);
     memcpy(strstr(text, "lines_hz: 100"), "lines_hz: 2  ", 13); /* outside the profile: found after reading */
@@ -104,7 +104,7 @@ static void twenty_are_kept_and_all_are_counted(void **state)
     assert_non_null(strstr(faults.fault[0].text, ":4: head.lines_hz: 2 is outside"));
 }
 
-/* Hostile: thousands of faults cost what reading costs. Nothing is asserted on time but that it ends. */
+/* A hostile file: thousands of errors cost as much as reading. The only assertion on time is that it ends. */
 static void many_faults_end(void **state)
 {
     (void)state;
@@ -118,7 +118,7 @@ static void many_faults_end(void **state)
     free(text);
 }
 
-/* ---- files that are none: refused at once, where opening one would wait, or reading it never end */
+/* ---- files that are none are refused at once: opening one could wait, or reading it never end */
 
 static void a_fifo_or_a_device_is_refused(void **state)
 {

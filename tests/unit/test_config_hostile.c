@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Configurations that are made to cost much: anchors without end, lists that name each other, a document within itself.
- * Each is refused by a limit, with its line, long before it costs anything. Depth and size: test_config. */
+ * A limit refuses each of them, with its line, long before it costs anything. test_config has depth and size. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
 enum { MOST_ANCHORS = 256 };
 
-/* A mapping of n keys, each with an anchor, above what a configuration needs. */
+/* Loads a mapping of n keys, each with an anchor, above what a configuration needs. */
 static void load_anchors(int n)
 {
     char *text = malloc(64 * (size_t)n + 64), *p = text;
@@ -28,7 +28,7 @@ static void anchors_have_a_limit(void **state)
     assert_says(":258: too many anchors; allowed 256");
 }
 
-/* Ten lists, each of which names the one before ten times: 10^10 elements, were they followed. */
+/* Ten lists name the one before ten times each: that would be 10^10 elements. */
 static void lists_of_lists_are_not_followed(void **state)
 {
     (void)state;
@@ -42,7 +42,7 @@ static void lists_of_lists_are_not_followed(void **state)
     }
     sprintf(p, "links: *a9\n");
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_true(faults.n <= 200); /* a line for each that is wrong, not for each way to it */
+    assert_true(faults.n <= 200); /* a line for each wrong element, not for each way to it */
 }
 
 static void a_document_within_itself_ends(void **state)

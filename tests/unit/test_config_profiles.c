@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Head profiles: those that come with the program, and what is refused of one. */
+/* Head profiles: those that come with the program, and refused ones. */
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/config/reference.h"
 #include "tests/unit/config_rig.h"
@@ -45,8 +45,7 @@ static void profiles_give_their_figures(void **state)
     assert_string_equal(p->maker, "Leica");
 }
 
-/* Reads a shipped profile, replaces `old` by `with` and loads it as heads/mine.yaml beside the configuration.
- */
+/* Reads a shipped profile, replaces `old` by `with` and loads it as heads/mine.yaml beside the configuration. */
 static int load_profile(const char *old, const char *with)
 {
     char text[8192];
@@ -209,7 +208,7 @@ static void profiles_are_listed(void **state)
     head =
         strstr(text, "\nhokuyo-urg-04lx: Hokuyo URG-04LX\n  planar     1024 steps a turn, 44 to 725 cast, 384 ahead, ");
     assert_non_null(head);
-    /* What a link may speak: any protocol of the head's emitter, whoever made the head. */
+    /* A link may have any protocol of the head's emitter, whoever made the head. */
     assert_non_null(strstr(head, "protocols  native, nmea, scip, cola\n"));
     assert_non_null(strstr(strstr(text, "\nsick-tim561: "), "protocols  native, nmea, scip, cola\n"));
     assert_non_null(strstr(strstr(text, "\nvelodyne-vlp16: "), "\n  beams      16 beams, 55296 ns a sequence"));

@@ -99,7 +99,7 @@ static void set_refuses(void **state)
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         char start[128], in_file[192];
         snprintf(start, sizeof start, "--set %s: ", wrong[i].key);
-        snprintf(in_file, sizeof in_file, "%s:", config_path); /* where the file is at fault together with --set */
+        snprintf(in_file, sizeof in_file, "%s:", config_path); /* with --set, an error in the file names the file */
         if (load_set(wrong[i].set) != SH_EINPUT) fail_msg("%s was taken", wrong[i].set);
         int elsewhere = strcmp(wrong[i].set, "output.crs=utm") == 0 || strcmp(wrong[i].set, "links[0].type=pty") == 0;
         const char *expected = elsewhere ? in_file : start;
@@ -109,8 +109,7 @@ static void set_refuses(void **state)
     }
 }
 
-/* A list or a section as YAML replaces what the file has, and what a --set before it has set; what comes after it
- * changes it. */
+/* YAML replaces the file's list or section, and earlier --set within it. Later --set changes it. */
 static void yaml_replaces(void **state)
 {
     (void)state;
@@ -145,7 +144,7 @@ static void yaml_replaces(void **state)
     assert_int_equal(cfg->n_links, 0);
 }
 
-/* The sections `scanner` go with the stations that have them. */
+/* The sections `scanner` are replaced with their stations. */
 static void yaml_replaces_scanners(void **state)
 {
     (void)state;
@@ -195,8 +194,8 @@ static void a_full_list_takes_no_more(void **state)
     assert_says("--set links[8].type: links has 8 elements; allowed indices 0 to 7");
 }
 
-/* Not given, the tolerance of positions is a thousandth of the plan's, at least 1e-7 m; that of meshes a tenth of it, or
- * 1 m where the plan's is not given either. */
+/* When not given, the tolerance of positions is a thousandth of the plan's, at least 1e-7 m. The tolerance of meshes is
+ * a tenth of it, or 1 m where the plan's is not given either. */
 static void tolerances_follow_the_plan(void **state)
 {
     (void)state;
@@ -216,8 +215,8 @@ static void tolerances_follow_the_plan(void **state)
     }
 }
 
-/* Settings that a client has changed, in nanometres, become the lengths that a file would have given; a pulse rate whose
- * range is shorter keeps its own limits. */
+/* Settings that a client has changed, in nanometres, become lengths as from a file. A pulse rate whose range is shorter
+ * keeps its own limits. */
 static void settings_become_lengths(void **state)
 {
     (void)state;

@@ -61,7 +61,7 @@ static void rows_are_sound(void **state)
         }
 }
 
-/* The example as it is printed; free it. */
+/* Returns the example as it is printed; free it. */
 static char *print_example(void)
 {
     char *text = NULL;
@@ -80,13 +80,13 @@ static void the_example_loads(void **state)
     free(text);
 }
 
-/* "# word": not a key behind a #, which has no blank there, or two and more. */
+/* "# word" is a comment. A key after a # has no blank there, or two and more. */
 static int is_comment(const char *line)
 {
     return line[1] == ' ' && line[2] != ' ';
 }
 
-/* With every # of the first column away it is a file with every key, each with a value that is read. */
+/* Without the # of the first column it is a file with every key, each with a value that can be read. */
 static void the_example_has_every_key(void **state)
 {
     (void)state;

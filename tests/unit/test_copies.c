@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Copies of meshes in a BVH against the same triangles written out: the same hits, labels and incidences. */
+/* Copies of meshes in a BVH against the same triangles written out. Hits, labels and incidences are the same. */
 #include <math.h>
 
 #include "core/bvh.h"
@@ -18,7 +18,7 @@ static double next(double lo, double hi)
     return lo + (hi - lo) * (double)(state_now >> 11) * 0x1p-53;
 }
 
-/* Two boxes, one on the other: closed, with faces that many copies share with the ground. */
+/* Two boxes, one on the other, closed. Many copies share their faces with the ground. */
 static const char TREE[] = "o trunk\nv -0.1 -0.1 0\nv 0.1 -0.1 0\nv 0.1 0.1 0\nv -0.1 0.1 0\n"
                            "v -0.1 -0.1 2\nv 0.1 -0.1 2\nv 0.1 0.1 2\nv -0.1 0.1 2\n"
                            "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
@@ -82,7 +82,7 @@ static double range_m[2][RAYS], cosine[2][RAYS];
 static uint32_t triangle[2][RAYS], label[2][RAYS];
 static float steep[2][RAYS];
 
-/* from_own: each ray begins elsewhere, some of them within a copy. */
+/* With from_own each ray begins elsewhere, some of them within a copy. */
 static void cast(const struct pair *p, const double middle_m[3], int from_own, uint32_t packet)
 {
     struct bvh_work *work;
@@ -114,8 +114,8 @@ static void cast(const struct pair *p, const double middle_m[3], int from_own, u
     bvh_work_free(work);
 }
 
-/* Corners are written out with an error of 2^-53 of the coordinates; a plane's tilt comes to that over the least edge,
- * 0.07 m, over at most 100 m. A ray at a smaller sine than 0.01 is left out. */
+/* Corners are written out with an error of 2^-53 of the coordinates. A plane's tilt is that over the least edge, 0.07
+ * m, over at most 100 m. A ray at a smaller sine than 0.01 is left out. */
 static void compare(const double middle_m[3], uint32_t least_hits)
 {
     const double rounding_m = 0x1p-53 * (fabs(middle_m[0]) + fabs(middle_m[1]) + fabs(middle_m[2]) + 200.0);
@@ -163,7 +163,7 @@ static void copies_are_what_they_are_written_out(void **state)
         }
 }
 
-/* Steepness is asked for of rays from one point; where it is large, its rounding is. */
+/* Steepness is compared for rays from one point. If it is large, its rounding is large, too. */
 static void incidence_is_the_same(void **state)
 {
     (void)state;
@@ -180,7 +180,7 @@ static void incidence_is_the_same(void **state)
     close_pair(&p);
 }
 
-/* Two copies at one place, and one of them again: the first is the hit, whatever order Embree finds them in. */
+/* Two copies are at one place, and one of them again. The first is the hit, in whatever order Embree finds them. */
 static void the_first_of_equal_copies_is_hit(void **state)
 {
     (void)state;
@@ -205,7 +205,7 @@ static void the_first_of_equal_copies_is_hit(void **state)
     close_pair(&p);
 }
 
-/* The way a copy turns is that of bodies that turn. */
+/* A copy turns in the same sense as a body that turns. */
 static void a_copy_turns_clockwise(void **state)
 {
     (void)state;

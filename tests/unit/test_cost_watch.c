@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A run that takes more than ten times what its plan says is warned of: by figures that the test brings, and once in a
- * loop whose plan has next to nothing for a pulse. */
+/* A run that takes more than ten times its planned cost gives a warning. The figures are the test's, and once those of
+ * a loop whose plan has next to nothing for a pulse. */
 #include "tests/unit/device_rig.h"
 
 #include <poll.h>
@@ -30,7 +30,7 @@ static void more_than_ten_times_is_told(void **state)
     assert_true(add(&f, SECOND - 1, 10, 0) == 0.0);    /* too little to say */
     assert_true(add(&f, 1, 990, 0) == 1e6);            /* a second of 1,000 pulses */
     assert_true(add(&f, SECOND, 1000000, 0) == 0.0);   /* 1,000 ns: not more than ten times */
-    assert_true(add(&f, SECOND, 500000, 0) == 2000.0); /* of these alone */
+    assert_true(add(&f, SECOND, 500000, 0) == 2000.0); /* of the last pulses alone */
 }
 
 /* At most open_pulses were claimed before the window and are cast in it. */
@@ -42,7 +42,7 @@ static void what_was_claimed_before_counts(void **state)
     assert_true(add(&f, 10 * SECOND, 0, 0) > 9999.0); /* a tick that never ends: nothing is claimed, nothing released */
 }
 
-/* Ticks without pulses, however long; and what ticks take beside their pulses. */
+/* There are ticks without pulses, however long; and the ticks' own cost beside their pulses. */
 static void a_head_that_rests_is_not_dear(void **state)
 {
     (void)state;
@@ -73,7 +73,7 @@ static void *read_all(void *fd)
     return NULL;
 }
 
-/* Runs until it was told, or else for ever. */
+/* Runs until there was a warning, which must come. */
 static void a_loop_tells_it_once(void **state)
 {
     (void)state;

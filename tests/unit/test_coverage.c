@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Coverage: areas are kept, a box is seen as a whole, an L-shaped room as geometry says, whatever the threads. */
+/* Coverage: areas are kept, all of a box is seen, and the visible part of an L-shaped room follows from geometry.
+ * Threads change nothing. */
 #include "tests/unit/coverage_rig.h"
 
 static const double LO[3] = {-1.9, -1.4, -1.1}, HI[3] = {2.2, 1.7, 1.3}, WITHIN[3] = {0.1, 0.2, 0.05};
 static const double BOX_M2 = 2.0 * (4.1 * 3.1 + 4.1 * 2.4 + 3.1 * 2.4);
 
-/* Lines of points a and b apart, seen at an angle, are images of a square grid: no circle between them has a radius of
- * more than half of the square's diagonal, stretched by range / cosine = range^2 / distance from the plane. 1 %: the
- * step isn't infinitely small, and the pan turns by a step during a line. */
+/* Lines of points a and b apart, seen at an angle, are images of a square grid. No circle between them has a radius of
+ * more than half of the square's diagonal, stretched by range / cosine = range^2 / distance from the plane. 1 % is
+ * added: the step isn't infinitely small, and the pan turns by a step during a line. */
 static int is_resolved(const struct cover_cell *cell)
 {
     return cell->least_m > 1.01 * M_SQRT1_2 * cell->spacing_m;
@@ -33,7 +34,7 @@ static void assert_near(const char *what, double got, double want, double tolera
     if (!(fabs(got - want) <= tolerance)) fail_msg("%s: %.17g, and it should be %.17g", what, got, want);
 }
 
-/* Each triangle's area is shared out among cells: some thousand additions. */
+/* Each triangle's area is shared out among cells by some thousand additions. */
 static void test_area_is_kept(void **state)
 {
     (void)state;
@@ -55,14 +56,14 @@ static void test_area_is_kept(void **state)
             for (int a = 0; a < 3; a++)
                 assert_true(high[a] - low[a] <= 2.5 * cells_m[i] + 1e-9);
         }
-        /* The largest cells: one for each wall. */
+        /* The largest cells are one for each wall. */
         if (cells_m[i] > 10.0) assert_int_equal(sums.cells, 6);
         free(cell);
         cover_close(c);
     }
 }
 
-/* A box from inside is seen as a whole where each cell holds a circle that no gap between the points does. Much smaller
+/* All of a box is seen from inside where each cell holds a circle that no gap between the points does. Much smaller
  * cells are not. */
 static void test_box(void **state)
 {
@@ -95,7 +96,7 @@ static void test_box(void **state)
     cover_close(c);
 }
 
-/* Nothing beyond the range is seen, and all that lies within it is. */
+/* Beyond the range nothing is seen, and within it all is. */
 static void test_range_limit(void **state)
 {
     (void)state;
@@ -130,8 +131,8 @@ static void test_range_limit(void **state)
     cover_close(c);
 }
 
-/* ---- the L. From its right leg: what lies beyond the line through the inner corner (2, 2) is hidden. On that line and
- * on the walls that end there a point belongs to both. */
+/* ---- the L. From its right leg everything beyond the line through the inner corner (2, 2) is hidden. A point on that
+ * line, or on the walls that end there, belongs to both. */
 static const double RIGHT[3] = {5.0, 1.0, 1.2}, UPPER[3] = {1.0, 4.0, 1.2};
 static const double SLACK = 1e-9;
 
@@ -145,15 +146,15 @@ static int upper_sees(const double p[3])
     return !(p[0] > 2.0 + SLACK && p[0] > 1.0 + (4.0 - p[1]) / 2.0 + SLACK);
 }
 
-/* Of the upper leg, 2 m by 3 m, a triangle of 2 m by 2/3 m is seen, on floor and ceiling; of the wall at x = 0 the part
- * below y = 8/3; of the walls at x = 2 and y = 5 nothing. */
+/* A triangle of 2 m by 2/3 m of the upper leg, 2 m by 3 m, is seen on floor and ceiling. The wall at x = 0 is seen
+ * below y = 8/3, and nothing of the walls at x = 2 and y = 5. */
 #define RIGHT_HIDDEN_M2 (2.0 * (6.0 - 2.0 / 3.0) + L_HEIGHT_M * (7.0 / 3.0 + 3.0 + 2.0))
-/* Of the right leg beyond x = 2, 4 m by 2 m, a triangle of 1 m by 2 m is seen; of the wall at y = 0 the part up to x = 3;
- * of those at x = 6 and y = 2 nothing. */
+/* A triangle of 1 m by 2 m of the right leg beyond x = 2, 4 m by 2 m, is seen. The wall at y = 0 is seen up to x = 3,
+ * and nothing of those at x = 6 and y = 2. */
 #define UPPER_HIDDEN_M2 (2.0 * (8.0 - 1.0) + L_HEIGHT_M * (3.0 + 2.0 + 4.0))
 #define L_M2            (2.0 * 18.0 + L_HEIGHT_M * 22.0)
 
-/* A whole turn coarsely, and finely what is far. */
+/* The head scans a whole turn coarsely, and the far part finely. */
 static const struct cover_sweep RIGHT_FAR = {0.15, -40.0, 40.0, 235.0, 325.0, 1000.0};
 static const struct cover_sweep UPPER_FAR = {0.15, -40.0, 40.0, 90.0, 200.0, 1000.0};
 
@@ -162,7 +163,7 @@ struct view {
     double coarse_m2;       /* of visible cells that may lie between the points */
 };
 
-/* Each cell is seen as geometry says: where all of it is visible it is, where nothing of it is it isn't. */
+/* Each cell is seen as geometry says: one that is all visible is seen, and one that is all hidden is not. */
 static struct view check_cells(const struct cover *c, const double station_m[3], int (*sees)(const double p_m[3]))
 {
     struct cover_cell *coarse = cells_of(c, station_m, 0.5, sees), *fine = cells_of(c, station_m, 0.15, sees);
@@ -200,7 +201,7 @@ static void check_l(const double station_m[3], const struct cover_sweep *far, in
     const struct view view = check_cells(c, station_m, sees);
     sums_of(c, &sums);
     assert_near("area", sums.area_m2, L_M2, 1e-11);
-    /* Of the cut cells, more or less is visible. They lie within a cell's width, 2.5 cell_m across, of the line. */
+    /* More or less of the cut cells is visible. They lie within a cell's width, 2.5 cell_m across, of the line. */
     print_message("%.3f m2 seen, %.3f m2 visible, %.3f m2 in cells that the shadow's line cuts, %.3f m2 perhaps "
                   "between the points\n",
                   view.seen_m2, L_M2 - hidden_m2, view.cut_m2, view.coarse_m2);
@@ -223,7 +224,8 @@ static void test_l_from_above(void **state)
     check_l(UPPER, &UPPER_FAR, upper_sees, UPPER_HIDDEN_M2, 2.0 * hypot(1.0, 2.0) + L_HEIGHT_M);
 }
 
-/* What one hides the other one sees. Scans at one place count as stations, so each place has one here. */
+/* The part that one station hides is seen by the other. Scans at one place count as stations, so each place has one
+ * here. */
 static void test_two_stations(void **state)
 {
     (void)state;
@@ -254,7 +256,7 @@ static void test_two_stations(void **state)
     cover_close(c);
 }
 
-/* All figures of all cells, to the last bit. */
+/* All figures of all cells are the same, to the last bit. */
 static void test_threads(void **state)
 {
     (void)state;
@@ -277,7 +279,8 @@ static void test_threads(void **state)
     cover_close(five);
 }
 
-/* The smallest incidence and range of a large cell: a pulse meets its wall nearly head on, at the wall's distance. */
+/* The smallest incidence and range of a large cell are known: a pulse meets its wall nearly head on, at the wall's
+ * distance. */
 static void test_figures_of_a_cell(void **state)
 {
     (void)state;
@@ -310,7 +313,7 @@ static void test_too_small(void **state)
     assert_null(coverage);
     const char *says = strstr(err.text, "a cell of ");
     if (says == NULL || strstr(err.text, "8 MiB are allowed") == NULL) fail_msg("%s", err.text);
-    /* What the text allows is allowed. */
+    /* The limit in the text is allowed. */
     assert_int_equal(sscanf(says, "a cell of %lf m", &allowed_m), 1);
     spec.cell_m = allowed_m;
     if (coverage_create(&spec, NULL, &coverage, &err) != 0) fail_msg("%s", err.text);

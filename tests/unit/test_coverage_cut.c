@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Triangles in pieces: their areas add up, none is too large, and points are found in the piece that holds them. And sums
+/* Triangles in pieces: their areas add up, none is too large, and a point is found in the piece that holds it. And sums
  * over cells. */
 #include <math.h>
 #include <setjmp.h>
@@ -14,8 +14,8 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
-/* A wall, a flat and a steep needle, one that is one piece, an equal-sided one, a right angle at the base's end as far
- * as a double can tell, and one at coordinates of UTM. */
+/* The triangles are a wall, a flat and a steep needle, one that is a single piece, and an equal-sided one. Two more
+ * have a right angle at the base's end to double precision, and coordinates of UTM. */
 static const double CASES[][3][3] = {
     {{0, 0, 0}, {10.2, 0, 0}, {10.2, 0, 4.24}},
     {{0, 0, 0}, {10, 0, 0}, {4, 0.01, 0.02}},
@@ -78,7 +78,7 @@ static void test_partition(void **state)
             check_pieces(CASES[i], sizes_m[k]);
 }
 
-/* Within the polygon to 1e-7 of the size: left of all its edges. */
+/* Returns whether the polygon holds the point to 1e-7 of the size: it is left of all its edges. */
 static int holds(int n, const double corner[4][3], const double normal[3], const double p[3], double slack_m)
 {
     for (int i = 0; i < n; i++) {
@@ -114,7 +114,7 @@ static void test_points_are_found(void **state)
         }
 }
 
-/* Corners, and what rounding leaves outside. */
+/* Corners are tried, and points that rounding leaves outside. */
 static void test_border(void **state)
 {
     (void)state;
@@ -130,7 +130,7 @@ static void test_border(void **state)
         }
 }
 
-/* Ten metres by a millimetre: one row, so columns of 0.25 / sqrt(5) m along two legs, each rounded up. */
+/* Ten metres by a millimetre have one row, so columns of 0.25 / sqrt(5) m along two legs, each rounded up. */
 static void test_needle(void **state)
 {
     (void)state;
@@ -138,8 +138,8 @@ static void test_needle(void **state)
     assert_true(cut_count(needle, 0.25) == ceil(3.0 * sqrt(5.0) / 0.25) + ceil(7.0 * sqrt(5.0) / 0.25));
 }
 
-/* Sums over cells that are put together by hand: areas by how many stations see them, by surface, by station; spreads
- * go by area, of what is seen alone. */
+/* Sums over cells that are put together by hand: areas by the number of stations that see them, by surface, by station.
+ * Spreads are weighted by area, of seen cells only. */
 static void test_sums(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The next station: places where a tripod can stand, and what would be gained there. */
+/* The next station: places where a tripod can stand, and the gain of each. */
 #include "tests/unit/coverage_rig.h"
 
 #include "core/studio/standpoint.h"
@@ -9,7 +9,7 @@ static const double HEIGHT_M = 1.2;
 
 /* ---- places */
 
-/* Not on the roof. */
+/* The roof does not count. */
 static uint32_t find_places(const struct cover *c, double step_m, double height_m, struct standpoint_place **place)
 {
     const struct standpoint_grid grid = {
@@ -20,8 +20,8 @@ static uint32_t find_places(const struct cover *c, double step_m, double height_
     return n;
 }
 
-/* The L on a grid of 0.5 m: x, y = 0.25, 0.75, ... Those 0.25 m from a wall are too near. Of the right leg remain 10 by 2
- * of x from 0.75 to 5.25 and y = 0.75, 1.25; in the row y = 1.75 the three with x < 2; of the upper leg 2 by 5 of x =
+/* The L on a grid of 0.5 m: x, y = 0.25, 0.75, ... Those 0.25 m from a wall are too near. The right leg keeps 10 by 2:
+ * x from 0.75 to 5.25 and y = 0.75, 1.25. The row y = 1.75 has the three with x < 2. The upper leg has 2 by 5: x =
  * 0.75, 1.25 and y from 2.25 to 4.25. */
 static void test_places(void **state)
 {
@@ -37,7 +37,7 @@ static void test_places(void **state)
         if (i > 0) assert_true(p[0] > p[-4] || (p[0] == p[-4] && p[1] > p[-3])); /* in order; a place is 4 doubles */
     }
     free(place);
-    /* 0.2 m of room above the head, and the room is 2.4 m high */
+    /* 0.2 m above the head are needed, and the room is 2.4 m high. */
     assert_int_equal(find_places(c, 0.5, 2.19, &place), 33);
     free(place);
     assert_int_equal(find_places(c, 0.5, 2.21, &place), 0);
@@ -45,8 +45,8 @@ static void test_places(void **state)
     cover_close(c);
 }
 
-/* A table of 1 m by 0.1 m is no floor: of the 8 spots around most lie beside it. A plate of 3 m is, and under it there is
- * not room enough. */
+/* A table of 1 m by 0.1 m is no floor: most of the 8 spots around lie beside it. A plate of 3 m is one, and there is
+ * too little room under it. */
 static void test_no_floors(void **state)
 {
     (void)state;
@@ -98,7 +98,7 @@ static void test_too_many(void **state)
 
 /* ---- gains */
 
-/* Directions of a whole sphere, rings of n_rings. */
+/* Directions of a whole sphere, in n_rings rings. */
 struct rays {
     uint32_t n;
     double dir[20000][3], sr[20000];
@@ -133,7 +133,7 @@ static void gains_of(const struct cover *c, const struct rays *rays, const doubl
         fail_msg("%s", err.text);
 }
 
-/* Which cells rays meet, the long way: each piece is asked whether the ray passes through it. */
+/* Finds the cells that rays meet in the slow way: each piece is asked whether the ray passes through it. */
 struct search {
     const double *from, *dir;
     double range_m;
@@ -162,7 +162,7 @@ static void try_piece(void *ctx, uint32_t cell, int n, const double corner[4][3]
     s->cell = cell;
 }
 
-/* With whole cells the gain is the sum of the cells that are met and that nobody has seen. */
+/* With whole cells the gain is the sum of the cells that are met and that no station has seen. */
 static void test_brute_force(void **state)
 {
     (void)state;
@@ -197,7 +197,7 @@ static void test_brute_force(void **state)
     cover_close(c);
 }
 
-/* Cells much smaller than a ray: the gain is the sum of what the rays stand for, and that is the area. Lines of rays end
+/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, and that is the area. Lines of rays end
  * within a ray's width of the edges, 12 edges of a box; by chance half of that, in either direction. */
 static void test_coarse_rays(void **state)
 {
@@ -214,8 +214,8 @@ static void test_coarse_rays(void **state)
     cover_close(c);
 }
 
-/* The best place of the L after a station in its right leg lies in the upper one, which reaches down to y = 0; what rays say of it agrees with whole
- * scans within the cells that outlines cut. */
+/* After a station in the right leg of the L, the best place lies in the upper one, which reaches down to y = 0. The
+ * estimate by rays agrees with whole scans within the cells that outlines cut. */
 static void test_the_other_leg(void **state)
 {
     (void)state;
@@ -237,15 +237,15 @@ static void test_the_other_leg(void **state)
     for (uint32_t i = 0; i < 33; i++)
         if (gain[i].gain_m2 > gain[best].gain_m2) best = i;
     assert_true(at[best][0] < 2.0);
-    /* All that was hidden is seen from there: 2 (6 - 2/3) of floor and ceiling, 22/3 m of walls; less the cells that the
-     * station's shadow line cuts, which are seen already: within 2.5 cells of 0.5 m along 6.6 m. */
+    /* All of the hidden part is seen from there: 2 (6 - 2/3) of floor and ceiling, 22/3 m of walls. The cells that the
+     * station's shadow line cuts are seen already: within 2.5 cells of 0.5 m along 6.6 m. */
     const double hidden_m2 = 2.0 * (6.0 - 2.0 / 3.0) + 22.0 / 3.0 * L_HEIGHT_M;
     assert_true(gain[best].gain_m2 <= hidden_m2 + 1e-9 && gain[best].gain_m2 >= hidden_m2 - 6.6 * 2.5 * 0.5);
     for (uint32_t i = 0; i < 33; i += 8) {
         cover_scan(c, at[i], &sweep, &scan);
         assert_int_equal(coverage_look(c->coverage, &scan, "scan", NULL, &pulses, &err), 0);
         coverage_waiting(c->coverage, &seen_m2, &gain_m2);
-        /* An outline of what is gained is at most the shadow's line of either, some 7 m; each cell there counts or not. */
+        /* An outline of the gain is at most the shadow's line of either, some 7 m. Each cell there counts or not. */
         print_message("%.2f %.2f: %.3f m2 by rays, %.3f m2 by a scan\n", at[i][0], at[i][1], gain[i].gain_m2, gain_m2);
         assert_true(fabs(gain[i].gain_m2 - gain_m2) <= 7.0 * 0.5);
         assert_true(seen_m2 >= gain_m2);

@@ -11,7 +11,8 @@
 
 typedef uint32_t (*crc_fn)(uint32_t crc, const void *data, size_t len);
 
-/* RFC 3720 appendix B.4 (bytes there are the CRC in little-endian order), and the catalogue's check value. */
+/* The values of RFC 3720 appendix B.4 (bytes there are the CRC in little-endian order), and the catalogue's check
+ * value. */
 static void check_published(crc_fn crc)
 {
     uint8_t zeros[32] = {0}, ones[32], up[32], down[32];
@@ -52,7 +53,7 @@ static void test_published_hw(void **state)
     check_published(crc32c_hw);
 }
 
-/* The definition, one bit at a time. */
+/* The definition goes one bit at a time. */
 static uint32_t bitwise(uint32_t crc, const uint8_t *p, size_t len)
 {
     crc = ~crc;
@@ -75,7 +76,7 @@ static void fill(void)
     }
 }
 
-/* Lengths around the block of three lanes (1008 bytes), every alignment, running CRCs. */
+/* Lengths are around the block of three lanes (1008 bytes), with every alignment and running CRCs. */
 static void check_lengths(crc_fn crc)
 {
     fill();
@@ -107,7 +108,7 @@ static void *table_thread(void *arg)
     return NULL;
 }
 
-/* Runs first, so that the table is made under competition. */
+/* This test runs first, so that threads compete for making the table. */
 static void test_first_use_from_threads(void **state)
 {
     (void)state;

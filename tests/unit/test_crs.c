@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Named coordinate reference systems by PROJ, against GeographicLib's UTM and against published places. */
+/* Named coordinate reference systems by PROJ, compared with GeographicLib's UTM and with published places. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -26,7 +26,7 @@ static struct crs_place located(const char *name, double easting_m, double north
     return place;
 }
 
-/* Two libraries of the same projection; 1e-9 degrees are 0.1 mm. WGS 84 / UTM has no other datum to come from. */
+/* They are two libraries of the same projection; 1e-9 degrees are 0.1 mm. WGS 84 / UTM involves no other datum. */
 static void utm_is_that_of_geographiclib(void **state)
 {
     (void)state;
@@ -46,8 +46,8 @@ static void utm_is_that_of_geographiclib(void **state)
         assert_int_equal(georef_locate_utm(at[i].zone, at[i].north, there, &up, &err), SH_OK);
         assert_near(place.at.lat_deg, want.lat_deg, 1e-9);
         assert_near(place.at.lon_deg, want.lon_deg, 1e-9);
-        /* Ten metres to grid north, in ECEF: their direction, and how long they are. At 10 m a chord's direction has
-         * turned by less than 2e-6 rad from the tangent at its beginning. */
+        /* Ten metres to grid north, in ECEF: their direction and length. At 10 m a chord's direction has turned by less
+         * than 2e-6 rad from the tangent at its beginning. */
         double a[3], b[3], east_m, north_m;
         georef_geodetic_to_ecef(&want, a);
         georef_geodetic_to_ecef(&up, b);
@@ -68,7 +68,7 @@ static void the_swiss_grid(void **state)
     const struct crs_place place = located("EPSG:2056", 2600000.0, 1200000.0);
     assert_near(place.at.lat_deg, 46.0 + 57.0 / 60 + 3.9 / 3600, 2e-5);
     assert_near(place.at.lon_deg, 7.0 + 26.0 / 60 + 19.1 / 3600, 3e-5);
-    assert_near(place.convergence_rad, 0.0, 1e-4); /* the datums' own turn, and that of the point by their shift */
+    assert_near(place.convergence_rad, 0.0, 1e-4); /* the datums' own turn, and the point's by their shift */
     assert_near(place.scale, 1.0, 2e-4);           /* the datums' ellipsoids */
     assert_true(place.accuracy_m > 0.0 && place.accuracy_m <= 5.0);
 }

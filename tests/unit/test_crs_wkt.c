@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What CRS texts say, and LAS 1.2's keys: meridians, false origins, axes, codes and kinds of heights (EPSG). */
+/* The contents of CRS texts and LAS 1.2's keys: meridians, false origins, axes, codes and kinds of heights (EPSG). */
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/las_header.h"
 #include "tests/unit/recorder_rig.h"
@@ -11,7 +11,7 @@ static void expect(int epsg, int geoid, const char *part)
     if (strstr(text, part) == NULL) fail_msg("EPSG %d: no %s in %s", epsg, part, text);
 }
 
-/* In that order. */
+/* The axes are in that order. */
 static void expect_order(int epsg, const char *first, const char *second)
 {
     char text[CRS_WKT_MAX];
@@ -46,7 +46,7 @@ static void test_wkt(void **state)
     }
 }
 
-/* The value of a GeoTIFF key (OGC 19-008); 0: it is not there. */
+/* Returns the value of a GeoTIFF key (OGC 19-008); 0: it is not there. */
 static unsigned key_of(int epsg, int geoid, unsigned key)
 {
     static uint8_t front[LAS_FRONT_MAX];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Holes that textures cut out: where a ray goes on is computed here ray by ray, from the texels as they are
+/* Holes that textures cut out. The continuation of a ray is computed here ray by ray, from the texels as they are
  * written, without the head's code. */
 #include "tests/unit/scene_files.h"
 
@@ -76,7 +76,7 @@ static void begin_obj(void)
     n_quads = 0;
 }
 
-/* Across the y axis, from -half to half, with the image once. */
+/* Writes a square across the y axis, from -half to half, with the image once. */
 static void quad(const char *material, double y, double half, double shift_u)
 {
     fprintf(obj, "usemtl %s\n", material);
@@ -112,7 +112,7 @@ struct rays {
 };
 static struct rays rays;
 
-/* Into a cone about y, from a small box around the origin. */
+/* Aims into a cone about y, from a small box around the origin. */
 static void aim(double slope, double reach_m)
 {
     uint64_t seed = 20;
@@ -151,17 +151,17 @@ static void cast_all(const struct scene *scene, uint32_t packet)
     bvh_free(bvh);
 }
 
-/* A layer of the truth. */
+/* This is a layer of the truth. */
 struct layer {
     double y, half, shift_u;
     int cut, label;
 };
 
-/* Texel borders and edges nearer than this to a ray are left alone: coordinates of textures are floats,
- * good to 6e-8 of 1 + shift, in squares 8 times that. */
+/* Rays nearer than this to a texel's border or an edge are skipped. Coordinates of textures are floats, good to 6e-8 of
+ * 1 + shift, in squares 8 times that. */
 static const double NEAR = 4e-6;
 
-/* 1: ray i meets the layer; 0: it does not; -1: too near to a border. */
+/* Returns 1 where ray i meets the layer, 0 where it does not, -1 where it is too near to a border. */
 static int meets(const struct layer *l, uint32_t i)
 {
     double t = (l->y - rays.py[i]) / rays.y[i];
@@ -218,7 +218,7 @@ static void half_of_a_board_is_seen_through(void **state)
     scene_free(scene);
 }
 
-/* A micrometre apart, which glass would step over; each shifted by a part of a square, so that some rays
+/* Layers are a micrometre apart, which glass would step over. Each is shifted by a part of a square, so that some rays
  * pass all. */
 static void a_stack_of_any_number_is_seen_through(void **state)
 {
@@ -243,7 +243,7 @@ static void a_stack_of_any_number_is_seen_through(void **state)
     scene_free(scene);
 }
 
-/* A board glued to a wall, in one plane, and one whose back is another face with the same corners. */
+/* A board is glued to a wall, in one plane. Another one's back is a face with the same corners. */
 static void what_lies_in_the_same_plane_stops_the_ray(void **state)
 {
     (void)state;
@@ -257,7 +257,7 @@ static void what_lies_in_the_same_plane_stops_the_ray(void **state)
         aim(0.19, 0.1);
         cast_all(scene, 0);
         for (uint32_t i = 0; i < rays.n; i++)
-            rays.label[i] = 0; /* of two in one plane either may be named */
+            rays.label[i] = 0; /* either of two in one plane may be named */
         compare(glued, 1);
         scene_free(scene);
     }
@@ -273,8 +273,8 @@ static void what_lies_in_the_same_plane_stops_the_ray(void **state)
     scene_free(scene);
 }
 
-/* Cards stand in front of a floor that is seen at a small angle: behind a hole the float distance of the
- * floor may be less than the card's. */
+/* Cards stand in front of a floor that is seen at a small angle. Behind a hole the float distance of the floor may be
+ * less than the card's. */
 static void nothing_is_lost_behind_a_card_above_the_floor(void **state)
 {
     (void)state;
@@ -313,7 +313,7 @@ static void nothing_is_lost_behind_a_card_above_the_floor(void **state)
     scene_free(scene);
 }
 
-/* Beyond its border a clamped board goes on as its border is, an opacity map cuts as alpha does. */
+/* Beyond its border a clamped board continues its border. An opacity map cuts as alpha does. */
 static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
 {
     (void)state;
@@ -339,8 +339,8 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
     scene_free(scene);
 }
 
-/* Where it was on the machine that the mesh is from. */
-/* Twice the image a side, shifted by three eighths: as the board with such coordinates. */
+/* The path is one on the machine that the mesh comes from. */
+/* The image is scaled to twice a side, and shifted by three eighths: that equals a board with such coordinates. */
 static void scale_and_offset_of_obj_count(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Coarse meshes by vertex clustering: counts by hand, bounds, what is refused. */
+/* Coarse meshes by vertex clustering: counts by hand, bounds, refusals. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,7 +16,7 @@ static const double CUBE[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
 static const uint32_t CUBE_FACE[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
 
-/* n x n quads on the square from x, y = 0 to size, at z(x, y); two triangles each. */
+/* n x n quads on the square from x, y = 0 to size, at z(x, y), with two triangles each. */
 struct sheet {
     double (*vertex_m)[3];
     uint32_t (*triangle)[3];
@@ -66,7 +66,7 @@ static void bounds_of(const struct decimated *m, double low[3], double high[3])
     }
 }
 
-/* No triangle twice, none without three corners, no vertex that nobody uses. */
+/* No triangle is there twice, each has three corners, and each vertex is used. */
 static void check_whole(const struct decimated *m)
 {
     uint8_t *used = calloc(m->n_vertices + 1, 1);
@@ -84,8 +84,8 @@ static void check_whole(const struct decimated *m)
     free(used);
 }
 
-/* The cells of a cube with cells of its edge are at its corners: nothing changes. With the limit above its 12 triangles
- * it isn't touched at all. */
+/* The cells of a cube, with cells of its edge, are at its corners: nothing changes. With the limit above its 12
+ * triangles it isn't touched at all. */
 static void cube_stays(void **state)
 {
     (void)state;
@@ -104,10 +104,10 @@ static void cube_stays(void **state)
     decimated_free(&m);
 }
 
-/* 64 x 64 quads on 1 m, cells of 1/4 m centred on 0, 1/4 ... 1: 5 x 5 cells. Cell j along an axis has the vertices i with
- * floor(4 i / 64 + 1/2) = j: 0..7, 8..23, 24..39, 40..55, 56..64, with the means 3.5, 15.5, 31.5, 47.5 and 60 of 64.
- * Triangles that cross no border vanish; those at the crossing of two borders give each of the 4 x 4 squares between
- * clusters its two. One vertex at a crossing has its diagonal the one way, as all quads do: no others come. */
+/* 64 x 64 quads on 1 m, cells of 1/4 m centred on 0, 1/4 ... 1: 5 x 5 cells. Cell j along an axis has the vertices i
+ * with floor(4 i / 64 + 1/2) = j: 0..7, 8..23, 24..39, 40..55, 56..64, with the means 3.5, 15.5, 31.5, 47.5 and 60 of
+ * 64. Triangles that cross no border vanish. Those at the crossing of two borders give each of the 4 x 4 squares
+ * between clusters its two. All quads have their diagonal the same way, so no others come. */
 static void plane_has_counts_by_hand(void **state)
 {
     (void)state;
@@ -137,8 +137,8 @@ static void plane_has_counts_by_hand(void **state)
     free_sheet(&s);
 }
 
-/* A rough one far from the origin, as in UTM: no more triangles than asked for, not far fewer, bounds within half a cell
- * along each axis, all heights within the bounds. */
+/* A rough sheet far from the origin, as in UTM: no more triangles than asked for, not far fewer, bounds within half a
+ * cell along each axis, all heights within the bounds. */
 static void limit_holds(void **state)
 {
     (void)state;
@@ -165,7 +165,8 @@ static void limit_holds(void **state)
     free_sheet(&s);
 }
 
-/* Two sheets nearer than a cell become one: of triangles between the same cells one is left, whichever way they face. */
+/* Two sheets nearer than a cell become one. One of the triangles between the same cells is left, whichever way they
+ * face. */
 static void doubles_become_one(void **state)
 {
     (void)state;

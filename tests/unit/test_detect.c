@@ -35,7 +35,7 @@ static void set_up(const struct detect_signal_spec *spec, struct detect_signal *
     if (detect_signal_set_up(spec, signal, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* What a head with such a signal says of one echo: 0.01 dB; LINE_REFL_NONE: not seen. */
+/* Returns the reflectance of one echo that a head with such a signal reports, in 0.01 dB; LINE_REFL_NONE: not seen. */
 static int told(const struct detect_signal *signal, double range_m, double rho)
 {
     uint64_t key = 7;
@@ -83,7 +83,7 @@ static void dark_colours_are_straight(void **state)
     assert_true(fabs(colour_srgb_decode(0.5) - 0.21404114) < 1e-8 && colour_srgb_decode(1.0) == 1.0);
 }
 
-/* The widest lobe there is, of gloss 0, ends 90 degrees off the mirror direction, too: met at 45 degrees. */
+/* The widest lobe, of gloss 0, ends 90 degrees beside the mirror direction, too: it is met at 45 degrees. */
 static void a_lobe_ends_beside_the_surface(void **state)
 {
     (void)state;
@@ -100,7 +100,7 @@ static void a_lobe_ends_beside_the_surface(void **state)
     surface_table_free(&table);
 }
 
-/* Names choose the first rule that fits; what it doesn't say comes from the colour. sRGB 0.5 is 0.2140 of the light
+/* Names choose the first rule that fits. Values that it lacks come from the colour. sRGB 0.5 is 0.2140 of the light
  * (IEC 61966-2-1). */
 static void names_and_colours_choose(void **state)
 {
@@ -133,7 +133,7 @@ static void names_and_colours_choose(void **state)
     surface_table_free(&table);
 }
 
-/* Reflectance is that of the target, whatever the range and the lens; fog takes 2 a R from it. */
+/* Reflectance is the target's, whatever the range and the lens. Fog takes 2 a R from it. */
 static void reflectance_is_the_targets(void **state)
 {
     (void)state;
@@ -153,7 +153,7 @@ static void reflectance_is_the_targets(void **state)
     }
 }
 
-/* Amplitude from the range equation; at short range what the lens catches. */
+/* The amplitude follows from the range equation, and at short range from the light that the lens catches. */
 static void amplitude_follows_the_range_equation(void **state)
 {
     (void)state;
@@ -172,9 +172,8 @@ static void amplitude_follows_the_range_equation(void **state)
     assert_int_equal(told(&signal, (double)NAN, 1.0), LINE_REFL_NONE);
 }
 
-/* Kim's table: fog of 500 m visibility and less does not know colours, 3.912 / 500 m; from there to 1 km q = V - 0.5, V
- * in km: 0.25 at 750 m, and no step at either end; haze of 4 km, q = 0.98; clear air of 23
- * km, q = 1.3. */
+/* Kim's table: fog of 500 m visibility and less does not depend on colours, 3.912 / 500 m. From there to 1 km q = V -
+ * 0.5, V in km: 0.25 at 750 m, and no step at either end. Haze of 4 km has q = 0.98, clear air of 23 km q = 1.3. */
 static void extinction_by_visibility(void **state)
 {
     (void)state;
@@ -238,9 +237,9 @@ static void point_at(double range_m, double mirror_turn, double pan_turn, double
     p[2] = range_m * sin(m);
 }
 
-/* Points in the ball, and where in it: for a uniform ball of radius r the mean square along each axis is r^2 / 5, and
- * (distance / r)^3 is uniform. Line angles on both sides of the zenith. Bounds: 4.75 standard errors; the variance of
- * x^2 is r^4 (3/35 - 1/25). */
+/* Points in the ball, and their distribution. For a uniform ball of radius r the mean square along each axis is r^2 /
+ * 5, and (distance / r)^3 is uniform. Line angles are on both sides of the zenith. Bounds: 4.75 standard errors; the
+ * variance of x^2 is r^4 (3/35 - 1/25). */
 static void the_ball_is_full(void **state)
 {
     (void)state;
@@ -296,7 +295,8 @@ static void the_ball_is_full(void **state)
     }
 }
 
-/* The same key, the same place: from the same point, however often. No echo stays none. Other seeds, other places. */
+/* The same key gives the same place: from the same point, however often. A missing echo stays missing. Other seeds give
+ * other places. */
 static void the_ball_does_not_accumulate(void **state)
 {
     (void)state;
@@ -313,8 +313,8 @@ static void the_ball_does_not_accumulate(void **state)
     assert_true(other_m != range_m[0]);
 }
 
-/* At the data sheet's range and reflectance the noise is the data sheet's, whatever part of it is a floor; of more
- * signal the floor is what is left; the part per distance adds to it. The same number is drawn each time. */
+/* At the data sheet's range and reflectance the noise is the data sheet's, whatever part of it is a floor. With more
+ * signal the floor remains, and the part per distance is added. The same number is drawn each time. */
 static void range_noise_has_a_floor(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Deviations along beams, and what is expected of them, by hand. */
+/* Deviations along beams, and their expected values, worked out by hand. */
 #include <math.h>
 
 #include "core/studio/deviation.h"
@@ -21,7 +21,7 @@ static struct deviation_head ideal_head(void)
     return head;
 }
 
-/* A beam level ahead, and a face that leans back by 60 degrees, or is turned by as much. */
+/* The beam is level and ahead. A face leans back by 60 degrees, or is turned by as much. */
 static const struct deviation_hit HEAD_ON = {100.0, {0, 1, 0}, {0, -1, 0}, -1};
 static const struct deviation_hit LEANING = {100.0, {0, 1, 0}, {0, -0.5, 0.86602540378443865}, -1};
 static const struct deviation_hit TURNED = {100.0, {0, 1, 0}, {0.86602540378443865, -0.5, 0}, -1};
@@ -61,7 +61,7 @@ static void sigma_of_angles(void **state)
     near_to(sigma(&head, &TURNED), 100.0 * 3e-5 * sqrt(3.0));
     near_to(sigma(&head, &high_turned), 100.0 * 3e-5 * 0.5); /* tan 45 degrees = 1 */
     assert_true(isinf(sigma(&head, &high)));                 /* the beam never meets that face */
-    /* Of a head that is upside down the same holds. */
+    /* The same holds for a head that is upside down. */
     const double over[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
     memcpy(head.setup.rotation, over, sizeof over);
     near_to(sigma(&head, &LEANING), 100.0 * 1e-5 * sqrt(3.0));
@@ -113,8 +113,8 @@ static void counts_and_bounds(void **state)
     assert_true(isinf(deviation_bound_m(&head, 100.0)));
 }
 
-/* A wall 10 m ahead, a pane before its right half, 8 m ahead. Points on beams to places of the wall (y = 10) or of the
- * pane (y = 8), that much further than there. */
+/* A wall is 10 m ahead, and a pane before its right half, 8 m ahead. Points lie on beams to places of the wall (y = 10)
+ * or of the pane (y = 8), that much further. */
 static const struct {
     double at[3], further_m, along_m;
 } POINT[] = {
@@ -163,7 +163,7 @@ static void deviations_along_the_beam(void **state)
     }
     assert_true(fabs((double)out.cosine[0] - 10.0 / sqrt(110.0)) < 1e-6);
     assert_true(fabs((double)out.range_m[0] - (sqrt(110.0) + 0.003)) < 1e-5);
-    /* 8 sigma of 0.2 m reach from pane to wall: neither is alone. */
+    /* 8 sigma of 0.2 m reach from pane to wall, so neither counts alone. */
     head.setup.range_sigma_m = 0.2;
     assert_int_equal(deviation_along(&compared, &head, NULL, &out, &err), SH_OK);
     assert_true(isnan(out.sigma_m[3]) && isnan(out.sigma_m[2]) && !isnan(out.along_m[3]));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The device in device time: each tick claimed by the test, with no threads and no clock. */
+/* These tests run the device in device time. The test claims each tick, with no threads and no clock. */
 #include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 
@@ -54,7 +54,7 @@ static void a_scan_goes_through_all_states_in_time(void **state)
     rig_close(rig);
 }
 
-/* A reader sees released ticks; the loop claims up to 65 ticks further (64 ms ahead, by default). */
+/* A reader sees released ticks. The loop claims up to 65 ticks further (64 ms ahead, by default). */
 static void a_command_reaches_the_beam_within_100_ms(void **state)
 {
     (void)state;
@@ -105,7 +105,7 @@ static void a_stop_in_spin_up_never_scans(void **state)
         assert_false(rig->work.scanning);
     assert_string_equal(rig_state(rig, 500), "idle");
     assert_true(device_last_scan(rig->device, NULL) == 0);
-    /* Ticks that are claimed can't be changed: as told 8 ticks ago, it turns down in 50 ms from the next one on. */
+    /* Claimed ticks can't be changed. A command of 8 ticks ago turns the head down in 50 ms from the next tick on. */
     rig_tell(rig, "SCAN:START", 500);
     rig_go_to(rig, 510);
     rig_tell(rig, "SCAN:STOP", 502);
@@ -116,7 +116,7 @@ static void a_stop_in_spin_up_never_scans(void **state)
     rig_close(rig);
 }
 
-/* Time that is granted is no command of the session: a journal has the others alone. */
+/* Granted time is no command of the session, and a journal has only commands. */
 static void a_journal_has_no_steps(void **state)
 {
     (void)state;
@@ -136,7 +136,7 @@ static void a_journal_has_no_steps(void **state)
     free(entry);
 }
 
-/* In the second frame, of 150,000 pulses each: as many as are done, that many with the one that runs, one more. */
+/* In the second frame, of 150,000 pulses each: as many frames as are done, that many with the running one, one more. */
 static void frames_are_counted_with_the_one_that_runs(void **state)
 {
     (void)state;
@@ -157,7 +157,7 @@ static void frames_are_counted_with_the_one_that_runs(void **state)
     }
 }
 
-/* A reader that joins a head at rest has descriptor and anchor within a second, too. They begin nothing. */
+/* A reader that joins a head at rest gets descriptor and anchor within a second, too. They begin nothing. */
 static void a_head_at_rest_describes_itself_each_second(void **state)
 {
     (void)state;
@@ -174,8 +174,7 @@ static void a_head_at_rest_describes_itself_each_second(void **state)
     rig_close(rig);
 }
 
-/* Every command with every kind of argument, thousands of times: only power and failures lead to off and
- * fault. */
+/* Every command with every kind of argument, thousands of times: only power and failures lead to off and fault. */
 static void no_command_leads_to_off_or_fault(void **state)
 {
     (void)state;
@@ -219,7 +218,7 @@ static void no_command_leads_to_off_or_fault(void **state)
     rig_close(rig);
 }
 
-/* --- what is said again --- */
+/* --- repeated frames --- */
 
 static void descriptor_and_anchor_come_first_and_every_second(void **state)
 {
@@ -237,7 +236,7 @@ static void descriptor_and_anchor_come_first_and_every_second(void **state)
     rig_close(rig);
 }
 
-/* 150 objects in chunks of 64: all at once, then a chunk every quarter of a second. */
+/* 150 objects in chunks of 64 come all at once, then a chunk every quarter of a second. */
 static void all_names_are_said_round_and_round(void **state)
 {
     (void)state;

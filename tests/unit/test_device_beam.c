@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults that change what is measured, tick by tick: where they begin and end, and that no pulse is lost by it. */
+/* Faults that change the measurements, tick by tick: where they begin and end. No pulse is lost by them. */
 #include "tests/unit/device_rig.h"
 
 #define LEN(array) ((int)(sizeof(array) / sizeof((array)[0])))
@@ -16,7 +16,7 @@ static void hear(void *ctx, const struct fault_note *note)
     notes[n_notes++] = *note;
 }
 
-/* A scan that begins, with these settings and faults. */
+/* Opens a scan that begins, with these settings and faults. */
 static struct rig *open_scan(const char *const *sets, int n_sets, const char *const *faults, int n_faults)
 {
     struct rig *rig = rig_open(NULL, sets, n_sets);
@@ -42,8 +42,8 @@ static void assert_note(uint32_t i, uint32_t fault, int ended, uint64_t pulse)
     assert_int_equal(notes[i].pulse, pulse);
 }
 
-/* At the head's highest rate, 2000 pulses a tick. A tick that is cut leaves up to so many, and each later one has room
- * for an eighth more: all is there again after eight ticks for each edge. */
+/* At the head's highest rate there are 2000 pulses a tick. A tick that is cut leaves up to so many, and each later one
+ * has room for an eighth more. After eight ticks for each edge all pulses are there again. */
 static void a_tick_ends_where_a_fault_does(void **state)
 {
     (void)state;
@@ -75,7 +75,7 @@ static void a_tick_ends_where_a_fault_does(void **state)
     rig_close(rig);
 }
 
-/* Lines of the segment, as the mirror turns; the descriptor has what is set. */
+/* The lines of the segment follow the mirror; the descriptor has the settings. */
 static void settings_change_while_the_mirror_is_slow(void **state)
 {
     (void)state;
@@ -97,7 +97,7 @@ static void settings_change_while_the_mirror_is_slow(void **state)
     rig_close(rig);
 }
 
-/* It ends with the scan, or when it is cleared, and begins anew with the next one. */
+/* A fault ends with the scan, or when it is cleared, and begins anew with the next one. */
 static void faults_end_with_their_scan(void **state)
 {
     (void)state;
@@ -125,7 +125,7 @@ static void faults_end_with_their_scan(void **state)
     rig_close(rig);
 }
 
-/* A mirror that stands does not wobble; once it turns again it does. */
+/* A stopped mirror does not wobble; once it turns again it does. */
 static void what_stands_does_not_wobble(void **state)
 {
     (void)state;
@@ -149,7 +149,7 @@ static void what_stands_does_not_wobble(void **state)
     rig_close(rig);
 }
 
-/* A command's fault counts its time from the command on: from the first pulse that fires then. */
+/* The time of a command's fault counts from the command on: from the first pulse that fires then. */
 static void an_added_fault_counts_from_its_command(void **state)
 {
     (void)state;
@@ -169,7 +169,7 @@ static void an_added_fault_counts_from_its_command(void **state)
     rig_close(rig);
 }
 
-/* The list changes while one strikes: it goes on, and its mirror stands where it stood. */
+/* The list changes while one strikes. It goes on, and its mirror stands where it stood. */
 static void another_fault_leaves_it_as_it_is(void **state)
 {
     (void)state;
@@ -191,7 +191,7 @@ static void another_fault_leaves_it_as_it_is(void **state)
     rig_close(rig);
 }
 
-/* Lines of 100 s, and no more than the profile's lines per second. */
+/* The mirror is limited to lines of 100 s, and to the profile's lines per second. */
 static void the_mirror_has_limits(void **state)
 {
     (void)state;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Events of errors: how many of them, and that none is forgotten. */
+/* Events of errors: their number is limited, and none is forgotten. */
 #include "tests/unit/device_rig.h"
 
-/* A tick holds 24 events; those of a client that is wrong all the time must not cost the scan's end. */
+/* A tick holds 24 events. The errors of a client that sends them all the time must not displace the scan's end. */
 static void the_last_events_are_said_however_many(void **state)
 {
     (void)state;
@@ -22,12 +22,13 @@ static void the_last_events_are_said_however_many(void **state)
             held += event->c;
         }
     assert_int_equal(single, 10);
-    assert_int_equal(held, 90); /* said though the second was not over */
+    assert_int_equal(held, 90); /* reported though the second was not over */
     assert_int_equal(ends, 1);
     rig_close(rig);
 }
 
-/* Each session has ten in a second of its own; a second later those held back are counted, and ten more have room. */
+/* Each session has ten in a second of its own. A second later the held back ones are counted, and ten more have
+ * room. */
 static void errors_are_held_back_by_session(void **state)
 {
     (void)state;
@@ -47,7 +48,7 @@ static void errors_are_held_back_by_session(void **state)
             events++;
         }
     }
-    assert_true(single[2] == 14 && held[2] == 0); /* who errs seldom is not concerned, however long */
+    assert_true(single[2] == 14 && held[2] == 0); /* a session with few errors is not affected, however long */
     assert_int_equal(single[1] + held[1], 2000);
     assert_in_range(events - 14, 2 * 11, 3 * 11);
     rig_close(rig);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the head's states, power, time and counters, as the device carries them out: tick by tick. */
+/* Faults of the head's states, power, time and counters, as the device carries them out, tick by tick. */
 #include "tests/unit/device_rig.h"
 
 enum { TICK_NS = 1000000, BOOT_TICKS = 200 };
 
-/* A device with these faults in its configuration, one a line. */
+/* Opens a device with these faults in its configuration, one a line. */
 static struct rig *open_with(const char *faults, const struct device_options *options, const char *const *sets,
                              int n_sets)
 {
@@ -21,7 +21,7 @@ static struct rig *open_with(const char *faults, const struct device_options *op
     return rig;
 }
 
-/* Claims on to the next STATE event; its tick. */
+/* Claims ticks up to the next STATE event, and returns its tick. */
 static uint64_t next_state(struct rig *rig, const char *name)
 {
     const struct native_event *event = rig_wait(rig, NATIVE_EV_STATE, 5000);
@@ -37,7 +37,7 @@ static void tell_refused(struct rig *rig, const char *line, const char *why)
     if (strstr(result.reply, why) == NULL) fail_msg("%s: %s", line, result.reply);
 }
 
-/* Two at once add up; one whose window is over does nothing. */
+/* Two at once add up. One whose window is over has no effect. */
 static void boots_slowly(void **state)
 {
     (void)state;
@@ -68,14 +68,14 @@ static void fails_the_self_test(void **state)
     rig_tell(rig, "SCAN:START", rig->next);
     assert_int_equal(next_state(rig, "idle"), BOOT_TICKS + 1); /* of *RST */
     rig_close(rig);
-    /* A window that no boot ends in. */
+    /* The window has no end of a boot in it. */
     rig = open_with("  - {kind: self_test, from_s: 0.201}\n  - {kind: self_test, until_s: 0.2}\n", NULL, NULL, 0);
     next_state(rig, "boot");
     assert_int_equal(next_state(rig, "idle"), BOOT_TICKS);
     rig_close(rig);
 }
 
-/* Nobody could start the one scan: the run is over. */
+/* The one scan can't be started, so the run is over. */
 static void ends_a_run_that_cannot_scan(void **state)
 {
     (void)state;
@@ -87,14 +87,14 @@ static void ends_a_run_that_cannot_scan(void **state)
     rig_close(rig);
 }
 
-/* What the head says in a tick: nothing. */
+/* In this tick the head sends nothing. */
 static void assert_silent(struct rig *rig)
 {
     const struct device_work *w = &rig->work;
     assert_true(w->n_events == 0 && !w->telemetry && !w->describe && !w->scanning && w->surfaces_n == 0);
 }
 
-/* Power goes at 1 s within a scan and is back 0.5 s later; all is as at power-up. */
+/* Power goes at 1 s within a scan and is back 0.5 s later. All is as at power-up. */
 static void loses_power(void **state)
 {
     (void)state;
@@ -115,7 +115,7 @@ static void loses_power(void **state)
     assert_int_equal(rig->work.n_events, 1); /* no SCAN_END */
     assert_string_equal(rig_event(rig, NATIVE_EV_STATE)->text, "off");
     assert_false(device_is_idle(rig->device));
-    /* Who speaks before that is released gets no answer, and changes nothing. */
+    /* A client that sends before that is released gets no answer, and changes nothing. */
     device_command(rig->device, 1, "HEAD:PRR 200000", 950, &result);
     assert_true(result.reply[0] == '\0' && result.error == 0 && result.effect == COMMAND_NONE);
     device_command(rig->device, 1, "FAULt:ADD {kind: laser_off}", 1001, &result);
@@ -141,7 +141,8 @@ static void loses_power(void **state)
     rig_close(rig);
 }
 
-/* At a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short is over. */
+/* It strikes at a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short is
+ * over. */
 static void loses_power_at_a_pulse(void **state)
 {
     (void)state;
@@ -156,7 +157,8 @@ static void loses_power_at_a_pulse(void **state)
         fired = rig->work.scanning ? rig->work.pulse_end : fired;
         assert_true(rig_claim(rig));
     }
-    /* At the first tick that begins with the pulse or later; a tick has 300 of them, cut at packets of 16. */
+    /* It strikes at the first tick that begins with the pulse or later. A tick has 300 of them, cut at packets of
+     * 16. */
     assert_true(fired >= 12345 && fired < 12345 + 300 + 16);
     next_state(rig, "boot");
     assert_int_equal(next_state(rig, "off"), 1000);
@@ -171,8 +173,8 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
-/* The second one begins with the tick with which power would be back: it stays away, since who follows power counts
- * that it goes and comes in turn. */
+/* The second one begins with the tick with which power would be back. Power stays away, since a reader counts on its
+ * going and coming in turn. */
 static void loses_power_as_it_comes(void **state)
 {
     (void)state;
@@ -197,7 +199,8 @@ static void loses_power_as_it_comes(void **state)
     rig_close(rig);
 }
 
-/* Lost ticks and errors of a head without power are said when power is back; the end of the run does not wait for it. */
+/* Lost ticks and errors of a head without power are reported when power is back. The end of the run does not wait for
+ * it. */
 static void ends_without_power(void **state)
 {
     (void)state;
@@ -205,7 +208,7 @@ static void ends_without_power(void **state)
         struct rig *rig = open_with("  - {kind: power_cycle, from_s: 0.3, for_ms: 100}\n", NULL, NULL, 0);
         rig_go_to(rig, 350);
         device_lost(rig->device, &rig->work);
-        for (int i = 0; i < 20; i++) /* more than are said in a second */
+        for (int i = 0; i < 20; i++) /* more than are reported in a second */
             device_report(rig->device, CMD_E_PULSES, "for the test");
         if (ends) device_end(rig->device);
         int more = 4; /* ticks */
@@ -253,7 +256,8 @@ static void tells_a_wrong_time(void **state)
     rig_close(rig);
 }
 
-/* To the nanosecond, within a tick: the second that begins with the fault is lost, and the one at its end is said. */
+/* It is right to the nanosecond, within a tick: the second that begins with the fault is lost, and the one at its end
+ * is reported. */
 static void loses_pps_up_to_the_end(void **state)
 {
     (void)state;
@@ -264,7 +268,7 @@ static void loses_pps_up_to_the_end(void **state)
     rig_close(rig);
 }
 
-/* A drift that a command takes out is over; the head is ahead from then on by what it gained. */
+/* A drift that a command clears is over. The head then stays ahead by the time that it gained. */
 static void drifts_until_it_is_cleared(void **state)
 {
     (void)state;
@@ -281,7 +285,7 @@ static void drifts_until_it_is_cleared(void **state)
     rig_close(rig);
 }
 
-/* A journal has the command, and replaying it does the same at the same tick. In real time a journal is looked through
+/* A journal has the command, and replaying it does the same at the same tick. In real time a journal is read through
  * before it is replayed. */
 static void is_replayed(void **state)
 {

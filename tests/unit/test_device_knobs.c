@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Commands that change what a scan is planned for: the scan is that of a head with the same keys, byte by byte; the one
- * before and the one after are not touched. */
+/* Commands that change the basis of a scan's plan. The scan is that of a head with the same keys, byte by byte. The one
+ * before and the one after do not change. */
 #include "tests/unit/device_rig.h"
 
 #include "drivers/protocol/crc32c.h"
@@ -13,7 +13,7 @@ struct scan {
     struct native_descriptor descriptor;
 };
 
-/* Sends the commands and scans; its ticks, from SCAN_START to SCAN_END. */
+/* Sends the commands and scans. Returns its ticks, from SCAN_START to SCAN_END. */
 static struct scan scan(struct rig *rig, const char *const *lines)
 {
     struct scan scan = {0};
@@ -76,7 +76,7 @@ static void commands_are_keys(void **state)
         for (int k = 0; k < 2; k++) {
             const char *const *c = cases[i].command, *const *key = cases[i].key;
             const char *stop = i == 3 ? "head.pan_stop_deg=10" : "head.frames=1";
-            /* rates change what a first scan counts, which telemetry says */
+            /* Rates change the counts of a first scan, which telemetry reports. */
             const int number = i == 3 ? 1 : 2;
             const struct scan by_commands = told(number, SETS("output.crs=local", layouts[k]), 2, LINES(c[0], c[1]));
             const struct scan by_keys =
@@ -85,7 +85,7 @@ static void commands_are_keys(void **state)
         }
 }
 
-/* Scan by scan in one run, to and fro; each is that of its own settings, and the descriptor says the ranges. */
+/* Scans in one run change back and forth. Each is that of its own settings, and the descriptor has the ranges. */
 static void each_scan_has_its_own(void **state)
 {
     (void)state;
@@ -100,7 +100,7 @@ static void each_scan_has_its_own(void **state)
     assert_true(near.descriptor.range_min_m == 0.5 && back.bytes == near.bytes);
 }
 
-/* A limit of the configuration can be taken back, up to that of the profile. */
+/* A limit of the configuration can be undone, up to that of the profile. */
 static void ranges_widen_up_to_the_profile(void **state)
 {
     (void)state;
@@ -125,7 +125,7 @@ static void the_last_scan_is_described_as_it_was(void **state)
     rig_close(rig);
 }
 
-/* In a scan they are refused, and leave it alone; a scale that ranges would not fit into is -221, too. */
+/* In a scan they are refused, and leave it alone. A scale that ranges would not fit into gives -221, too. */
 static void what_can_not_be_is_refused(void **state)
 {
     (void)state;

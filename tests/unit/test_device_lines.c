@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the device's ticks hold, as a client adds it up: no pulse and no line is lost or doubled, however a
- * scan goes on and ends. */
+/* The contents of the device's ticks, as a client adds them up. No pulse and no line is lost or doubled, however a scan
+ * goes on and ends. */
 #include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 
@@ -11,7 +11,7 @@
 #define HZ INT64_C(1000000)
 
 struct tally {
-    uint64_t pulse_next; /* all before were in some tick */
+    uint64_t pulse_next; /* all pulses before were in some tick */
     uint64_t line_next;  /* first pulse of the line to end next */
     uint64_t n_cast, n_fired, cast_in_lines, points, lines, partial;
     int64_t t_line;
@@ -28,7 +28,7 @@ static void tally_line(struct tally *tally, const struct line_end *end)
     tally->partial += (end->status & LINE_PARTIAL) != 0;
 }
 
-/* Fills the tick just claimed and adds it up, as a client would that reads the frames. */
+/* Fills the last claimed tick and adds it up, as a client that reads the frames. */
 static void tally_tick(struct rig *rig, struct tally *tally)
 {
     const struct ring_tick *tick = rig_fill(rig);
@@ -58,7 +58,7 @@ static void tally_tick(struct rig *rig, struct tally *tally)
     }
 }
 
-/* After the scan's end: every pulse was in a tick, in a line end, and, when cast, a point. */
+/* After the scan's end every pulse was in a tick, in a line end, and, when cast, a point. */
 static void check_tally(const struct tally *tally, uint64_t pulses)
 {
     assert_true(tally->pulse_next == pulses && tally->n_fired == pulses);
@@ -78,7 +78,7 @@ static void a_whole_scan_adds_up(void **state)
     rig_close(rig);
 }
 
-/* Runs a scan that is stopped when `ticks` ticks of it are claimed; returns the pulses it had. */
+/* Runs a scan that is stopped when `ticks` ticks of it are claimed. Returns its pulses. */
 static uint64_t stopped_scan(struct rig *rig, const char *prr, uint64_t ticks, struct tally *tally)
 {
     memset(tally, 0, sizeof *tally);
@@ -102,7 +102,7 @@ static uint64_t stopped_scan(struct rig *rig, const char *prr, uint64_t ticks, s
     return pulses;
 }
 
-/* Also where the ticks before the stop took all pulses there were: 1.6 MHz is 100 whole packets a tick. */
+/* This includes that the ticks before the stop took all pulses: 1.6 MHz is 100 whole packets a tick. */
 static void a_stop_ends_the_line_at_hand_as_partial(void **state)
 {
     (void)state;
@@ -115,7 +115,7 @@ static void a_stop_ends_the_line_at_hand_as_partial(void **state)
             struct tally tally;
             snprintf(prr, sizeof prr, "HEAD:PRR %u", (unsigned)prr_hz[i]);
             uint64_t pulses = stopped_scan(rig, prr, ticks, &tally);
-            /* what fired before the tick in which the stop took effect */
+            /* These pulses fired before the tick in which the stop took effect. */
             assert_true(pulses == (ticks * prr_hz[i] + 999) / 1000);
             check_tally(&tally, pulses);
             uint64_t lines = (pulses - 1) * 100 / prr_hz[i] + 1, whole = (lines * prr_hz[i] + 99) / 100;
@@ -124,7 +124,7 @@ static void a_stop_ends_the_line_at_hand_as_partial(void **state)
     rig_close(rig);
 }
 
-/* The last line end of the tick just claimed; 0: it has none. */
+/* Writes the last line end of the last claimed tick. Returns 0 where it has none. */
 static int last_line_end(struct rig *rig, struct line_end *end)
 {
     const struct ring_tick *tick = rig_fill(rig);
@@ -139,9 +139,9 @@ static int last_line_end(struct rig *rig, struct line_end *end)
     return found;
 }
 
-/* The encoders then say where the axes are, though no pulse was fired at the new rate: 1.6 MHz is 100 whole packets a tick,
- * so none was left over. Three facets and a gain of two: 240 degrees a line of 10 ms, from -40 on; the pan turns 180 degrees
- * a second. They may be read at the last pulse or at the next one: 0.015 degrees of the mirror. */
+/* The encoders then have the axes' angles, though no pulse was fired at the new rate: 1.6 MHz is 100 whole packets a
+ * tick, so none was left over. Three facets and a gain of two are 240 degrees a line of 10 ms, from -40 on. The pan
+ * turns 180 degrees a second. They may be read at the last pulse or at the next one: 0.015 degrees of the mirror. */
 static void a_stop_right_after_a_change_has_its_angles(void **state)
 {
     (void)state;
@@ -151,7 +151,7 @@ static void a_stop_right_after_a_change_has_its_angles(void **state)
     struct line_end end;
     rig_go_to(rig, 300);
     for (uint64_t ticks = 1; ticks < 10 * 4; ticks++) {
-        if (ticks % 10 == 0) continue; /* no line is at hand */
+        if (ticks % 10 == 0) continue; /* no line is running */
         rig_tell(rig, "*RST", rig->next);
         rig_tell(rig, "HEAD:PRR 1600000", rig->next);
         rig_tell(rig, "SCAN:START", rig->next);
@@ -209,8 +209,8 @@ static void settings_change_in_mid_scan(void **state)
     rig_close(rig);
 }
 
-/* Slots have room for a usual tick from the start. No tick of points alone takes more, and the longest takes three
- * quarters of it: the room fits the rates that are set, not those of the profile. */
+/* Slots have room for a usual tick from the start. No tick with only points takes more, and the longest takes three
+ * quarters of it. So the room fits the set rates, and not the profile's. */
 static void a_usual_tick_is_what_a_slot_has_room_for(void **state)
 {
     (void)state;
@@ -233,8 +233,8 @@ static void a_usual_tick_is_what_a_slot_has_room_for(void **state)
     rig_close(rig);
 }
 
-/* From the slowest rates to the fastest and back: the pulses since the last cut come at the new rate, more
- * than a tick has. No buffer overflows, and the head catches up. */
+/* Rates go from the slowest to the fastest and back. The pulses since the last cut come at the new rate, more than a
+ * tick has. No buffer overflows, and the head catches up. */
 static void a_jump_of_the_rates_fits_into_a_tick(void **state)
 {
     (void)state;
@@ -259,7 +259,7 @@ static void a_jump_of_the_rates_fits_into_a_tick(void **state)
             }
             assert_true(rig_claim(rig));
             tally_tick(rig, &tally);
-            /* caught up: what fired by the tick's end is there, but for less than a packet */
+            /* The head has caught up: all pulses that fired by the tick's end are there, but for less than a packet. */
             int64_t by = (int64_t)rig->next * 1000000 - rig->work.scan_t0_ns;
             if (tick == 199 || tick == 399)
                 assert_true(schedule_pulse_at(&rig->work.segment, by) - rig->work.pulse_end < SCHEDULE_PACKET);
@@ -273,7 +273,7 @@ static void a_jump_of_the_rates_fits_into_a_tick(void **state)
     rig_close(rig);
 }
 
-/* The lines of one tick at the slowest loop and the fastest mirror that a profile may have: 100 a tick. */
+/* The lines of one tick at the slowest loop and the fastest mirror of a profile: 100 a tick. */
 static void many_lines_fit_into_a_tick(void **state)
 {
     (void)state;
@@ -342,7 +342,7 @@ static void an_end_from_outside_stops_the_scan_first(void **state)
     rig_close(rig);
 }
 
-/* Commands at random, scan after scan: whatever changes and whenever, the frames of each scan add up. */
+/* Random commands come scan after scan. Whatever changes and whenever, the frames of each scan add up. */
 static void whatever_is_commanded_adds_up(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Ticks that the head could not compute in time: what was in them is said again. */
+/* Ticks that the head could not compute in time: their events are reported again. */
 #include "tests/unit/device_rig.h"
 
 static void a_lost_tick_says_its_events_again(void **state)
@@ -33,7 +33,7 @@ static void a_lost_tick_says_its_events_again(void **state)
     rig_close(rig);
 }
 
-/* Two ticks are lost, one after the other, and with the second one the event that speaks of the first. */
+/* Two ticks are lost, one after the other, and with the second one the event about the first. */
 static void a_lost_overrun_is_said_with_the_next(void **state)
 {
     (void)state;

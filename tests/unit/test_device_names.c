@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Names of surfaces on the wire: all of them reach who joins late, also names so long that a chunk takes two frames. */
+/* Names of surfaces on the wire. All of them reach a reader that joins late, even names so long that a chunk takes two
+ * frames. */
 #include "tests/unit/device_rig.h"
 
 enum { OBJECTS = 70, NAME_LEN = 63 };
@@ -9,7 +10,7 @@ struct heard {
     int frames;
 };
 
-/* Triangles of their own around the station, with names of 63 bytes, the longest. */
+/* Writes separate triangles around the station, with names of 63 bytes, the longest. */
 static void write_long_names(void)
 {
     char path[96];
@@ -46,9 +47,9 @@ static void hear(struct rig *rig, struct heard *heard)
     }
 }
 
-/* 70 names are two chunks: at the scan's start, and then one each quarter of a second. Who joins 10 ms after the start
- * has them all within half a second, each once. 64 pairs of 128 bytes are 8192, and a frame holds that less a head: a chunk
- * of them takes two frames. */
+/* 70 names are two chunks: at the scan's start, and then one each quarter of a second. A reader that joins 10 ms after
+ * the start has them all within half a second, each once. 64 pairs of 128 bytes are 8192, and a frame holds that less a
+ * head. So a chunk of them takes two frames. */
 static void all_names_reach_who_joins_late(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What sessions of other protocols than the native one have of the device: commands without lasting control, what the
- * head is at the moment, UTC and fixes. */
+/* The device for sessions of other protocols than the native one: commands without lasting control, the head's present
+ * state, UTC and fixes. */
 #include "tests/unit/device_rig.h"
 
 static int once(struct rig *rig, uint32_t session, const char *line)
@@ -17,7 +17,7 @@ static int lasting(struct rig *rig, uint32_t session, const char *line)
     return result.error;
 }
 
-/* Session numbers of CONTROL events in the next tick. */
+/* Returns how many CONTROL events are in the next tick. */
 static uint32_t count_control_events(struct rig *rig)
 {
     uint32_t n = 0;
@@ -33,7 +33,7 @@ static void control_is_given_back_at_once(void **state)
     struct rig *rig = rig_open(NULL, NULL, 0);
     rig_go_to(rig, 300);
     assert_int_equal(once(rig, 2, "HEAD:LINES 20"), 0);
-    assert_int_equal(count_control_events(rig), 0); /* nobody has it, and nobody had */
+    assert_int_equal(count_control_events(rig), 0); /* nobody has or had control */
     assert_int_equal(lasting(rig, 1, "HEAD:LINES 21"), 0);
     assert_int_equal(count_control_events(rig), 1);
     assert_int_equal(once(rig, 2, "HEAD:LINES 22"), CMD_E_PROTECTED);
@@ -45,7 +45,7 @@ static void control_is_given_back_at_once(void **state)
     rig_close(rig);
 }
 
-/* Asking what the head is changes nothing that it will say. */
+/* Asking for the head's description changes nothing that it will report. */
 static void to_describe_it_changes_nothing(void **state)
 {
     (void)state;
@@ -82,7 +82,7 @@ static void no_time_no_fixes(void **state)
     rig_close(rig);
 }
 
-/* Power-up a quarter of a second before a full one; two fixes a second. */
+/* Power-up is a quarter of a second before a full one, and there are two fixes a second. */
 static void fixes_lie_at_their_times_of_utc(void **state)
 {
     (void)state;

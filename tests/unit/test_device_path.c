@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the head is: on a trajectory, after its end, and on a platform whose poses come live. */
+/* The place of the head: on a trajectory, after its end, and on a platform whose poses come live. */
 #include <math.h>
 
 #include "firmware_sim/device/device_state.h"
 #include "tests/unit/device_rig.h"
 
-/* A time far ahead is counted, and the right ones go on. In steps the time is granted: any. */
+/* A time far ahead is counted, and the right ones go on. In steps time is granted, so any is allowed. */
 static void a_pose_far_ahead_keeps_no_other_out(void **state)
 {
     (void)state;
@@ -25,7 +25,7 @@ static void a_pose_far_ahead_keeps_no_other_out(void **state)
     rig_close(rig);
 }
 
-/* North at 1 m/s. Where a scan ends, by a stop or with its frames, the platform stands until the next one. */
+/* The platform goes north at 1 m/s. Where a scan ends, by a stop or with its frames, it stands until the next one. */
 static void a_platform_stands_where_the_scan_ended(void **state)
 {
     (void)state;
@@ -94,8 +94,8 @@ static void a_path_ends_with_its_last_pose(void **state)
     unlink(path);
 }
 
-/* A pose each 10 ms, north at 2 m/s. Between two of them the head is where a straight way has it; after the last it goes on
- * so for extrapolate_ms, and then it stands. */
+/* There is a pose each 10 ms, north at 2 m/s. Between two of them the head is on the straight way. After the last it
+ * goes on so for extrapolate_ms, and then it stands. */
 static void a_live_platform_goes_on_for_a_while(void **state)
 {
     (void)state;
@@ -121,7 +121,7 @@ static void a_live_platform_goes_on_for_a_while(void **state)
     rig_close(rig);
 }
 
-/* Of one time there is one pose, and none comes before another that is known; nor from beyond the reach. */
+/* A time has one pose. None comes before another known one, or from beyond the reach. */
 static void poses_come_in_order(void **state)
 {
     (void)state;
@@ -143,7 +143,8 @@ static void poses_come_in_order(void **state)
     rig_close(rig);
 }
 
-/* North at 20 m/s, with a fix ten times a second: each is where the head was then, not a tenth of a second further. */
+/* The head goes north at 20 m/s, with a fix ten times a second. Each fix is where the head was then, not a tenth of a
+ * second further. */
 static void a_fix_is_where_the_head_was(void **state)
 {
     (void)state;

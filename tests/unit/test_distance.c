@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Distance to the scene against brute force in 113-bit arithmetic by another algorithm. */
+/* These tests compare the distance to the scene with brute force in 113-bit arithmetic by another algorithm. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,9 +18,9 @@ typedef __float128 quad;
 typedef long double quad; /* 113 bits, too, where there is no other: on ARM */
 #endif
 
-/* Corner differences, relative to the query point, round by 2^-53 of themselves on each axis; products, the
- * foot and the square root add a few more. 16 half-units in the last place of the largest difference hold all
- * of it, also at large coordinates, since a difference of doubles rounds relative to itself. */
+/* Corner differences, relative to the query point, round by 2^-53 of themselves on each axis. Products, the foot and
+ * the square root add a few more. 16 half-units in the last place of the largest difference hold all of it, also at
+ * large coordinates, since a difference of doubles rounds relative to itself. */
 static const double ROUNDING = 16 * 0x1p-53;
 
 static double uniform(double low, double high)
@@ -60,7 +60,7 @@ static double reference_distance(const double p[3], const double ca[3], const do
         w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
         v = 1 - w;
     } else {
-        /* v and w from the areas would lose needles even here; the distance from the plane doesn't */
+        /* With v and w from the areas needles would lose precision even here. The distance from the plane does not. */
         quad n[3] = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]};
         quad height = dotq(n, ap);
         return (double)sqrtl((long double)(height * height / dotq(n, n)));
@@ -89,7 +89,7 @@ static double apart(const double a[3], const double b[3])
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* The farthest corner of one triangle: what the rounding of its distance is relative to. */
+/* Returns the farthest corner of one triangle: the rounding of its distance is relative to that. */
 static double farthest_corner(const struct scene *s, uint32_t triangle, const double p[3])
 {
     double d = 0;
@@ -123,7 +123,7 @@ static struct distance *make_index(const struct scene *scene)
     return index;
 }
 
-/* One query against brute force, and against its own answer. */
+/* Compares one query with brute force, and with its own answer. */
 static void check_query(const struct distance *index, const struct scene *s, const double p[3])
 {
     struct distance_hit hit;
@@ -162,7 +162,7 @@ static void random_scene(const double origin[3], int queries)
     struct distance *index = make_index(s);
     for (int i = 0; i < queries; i++) {
         double p[3];
-        /* spread out, and then close to a surface, where a query prunes hardest */
+        /* Points are spread out, and then close to a surface, where a query prunes most. */
         const double *near = v[rand() % (COUNT * 3)];
         for (int k = 0; k < 3; k++)
             p[k] = i % 2 ? near[k] + uniform(-1, 1) * 1e-3 : origin[k] + uniform(-300, 300);
@@ -184,8 +184,8 @@ static void random_points_at_utm(void **state)
     random_scene((double[3]){500000, 5800000, 100}, 400);
 }
 
-/* 16 sheets, 1 um apart, 200 m from the centre, where a float's step is 15 um: in float they fall together,
- * so which one is nearest is only found if no candidate is lost to rounding. */
+/* 16 sheets are 1 um apart, 200 m from the centre, where a float's step is 15 um. In float they coincide, so the
+ * nearest one is only found if no candidate is lost to rounding. */
 static void sheets_that_float_cannot_tell(void **state)
 {
     (void)state;
@@ -219,7 +219,7 @@ static void sheets_that_float_cannot_tell(void **state)
     }
 }
 
-/* Points made on faces, edges and corners: as near as their own coordinates can be written. */
+/* Points are made on faces, edges and corners, as near as their own coordinates can be written. */
 static void points_on_the_surface(void **state)
 {
     (void)state;
@@ -254,9 +254,8 @@ static void points_on_the_surface(void **state)
     }
 }
 
-/* Height over length from 1e-2 to 1e-11, the third corner at an end or in the middle; points around, and
- * points straight above, where a needle's uncertain normal counts. The bound is that of any other triangle.
- */
+/* Height over length goes from 1e-2 to 1e-11, with the third corner at an end or in the middle. Points are around, and
+ * straight above, where a needle's uncertain normal counts. The bound is that of any other triangle. */
 static void needles(void **state)
 {
     (void)state;
@@ -315,7 +314,7 @@ static void limits_and_ties(void **state)
     assert_int_equal(distance_query(index, nowhere, INFINITY, &hit), 0);
     assert_int_equal(distance_query(index, far, 1e9, &hit), 1);
     assert_true(hit.distance_m == 999999999);
-    /* whose squares a double or a float can't hold */
+    /* A double or a float can't hold the squares of these. */
     for (int k = 0; k < 3; k++) {
         static const double size_m[] = {1e19, 1e30, 1e39, 1e160, 1e300};
         for (int i = 0; i < 10; i++) {

@@ -107,7 +107,8 @@ static void test_xml(void **state)
     assert_null(strstr(e57rig_xml, "creationDateTime")); /* no clock in this stream */
 }
 
-/* Shots whose reflectance is not modelled are no part of the limits; where there is nothing else, there are none. */
+/* Shots whose reflectance is not modelled do not count for the limits. If there are no others, there are no
+ * limits. */
 static void test_intensity_limits(void **state)
 {
     (void)state;
@@ -127,7 +128,7 @@ static void test_intensity_limits(void **state)
     assert_null(strstr(strstr(e57rig_xml, "scan 2, station 2"), "intensityLimits"));
 }
 
-/* A shot without echo stands at 0 0 0, which is no place within the bounds. */
+/* A shot without echo is at 0 0 0, which does not count for the bounds. */
 static void test_bounds_of_empty_shots(void **state)
 {
     (void)state;
@@ -142,7 +143,7 @@ static void test_bounds_of_empty_shots(void **state)
                 fabs(e57rig_number(e57rig_xml, "zMinimum") - 12) < 1e-9);
 }
 
-/* More records than a packet holds, with streams of one, two and four bits across its edge. */
+/* There are more records than a packet holds, with streams of one, two and four bits across its edge. */
 static void test_packets(void **state)
 {
     (void)state;
@@ -172,7 +173,7 @@ static void test_packets(void **state)
     }
 }
 
-/* The colours of a record beside its label, over the edges of packets, and what the XML says of them. */
+/* Colours are beside the label in a record, across the edges of packets, and the XML describes them. */
 static void test_colours(void **state)
 {
     (void)state;

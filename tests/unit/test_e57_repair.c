@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* E57 files whose recorder was killed, or whose disk was full: what a repair makes of them, wherever they end. */
+/* E57 files whose recorder was killed, or whose disk was full: the result of a repair, wherever they end. */
 #include "tests/unit/e57_rig.h"
 #include "tests/unit/killed_rig.h"
 
 enum { PAGE = 1024, CONTENT = 1020, MAX_PACKETS = 128, MAX_SCANS = 4 };
 
-/* Of the complete recording, by its XML and the lengths of its packets: where each scan's packets begin, and each packet
- * ends, without the CRCs; records up to there. */
+/* The complete recording, by its XML and the lengths of its packets: the begin of each scan's packets, the end of each
+ * packet, without the CRCs, and the records up to there. */
 static struct {
     size_t end, n;
     int scan;
@@ -14,7 +14,7 @@ static struct {
 static int n_packets, n_scans;
 static const char MISSING[] = "; repaired: its end is missing";
 static size_t scan_begin[MAX_SCANS];
-static uint8_t *whole, *left; /* the complete file; that on the disk just before */
+static uint8_t *whole, *left; /* the complete file; the disk's contents just before */
 static size_t whole_len, left_len;
 static int empty_shots, coloured;
 
@@ -62,8 +62,8 @@ static void keep_left(const char *path)
     left = rig_read(path, &left_len);
 }
 
-/* Lines with a second or more between them, so that packets are short; the last point of the stream comes too late for any
- * packet but that of the end. */
+/* Lines have a second or more between them, so that packets are short. The last point of the stream comes too late for
+ * any packet but that of the end. */
 static void record_scans(void)
 {
     static struct rig_point p[40];
@@ -94,7 +94,7 @@ static void record_scans(void)
     assert_int_equal(n_scans, 3);
 }
 
-/* What the first `len` bytes hold. */
+/* Counts the scans and packets that the first `len` bytes hold. */
 static void expect_of(size_t len, int *scans, int *packets)
 {
     const size_t there = len / PAGE * CONTENT;
@@ -146,7 +146,7 @@ static void check_bounds(const char *xml)
     assert_true(e57rig_number(xml, "rowMaximum") == row_max && e57rig_number(xml, "columnMaximum") == column_max);
 }
 
-/* Exactly the first records of each scan, and as many scans. */
+/* The file has exactly the first records of each scan, and as many scans. */
 static void check_file(const char *path, int scans, int packets)
 {
     size_t n[MAX_SCANS] = {0}, at = 0;
@@ -190,7 +190,7 @@ static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
     return 0;
 }
 
-/* Wherever the same packets are left, the same file comes out; it is looked into once. */
+/* If the same packets are left, the same file comes out, so it is read once. */
 static void check_cut(const char *path, const uint8_t *from, size_t len)
 {
     struct repair repair;
@@ -233,7 +233,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     free(file);
 }
 
-/* At the edges of pages, where anything changes, and a byte before. */
+/* Files are cut at the edges of pages, where anything changes, and a byte before. */
 static void test_cuts(void **state)
 {
     (void)state;
@@ -250,7 +250,7 @@ static void test_cuts(void **state)
     }
 }
 
-/* Without what says that it was repaired; free() it. */
+/* Returns the XML without the note of the repair; free() it. */
 static char *xml_of(const char *path)
 {
     e57rig_read(path);
@@ -259,7 +259,7 @@ static char *xml_of(const char *path)
     return xml;
 }
 
-/* A file that was being completed, or a whole one of which the end is missing: once all points are there, the same file comes
+/* A file that was being completed, or a whole one whose end is missing. Once all points are there, the same file comes
  * out, and says that its end may be missing. */
 static void test_end(void **state)
 {
@@ -297,7 +297,7 @@ static void test_end(void **state)
     unlink(path);
 }
 
-/* What is no E57 file of ours, and what is damaged within, is refused in one line and left as it was. */
+/* A file that is no E57 file of ours, or that is damaged within, is refused in one line and left as it was. */
 static void test_refused(void **state)
 {
     (void)state;
@@ -336,7 +336,7 @@ static void reseal(uint8_t *page)
         page[CONTENT + i] = (uint8_t)(~crc >> (24 - 8 * i));
 }
 
-/* What is between the last packet of ours and the XML section is another program's: no number of points is claimed. */
+/* Bytes between our last packet and the XML section are another program's. The repair claims no number of points. */
 static void test_elsewhere(void **state)
 {
     (void)state;
@@ -358,8 +358,8 @@ static void test_elsewhere(void **state)
     unlink(path);
 }
 
-/* Any byte of notes, headers and packets may say anything, with a right CRC: nothing worse than a refusal comes of it, and a
- * file that was repaired is whole. */
+/* Any byte of notes, headers and packets may have any value, with a right CRC. The worst result is a refusal, and a
+ * repaired file is whole. */
 static void test_absurd(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames made anew: their headers read back by their offsets, their checksums summed by another way, and a connection
- * whose numbers fit. */
+/* Frames are made anew. Their headers are read back by their offsets, their checksums are summed in another way, and
+ * the numbers of a connection fit. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -31,7 +31,7 @@ static uint32_t be32(const uint8_t *at)
     return be16(at) << 16 | be16(at + 2);
 }
 
-/* One's complement addition, byte by byte: 0xffff for a block with its right checksum in it. */
+/* One's complement addition, byte by byte. It gives 0xffff for a block with its right checksum in it. */
 static uint32_t add_bytes(uint32_t sum, const uint8_t *at, size_t len)
 {
     for (size_t i = 0; i < len; i++) {
@@ -97,7 +97,7 @@ static void test_datagrams(void **state)
     check_udp(&SIX, &SIX_GROUP, data, sizeof data);
 }
 
-/* The sum 0 is sent as 0xffff: 0 says that there is none. Of all payloads of two bytes one has it. */
+/* The sum 0 is sent as 0xffff, as 0 means that there is none. One of all payloads of two bytes has it. */
 static void test_sum_of_zero(void **state)
 {
     (void)state;
@@ -131,7 +131,8 @@ static void test_hardware_addresses(void **state)
     check_hardware(&SENSOR, "\x02\x00\xc0\xa8\x01\xc9");
 }
 
-/* What the two ends of a connection know: what each has sent, and how much of it the other has acknowledged. */
+/* The state of the two ends of a connection: the bytes that each has sent, and how many of them the other has
+ * acknowledged. */
 struct heard {
     uint32_t seq[2];
     uint8_t bytes[2][8192];
@@ -180,7 +181,7 @@ static void hold_talk(struct tcp_talk *talk)
     assert_memory_equal(h.bytes[1], data, sizeof data);
 }
 
-/* Also through the end of the numbers. */
+/* This includes the wrap of the numbers. */
 static void test_talk(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults as data: when one strikes, by chance as well; the list of a run; the truth as JSON and as text. */
+/* Faults as data: when one strikes, also by chance; the list of a run; the truth as JSON and as text. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -38,7 +38,7 @@ static void each_kind_has_its_name_and_place(void **state)
     assert_int_equal(places[FAULT_AT_CONNECTION], 3);
 }
 
-/* Of N trials with p the hits have sigma sqrt(N p (1 - p)); beyond 5 sigma it is a false alarm in 6e-7 of all seeds.
+/* In N trials with p the hits have sigma sqrt(N p (1 - p)). Beyond 5 sigma it is a false alarm in 6e-7 of all seeds.
  * The seeds are fixed, and so is the result. */
 static void chance_is_as_likely_as_said(void **state)
 {
@@ -59,12 +59,12 @@ static void chance_is_as_likely_as_said(void **state)
         }
         const double p = share[i], pp = p * p;
         assert_true(fabs((double)hits - N * p) <= 5.0 * sqrt(N * p * (1.0 - p)));
-        /* Pairs of neighbours overlap, which makes them vary up to three times as much as N trials with p^2. */
+        /* Pairs of neighbours overlap, so they vary up to three times as much as N trials with p^2. */
         assert_true(fabs((double)twice - N * pp) <= 5.0 * sqrt(3.0 * N * pp * (1.0 - pp)) + 1.0);
     }
 }
 
-/* Two faults, two links, two seeds, two draws: what one does says nothing of the other. 64 bits agree in 32 +- 4. */
+/* Two faults, links, seeds and draws are independent of each other. 64 bits agree in 32 +- 4. */
 static void what_belongs_to_different_places_is_independent(void **state)
 {
     (void)state;
@@ -267,7 +267,7 @@ static void a_dash_is_standard_output(void **state)
     assert_int_not_equal(access("-", F_OK), 0);
 }
 
-/* The longest note still is a command line of the journal, which has them as remarks. */
+/* The longest note still fits as a command line into the journal, which has them as remarks. */
 static void the_longest_note_is_not_cut(void **state)
 {
     (void)state;
@@ -310,7 +310,7 @@ static void what_cannot_be_written_is_said(void **state)
     assert_int_equal(truth_close(truth, &err), SH_OK);
 }
 
-/* A fault that is taken out is forgotten; those that stay keep their counts, wherever they stand in the list. */
+/* A fault that is taken out is forgotten. Those that stay keep their counts, wherever they are in the list. */
 static void a_tally_keeps_what_is_in_the_list(void **state)
 {
     (void)state;

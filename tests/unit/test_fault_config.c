@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request as the configuration, scenarios and FAULt:ADD read them: which keys a kind has, their limits, and
- * what they are when not given. */
+/* Faults on request as the configuration, scenarios and FAULt:ADD read them: the keys of a kind, their limits, and
+ * their defaults. */
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
-/* Kinds with the keys that say what; and whether for_ms must be given. By hand, from fault/README.md. */
+/* Kinds with their describing keys, and whether for_ms must be given. They are worked out by hand from
+ * fault/README.md. */
 static const struct {
     const char *kind, *keys;
     int needs_ms;
@@ -54,7 +55,7 @@ static int has(const char *keys, const char *key)
     return at != NULL && (at == keys || at[-1] == ' ') && (at[len] == ' ' || at[len] == '\0');
 }
 
-/* None of them is cut off. */
+/* The list is not cut off. */
 static void an_unknown_kind_is_told_all_kinds(void **state)
 {
     (void)state;
@@ -204,7 +205,7 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     write_in("scenario.yaml", many);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     assert_non_null(strstr(wrong.fault[0].text, "30 faults, and the configuration has 3; allowed 32 together"));
-    assert_int_equal(cfg->faults.n, 3); /* as it was */
+    assert_int_equal(cfg->faults.n, 3); /* the list is as it was */
     snprintf(path, sizeof path, "%s/none.yaml", dir);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, link: 2}\noutput:"), SH_EINPUT);

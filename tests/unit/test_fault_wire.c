@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the wire, each kind by itself: exactly the frames that it notes are changed, at exactly that byte. All
- * others come as they were, and in order. (Kinds that change when a frame comes are in test_fault_wire_order.c.) */
+/* Faults on the wire, each kind by itself. Exactly the noted frames are changed, at exactly the noted byte. All others
+ * come unchanged and in order. (Kinds that change when a frame comes are in test_fault_wire_order.c.) */
 #include "drivers/protocol/native.h"
 #include "tests/unit/wire_rig.h"
 
@@ -66,7 +66,7 @@ static void truncated_frames_lack_their_end(void **state)
     rig_end(1);
 }
 
-/* How many bits of an item differ from what went out, which came alone. */
+/* Returns how many bits of an item differ from the sent one, which came alone. */
 static uint32_t count_bits(const struct rig_item *item)
 {
     uint32_t n = 0;
@@ -122,7 +122,7 @@ static void two_flips_never_make_each_other_right(void **state)
     rig_end(0);
 }
 
-/* A resealed flip is in the payload, and no checksum sees it. */
+/* A resealed flip is in the payload, and no checksum shows it. */
 static void resealed_flips_are_right_by_their_checksums(void **state)
 {
     (void)state;
@@ -152,7 +152,7 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     rig_run(&f, 2);
     assert_int_equal(rig.n_notes, 0);
     rig_end(2);
-    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* what is flipped besides stays wrong, in any order */
+    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* other flipped bits stay wrong, in any order */
     both[1].byte = -1;
     rig_open(both, 2, 1);
     for (int i = 0; i < 20; i++)
@@ -172,7 +172,8 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     rig_end(1);
 }
 
-/* The system of a datagram's reader drops what is damaged on its way, so it is not sent; but what is resealed is. */
+/* A datagram's system drops those that are damaged on their way, so a damaged one is not sent. A resealed one is
+ * sent. */
 static void a_damaged_datagram_is_not_sent(void **state)
 {
     (void)state;
@@ -246,7 +247,7 @@ static void a_dropped_frame_is_hit_by_nothing_else(void **state)
     rig_end(1);
 }
 
-/* Nothing that would have come after it is noted: nobody will see it. */
+/* After the end nothing more is noted, as no client will see it. */
 static void a_session_that_ends_takes_nothing_more(void **state)
 {
     (void)state;
@@ -267,14 +268,14 @@ static void a_session_that_ends_takes_nothing_more(void **state)
     assert_int_equal(rig_take(0), 5);
     assert_int_equal(rig.n_notes, 2);
     assert_true(rig.note[1].kind == FAULT_DISCONNECT && rig.note[1].number == 5);
-    rig_expect((const int[]){0, 2, 3, 1, -1}); /* what was held comes before the end */
+    rig_expect((const int[]){0, 2, 3, 1, -1}); /* held units come before the end */
     assert_true(rig.write[4].kind == WIRE_ACT && rig.write[4].act == FAULT_DISCONNECT);
     wire_count_unwritten(rig.wire, &frames, &pulses);
     assert_true(frames == 4 && pulses == 400);
     assert_true(wire_is_empty(rig.wire));
 }
 
-/* Until all of its writes are out, a frame is not written; a copy of it is none. */
+/* A frame is not written until all of its writes are out. A copy of it does not count. */
 static void what_is_not_written_is_counted(void **state)
 {
     (void)state;

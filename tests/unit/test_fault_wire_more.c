@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the wire: when they strike, as they are added and taken out at run time too; what a wire keeps; and mixtures
- * of all kinds by chance, whose output is what their notes say. */
+/* Faults on the wire: when they strike, also as they are added and taken out at run time; how much a wire keeps; and
+ * random mixtures of all kinds, whose output follows from their notes. */
 #include "tests/common/thorough.h"
 #include "tests/unit/wire_rig.h"
 
@@ -8,7 +8,7 @@ static struct fault f;
 
 /* ---- when */
 
-/* The numbers of the frames that were hit. */
+/* Expects the numbers of the frames that were hit. */
 static void expect_hits(const uint64_t *numbers)
 {
     uint32_t n = 0;
@@ -115,7 +115,7 @@ static void a_fault_counts_from_when_it_was_added(void **state)
     assert_int_equal(fault_board_remove(rig.board, 2), 0);
     rig_frame_at(RIG_STREAM, 40, 2000 * MS, 0);
     assert_int_equal(rig.n_notes, 6);
-    assert_int_equal(fault_board_injected(rig.board, 1), 4); /* what was taken out keeps its count */
+    assert_int_equal(fault_board_injected(rig.board, 1), 4); /* removed faults keep their count */
     assert_int_equal(fault_board_injected(rig.board, 0), 6);
     assert_int_equal(add(&f, 0), 3); /* and its number */
 }
@@ -148,7 +148,7 @@ static void a_wire_is_full_by_what_only_time_keeps_back(void **state)
     int n = 0;
     for (; !wire_is_full(rig.wire, CAP, rig.now_ns); n++)
         rig_frame(RIG_STREAM);
-    assert_in_range(n, 10, 60); /* what a piece takes beside its bytes counts, too */
+    assert_in_range(n, 10, 60); /* a piece's overhead counts, too */
     rig_close();
     f.kind = FAULT_DELAY; /* a long way holds more */
     rig_open(&f, 1, 1);
@@ -158,7 +158,7 @@ static void a_wire_is_full_by_what_only_time_keeps_back(void **state)
     rig.now_ns += 2000 * MS; /* the way is over, and nobody has read */
     assert_true(wire_is_full(rig.wire, CAP, rig.now_ns));
     rig_close();
-    for (int i = 0; i < 2; i++) { /* what waits for frames must not keep them out */
+    for (int i = 0; i < 2; i++) { /* waiting units must not keep frames out */
         f = fault_of_kind(i == 0 ? FAULT_REORDER : FAULT_MERGE);
         f.n = i == 0 ? 300 : 64;
         rig_open(&f, 1, 1);
@@ -227,7 +227,7 @@ static struct fault any_fault(int native)
     return any;
 }
 
-/* The clock and the taking go on as they like: neither changes what comes out, nor what is noted. */
+/* The clock and the taking go on at random. Neither changes the output or the notes. */
 static void mix(uint64_t seed, int pace, int native)
 {
     struct fault list[12];

@@ -5,7 +5,7 @@
 
 static struct fault f;
 
-/* It comes after the frame whose number is n higher, in its own counting. */
+/* A reordered frame comes after the frame whose number is n higher, in its own counting. */
 static void a_reordered_frame_comes_behind_as_many_as_noted(void **state)
 {
     (void)state;
@@ -41,7 +41,7 @@ static void frames_that_are_all_reordered_all_come(void **state)
     assert_int_equal(rig.n_notes, 300);
 }
 
-/* Those beyond the end come when nothing more does, or two seconds of device time later. */
+/* Frames held beyond the end come when no more follow, or two seconds of device time later. */
 static void a_held_frame_waits_no_longer_than_said(void **state)
 {
     (void)state;
@@ -195,7 +195,7 @@ static void merged_frames_go_out_in_one_write(void **state)
     assert_int_equal(rig_take(0), 1);
 }
 
-/* Whatever way a piece takes through it, a queue that is empty has no bytes, and one that is full gets room again. */
+/* However a piece goes through it, a queue that is empty has no bytes, and a full one gets room again. */
 static void a_queue_gives_back_its_room(void **state)
 {
     (void)state;

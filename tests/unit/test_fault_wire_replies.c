@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the wire: replies that are missing, late or wrong, echoes, and from which reply on a fault counts. */
+/* Faults on the wire: replies that are missing, late or wrong, echoes, and the first reply that a fault counts. */
 #include "tests/unit/wire_rig.h"
 
 static struct fault f;
 
-/* What went out is this text. */
+/* The sent text is this. */
 static void expect_text(const char *text)
 {
     if (rig.n_out != strlen(text) || memcmp(rig.out, text, rig.n_out) != 0)
@@ -31,7 +31,7 @@ static void a_reply_that_is_dropped_is_missing(void **state)
     assert_true(rig.n_notes == 1 && rig.note[0].number == 2 && rig.note[0].of == FAULT_OF_REPLIES);
 }
 
-/* Its end lies in device time that is still to come, as the tick that the command took effect with. */
+/* Its end is in device time that is still to come: the tick at which the command took effect. */
 static void a_fault_that_was_taken_out_changes_no_reply(void **state)
 {
     (void)state;
@@ -66,7 +66,7 @@ static void frames_overtake_a_late_reply_and_replies_do_not(void **state)
     assert_int_equal(rig_take(0), 1);
 }
 
-/* It differs always from the right one. */
+/* It always differs from the right one. */
 static void a_wrong_reply_is_wrong(void **state)
 {
     (void)state;
@@ -89,7 +89,7 @@ static void a_wrong_reply_is_wrong(void **state)
     assert_memory_equal(rig.out + 5, rig.item[0].bytes, 5);
 }
 
-/* Of the line that it answers, however the lines came; those that have no answer are passed over. */
+/* An echo is that of the line that it answers, however the lines came. Lines without an answer are skipped. */
 static void an_echo_is_that_of_the_replys_own_line(void **state)
 {
     (void)state;
@@ -138,7 +138,7 @@ static void more_than_can_be_heard_does_no_harm(void **state)
     assert_int_equal(rig.n_notes, 300);
 }
 
-/* A reply counts from the command on that added the fault, and not that command's own. */
+/* Replies count from after the command that added the fault, without that command's own. */
 static void replies_count_from_after_the_command(void **state)
 {
     (void)state;

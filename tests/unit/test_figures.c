@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Figures of clouds, by hand. */
+/* Figures of clouds, worked out by hand. */
 #include <math.h>
 
 #include "core/studio/figures.h"
@@ -44,7 +44,7 @@ static void groups_have_their_own_figures(void **state)
     near_to(f[0].z_mean, -1.0);
     near_to(f[0].z_rms, sqrt(5.0));
     near_to(f[0].z_counts, sqrt(0.5));
-    /* The second one: at an incidence of 84 degrees there is no deviation along the beam; one sigma is not known. */
+    /* The second point, at an incidence of 84 degrees, has no deviation along the beam; one sigma is not known. */
     assert_true(f[1].points == 2 && f[1].along == 1 && f[1].judged == 0);
     near_to(f[1].max_m, 0.010);
     near_to(f[1].along_mean_m, 0.004);
@@ -58,7 +58,7 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Against a sorted copy: rank ceil(0.95 n); with many that are equal, too. */
+/* Percentiles are compared with a sorted copy: rank ceil(0.95 n), also with many equal values. */
 static void percentiles_are_the_nearest_rank(void **state)
 {
     (void)state;
@@ -120,7 +120,7 @@ static void histograms_count_each_value_once(void **state)
     assert_true(h.bins > 0 && h.count[0] == 1);
 }
 
-/* A square of 2 m at 45 degrees: its cells of 1 m are 1.414 m2 large. 4 columns of points with 9, 9, 1, 1. */
+/* A square of 2 m at 45 degrees has cells of 1 m with 1.414 m2. There are 4 columns of points with 9, 9, 1, 1. */
 static void density_is_points_by_area(void **state)
 {
     (void)state;
@@ -161,7 +161,7 @@ static void density_is_points_by_area(void **state)
     figures_density_within(&d, 1, 3.0, 5.0, &row); /* from the first one on, up to before the second */
     assert_true(row.cells == 2 && row.points == 18);
     figures_density_free(&d);
-    /* two stations by turns: where both have points there are two cells in one place */
+    /* Two stations come in turns. If both have points there are two cells in one place. */
     uint16_t station[20];
     for (size_t i = 0; i < n; i++)
         station[i] = (uint16_t)(1 + i % 2);

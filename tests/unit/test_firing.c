@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Schedules with a firing table, against what a data sheet says: firing times as fractions in 128-bit integers. */
+/* Schedules with a firing table, against a data sheet: firing times as fractions in 128-bit integers. */
 #include "tests/common/cases.h"
 
 #include <math.h>
@@ -48,7 +48,7 @@ static void the_rate_is_no_whole_number(void **state)
     assert_int_equal(emitter_rate_uhz(&e), 289351851852); /* 16 / 55.296 us is 289351.851 851 851... Hz */
 }
 
-/* Before an hour, a day, and now and then. */
+/* Returns a pulse in the first hour or day, or anywhere. */
 static uint64_t some_pulse(uint64_t *cases, int i)
 {
     const uint64_t hour = (uint64_t)HOUR_NS / 55296 * 16;
@@ -81,7 +81,7 @@ static void an_hour_and_a_day_are_exact(void **state)
     assert_true(schedule_pulse_at(&seg, DAY_NS) == (uint64_t)DAY_NS / 55296 * 16); /* 86400 s are whole sequences */
 }
 
-/* The sequence of a head whose period is no whole number of nanoseconds. */
+/* A sequence of a head whose period is no whole number of nanoseconds. */
 static void rational_sequences_are_exact(void **state)
 {
     (void)state;
@@ -146,8 +146,8 @@ static void take_lines(const struct schedule_segment *seg, uint64_t *next, uint6
     }
 }
 
-/* Rates of turns change anywhere, also within a sequence: firing times and the firing's number go on, the azimuth
- * goes on from where it was, no pulse is lost or doubled. */
+/* Rates of turns change anywhere, also within a sequence. Firing times and the firing's number go on, the azimuth
+ * continues, and no pulse is lost or doubled. */
 static void turn_rates_change_anywhere(void **state)
 {
     (void)state;
@@ -183,7 +183,7 @@ static void turn_rates_change_anywhere(void **state)
     assert_int_equal(cast, k);
 }
 
-/* A window is one of the turning azimuth; where each beam looks from there does not matter. */
+/* A window is one of the turning azimuth. The direction of each beam from there does not matter. */
 static void a_window_cuts_turns(void **state)
 {
     (void)state;
@@ -203,7 +203,7 @@ static void a_window_cuts_turns(void **state)
     }
 }
 
-/* The other way round; a beam's own azimuth is clockwise all the same. */
+/* The head turns the other way round. A beam's own azimuth is clockwise all the same. */
 static void beams_turn_either_way(void **state)
 {
     (void)state;
@@ -221,7 +221,7 @@ static void beams_turn_either_way(void **state)
     }
 }
 
-/* What a run says of its pulses is what the schedule says of each. */
+/* The figures of a run are those of the schedule for each pulse. */
 static void runs_say_the_same(void **state)
 {
     (void)state;
@@ -247,7 +247,7 @@ static void runs_say_the_same(void **state)
         /* 20 turns a second */
         assert_true(fabs((double)run.r * run.pan_turn_per_r - (double)(vlp16_ns(k) % 50000000) / 5e7) < 0x1p-51);
     }
-    /* As long a run as fits into so many nanoseconds does fit, wherever it begins. */
+    /* The longest run that fits into so many nanoseconds fits wherever it begins. */
     const uint64_t longest = schedule_longest_run(&seg, 16777215);
     assert_true(longest > 4700);
     for (uint64_t k = 0; k < 16; k++)
@@ -255,7 +255,7 @@ static void runs_say_the_same(void **state)
     assert_int_equal(schedule_longest_run(&seg, 100), 1);
 }
 
-/* ---- what is refused */
+/* ---- refusals */
 
 static void refused(const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps, const char *says)
 {

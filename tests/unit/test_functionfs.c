@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The functionfs back end with a test's files in place of the kernel's: FIFOs for endpoints, which the same
- * asynchronous I/O reads and writes, and a socket pair for ep0. An empty FIFO answers a read as an endpoint does that
- * is not enabled: at once, with -EAGAIN. What a kernel answers itself is left to the guest tests. */
+/* The functionfs back end with a test's files in place of the kernel's. FIFOs stand for endpoints, which the same
+ * asynchronous I/O reads and writes, and a socket pair for ep0. An empty FIFO answers a read as a disabled endpoint
+ * does: at once, with -EAGAIN. The guest tests have the kernel's own answers. */
 #include "tests/unit/usb_host.h"
 #include "tests/unit/usb_models.h"
 
@@ -39,7 +39,7 @@ static const struct usb_endpoint_row unit_endpoints[] = {
 static const struct usb_interface_row unit_interfaces[] = {
     {.class = 0xff, .endpoint = unit_endpoints, .n_endpoints = 2}};
 
-/* out: what stands for the OUT endpoint; NULL: a FIFO. */
+/* out: the file for the OUT endpoint; NULL: a FIFO. */
 static struct rig rig_open_model(const char *out, const struct usb_model *model)
 {
     struct rig rig = {.ops = usb_backend_ops_get(USB_BACKEND_FUNCTIONFS), .dir = "/tmp/test_functionfs.XXXXXX"};
@@ -98,7 +98,7 @@ static void handle(struct rig *rig)
     assert_int_equal(rig->ops->handle(rig->ffs, fds, n, count_act, rig), SH_OK);
 }
 
-/* Until it has nothing to do: then poll(2) waits, and the processor rests. */
+/* Runs until it has nothing to do. Then poll(2) waits, and the processor rests. */
 static void settle(struct rig *rig)
 {
     for (int calls = 0; calls < 1000; calls++) {
@@ -124,7 +124,7 @@ static void host_sends(struct rig *rig, const char *text)
     close(fd);
 }
 
-/* The host takes the configuration away: every read comes back at once, again and again. */
+/* The host takes the configuration away, so every read comes back at once, again and again. */
 static void test_deconfigured(void **state)
 {
     (void)state;
@@ -151,7 +151,7 @@ static void test_deconfigured(void **state)
     rig_close(&rig);
 }
 
-/* What fails from before the present configuration says nothing about this one. */
+/* A failure from before the present configuration does not count for this one. */
 static void test_left_over(void **state)
 {
     (void)state;
@@ -168,7 +168,7 @@ static void test_left_over(void **state)
     rig_close(&rig);
 }
 
-/* /dev/null completes each read with no bytes: a host that sends empty packets without end. ep0 gets its turn. */
+/* /dev/null completes each read with no bytes, like a host that sends empty packets without end. ep0 gets its turn. */
 static void test_busy_endpoint(void **state)
 {
     (void)state;
@@ -184,7 +184,7 @@ static void test_busy_endpoint(void **state)
     rig_close(&rig);
 }
 
-/* An error that does not pass: here the kernel can't write to the buffers. */
+/* An error that does not pass: the kernel can't write to the buffers. */
 static void test_failing_endpoint(void **state)
 {
     (void)state;
@@ -208,11 +208,11 @@ static void test_failing_endpoint(void **state)
     rig_close(&rig);
 }
 
-/* Failures count in a row: after a transfer that went well those before it are forgotten, however many there were. */
+/* Failures count in a row. After a transfer that succeeded those before it are forgotten, however many there were. */
 static void test_failures_long_past(void **state)
 {
     (void)state;
-    struct rig rig = rig_open("/dev/zero"); /* whoever reads it gets a whole buffer */
+    struct rig rig = rig_open("/dev/zero"); /* each read gets a whole buffer */
     struct ffs_pipe *pipe = &rig.ffs->pipes.pipe[1];
     static uint8_t bytes[FFS_SLOT_BYTES];
     event(&rig, FUNCTIONFS_ENABLE);
@@ -263,8 +263,8 @@ static void test_endpoint_request(void **state)
     rig_close(&rig);
 }
 
-/* A telegram of whole packets has a packet of no bytes after it: as a write of its own, which is FunctionFS's way. Where
- * it fills a buffer to its last byte, that write is all that the next buffer does. */
+/* A telegram of whole packets has a packet of no bytes after it, which FunctionFS sends by a write of its own. Where
+ * the telegram fills a buffer to its last byte, the next buffer has only that write. */
 static void test_units(void **state)
 {
     (void)state;

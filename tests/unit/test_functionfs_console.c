@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The console of a gadget, with a socket pair in place of the kernel's tty: it, too, says how much nobody has taken yet
- * (TIOCOUTQ is SIOCOUTQ), and an eventfd in place of the timer. Clients that stop reading, and those who come after them. */
+/* These tests run the console of a gadget, with a socket pair in place of the kernel's tty, and an eventfd in place of
+ * the timer. A socket pair also reports how much was not taken yet (TIOCOUTQ is SIOCOUTQ). Clients stop reading, and
+ * others come after them. */
 #include "tests/unit/usb_host.h"
 
 #include <poll.h>
@@ -57,13 +58,13 @@ static int open_port(void **state)
 static int close_port(void **state)
 {
     struct port *port = *state;
-    usb_device_free(port->head.device); /* gives back what waits */
+    usb_device_free(port->head.device); /* it frees the waiting bytes */
     ffs_console_close(&port->console);
     close(port->host);
     return 0;
 }
 
-/* A line of the client, all of which the head reads. */
+/* The client sends a line, and the head reads all of it. */
 static void client_says(struct port *port, const char *text)
 {
     char heard[64];
@@ -88,7 +89,8 @@ static size_t head_says(struct port *port, const void *text, size_t len)
     return usb_device_write(port->head.device, CONSOLE_IN, text, len);
 }
 
-/* Until the port takes no more, with a part of the last text still at the console. Returns all that the head wrote. */
+/* Fills the port until it takes no more, with a part of the last text still at the console. Returns the number of bytes
+ * that the head wrote. */
 static size_t fill(struct port *port)
 {
     static char old[1000];
@@ -114,8 +116,8 @@ static size_t client_reads(struct port *port, void *bytes, size_t room)
 
 static char bytes[1 << 22];
 
-/* It closed its port, which nobody says: for a second and more it takes nothing. What the port holds goes to who comes
- * next; what was still to be given to the port does not. A frame that is whole follows the one that was cut. */
+/* The client closed its port, which is not reported: for a second and more the port takes nothing. Bytes in the port go
+ * to the next client. Bytes still to be given to the port do not. A whole frame follows the one that was cut. */
 static void what_waits_at_a_close_is_void(void **state)
 {
     struct port *port = *state;
@@ -140,7 +142,7 @@ static void what_waits_at_a_close_is_void(void **state)
     assert_int_equal(event.code, NATIVE_EV_READER_LOST);
 }
 
-/* One that is slow, or has nothing to read, keeps its session. */
+/* A client that is slow, or has nothing to read, keeps its session. */
 static void a_slow_client_keeps_its_session(void **state)
 {
     struct port *port = *state;

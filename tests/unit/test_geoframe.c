@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How a scene lies on the Earth: stations of one scene agree, directions and scale are right, traps are told. */
+/* How a scene lies on the Earth. Stations of one scene agree, directions and scale are right, and traps give
+ * warnings. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -37,7 +38,7 @@ static void tangent(struct geoframe *frame, double lat_deg, double lon_deg, doub
     ok(geoframe_set_tangent(frame, origin_m, &at, north_deg, &err));
 }
 
-/* A point of the scene in the CRS, as the station sees it. */
+/* Writes a point of the scene in the CRS, as the station sees it. */
 static int see(const struct geoframe *frame, enum georef_crs crs, int zone, const double station_m[3],
                const double point_m[3], double p[3])
 {
@@ -69,7 +70,7 @@ static int see(const struct geoframe *frame, enum georef_crs crs, int zone, cons
     return epsg;
 }
 
-/* Any point of the scene has one place, from wherever it is seen: the wanted 1e-6 m and a hundredth of it. */
+/* Any point of the scene has one place, from wherever it is seen: to the wanted 1e-6 m, and a hundredth of it. */
 static void assert_agree(const struct geoframe *frame, int zone, const double first[3], const double second[3],
                          const double corner[3])
 {
@@ -120,7 +121,7 @@ static void a_grid_scene_keeps_its_coordinates(void **state)
     assert_memory_equal(p, corner, sizeof p);
 }
 
-/* A point of the scene has its place: the frame and the georeference say the same, which are different ways. */
+/* The frame and the georeference give a point of the scene the same place, in different ways. */
 static void frame_and_georeference_agree(void **state)
 {
     (void)state;
@@ -144,7 +145,7 @@ static void frame_and_georeference_agree(void **state)
     }
 }
 
-/* 500 m east of the anchor the plumb line leans by atan(500 / (N + h)), N the radius in the prime vertical. */
+/* 500 m east of the anchor the plumb line leans by atan(500 / (N + h)), with N the radius in the prime vertical. */
 static void a_far_station_leans(void **state)
 {
     (void)state;
@@ -174,7 +175,7 @@ static void north_is_clockwise_from_y(void **state)
     assert_near(at.lat_deg, 40 + 10 / (m_m + 110) * 180 / M_PI, 1e-11);
 }
 
-/* The rotation of a grid is its convergence: a step to true north, as the projection itself takes it. */
+/* The rotation of a grid is its convergence: a step to true north, by the projection itself. */
 static void a_grid_is_turned_by_its_convergence(void **state)
 {
     (void)state;

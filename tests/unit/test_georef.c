@@ -78,8 +78,8 @@ static void test_local(void **state)
     georef_free(georef);
 }
 
-/* Meridian arc from the equator by Simpson's rule; the integrand is smooth, 20000 steps leave less than 1e-9
- * m. */
+/* Computes the meridian arc from the equator by Simpson's rule. The integrand is smooth, so 20000 steps have an error
+ * below 1e-9 m. */
 static double meridian_arc_m(double lat_deg)
 {
     enum { STEPS = 20000 };
@@ -108,9 +108,8 @@ static void test_utm_central_meridian(void **state)
     }
 }
 
-/* Off the meridian: the projection is conformal, so a short step north and one east have the same length k
- * and stand at right angles, and k = 0.9996 (1 + l^2 cos^2(lat) (1 + eta^2) / 2 + ...) (Snyder, Map
- * Projections, 8-11). */
+/* Away from the meridian the projection is conformal. So a short step north and one east have the same length k and are
+ * at right angles, and k = 0.9996 (1 + l^2 cos^2(lat) (1 + eta^2) / 2 + ...) (Snyder, Map Projections, 8-11). */
 static void test_utm_scale(void **state)
 {
     (void)state;
@@ -190,7 +189,7 @@ static void test_round_trip(void **state)
     }
 }
 
-/* Where UTMUPS used per point fails: 10,000 km between neighbours across the equator, another zone across its
+/* Cases where UTMUPS used per point fails: 10,000 km between neighbours across the equator, another zone across its
  * border, an exception beyond the edge of the table. */
 static void test_borders(void **state)
 {
@@ -205,7 +204,7 @@ static void test_borders(void **state)
         struct georef_spec spec = {
             .crs = GEOREF_UTM, .lat_deg = at[i].lat_deg, .lon_deg = at[i].lon_deg, .utm_zone = at[i].zone};
         struct georef *georef = NULL;
-        if (at[i].zone != 0) { /* as far east of the central meridian as is allowed */
+        if (at[i].zone != 0) { /* the farthest east of the central meridian that is allowed */
             double low = 3, high = 17;
             while (high - low > 1e-9) {
                 spec.lon_deg = (low + high) / 2;
@@ -230,7 +229,7 @@ static void test_borders(void **state)
     }
 }
 
-/* Blocks of any length, and values not in place, too. */
+/* This includes blocks of any length, and values that are not in place. */
 static void check_nan(const struct georef *georef, int is_local)
 {
     enum { N = 300 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of georeferencing where the scene's frame does not lie level: what is far there may be far up here. */
+/* Bounds of georeferencing where the scene's frame is not level: far in the scene may be far up there. */
 #include "core/angle.h"
 #include "core/geoframe.h"
 #include "tests/unit/georef_rig.h"
@@ -7,7 +7,7 @@
 enum { POINTS = 48 };
 static const double RADIUS_M = 2000, HEIGHT_M = 20;
 
-/* The scene's x axis goes up by so much from the east, y stays north. */
+/* The scene's x axis goes up by so much from the east, and y stays north. */
 static struct georef *make_tilted(enum georef_crs crs, double lat_deg, double tilt_deg)
 {
     const double s = sin(angle_rad(tilt_deg)), c = cos(angle_rad(tilt_deg));
@@ -19,7 +19,8 @@ static struct georef *make_tilted(enum georef_crs crs, double lat_deg, double ti
     return georef;
 }
 
-/* On the edges of the cylinder; degrees by the ellipsoid's least radius, so that errors are not said too large. */
+/* Points are on the edges of the cylinder. Degrees are converted by the ellipsoid's least radius, so that errors are
+ * not overestimated. */
 static double largest_error_m(struct georef *georef, enum georef_method method, double lat_deg)
 {
     const double degree_m = angle_rad(6335000.0);
@@ -56,14 +57,14 @@ static void test_tilted(void **state)
             if (!(error_m <= bound_m))
                 fail_msg("latitude %g, tilted by %g, EPSG %d, order %d: off by %.3g m, bound %.3g m", lat, tilt,
                          georef_epsg(georef), 1 + (int)m - (int)GEOREF_ORDER1, error_m, bound_m);
-            /* not idle, either: a turned cylinder is taken for a ball, and orders add up their terms */
+            /* The bound is not much too large: a turned cylinder counts as a ball, and orders add up their terms. */
             assert_true(m != GEOREF_ORDER1 || bound_m < 10 * error_m);
         }
         georef_free(georef);
     }
 }
 
-/* Scenes in a polar grid, whose degrees come by the meridian, too: on both sides, all around. */
+/* Scenes in a polar grid, whose degrees follow the meridian, too: at both poles, all around. */
 static void test_polar_grids(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Heights above a geoid, by a file that the test makes: a surface that rises by a metre a degree of latitude, which the
+/* Heights above a geoid, by a file that the test makes. Its surface rises by a metre a degree of latitude, which the
  * cubic interpolation of GeographicLib reproduces but for rounding. */
 #include <stdlib.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@ enum { WIDTH = 360, HEIGHT = 181 };
 
 static char folder[] = "/tmp/test_georef_geoid_XXXXXX";
 
-/* PGM with two bytes a pixel, from 90 degrees north on; metres are -100 + 0.01 times the pixel. */
+/* The file is PGM with two bytes a pixel, from 90 degrees north on. Metres are -100 + 0.01 times the pixel. */
 static int set_up(void **state)
 {
     char path[64];
@@ -54,8 +54,8 @@ static struct georef *make_on(const struct georef_geoid *geoid, enum georef_crs 
     return georef;
 }
 
-/* The station's height is 500 m less 40 m. 20 km to the north the geoid is 0.18 m higher: heights there are that much
- * less than above the ellipsoid. Interpolation rounds in 1e-12 of some hundred metres. */
+/* The station's height is 500 m less 40 m. 20 km to the north the geoid is 0.18 m higher, so heights there are that
+ * much less than above the ellipsoid. Interpolation rounds in 1e-12 of some hundred metres. */
 static void test_heights(void **state)
 {
     (void)state;
@@ -80,7 +80,7 @@ static void test_heights(void **state)
             georef_reverse(above, got, back);
             expect_point(back, d[0], d[1], d[2], TOL_M);
         }
-        /* interpolated for each point: there is no polynomial */
+        /* It is interpolated for each point, so there is no polynomial. */
         assert_int_equal(georef_set_method(above, GEOREF_ORDER2, &err), SH_EINPUT);
         assert_non_null(strstr(err.text, "geoid"));
         georef_free(above);

@@ -3,8 +3,7 @@
 #include "core/locate.h"
 #include "tests/unit/georef_rig.h"
 
-/* There and back between systems; and where the ends of the ellipsoid's axes and the
- * false origins are. */
+/* Places go back and forth between systems. The ends of the ellipsoid's axes and the false origins are right. */
 static void test_places(void **state)
 {
     (void)state;
@@ -42,7 +41,7 @@ static void test_places(void **state)
     }
 }
 
-/* Convergence east of the central meridian: atan(tan(dlon) sin(lat)) on the sphere, within e'^2 of it; scale
+/* Convergence east of the central meridian is atan(tan(dlon) sin(lat)) on the sphere, within e'^2 of it; scale is
  * 0.9996 (1 + x^2/2R^2). */
 static void test_convergence(void **state)
 {
@@ -54,7 +53,7 @@ static void test_convergence(void **state)
     expect_near(convergence_rad, sphere, 0.01 * sphere);
     double x_m = 2 * PI / 180 * cos(50 * PI / 180) * 6.38e6;
     expect_near(scale, 0.9996 * (1 + x_m * x_m / 2 / 6.38e6 / 6.38e6), 1e-6);
-    /* and it is that of the map: true north goes to the west of the grid's */
+    /* It is that of the map: true north goes to the west of the grid's. */
     double d[3];
     forward_one(georef, (const double[3]){0, 1, 0}, d);
     expect_near(atan2(d[0], d[1]), -convergence_rad, 1e-8);
@@ -65,7 +64,7 @@ static void test_convergence(void **state)
     georef_free(georef);
 }
 
-/* Another centre: the same positions, also across the zone's border, the equator and the antimeridian. */
+/* Another centre gives the same positions, also across the zone's border, the equator and the antimeridian. */
 static void test_recentre(void **state)
 {
     (void)state;
@@ -110,7 +109,7 @@ static void test_recentre(void **state)
     georef_free(georef);
 }
 
-/* A count is at most scale_m long on the ground and the furthest points fit; where they can't, it is said. */
+/* A count is at most scale_m long on the ground and the farthest points fit. If they can't, it is reported. */
 static void test_scale(void **state)
 {
     (void)state;
@@ -148,7 +147,7 @@ static void test_scale(void **state)
     georef_free(georef);
 }
 
-/* The other hemisphere's false northing, and its code; a scene in a grid of the south keeps that. */
+/* The other hemisphere has its false northing and its code. A scene in a grid of the south keeps that. */
 static void test_sides(void **state)
 {
     (void)state;
@@ -176,8 +175,8 @@ static void test_sides(void **state)
     georef_free(georef);
 }
 
-/* Degrees: the difference is the short way, and the axes are east, north, up. The map bends by less than 1e-9 over the
- * steps that its axes are taken from, but for the ellipsoid's own 100 m / 6.4e6 m, which cancels on both sides. */
+/* For degrees the difference is the short way, and the axes are east, north, up. The map bends by less than 1e-9 over
+ * the steps that its axes are taken from. The ellipsoid's own 100 m / 6.4e6 m cancels on both sides. */
 static void test_degrees(void **state)
 {
     (void)state;
@@ -204,7 +203,7 @@ static void test_degrees(void **state)
     georef_free(georef);
 }
 
-/* Order 5 is for maps that leave heights as they are. */
+/* Order 5 is for maps that do not change heights. */
 static void test_orders(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Terrain from GeoTIFF: places and heights against the numbers that were written, holes, what is refused. */
+/* Terrain from GeoTIFF: places and heights against the written numbers, holes, refusals. */
 #include <math.h>
 #include <sys/stat.h>
 #include <tiffio.h>
@@ -45,7 +45,7 @@ static void assert_vertex(const struct scene *s, uint32_t i, double x, double y,
         fail_msg("vertex %u at %.10f %.10f %.10f instead of %.10f %.10f %.10f", i, v[0], v[1], v[2], x, y, z);
 }
 
-/* All vertices of the 5 x 4 cells, from the middle of the first one. */
+/* Checks all vertices of the 5 x 4 cells, from the middle of the first one. */
 static void assert_grid(const struct scene *s, double x0, double y0, double dx, double dy, double unit, double z0)
 {
     assert_int_equal(s->n_vertices, 20);
@@ -61,7 +61,7 @@ static double up_of(const struct scene *s, uint32_t i)
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Twice the area from above, with its sign: each triangle faces up. */
+/* Returns twice the area from above, with its sign: each triangle faces up. */
 static double assert_up(const struct scene *s)
 {
     double sum = 0.0;
@@ -93,7 +93,8 @@ static void each_cell_is_where_it_is(void **state)
     scene_free(s);
 }
 
-/* Types and packings that hold these numbers as they are. libtiff (4.5) writes no sound predictor 3 into the other byte order. */
+/* These types and packings hold the numbers exactly. libtiff (4.5) writes no sound predictor 3 into the other byte
+ * order. */
 static void all_forms_give_the_same(void **state)
 {
     (void)state;
@@ -147,7 +148,7 @@ static void negative_numbers_and_many_tiles(void **state)
     scene_free(s);
 }
 
-/* Turned by the angle of 3, 4, 5 and, second, mirrored: faces still look up. */
+/* The raster is turned by the angle of 3, 4, 5 and, in the second case, mirrored. Faces still look up. */
 static void a_transformation(void **state)
 {
     (void)state;
@@ -168,7 +169,7 @@ static void a_transformation(void **state)
     }
 }
 
-/* Cell 1, 1 of 5 x 4: three triangles of its four quads stay by the other corners; 4 quads lose half. */
+/* Cell 1, 1 of 5 x 4 is a hole. Three triangles of its four quads stay by the other corners; 4 quads lose half. */
 static void holes(void **state)
 {
     (void)state;
@@ -189,7 +190,7 @@ static void holes(void **state)
         assert_int_equal(n_warnings, 1);
         scene_free(s);
     }
-    /* A whole number's no-data; what is left beside it touches nothing. */
+    /* The no-data value is a whole number; the cells that are left touch nothing. */
     for (int i = 0; i < 20; i++)
         value[i] = i == 0 || i / 5 >= 2 ? heights[i] : 255;
     struct tif t = tif_of(5, 4, value);
@@ -206,7 +207,7 @@ static void holes(void **state)
     refuse_tif(&t, "no cell of 5 x 4 has a height");
 }
 
-/* Feet by the system, by keys, by GDAL's word; scale and offset of GDAL. */
+/* Feet come by the system, by keys, or by GDAL's word; scale and offset by GDAL. */
 static void units(void **state)
 {
     (void)state;
@@ -253,7 +254,7 @@ static void units(void **state)
     }
 }
 
-/* Its value is no height on the Earth, and the file doesn't say so. */
+/* The value is no height on the Earth, and the file doesn't mark it. */
 static void odd_heights_are_doubted(void **state)
 {
     (void)state;
@@ -271,7 +272,8 @@ static void odd_heights_are_doubted(void **state)
     scene_free(s);
 }
 
-/* A part of the map that readers leave out, GDAL among them, where heights have no system; and a system of its own. */
+/* The map's scale of heights is not used where these have no system of their own, as in GDAL. A system of the file's own
+ * is reported. */
 static void what_is_left_out_is_said(void **state)
 {
     (void)state;
@@ -282,7 +284,7 @@ static void what_is_left_out_is_said(void **state)
     assert_non_null(strstr(warnings, "scales the heights, which is not used"));
     scene_free(s);
     t.key[3][0] = 4096;
-    t.key[3][1] = 5773; /* with a system of the heights it counts, here and in GDAL */
+    t.key[3][1] = 5773; /* with a system of the heights it is used, here and in GDAL */
     t.tie[5] = 7.0;
     s = read_tif(&t);
     assert_grid(s, 690001.0, 5335998.5, 2.0, -3.0, 0.5, 7.0);
@@ -366,7 +368,7 @@ static void what_is_refused(void **state)
     WITH("its tag 42112 has 65536 bytes; allowed are up to 65535", t.metadata = many);
 }
 
-/* Another up or scale would turn the terrain over, or shrink it; and a mask beside it says where holes are. */
+/* Another up or scale would turn the terrain over, or shrink it. A mask beside it marks the holes. */
 static void refuse_spec(const struct scene_mesh_spec *spec, const char *expected)
 {
     struct scene *scene;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The anchor that GeoTIFF meshes give: against GeographicLib where the system is UTM, against PROJ elsewhere. */
+/* The anchor that GeoTIFF meshes give, compared with GeographicLib where the system is UTM, and with PROJ elsewhere. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -90,7 +90,8 @@ static void a_raster_in_utm_makes_the_scene_that_grid(void **state)
     assert_null(strstr(warned, "ellipsoid"));
 }
 
-/* 5030 is WGS 84 among GeoTIFF's codes of ellipsoids; 5703 counts from the sea. One raster without is enough to doubt. */
+/* 5030 is WGS 84 among GeoTIFF's codes of ellipsoids, and 5703 counts from the sea. One raster whose heights do not
+ * count from an ellipsoid is enough for a warning. */
 static void heights_above_an_ellipsoid_are_not_doubted(void **state)
 {
     (void)state;
@@ -103,7 +104,7 @@ static void heights_above_an_ellipsoid_are_not_doubted(void **state)
     }
 }
 
-/* The geoid's height: exact with an offset of the same height, else tangent. */
+/* The geoid's height is exact with an offset of the same height, else tangent. */
 static void height_m_is_that_of_the_raster_s_zero(void **state)
 {
     (void)state;
@@ -120,7 +121,8 @@ static void height_m_is_that_of_the_raster_s_zero(void **state)
     assert_true(apart_m(&want, &site->station[0].at.place) < 22.4 * 4.1e-4 + 1e-4);
 }
 
-/* Where the middle is, by PROJ; grid north turned by the convergence; corners as far off as the warning says. */
+/* The middle is placed by PROJ, and grid north is turned by the convergence. Corners are as wrong as the warning
+ * says. */
 static void another_grid_makes_it_tangent(void **state)
 {
     (void)state;

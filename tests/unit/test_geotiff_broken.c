@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Broken GeoTIFFs, and ones too large: a line of text that names the file, and no reader that crashes. */
+/* Broken GeoTIFFs, and ones that are too large: a line of text names the file, and no reader crashes. */
 #include <tiffio.h>
 
 #include "tests/common/thorough.h"
@@ -14,7 +14,7 @@ static const char *tif_path(const char *name)
     return path;
 }
 
-/* A packed one of 5 x 4 cells; its length. */
+/* Packs a file of 5 x 4 cells, and returns its length. */
 static size_t pack(uint8_t data[8192])
 {
     struct tif t = tif_of(5, 4, heights);
@@ -30,7 +30,7 @@ static size_t pack(uint8_t data[8192])
     return n;
 }
 
-/* Anywhere: the directory is at the end, so each is an error with the file's name. */
+/* The file is cut anywhere. The directory is at the end, so each cut is an error with the file's name. */
 static void cut_off_anywhere(void **state)
 {
     (void)state;
@@ -41,7 +41,8 @@ static void cut_off_anywhere(void **state)
     refuse("text.tif", "solid hall, or any other text", 29, "no TIFF by its first bytes");
 }
 
-/* One byte in a hundred is another one, by a fixed seed: terrain, or one line that names the file; no reader that crashes. */
+/* One byte in a hundred is changed, with a fixed seed. The result is terrain, or one line that names the file, and no
+ * reader crashes. */
 static void broken_bytes(void **state)
 {
     (void)state;
@@ -65,7 +66,7 @@ static void broken_bytes(void **state)
     }
 }
 
-/* The first image is whole, and what should follow lies beyond the file. */
+/* The first image is whole, and the next one lies beyond the file. */
 static void what_follows_is_broken(void **state)
 {
     (void)state;
@@ -86,7 +87,7 @@ static void what_follows_is_broken(void **state)
     unlink(path);
 }
 
-/* A raster too large is refused by its figures, before its cells are looked at. */
+/* A raster that is too large is refused by its figures, before its cells are read. */
 static void too_many_triangles(void **state)
 {
     (void)state;

@@ -22,7 +22,7 @@ static void check_uv(const struct scene *s)
         }
 }
 
-/* uv: accessor of texture coordinates, replaced by these. */
+/* uv: the accessor of texture coordinates, replaced by these. */
 static void check_normalized(const char *type, const void *data, size_t size, int stride)
 {
     char rest[2048], more[64];
@@ -52,7 +52,8 @@ static void normalized_texture_coordinates(void **state)
     check_normalized("5122", i16, sizeof i16, 4);
 }
 
-/* Corners in the order of gltf_quad: red, green, half grey (128 of 255 in sRGB is 0.21586 of linear light), blue. */
+/* Corners are in the order of gltf_quad: red, green, half grey (128 of 255 in sRGB is 0.21586 of linear light),
+ * blue. */
 static void check_colours(const char *type, const char *kind, const void *data, size_t size, int stride)
 {
     static const uint8_t want[4][4] = {{255, 0, 0, 255}, {0, 255, 0, 255}, {128, 128, 128, 255}, {0, 0, 255, 255}};
@@ -85,7 +86,7 @@ static void colours_of_vertices(void **state)
     check_colours("5126", "VEC4", f32, sizeof f32, 16);
 }
 
-/* KHR_mesh_quantization: half of a step of 1/32767, scaled by 2, is 31 um; of whole millimetres 0.5 mm. */
+/* KHR_mesh_quantization: half of a step of 1/32767, scaled by 2, is 31 um; half of a millimetre is 0.5 mm. */
 static void quantized_positions(void **state)
 {
     (void)state;
@@ -120,7 +121,7 @@ static void quantized_positions(void **state)
     }
 }
 
-/* Two of four zeros are others; a sparse one over a buffer view; and one that is all zeros: a corner at the origin. */
+/* Two of four zeros are replaced; a sparse accessor is over a buffer view; one is all zeros, a corner at the origin. */
 static void sparse_accessors(void **state)
 {
     (void)state;
@@ -150,7 +151,7 @@ static void sparse_accessors(void **state)
     }
 }
 
-/* Each mode, with indices and without: triangles, and what is counted as points and lines. */
+/* Each mode is tried with indices and without: triangles, and the counts of points and lines. */
 static void modes_of_primitives(void **state)
 {
     (void)state;
@@ -177,7 +178,7 @@ static void modes_of_primitives(void **state)
         gltf_block(strip, sizeof strip, "");
         gltf_block(strip_index, sizeof strip_index, "");
         gltf_block(fan_index, sizeof fan_index, "");
-        /* beside it a triangle, since a file must have one */
+        /* A triangle is beside it, since a file must have one. */
         snprintf(rest, sizeof rest,
                  ONE_NODE "\"meshes\":[{\"primitives\":[{%s\"attributes\":{\"POSITION\":%d},\"mode\":%d},"
                           "{\"attributes\":{\"POSITION\":0},\"indices\":6}]}],\"accessors\":[" GLTF_QUAD_ACCESSORS
@@ -195,7 +196,7 @@ static void modes_of_primitives(void **state)
     }
 }
 
-/* Offsets, counts and indices that lead out of the file, some so large that sums would wrap. */
+/* Offsets, counts and indices lead out of the file, some so large that sums would wrap. */
 static void nothing_is_read_beyond_the_file(void **state)
 {
     (void)state;
@@ -234,7 +235,7 @@ static void nothing_is_read_beyond_the_file(void **state)
     }
 }
 
-/* Four thousand million points from no buffer: no memory is asked for what they don't take. */
+/* Four thousand million points have no buffer. No memory is asked for beyond their bytes. */
 static void absurd_counts_end(void **state)
 {
     (void)state;

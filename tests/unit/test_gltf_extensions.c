@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Extensions of glTF: known and required ones, packed buffers, images of other formats, textures that are turned, names of
+/* Extensions of glTF: known and required ones, packed buffers, images of other formats, turned textures, names of
  * materials. */
 #include "tests/unit/gltf_files.h"
 
@@ -29,7 +29,7 @@ static void required_and_unknown(void **state)
     scene_free(s);
 }
 
-/* No effect on what a laser sees: lights, gloss, metadata. */
+/* They do not change a laser's view: lights, gloss, metadata. */
 static void required_and_harmless(void **state)
 {
     (void)state;
@@ -41,14 +41,14 @@ static void required_and_harmless(void **state)
     scene_free(s);
 }
 
-/* How much light goes through is kept, and nothing made of it. */
+/* The share of light that goes through is kept, and not used. */
 static void transparency_is_kept(void **state)
 {
     (void)state;
     static const struct {
         const char *material;
         float clear;
-        const char *odd; /* what a warning names; NULL: there is none */
+        const char *odd; /* the name in a warning; NULL: there is none */
     } as[] = {{"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f, NULL},
               {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
               {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},
@@ -90,7 +90,7 @@ static int load_images(const char *required, const char *texture, int textures, 
     return rc;
 }
 
-/* KTX2: refused where it is required and colours are wanted; else the other image, or a warning. */
+/* KTX2 is refused where it is required and colours are wanted; else the other image is taken, or there is a warning. */
 static void images_that_are_not_read(void **state)
 {
     (void)state;
@@ -116,7 +116,7 @@ static void images_that_are_not_read(void **state)
     scene_free(s);
 }
 
-/* EXT_texture_webp, within the file: its texels, without loss. */
+/* EXT_texture_webp, within the file, gives its texels, without loss. */
 static void webp_is_decoded(void **state)
 {
     (void)state;
@@ -202,10 +202,11 @@ static void meshopt_is_unpacked(void **state)
     try_packed("ATTRIBUTES", ",\"filter\":\"OCTAHEDRAL\"", 0, "meshopt has no ATTRIBUTES of 4 times 12 bytes");
 }
 
-/* ---- how textures lie */
+/* ---- placement of textures */
 
-/* u' = offset + R * S * u, with v down; the set of the transform counts, and may stand before the first. A quarter turn with the
- * scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left quarter of the image. */
+/* u' = offset + R * S * u, with v down. The set of the transform counts, and may stand before the first. A quarter
+ * turn with the scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left quarter of the
+ * image. */
 static void turned_textures(void **state)
 {
     (void)state;
@@ -233,7 +234,8 @@ static void turned_textures(void **state)
 
 /* ---- materials */
 
-/* Two of one name, one without: three surfaces with three colours. Specular-glossiness has names of its own. */
+/* Two materials have one name, and one has none: three surfaces with three colours. Specular-glossiness has names of
+ * its own. */
 static void each_material_is_a_surface(void **state)
 {
     (void)state;
@@ -256,7 +258,7 @@ static void each_material_is_a_surface(void **state)
     scene_free(s);
 }
 
-/* A name with an escaped blank is that of the file; an image may be data of a URI. */
+/* A name with an escaped blank is the file's. An image may be data of a URI. */
 static void names_and_data_of_images(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The tree of glTF in double, scenes, instances, skins and morph targets in their default pose. */
+/* These are tests of the tree of glTF in double, scenes, instances, skins and morph targets in their default pose. */
 #include "tests/unit/gltf_files.h"
 
 #include <math.h>
@@ -27,7 +27,8 @@ static void refuse_tree(const char *tree, const char *says)
     gltf_refuse(rest, says);
 }
 
-/* JSON's order means nothing: the buffer's views before, the nodes after what names them. No scene: all roots. */
+/* The order in JSON does not count: the buffer's views come before, the nodes after their references. Without a scene
+ * all roots count. */
 static void order_and_scenes(void **state)
 {
     (void)state;
@@ -47,7 +48,7 @@ static void order_and_scenes(void **state)
     scene_free(s);
 }
 
-/* A quarter turn about y as a matrix and as a quaternion, after a scale: x to -z, z to x. */
+/* A quarter turn about y is given as a matrix and as a quaternion, after a scale: x goes to -z, z to x. */
 static void matrices_and_their_parts(void **state)
 {
     (void)state;
@@ -62,7 +63,7 @@ static void matrices_and_their_parts(void **state)
     refuse_tree("\"nodes\":[{\"mesh\":0,\"scale\":[1,1]}]", "nodes[0].scale is not 3 numbers");
 }
 
-/* A shift of 500 km that a node below takes back takes nothing away: nodes are multiplied in double. */
+/* A shift of 500 km that a node below undoes loses no precision: nodes are multiplied in double. */
 static void the_tree_is_in_double(void **state)
 {
     (void)state;
@@ -72,8 +73,8 @@ static void the_tree_is_in_double(void **state)
                low, high, 0.0);
 }
 
-/* Positions are floats. One of 2 m is rounded by up to 2 * 2^-24 m, which a scale makes larger: 100,000 makes it 0.0119 m, and 10,000
- * 0.00119 m. The tolerance is 0.001 m, so both are refused; a scale of 1,000 is not. */
+/* Positions are floats. One of 2 m is rounded by up to 2 * 2^-24 m, and a scale makes that larger: 100,000 makes it
+ * 0.0119 m, and 10,000 0.00119 m. The tolerance is 0.001 m, so both are refused; a scale of 1,000 is not. */
 static void a_coarse_mesh_is_refused(void **state)
 {
     (void)state;
@@ -105,7 +106,7 @@ static void trees_that_are_none(void **state)
     refuse_tree("\"nodes\":[{\"mesh\":3}]", "meshes[3] is not there: there are 1");
 }
 
-/* A wrong index is an error where something drawn needs it, else a warning; each names the first one. */
+/* A wrong index is an error where a drawn node needs it, else a warning. Each names the first one. */
 static void indices_of_nothing(void **state)
 {
     (void)state;
@@ -141,7 +142,7 @@ static void indices_of_nothing(void **state)
         if (n_warnings != 1 || strstr(warnings, as[i].says) == NULL) fail_msg("%zu: %s", i, warnings);
         scene_free(s);
     }
-    n_warnings = 0; /* an error says it, and nothing beside */
+    n_warnings = 0; /* there is the error, and no warning beside it */
     refuse_tree("\"nodes\":[{\"mesh\":0,\"skin\":3}]", "skins[3] is not there: there are 0");
     assert_int_equal(n_warnings, 0);
     gltf_quad();
@@ -151,7 +152,7 @@ static void indices_of_nothing(void **state)
                 "an index into bufferViews is missing where one is needed");
 }
 
-/* A chain as long as a file may make it: no stack is used up. */
+/* A chain as long as a file may make it does not use up the stack. */
 static void a_deep_chain_is_walked(void **state)
 {
     (void)state;
@@ -168,7 +169,7 @@ static void a_deep_chain_is_walked(void **state)
     scene_free(s);
 }
 
-/* Two instances, the second 3 m on, turned by a quarter about z and half as large. */
+/* There are two instances. The second is 3 m away, turned by a quarter about z and half as large. */
 static void instances_are_written_out(void **state)
 {
     (void)state;
@@ -195,7 +196,7 @@ static void instances_are_written_out(void **state)
     scene_free(scene);
 }
 
-/* KHR_node_visibility: what is below a hidden node is hidden, and said. */
+/* KHR_node_visibility: nodes below a hidden one are hidden, and reported. */
 static void hidden_nodes_are_left_out(void **state)
 {
     (void)state;
@@ -213,8 +214,8 @@ static void hidden_nodes_are_left_out(void **state)
 
 /* ---- poses */
 
-/* The quad hangs on two joints: its left corners on one at x = 10, half as large; its right corners on another in a second
- * set, which stands where it was bound. The mesh's own node is far off, and moves nothing. */
+/* The quad has two joints. Its left corners are on one at x = 10, half as large. Its right corners are on another in a
+ * second set, which stands where it was bound. The mesh's own node is far away, and moves nothing. */
 static void skins_in_their_default_pose(void **state)
 {
     (void)state;
@@ -246,7 +247,7 @@ static void skins_in_their_default_pose(void **state)
     scene_free(s);
 }
 
-/* Targets by the mesh's weights, unless the node has some; without either none counts. */
+/* Targets count by the mesh's weights, unless the node has some; without either none counts. */
 static void morph_targets_by_default_weights(void **state)
 {
     (void)state;

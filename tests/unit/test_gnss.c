@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The receiver's positions and times, against closed forms of WGS 84. */
+/* The receiver's positions and times against closed forms of WGS 84. */
 #include "tests/unit/device_rig.h"
 
 #include <math.h>
@@ -47,7 +47,7 @@ static struct receiver open_receiver(const char *lat, const char *lon, const cha
     return r;
 }
 
-/* The receiver keeps addresses of its members, so not in open_receiver. */
+/* The receiver keeps addresses of its members, so it can't start in open_receiver. */
 static void start_receiver(struct receiver *r)
 {
     struct sh_err err;
@@ -86,7 +86,7 @@ static struct fix get_fix(const struct receiver *r, uint64_t index, uint32_t sta
     return fix;
 }
 
-/* WGS 84, NIMA TR8350.2. */
+/* The ellipsoid is WGS 84, NIMA TR8350.2. */
 static void to_ecef(double lat_deg, double lon_deg, double height_m, double p[3])
 {
     const double a = 6378137, f = 1 / 298.257223563, e2 = f * (2 - f);
@@ -96,7 +96,7 @@ static void to_ecef(double lat_deg, double lon_deg, double height_m, double p[3]
     p[2] = (n * (1 - e2) + height_m) * sin(lat);
 }
 
-/* East, north, up from a place to a fix. */
+/* Writes east, north and up from a place to a fix. */
 static void offset_enu(double lat_deg, double lon_deg, double height_m, const struct fix *fix, double d[3])
 {
     double p[3], q[3], lat = lat_deg * M_PI / 180, lon = lon_deg * M_PI / 180;
@@ -108,8 +108,8 @@ static void offset_enu(double lat_deg, double lon_deg, double height_m, const st
     d[2] = cos(lat) * cos(lon) * x + cos(lat) * sin(lon) * y + sin(lat) * z;
 }
 
-/* Half a step of the last digit: 0.5e-7' are 0.093 mm north (a minute is at most 1861.6 m), and as much east at the
- * equator; two heights of 4 decimals 0.05 mm each; the coordinates themselves are good to 1e-9 m. */
+/* Half a step of the last digit. 0.5e-7' are 0.093 mm north (a minute is at most 1861.6 m), and as much east at the
+ * equator. Two heights of 4 decimals have 0.05 mm each. The coordinates themselves are good to 1e-9 m. */
 #define STEP_M 0.0001
 
 static void check_antenna(const char *lat, const char *lon, const char *heading, const char *arm, const double enu[3])
@@ -157,7 +157,7 @@ static void at_the_poles(void **state)
     }
 }
 
-/* Power-up is at .375 s; the first multiple of 1/rate after it. */
+/* Power-up is at .375 s. The first time is the first multiple of 1/rate after it. */
 static void times_are_those_of_the_rate(void **state)
 {
     (void)state;
@@ -199,8 +199,8 @@ static void it_stands_where_the_head_stands(void **state)
     close_receiver(&r);
 }
 
-/* 2000 positions: the mean of n is within 5 sigma / sqrt(n) and the standard deviation within 5 / sqrt(2 n) of sigma
- * but once in 1.7 million each; a fixed seed, so it either is or not. */
+/* 2000 positions. The mean of n is within 5 sigma / sqrt(n), and the standard deviation within 5 / sqrt(2 n) of sigma,
+ * but once in 1.7 million each. The seed is fixed, so the result is, too. */
 static void noise_is_what_was_asked_for(void **state)
 {
     (void)state;
@@ -234,8 +234,8 @@ static void noise_is_what_was_asked_for(void **state)
     close_receiver(&r);
 }
 
-/* No error says anything of a later one, on its own axis or another: of N positions the mean product of two errors is
- * within 5 sigma^2 / sqrt(N) but once in 1.7 million. 36 of them: once in 48,000; a fixed seed. */
+/* An error is independent of later ones, on its own axis and on others. The mean product of two errors of N positions
+ * is within 5 sigma^2 / sqrt(N) but once in 1.7 million. There are 36 of them: once in 48,000. The seed is fixed. */
 static void noise_does_not_last(void **state)
 {
     (void)state;
@@ -260,7 +260,7 @@ static void noise_does_not_last(void **state)
     close_receiver(&r);
 }
 
-/* 3 m/s east and 4 north. Places are known to 1e-9 m each, which 10 ms make 2e-7 m/s of. */
+/* The way is 3 m/s east and 4 north. Places are known to 1e-9 m each, which 10 ms turn into 2e-7 m/s. */
 static void speed_and_course_are_those_of_the_way(void **state)
 {
     (void)state;
@@ -283,7 +283,8 @@ static void speed_and_course_are_those_of_the_way(void **state)
     close_receiver(&r);
 }
 
-/* Position packets of a VLP-16 and its settings need no place: their sentence says V, and not 0 degrees north and east. */
+/* Position packets of a VLP-16 and its settings need no place. Their sentence says V, and not 0 degrees north and
+ * east. */
 static void without_a_place_no_fix_is_valid(void **state)
 {
     (void)state;

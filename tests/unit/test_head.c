@@ -10,7 +10,7 @@
 
 #include "firmware_sim/command/head.h"
 
-/* All pairs, by name, as a person would write them on paper; "-" is refused. */
+/* All pairs, by name, as on paper; "-" is refused. */
 static const char *const event_order[HEAD_N_EVENTS] = {"power-on", "power-off", "booted",    "start", "spun-up",
                                                        "stop",     "done",      "spun-down", "fail",  "reset"};
 static const struct {
@@ -83,7 +83,7 @@ static void only_power_leads_to_and_from_off(void **ctx)
     }
 }
 
-/* States reachable from `from` by the given events, as a bit set. */
+/* Returns the states that are reachable from `from` by the given events, as a bit set. */
 static unsigned reachable(int from, unsigned events)
 {
     unsigned set = 1u << from, before = 0;
@@ -105,7 +105,7 @@ static void idle_is_reachable_without_a_power_cycle(void **ctx)
     for (int state = HEAD_BOOT; state < HEAD_N_STATES; state++)
         assert_true(reachable(state, all & ~power) >> HEAD_IDLE & 1);
     assert_int_equal(reachable(HEAD_OFF, all), (1u << HEAD_N_STATES) - 1);
-    /* A client with *RST and the head's own movements gets there from everywhere but the self test. */
+    /* *RST and the head's own movements lead there from everywhere but the self test. */
     const unsigned by_reset = 1u << HEAD_EV_RESET | 1u << HEAD_EV_SPUN_DOWN;
     for (int state = HEAD_IDLE; state < HEAD_N_STATES; state++)
         assert_true(reachable(state, by_reset) >> HEAD_IDLE & 1);
@@ -121,7 +121,7 @@ static void a_failure_takes_every_powered_state(void **ctx)
             assert_int_equal(next(HEAD_FAULT, event), -1);
 }
 
-/* The laser fires in `scanning` only; the mirror must have come up to speed before and must stop after. */
+/* The laser fires in `scanning` only. The mirror must have come up to speed before, and must stop after. */
 static void scanning_lies_between_the_spins(void **ctx)
 {
     (void)ctx;

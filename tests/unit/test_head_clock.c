@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head's clock: full seconds to the nanosecond, its errors, and what of the device goes by it. */
+/* The head's clock: full seconds to the nanosecond, its errors, and the parts of the device that follow it. */
 #include "tests/unit/device_rig.h"
 
 #include <math.h>
@@ -34,7 +34,7 @@ struct edges {
     int64_t at_ns[64], tai_s[64];
 };
 
-/* All edges up to a time, in ticks of a size that does not divide anything. */
+/* Finds all edges up to a time, in ticks of a size that does not divide anything. */
 static struct edges find_edges(const struct head_clock *clock, int64_t tick_ns, int64_t until_ns)
 {
     struct edges e = {0};
@@ -58,7 +58,7 @@ static void exact_seconds(void **state)
     assert_true(head_clock_true_ns(&clock, 5) == head_clock_ns(&clock, 5));
 }
 
-/* An edge at power-up is one. */
+/* An edge at power-up counts. */
 static void the_first_nanosecond(void **state)
 {
     (void)state;
@@ -67,8 +67,8 @@ static void the_first_nanosecond(void **state)
     assert_true(e.n == 2 && e.at_ns[0] == 0 && e.tai_s[0] == TAI0_S && e.at_ns[1] == UTC_SECOND_NS);
 }
 
-/* The clock gains d for each second: it shows second s at the smallest t with t + floor(t d) >= s - tai0, that is at
- * ceil((s - tai0) / (1 + d)) up to one for the two roundings. Looked for by hand around it. */
+/* The clock gains d for each second. It shows second s at the smallest t with t + floor(t d) >= s - tai0, that is at
+ * ceil((s - tai0) / (1 + d)), within one for the two roundings. The test searches around it. */
 static void drift(void **state)
 {
     (void)state;
@@ -93,8 +93,8 @@ static void drift(void **state)
     }
 }
 
-/* At 5.25 s the clock, which then shows x.55, is set on by 2.2 s or back: seconds are left out or come again, and the
- * jump itself is none. */
+/* At 5.25 s the clock, which then shows x.55, is set ahead or back by 2.2 s. Seconds are left out or come again, and
+ * the jump itself is no edge. */
 static void jumps(void **state)
 {
     (void)state;
@@ -106,14 +106,14 @@ static void jumps(void **state)
     e = find_edges(&back, 1000000, INT64_C(9000000000));
     assert_true(e.at_ns[4] == 4700000000 && e.tai_s[4] == TAI0_S + 5);
     assert_true(e.at_ns[5] == 5900000000 && e.tai_s[5] == TAI0_S + 4); /* 3.35 s at 5.25 s */
-    /* Onto a full second within a tick: that is when it begins. */
+    /* With a jump onto a full second within a tick, that second begins at the jump. */
     struct head_clock onto = make_clock(0, 0, 0.45, 5.25);
     e = find_edges(&onto, 10000000, INT64_C(6500000000));
     assert_true(e.at_ns[5] == 5250000000 && e.tai_s[5] == TAI0_S + 6);
 }
 
-/* What the clock is to show, in exact integers and in one sum: each gain counts for the time that it overlaps with,
- * less that in which the clock stands. Windows in ns; gains in 1e-12. */
+/* The expected clock, in exact integers and in one sum. Each gain counts for the time that it overlaps with, without
+ * the time in which the clock stands. Windows are in ns, gains in 1e-12. */
 static const struct {
     int64_t from_ns, until_ns, ppt;
 } GAIN[] = {{0, INT64_MAX, -3000000}, {1234567891, 7777777777, 123456789}, {2000000000, 9100000001, -31000000000}};
@@ -162,7 +162,7 @@ static struct head_clock changed_clock(void)
     return clock;
 }
 
-/* Gains, jumps and standstills one over the other: each nanosecond that is looked at, and each full second. */
+/* Gains, jumps and standstills overlap. The sampled nanoseconds and each full second are checked. */
 static void changes(void **state)
 {
     (void)state;
@@ -193,7 +193,7 @@ static void changes(void **state)
     assert_true(n == e.n && n > 6);
 }
 
-/* A clock that reaches a full second as it begins to stand, and one that would run backwards. */
+/* One clock reaches a full second as it begins to stand, and one would run backwards. */
 static void stands_on_a_second(void **state)
 {
     (void)state;
@@ -207,7 +207,7 @@ static void stands_on_a_second(void **state)
     assert_true(head_clock_ns(&clock, 4000000000) == head_clock_ns(&clock, 99000000000));
 }
 
-/* More changes than are kept: the time since the first of those kept is right. */
+/* There are more changes than are kept. The time since the first of the kept ones is right. */
 static void forgets_the_oldest(void **state)
 {
     (void)state;
@@ -238,7 +238,7 @@ static void leap_seconds(void **state)
     for (uint32_t i = n; i < UTC_MAX_LEAPS; i++)
         assert_true(head_clock_add_leap(&clock, 0, &posix_s));
     assert_false(head_clock_add_leap(&clock, 0, &posix_s));
-    /* Before leap seconds that are known: those after it are one more. */
+    /* A leap second is added before a known one, whose difference grows by one. */
     struct utc_table table = *utc_table_builtin();
     const int32_t last = table.leap[table.n - 1].tai_minus_utc;
     assert_true(utc_table_add(&table, 1451606460) && !utc_table_add(&table, 1451606460)); /* 2016-01-01 00:01 */
@@ -262,7 +262,7 @@ static void epochs(void **state)
     assert_true(epoch_parse("", table, &source, NULL, &err) == SH_OK && source == EPOCH_NONE);
 }
 
-/* The system's clock is between what it was before and after. */
+/* The system's clock lies between its values before and after. */
 static void the_systems_clock(void **state)
 {
     (void)state;
@@ -280,7 +280,7 @@ static void the_systems_clock(void **state)
                 after.tv_sec * UTC_SECOND_NS + after.tv_nsec + 1000000); /* slewing, never so much in a moment */
 }
 
-/* CLOCK_TAI is taken where the system has set its offset, and refused where it is a UTC. */
+/* CLOCK_TAI is taken where the system has set its offset, and refused where it equals UTC. */
 static void the_systems_tai(void **state)
 {
     (void)state;
@@ -303,7 +303,7 @@ static void the_systems_tai(void **state)
     assert_true(late_ns >= -1000000); /* as above */
 }
 
-/* A device from 23:59:57.75 on, over the leap second, its clock 0.25 s ahead and 100 ppm fast. */
+/* The device runs from 23:59:57.75 on, over the leap second, with its clock 0.25 s ahead and 100 ppm fast. */
 static void the_device_goes_by_it(void **state)
 {
     (void)state;
@@ -339,7 +339,7 @@ static void the_device_goes_by_it(void **state)
     rig_close(rig);
 }
 
-/* Without a time: no event, no GPS time, telemetry without UTC. */
+/* Without a time there is no event, no GPS time, and telemetry without UTC. */
 static void a_device_that_does_not_know(void **state)
 {
     (void)state;

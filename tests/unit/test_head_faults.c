@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults in the head: when they begin and end, and what is noted (firmware_sim/device/head_faults.h). */
+/* Faults in the head: when they begin and end, and their notes (firmware_sim/device/head_faults.h). */
 #include "firmware_sim/device/head_faults.h"
 
 #include <stdarg.h>
@@ -48,7 +48,7 @@ static struct fault make(enum fault_kind kind, double from_s, double until_s)
         .kind = kind, .probability = 1.0, .until_pulse = UINT64_MAX, .from_s = from_s, .until_s = until_s};
 }
 
-/* Windows between ticks: the clock's are exact, the others are of whole ticks. */
+/* Windows may begin between ticks. The clock's are exact, and the others are of whole ticks. */
 static void begins_and_ends_at_its_times(void **state)
 {
     (void)state;
@@ -81,7 +81,7 @@ static void begins_and_ends_at_its_times(void **state)
     fault_board_free(rig.board);
 }
 
-/* Pulses 15 to 34 of each scan, ten in a tick: the note names the first that is hit. */
+/* They strike pulses 15 to 34 of each scan, ten in a tick. The note names the first hit pulse. */
 static void strikes_each_scan_at_its_pulses(void **state)
 {
     (void)state;
@@ -105,7 +105,7 @@ static void strikes_each_scan_at_its_pulses(void **state)
     fault_board_free(rig.board);
 }
 
-/* A list that changes leaves those that are at work as they are; what is taken out ends. */
+/* A change of the list does not change those that are at work, and ends those that are taken out. */
 static void follows_the_board(void **state)
 {
     (void)state;

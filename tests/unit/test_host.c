@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead over socket pairs and files: what it tells of a stream. */
+/* libscanhead over socket pairs and files, and its view of a stream. */
 #include <fcntl.h>
 #include <math.h>
 
@@ -195,7 +195,7 @@ static void test_file(void **state)
     put_descriptor(fd, 1, 1, 0);
     put_anchor(fd, 0);
     put_points(fd, 1, 0);
-    /* a frame cut at its end, and a whole one hidden behind its length */
+    /* The stream has a frame cut at its end, and a whole one hidden in its length. */
     struct line_block block = make_block(100, 1);
     native_encode_points(out, sizeof out, &block, 0);
     native_seal(out, rig_next_seq());
@@ -237,18 +237,18 @@ static void test_gps_time(void **state)
     assert_true(fabs(t_s - 1.23456789) < 1e-15); /* seconds and fraction are rounded apart */
     assert_int_equal(scanhead_gps_time(sh, -2500000000, &t_s), 0);
     assert_true(t_s == -2.5);
-    /* The head's clock was set 3.75 s on between: the second of GPS 1e9 + 5 began 1.25 s after the scan. */
+    /* The head's clock was set ahead by 3.75 s between: the second of GPS 1e9 + 5 began 1.25 s after the scan. */
     put_event(head, NATIVE_EV_PPS, 1315964790, 6250000000, 1000000005, 0);
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(f.event, SCANHEAD_EV_PPS);
     assert_int_equal(scanhead_gps_time(sh, 1250000001, &t_s), 0);
     assert_true(fabs(t_s - 5.000000001) < 1e-15);
-    /* A scan of which the start was not seen: its points tell when that was, here 500 ns after power-up. */
+    /* The start of this scan was not seen. Its points give its time, here 500 ns after power-up. */
     put_points(head, 3, 0);
     expect_frame(sh, SCANHEAD_POINTS, &f);
     assert_int_equal(scanhead_gps_time(sh, 7000000000 - 500, &t_s), 0);
     assert_true(t_s == 5.75);
-    /* A head that doesn't know the time. */
+    /* This head doesn't know the time. */
     put_event(head, NATIVE_EV_SCAN_START, 2, 9000000000, 0, 0);
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(scanhead_gps_time(sh, 0, &t_s), SCANHEAD_ESTATE);

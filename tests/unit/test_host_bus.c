@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead on a bus that is played: what a device calls itself, permissions, several heads, waiting for one. What a
- * real bus does is for tests/guest. */
+/* libscanhead on a scripted bus: the names of a device, permissions, several heads, waiting for one. tests/guest has a
+ * real bus. */
 #include "tests/unit/bus_rig.h"
 
 /* ---- finding and opening */
@@ -39,7 +39,7 @@ static void test_strings(void **state)
         assert_string_equal(head[0].problem, "");
         snprintf(other, sizeof other, "usb:1209:0001:%s", cases[i].shown);
         assert_string_equal(head[0].source, other);
-        close_head(open_head(head[0].source)); /* what is shown is what opens it */
+        close_head(open_head(head[0].source)); /* the shown name opens the head */
         close_head(open_head("usb"));
         snprintf(other, sizeof other, "usb:1209:1:%.60sx", cases[i].shown);
         assert_int_equal(scanhead_open(other, &sh, err, sizeof err), SCANHEAD_ELOST);
@@ -51,7 +51,7 @@ static void test_strings(void **state)
     }
 }
 
-/* The user reads one line, on a terminal or in a log, and can do what it says. */
+/* The user reads one line, on a terminal or in a log, and can follow it. */
 static void expect_rule(const char *text)
 {
     assert_non_null(strstr(text, "no permission"));
@@ -112,7 +112,7 @@ static void test_cannot_open(void **state)
     bus.device[0].open_rc = LIBUSB_ERROR_NO_MEM;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
     bus.device[0].open_rc = 0;
-    /* less than two reads under way are no stream; what was begun is taken back */
+    /* Fewer than two reads under way are no stream, so the ones that were begun are undone. */
     bus.submit_room = 1;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
     assert_int_equal(bus.sessions, 0);
@@ -159,7 +159,7 @@ static void test_wait(void **state)
     close_head(sh);
 }
 
-/* Just plugged in, udev has not given the permission yet: tried again without another event. */
+/* A head was just plugged in, and udev has not given the permission yet. It is tried again without another event. */
 static void permit(void)
 {
     bus.device[0].present = 1;
@@ -184,7 +184,7 @@ static void test_wait_for_permission(void **state)
     expect_rule(err);
 }
 
-/* Without hot-plug events the list is looked at again and again. */
+/* Without hot-plug events the list is read again and again. */
 static void test_wait_without_events(void **state)
 {
     char err[512];

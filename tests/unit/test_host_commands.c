@@ -35,7 +35,7 @@ static int came(int fd, const char *expect)
     return strcmp(line, expect) == 0;
 }
 
-/* Neither waits for ever: a client that has given up takes nothing more. */
+/* Neither waits for ever: a client that has given up takes no more. */
 static int give(int fd, const void *data, size_t len)
 {
     size_t done = 0;
@@ -109,7 +109,7 @@ static void test_command(void **state)
     assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
     struct script h = {.fd = head, .expect = "SCAN:STOP", .frames_before = 1, .reply = NULL};
     assert_int_equal(run_command(sh, &h, reply, sizeof reply), SCANHEAD_ECLOSED);
-    expect_frame(sh, SCANHEAD_POINTS, &f); /* what came before the end is not lost */
+    expect_frame(sh, SCANHEAD_POINTS, &f); /* frames before the end are not lost */
     assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ECLOSED);
     assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, 10), SCANHEAD_ECLOSED);
     close(head);
@@ -130,7 +130,7 @@ static void test_command_refused(void **state)
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
     assert_non_null(strstr(scanhead_error(sh), "TIME?"));
     assert_int_equal(recv(head, back, sizeof back, 0), 6);
-    /* its reply comes after the next command has been given, and is not taken for that one's */
+    /* Its reply comes after the next command was given, and does not count for that one. */
     struct script s = {
         .fd = head, .expect = "HEAD:PRR?", .identity = "999\r\nMaker,Model,SN1,1.0\r\n", .reply = "12345678\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
@@ -146,7 +146,8 @@ static void test_command_refused(void **state)
     scanhead_close(sh);
 }
 
-/* More than 64 MiB before the reply: the oldest go, counted, and what they said is not forgotten. */
+/* There are more than 64 MiB before the reply. The oldest frames are dropped and counted, but their contents are not
+ * forgotten. */
 static void test_command_queue_bound(void **state)
 {
     (void)state;
@@ -182,7 +183,7 @@ static void test_pty(void **state)
     struct scanhead *sh;
     struct scanhead_frame f;
     assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
-    /* bytes a terminal in its usual mode would change: ^C ^D CR ^S ^V DEL */
+    /* These are bytes that a terminal in its usual mode would change: ^C ^D CR ^S ^V DEL. */
     struct native_event e = {.code = 1, .text = "\x03\x04\r\n\x11\x13\x16\x7f"};
     put_all(master, out, native_encode_event(out, sizeof out, &e, 1, 0));
     expect_frame(sh, SCANHEAD_EVENT, &f);

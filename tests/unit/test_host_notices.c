@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: what it notices of a stream, of replies and of connections, and when. */
+/* libscanhead's notices of a stream, of replies and of connections, and their order. */
 #include <arpa/inet.h>
 #include <pthread.h>
 
@@ -47,7 +47,7 @@ static void put_numbered(int fd, uint32_t seq)
     put_all(fd, raw, make_event(raw, seq));
 }
 
-/* Each notice comes before the frame that follows it, and the counters count it already. */
+/* Each notice comes before the frame that follows it, and the counters include it already. */
 static void test_stream(void **state)
 {
     (void)state;
@@ -118,13 +118,13 @@ static void test_file(void **state)
     listen_to(sh);
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(scanhead_next(sh, &f, -1), SCANHEAD_ECLOSED);
-    assert_int_equal(n_noticed, 1); /* that a recording has an end is nothing to notice */
+    assert_int_equal(n_noticed, 1); /* the end of a recording is no notice */
     expect(0, SCANHEAD_NOTICE_CUT, EVENT, 0, 2);
     assert_int_equal(noticed[0].t_ns, 18);
     scanhead_close(sh);
 }
 
-/* ---- replies: a thread plays the head, a line in, some bytes out */
+/* ---- replies: a thread plays the head, with a line in and some bytes out */
 
 struct turn {
     const char *line;
@@ -198,7 +198,7 @@ static void test_echo(void **state)
     scanhead_close(sh);
 }
 
-/* A reply that comes when its command was given up: before the next command, and on the way to it. */
+/* A reply comes when its command was given up: before the next command, or on its way. */
 static void test_late_reply(void **state)
 {
     (void)state;
@@ -225,7 +225,7 @@ static void test_late_reply(void **state)
     assert_int_equal(n_noticed, 2);
     expect(1, SCANHEAD_NOTICE_LATE_REPLY, 4 + EVENT + IDENTITY + 2, 0, 2);
     assert_int_equal(stats.late_replies, 2);
-    /* both have come: what comes now was not asked for */
+    /* Both have come, so this one was not asked for. */
     put_all(head, "5\r\n", 3);
     assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
     assert_int_equal(n_noticed, 3);
@@ -234,7 +234,7 @@ static void test_late_reply(void **state)
     scanhead_close(sh);
 }
 
-/* The command that was given up asked who the head is: one of two equal answers is late. */
+/* The command that was given up asked for the identity. One of two equal answers is late. */
 static void test_late_identity(void **state)
 {
     (void)state;
@@ -279,7 +279,7 @@ static void test_late_list(void **state)
 
 /* ---- connections */
 
-/* A TCP port of this machine, and a handle that is connected to it. */
+/* Opens a TCP port of this machine, and a handle that is connected to it. */
 static struct scanhead *open_tcp(int *door)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -295,7 +295,7 @@ static struct scanhead *open_tcp(int *door)
     return sh;
 }
 
-/* A reply that was given up on one connection does not come by another: a line there was not asked for. */
+/* A reply that was given up on one connection does not come by another. A line there was not asked for. */
 static void test_given_up_before(void **state)
 {
     (void)state;
@@ -332,7 +332,7 @@ static void test_reattach(void **state)
     put_numbered(head, 100);
     put_all(head, raw, make_event(raw, 101) / 2);
     shutdown(head, SHUT_WR);
-    /* a command finds the end; what had come is still there */
+    /* A command finds the end. Earlier frames are still there. */
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, WAIT_MS), SCANHEAD_ECLOSED);
     expect_frame(sh, SCANHEAD_EVENT, &f);
     close(head);
@@ -349,7 +349,7 @@ static void test_reattach(void **state)
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(n_noticed, 4);
     expect(3, SCANHEAD_NOTICE_GAP, EVENT + EVENT / 2, 101, 2);
-    /* it is left while frames are on their way; they come first, and the head that has started again after them */
+    /* It is left while frames are on their way. They come first, and the head that has started again after them. */
     put_numbered(head, 104);
     assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     uint8_t rest[3 * EVENT];

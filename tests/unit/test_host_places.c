@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: what a frame of points needs of others. Where points are placed and until when, what follows them, whose
- * emitter it is, what the head's clock says, and the turn between two poses. */
+/* libscanhead: a frame of points depends on other frames. Tested are its place and until when that holds, the frames
+ * that follow it, its emitter, the head's clock, and the turn between two poses. */
 #include <math.h>
 
 #include "tests/unit/host_rig.h"
 
-/* The frame in `out`, with the next number, after `lost` others. */
+/* Sends the frame in `out`, with the next number, after `lost` others. */
 static void put(int fd, size_t len, int lost)
 {
     uint32_t seq = rig_next_seq();
@@ -28,7 +28,7 @@ static void expect_points(struct scanhead *sh, struct scanhead_frame *f, struct 
     assert_int_equal(scanhead_points(sh, f, 0, p, MAX_POINTS), n);
 }
 
-/* A station 1e-4 degrees from the antimeridian, on either side; points 2e-4 degrees away, across it. */
+/* A station is 1e-4 degrees from the antimeridian, on either side. Points are 2e-4 degrees away, across it. */
 static void test_antimeridian(void **state)
 {
     (void)state;
@@ -60,7 +60,7 @@ static void test_antimeridian(void **state)
     }
 }
 
-/* An anchor is for points before until_ms: one at that very time has another, which did not come. */
+/* An anchor is for points before until_ms. A point at that very time has another anchor, which did not come. */
 static void test_until(void **state)
 {
     (void)state;
@@ -82,7 +82,7 @@ static void test_until(void **state)
     }
 }
 
-/* Points with attributes and colours: a frame of each follows; of the frames written, one is left out at `lost`. */
+/* Points have attributes and colours: a frame of each follows. One of the frames is left out, at `lost`. */
 static void put_with_attributes(int fd, int lost)
 {
     static int16_t amplitude[MAX_POINTS];
@@ -116,7 +116,7 @@ static void expect_both(struct scanhead *sh, int want)
     assert_int_equal(scanhead_colours(sh, &f, 0, colour, 3), want);
 }
 
-/* The second time the points are lost. The same pulses came before, and what follows is not about those. */
+/* The second time the points are lost. The same pulses came before, and the following frames do not belong to those. */
 static void test_followers(void **state)
 {
     (void)state;
@@ -169,8 +169,8 @@ static void test_emitter(void **state)
     scanhead_close(sh);
 }
 
-/* Each of the three events says what the head's clock was: PPS in whole seconds, the others in ns. Adjusted standard GPS
- * time is 1e9 s less. */
+/* Each of the three events has the head's clock: PPS in whole seconds, the others in ns. Adjusted standard GPS time is
+ * 1e9 s less. */
 static void test_clock(void **state)
 {
     (void)state;

@@ -68,7 +68,7 @@ static void test_polar_points(void **state)
     }
 }
 
-/* The frame of the head: forward, right, up, backward over the zenith. */
+/* Directions in the head's frame: forward, right, up, backward over the zenith. */
 static void test_polar_directions(void **state)
 {
     (void)state;
@@ -119,8 +119,8 @@ static void test_geo_points(void **state)
     assert_int_equal(p[0].label, SCANHEAD_NO_LABEL);
 }
 
-/* Degrees: longitudes stay within 180, and ranges are straight through space. On the meridian a degree is its radius of
- * curvature at the middle (WGS 84); what is left of the arc and the chord is 1e-8 of 2 km. */
+/* In degrees longitudes stay within 180, and ranges are straight through space. On the meridian a degree is its radius
+ * of curvature at the middle (WGS 84). The difference of the arc and the chord is 1e-8 of 2 km. */
 static void test_geodetic_points(void **state)
 {
     (void)state;
@@ -190,8 +190,8 @@ static void test_scales(void **state)
     scanhead_close(sh);
 }
 
-/* Between two poses the head turns the short way, whatever the signs of their quaternions: half of 0.2 rad about z. Flags
- * are those of both. */
+/* Between two poses the head turns the short way, whatever the signs of their quaternions: half of 0.2 rad about z.
+ * Flags are those of both. */
 static void test_poses(void **state)
 {
     (void)state;
@@ -220,7 +220,7 @@ static void test_poses(void **state)
     }
 }
 
-/* Pulses lost are told as they are lost, and once more at the scan's end. */
+/* Lost pulses are reported as they are lost, and once more at the scan's end. */
 static void test_pulses_lost(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: what it counts, hashes and refuses of a stream. */
+/* libscanhead: its counts, hash and refusals of a stream. */
 #include <nettle/sha2.h>
 
 #include "tests/unit/host_rig.h"
@@ -48,7 +48,7 @@ static void test_version_and_types(void **state)
     native_seal(out, 0);
     put_all(head, out, len);
     out[2] = 1;
-    out[1] = 99; /* a type of later times is handed out as it is */
+    out[1] = 99; /* an unknown type of later times is passed on unchanged */
     native_seal(out, 1);
     put_all(head, out, len);
     assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_EFORMAT);

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead on a bus that is played: transfers that fail, unplugging at each moment, closing with some under way.
- * What a real bus does is for tests/guest. */
+/* libscanhead on a scripted bus: transfers that fail, unplugging at each moment, closing with some under way.
+ * tests/guest has a real bus. */
 #include "tests/unit/bus_rig.h"
 
 /* ---- the stream */
 
-/* Empty packets, errors of the bus, a stalled endpoint, in between good ones: what came is there, in order. */
+/* Empty packets, errors of the bus and a stalled endpoint come between good transfers. The received bytes are there, in
+ * order. */
 static void test_failures_pass(void **state)
 {
     static const enum libusb_transfer_status failures[] = {LIBUSB_TRANSFER_ERROR, LIBUSB_TRANSFER_STALL,
@@ -28,7 +29,7 @@ static void test_failures_pass(void **state)
     close_head(sh);
 }
 
-/* A frame whose first half comes with the failure, as some controllers give it. */
+/* The first half of a frame comes with the failure, as some controllers give it. */
 static void test_data_with_a_failure(void **state)
 {
     uint8_t raw[512];
@@ -43,7 +44,7 @@ static void test_data_with_a_failure(void **state)
     close_head(sh);
 }
 
-/* usbfs has no memory for a moment: the read is sent off again later, behind the others. */
+/* usbfs has no memory for a moment. The read is submitted again later, after the others. */
 static void test_submit_fails_for_a_while(void **state)
 {
     (void)state;
@@ -82,7 +83,7 @@ static void test_unplug_at_once(void **state)
     expect_lost(sh);
 }
 
-/* The bus shows a device that goes as errors first. */
+/* The bus shows a device that goes by errors at first. */
 static void test_unplug_with_errors(void **state)
 {
     (void)state;
@@ -96,7 +97,7 @@ static void test_unplug_with_errors(void **state)
     expect_lost(sh);
 }
 
-/* Never a word from the hub: after a while the head is lost all the same. */
+/* The hub never reports it. After a while the head is lost all the same. */
 static void test_errors_without_end(void **state)
 {
     (void)state;
@@ -108,8 +109,8 @@ static void test_errors_without_end(void **state)
     expect_lost(sh);
 }
 
-/* Another program resets the bus: the kernel ends all transfers as if the device had gone, and it answers all the same.
- * That is not an unplugging; what came before is there, and a new session goes on with the same head. */
+/* Another program resets the bus. The kernel ends all transfers as if the device had gone, but it still answers. That
+ * is not an unplugging: earlier frames are there, and a new session goes on with the same head. */
 static void test_bus_reset(void **state)
 {
     struct scanhead_frame frame;
@@ -153,7 +154,7 @@ static void ask(struct scanhead *sh)
     ask_after(sh, "");
 }
 
-/* The write fails after it was sent off: that command gets no reply, and the next one goes out. */
+/* The write fails after it was submitted. That command gets no reply, and the next one is sent. */
 static void test_write_fails(void **state)
 {
     static const enum libusb_transfer_status failures[] = {LIBUSB_TRANSFER_ERROR, LIBUSB_TRANSFER_STALL};
@@ -176,7 +177,7 @@ static void test_write_fails(void **state)
     close_head(sh);
 }
 
-/* The bus still says that the device is there, and takes nothing for it: the read that is under way tells nothing. */
+/* The bus still reports the device, but takes no writes for it. The read that is under way shows nothing. */
 static void test_unplug_seen_by_writing(void **state)
 {
     char reply[64];
@@ -195,7 +196,8 @@ static void test_unplug_while_writing(void **state)
 {
     char reply[64];
     (void)state;
-    /* in between: the write fails, then the device is gone when the endpoint is to be started anew */
+    /* The failure comes in between: the write fails, then the device is gone when the endpoint is to be started
+     * anew. */
     struct scanhead *sh = open_head("usb");
     fake_script(FAKE_OUT, LIBUSB_TRANSFER_ERROR, NULL, 0);
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
@@ -217,7 +219,7 @@ static void test_unplug_while_writing(void **state)
     close_head(sh);
 }
 
-/* The head takes no command: closing takes the write back before anything is freed. */
+/* The head takes no command. Closing cancels the write before anything is freed. */
 static void test_close_while_writing(void **state)
 {
     char reply[64];
@@ -229,7 +231,7 @@ static void test_close_while_writing(void **state)
     close_head(sh);
 }
 
-/* A transfer that does not end when it is taken back is forgotten with the device. */
+/* A transfer that does not end when it is cancelled is forgotten with the device. */
 static void test_close_with_a_stuck_transfer(void **state)
 {
     (void)state;

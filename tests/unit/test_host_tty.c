@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead on a terminal that was in its usual mode, with echo, while the head was sending: what the head took for
- * commands is answered with errors, and the first command gets its own reply all the same. */
+/* libscanhead on a terminal that was in its usual mode, with echo, while the head was sending. Echoes that the head
+ * took for commands are answered with errors. The first command gets its own reply all the same. */
 #include <fcntl.h>
 #include <poll.h>
 #include <pthread.h>
@@ -27,11 +27,11 @@ enum { FRAMES = 40, TIMEOUT_MS = 120000 };
 struct head {
     int master;
     pthread_t thread;
-    char line[512]; /* what it has of a command */
+    char line[512]; /* the part of a command that has come */
     size_t len;
     const char *late; /* comes before the answer to the first line; NULL: nothing */
     size_t half;      /* bytes of a frame that is never ended, before the first answer */
-    int slow;         /* answers no question until a second one came; the second's comes before the next command's */
+    int slow;         /* the first *IDN? gets no answer; it comes before that of the next command */
     int owed;
     int identities, errors;
 };
@@ -111,7 +111,7 @@ static void *play(void *arg)
     return NULL;
 }
 
-/* A terminal in its usual mode; *slave holds it open, as the kernel's own side of a serial line does. */
+/* A terminal in its usual mode. *slave holds it open, as the kernel's own side of a serial line does. */
 static int make_terminal(char *source, size_t len, int *slave)
 {
     int master = posix_openpt(O_RDWR | O_NOCTTY);
@@ -148,7 +148,7 @@ static void end(struct head *head, struct scanhead *sh, int slave)
     close(head->master);
 }
 
-/* The head had an echo of its own frames, half a line of somebody's, and errors on their way. */
+/* An echo of the head's own frames, half a line of another client, and errors were on their way. */
 static void test_replies_in_order(void **state)
 {
     char source[64];
@@ -168,8 +168,8 @@ static void test_replies_in_order(void **state)
     assert_true(head.errors >= 2);     /* the half line, and NOSUCH */
 }
 
-/* What came before raw mode was changed on its way, CR to LF and so on: none of it comes out as frames, and what comes
- * after does, whole. */
+/* Bytes from before raw mode were changed on their way, CR to LF and so on. None of them become frames, and later ones
+ * come whole. */
 static void test_frames_after(void **state)
 {
     char source[64];
@@ -192,8 +192,8 @@ static void test_frames_after(void **state)
     end(&head, sh, slave);
 }
 
-/* Nobody answers: the time-out is the command's, and the next command asks again. What was asked before may be lost, or
- * be answered now. */
+/* There is no answer: the time-out is the command's, and the next command asks again. The earlier question may be lost,
+ * or be answered now. */
 static void check_late_head(int lost)
 {
     char source[64], reply[64];
@@ -205,7 +205,7 @@ static void check_late_head(int lost)
         assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
         assert_non_null(strstr(scanhead_error(sh), "TIME?"));
     }
-    /* A command whose time is over before it could ask asks nothing: on a busy machine 20 ms may go by at once. */
+    /* A command whose time is over before it could ask sends nothing: on a busy machine 20 ms may go by at once. */
     const int question = (int)strlen("\n*IDN?\n");
     int waiting = 0;
     assert_int_equal(ioctl(head.master, FIONREAD, &waiting), 0);
@@ -232,7 +232,7 @@ static void test_late_head(void **state)
     check_late_head(1);
 }
 
-/* The head was in the middle of a frame for the program before: the first answer is lost in the rest of it. */
+/* The head was in the middle of a frame for the program before. The first answer is lost in the rest of it. */
 static void test_half_a_frame(void **state)
 {
     uint8_t raw[512];
@@ -251,7 +251,7 @@ static void test_half_a_frame(void **state)
     }
 }
 
-/* A head so slow that it is asked twice: the answer that comes last is not taken for the reply to a command. */
+/* A head is so slow that it is asked twice. The answer that comes last does not count as the reply to a command. */
 static void test_slow_head(void **state)
 {
     char source[64];

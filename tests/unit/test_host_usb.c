@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: names of USB heads, and a head that goes away and comes back. What a real bus does is for tests/guest.
- */
+/* libscanhead: names of USB heads, and a head that goes away and comes back. tests/guest has a real bus. */
 #include <arpa/inet.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -111,7 +110,7 @@ static void test_reattach(void **state)
     assert_int_equal(stats.frames, 8);
     assert_int_equal(stats.seq_lost, 5);
     assert_int_equal(stats.bad_bytes, len / 2);
-    /* nobody there: the reason, and the handle can be asked again and closed */
+    /* Nobody listens there. The handle gives the reason, and can be asked again and closed. */
     close(fd);
     close(door);
     assert_int_equal(scanhead_next(sh, &frame, 120000), SCANHEAD_ECLOSED);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Broken files of the formats that Assimp reads: small models with bytes changed, lines deleted or doubled, numbers
- * made huge, records of another type, cut off. Each either gives a scene or one line that says what is wrong; this
- * process neither dies nor hangs, whatever becomes of Assimp's.
+/* Broken files of the formats that Assimp reads. Small models have bytes changed, lines deleted or doubled, numbers
+ * made huge, records of another type, or are cut off. Each either gives a scene or one line that names the error. This
+ * process neither dies nor hangs, whatever happens to Assimp's.
  *
- * HOSTILE_EVERY: only every so many of the 600 files are tried (default 1, with sanitizers 10; make test-hostile: 1). */
+ * HOSTILE_EVERY: only every so many of the 600 files are tried (default 1, with sanitizers 10; make test-hostile:
+ * 1). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -73,7 +74,7 @@ static bool is_text(const struct file *f)
     return memchr(f->bytes, '\0', f->n) == NULL;
 }
 
-/* A line of a text, some bytes of what is none. */
+/* Finds a line of a text, or some bytes of a binary file. */
 static void find_part(const struct file *f, struct draw *d, size_t *at, size_t *len)
 {
     *at = below(d, f->n);
@@ -115,7 +116,7 @@ static bool is_in(char c, const char *set)
     return c != '\0' && strchr(set, c) != NULL;
 }
 
-/* From some place on, the next run of characters of a set; 0 bytes: there is none. */
+/* Finds the next run of characters of a set, from some place on. It has 0 bytes where there is none. */
 static size_t find_run(const struct file *f, struct draw *d, const char *set, size_t *at)
 {
     size_t from = below(d, f->n), len = 0;
@@ -128,7 +129,7 @@ static size_t find_run(const struct file *f, struct draw *d, const char *set, si
     return len;
 }
 
-/* A number, or four bytes of what is no text. */
+/* Changes a number, or four bytes of a binary file. */
 static void change_number(struct file *f, struct draw *d)
 {
     static const char *const texts[] = {"1e38", "4294967295", "-1", "nan", "x", "99999999999999999999", "1e-300", "0"};
@@ -143,7 +144,7 @@ static void change_number(struct file *f, struct draw *d)
     }
 }
 
-/* A word of the file in the place of another: a record's type, an element's name. */
+/* Puts a word of the file in the place of another: a record's type, an element's name. */
 static void change_word(struct file *f, struct draw *d)
 {
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_";
@@ -160,7 +161,7 @@ static void break_file(struct file *f, uint64_t number)
     static void (*const ways[])(struct file * f, struct draw * d) = {change_bytes,  delete_part, double_part,  cut_off,
                                                                      change_number, change_word, change_number};
     struct draw d = {rng_key(13, number), 0};
-    for (uint64_t i = 1 + below(&d, 8) / 6; i > 0 && f->n > 1; i--) /* mostly one: more is refused at once */
+    for (uint64_t i = 1 + below(&d, 8) / 6; i > 0 && f->n > 1; i--) /* mostly one change: more are refused at once */
         ways[below(&d, sizeof ways / sizeof ways[0])](f, &d);
 }
 
@@ -176,7 +177,7 @@ static bool is_whole(const struct scene *s)
     return s->n_triangles > 0;
 }
 
-/* -1: not as it has to be. */
+/* Returns -1 where the result is wrong. */
 static int judge(int rc, const struct scene *s, const struct sh_err *err, const char *path)
 {
     static const struct {
@@ -197,7 +198,7 @@ static int judge(int rc, const struct scene *s, const struct sh_err *err, const 
     return REFUSED;
 }
 
-/* number N_FILES and above: whole. */
+/* A number of N_FILES and above is a whole file. */
 static int try_file(uint64_t number)
 {
     const struct hostile_model *model = hostile_model(number);
@@ -220,7 +221,7 @@ static int try_file(uint64_t number)
     return outcome;
 }
 
-/* ---- all of them, shared among processes; a death of one fails */
+/* ---- all of them, shared among processes; the death of one is a failure */
 
 struct tally {
     unsigned n[HOSTILE_FORMATS][OUTCOMES], wrong;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* HTTP as others speak it: pieces, limits, broken requests, garbage. Through the settings of a VLP-16. */
+/* HTTP of other programs: pieces, limits, broken requests, garbage. The tests go through the settings of a VLP-16. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -12,7 +12,7 @@
 
 static const char done[] = DONE("keep-alive");
 
-/* One after the other on one connection, in one piece, and byte by byte. */
+/* Requests come one after the other on one connection, in one piece, and byte by byte. */
 static void test_pieces(void **state)
 {
     (void)state;
@@ -31,7 +31,7 @@ static void test_pieces(void **state)
     assert_string_equal(http_answer(), whole);
 }
 
-/* What is wrong with a request, and that the connection ends where its end can't be known. */
+/* Each error of a request is reported. The connection ends where the request's end can't be known. */
 static void test_broken_requests(void **state)
 {
     (void)state;
@@ -41,7 +41,7 @@ static void test_broken_requests(void **state)
         int status, ends;
     } cases[] = {
         {"\x16\x03\x01\x02\x01\x01\r\n\r\n", 400, 1}, /* TLS */
-        {"\x16\x03\x01\x02\x01\x01", 400, 1},         /* as it comes: its end is never an empty line */
+        {"\x16\x03\x01\x02\x01\x01", 400, 1},         /* it is refused at once: its end is never an empty line */
         {"GET /\r\n", 400, 1},                        /* HTTP/0.9 */
         {"GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n", 400, 1},
         {"GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400, 1},
@@ -98,7 +98,7 @@ static void test_broken_requests(void **state)
     }
 }
 
-/* HEAD: as GET, without the body. */
+/* HEAD answers as GET, without the body. */
 static void test_head_method(void **state)
 {
     (void)state;
@@ -110,7 +110,7 @@ static void test_head_method(void **state)
     assert_non_null(strstr(http_answer(), "\r\n\r\nthis is not a request of HTTP/1.1\n"));
 }
 
-/* A client that waits for leave to send its body. */
+/* The client waits for leave to send its body. */
 static void test_expect_continue(void **state)
 {
     (void)state;
@@ -123,7 +123,7 @@ static void test_expect_continue(void **state)
     http_assert_command("HEAD:LINES 10.000000");
 }
 
-/* A browser sends a form of any page to any address, and says whose page it is. */
+/* A browser sends a form of any page to any address, and names the page's origin. */
 static void test_pages_from_elsewhere(void **state)
 {
     (void)state;
@@ -143,7 +143,7 @@ static void test_pages_from_elsewhere(void **state)
     }
 }
 
-/* Nothing that a client sent comes back. */
+/* No bytes of a client come back. */
 static void test_nothing_is_reflected(void **state)
 {
     (void)state;
@@ -160,7 +160,7 @@ static void test_nothing_is_reflected(void **state)
     }
 }
 
-/* Garbage, and whole requests with some bytes wrong, in pieces of all sizes: every answer is one, nothing is
+/* Garbage, and whole requests with some bytes wrong, come in pieces of all sizes. Every answer is one, nothing is
  * written past the buffers (sanitizers), and a new session works. */
 static void test_garbage(void **state)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* IFC files that are damaged, each by one fault drawn from a seed: both readers answer or are ended, an error is one line,
- * and of what the file's own records still say nothing goes lost without a word. BROKEN_FILES=84: so many (8). The tests are
- * skipped where npm has not installed the readers. */
+/* Damaged IFC files, each with one change drawn from a seed. Both readers answer or are ended, and an error is one
+ * line. Each product that the file's own records still have is there, or is reported. BROKEN_FILES=84: so many (8). The
+ * tests are skipped where npm has not installed the readers. */
 #include "core/import/ifc/ifc_read.h"
 #include "core/import/ifc/ifc_records.h"
 #include "tests/unit/ifc_files.h"
@@ -19,7 +19,7 @@ static uint32_t draw(uint32_t n)
     return (state >> 8) % n;
 }
 
-/* One of the places in the data where this stands. */
+/* Returns one of the places in the data that have this text. */
 static char *find(char *in, const char *what)
 {
     uint32_t n = 0;

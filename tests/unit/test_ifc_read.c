@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* IFC by its two readers: shapes with known area and volume, names, units, places far away. The
- * tests that need the readers are skipped where npm has not installed them. */
+/* IFC by its two readers: shapes with known area and volume, names, units, places far away. The tests that need the
+ * readers are skipped where npm has not installed them. */
 #include <math.h>
 
 #include "core/import/ifc/ifc_read.h"
@@ -35,7 +35,7 @@ static void must_read(double tolerance_m)
     if (read_text(tolerance_m) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Area and signed volume of the surfaces whose object ends in the product's GlobalId. */
+/* Measures the area and signed volume of the surfaces whose object ends in the product's GlobalId. */
 static void measure(size_t product, double *area, double *volume)
 {
     char guid[32];
@@ -62,9 +62,9 @@ static void measure(size_t product, double *area, double *volume)
     }
 }
 
-/* A regular polygon of n sides within a circle has sin(2 x) / (2 x) of its area, for x = pi / n: 2 x^2 / 3 less. A sphere is cut
- * up in two directions. Its meridian lies x^2 R / 3 outside of its chords on average, which is x^2 of the volume: 2.5 times as
- * much in all. */
+/* A regular polygon of n sides within a circle has sin(2 x) / (2 x) of its area, for x = pi / n: 2 x^2 / 3 less. A
+ * sphere is divided in two directions. Its meridian lies x^2 R / 3 outside of its chords on average, which is x^2 of
+ * the volume. Together that is 2.5 times as much. */
 static double facets_share(double circle_m, int sides)
 {
     if (circle_m == 0.0) return 1e-6;
@@ -92,7 +92,7 @@ static void shapes_have_their_area_and_volume(void **state)
     (void)state;
     needs_readers();
     check_shapes(1, 23);
-    /* web-ifc makes its corners sharp, 4.8 % too much: both are closed, and it is named */
+    /* web-ifc makes its corners sharp, 4.8 % too much. Both are closed, and it is named. */
     if (strstr(warnings, "'rounded' guid_of_product__00027") == NULL) fail_msg("%s", warnings);
     /* ifc-lite has no cones */
     if (strstr(warnings, "'cone'") == NULL) fail_msg("%s", warnings);
@@ -102,7 +102,7 @@ static void shapes_have_their_area_and_volume(void **state)
     if (strstr(err.text, "(scene.ifc_strict)") == NULL) fail_msg("%s", err.text);
 }
 
-/* With it the sides of a circle: 1 mm of 1 m asks for 71. */
+/* The sides of a circle depend on the tolerance: 1 mm of 1 m needs 71. */
 static void facets_hold_the_tolerance(void **state)
 {
     (void)state;
@@ -112,8 +112,8 @@ static void facets_hold_the_tolerance(void **state)
     double area, volume;
     measure(0, &area, &volume);
     assert_true(fabs(volume / (2 * M_PI) - 1) <= facets_share(1, 70));
-    /* Chords of 71 sides are 0.089 m, and those of a cap that leave out a corner twice that. */
-    double least = 1.0; /* how near the middle of an edge along the circle comes to the axis */
+    /* Chords of 71 sides are 0.089 m. The edges of a cap that leave out a corner are twice that. */
+    double least = 1.0; /* least distance of the middle of an edge along the circle from the axis */
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         for (int c = 0; c < 3; c++) {
             const double *a = scene->vertex_m[scene->triangle[i][c]],
@@ -125,12 +125,12 @@ static void facets_hold_the_tolerance(void **state)
     assert_true(least > 1 - 1e-3 && least < 1 - 1e-5);
     assert_int_equal(n_warnings, 0);
     scene_free(scene);
-    must_read(1e-6); /* beyond what is asked for: it is said */
+    must_read(1e-6); /* beyond the demanded tolerance: it is reported */
     if (strstr(warnings, "facets of its curves") == NULL) fail_msg("%s", warnings);
     scene_free(scene);
 }
 
-/* A hole through, while the opening itself and a space are no surfaces; the style's name and colour. */
+/* A hole goes through. The opening itself and a space are no surfaces. The style gives name and colour. */
 static void openings_and_styles(void **state)
 {
     (void)state;
@@ -156,7 +156,7 @@ static void openings_and_styles(void **state)
     scene_free(scene);
 }
 
-/* IFC2x3 and IFC4x3, feet, a site 2,700 km away, and names that are whole. */
+/* The files have IFC2x3 and IFC4x3, feet, a site 2,700 km away, and complete names. */
 static void schemas_units_and_places(void **state)
 {
     (void)state;
@@ -188,7 +188,7 @@ static void schemas_units_and_places(void **state)
     scene_free(scene);
 }
 
-/* The demo's house: Assimp left two walls without a top, and 476 m2 of them instead of 493. */
+/* The demo's house: Assimp left two walls without a top, and gave 476 m2 for them instead of 493. */
 static void house_is_whole(void **state)
 {
     (void)state;
@@ -200,12 +200,12 @@ static void house_is_whole(void **state)
     double walls = 0.0;
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         if (strncmp(scene->surface[scene->label[i]].object, "IfcWall", 7) == 0) walls += triangle_area(scene, i);
-    /* both readers, and a third one, within 0.01 m2 */
+    /* This is both readers' figure, and a third one's, within 0.01 m2. */
     assert_true(fabs(walls - 492.43) < 0.02 && fabs(total_area(scene) - 2219.6) < 0.3);
     scene_free(scene);
 }
 
-/* One product more than labels, all of one shape: refused by the records, before minutes go into bodies. */
+/* There is one product more than labels, all of one shape. The records refuse it, before bodies take minutes. */
 static void too_many_products(void **state)
 {
     (void)state;
@@ -229,7 +229,7 @@ int main(void)
         cmocka_unit_test(shapes_have_their_area_and_volume),
         cmocka_unit_test(openings_and_styles),
         cmocka_unit_test(too_many_products),
-#ifndef SH_SANITIZE /* they take the same code, and the readers' seconds */
+#ifndef SH_SANITIZE /* they run the same code, and take the readers' seconds */
         cmocka_unit_test(facets_hold_the_tolerance),
         cmocka_unit_test(schemas_units_and_places),
         cmocka_unit_test(house_is_whole),

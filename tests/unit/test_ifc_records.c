@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The records of IFC files: texts, units, products, what is not whole; and the figures and rules that choose a body. No reader
- * of bodies is needed. */
+/* The records of IFC files: texts, units, products, incomplete records; and the figures and rules that choose a body.
+ * No reader of bodies is needed. */
 #include <math.h>
 
 #include "core/import/ifc/ifc_choose.h"
@@ -30,7 +30,7 @@ static void decodes(const char *quoted, const char *want)
     free(got);
 }
 
-/* Each way in which files of ours and of others write letters beyond ASCII. */
+/* These are the ways in which our files and others' write letters beyond ASCII. */
 static void texts_are_whole(void **state)
 {
     (void)state;
@@ -46,10 +46,10 @@ static void texts_are_whole(void **state)
     decodes("'it''s \\\\ here'", "it's \\ here");
     decodes("''", "");
     decodes("$", "");
-    decodes("'\\X2\\00'", "00"); /* cut off: what is not a character of it stays */
+    decodes("'\\X2\\00'", "00"); /* cut off: bytes that are no character of it stay */
 }
 
-/* The unit of length scales what the records say: 4 feet are 1.2192 m. */
+/* The unit of length scales the records' values: 4 feet are 1.2192 m. */
 static void units_are_read(void **state)
 {
     (void)state;
@@ -112,7 +112,7 @@ static void refused(const char *expected)
     ifc_records_close(&records);
 }
 
-/* No reader of bodies says any of these: they leave out what they don't find. */
+/* Readers of bodies report none of these: they leave out records that they don't find. */
 static void what_is_not_whole_is_refused(void **state)
 {
     (void)state;
@@ -131,7 +131,7 @@ static void what_is_not_whole_is_refused(void **state)
     refused("a second record #1000");
 }
 
-/* No place follows from these. */
+/* No place follows from these placements. */
 static void placement_in_a_ring_is_refused(void **state)
 {
     (void)state;
@@ -142,8 +142,8 @@ static void placement_in_a_ring_is_refused(void **state)
     assert_non_null(strstr(err.text, ", line "));
 }
 
-/* Each product stands on the one before it, and has an opening. Where each product would follow its chain to the end, and look at
- * every opening, these 40,000 would take minutes, and the program's limit would end the test. */
+/* Each product stands on the one before it, and has an opening. If each product followed its chain to the end and
+ * looked at every opening, these 40,000 would take minutes. The program's limit would end the test. */
 static void long_chains_take_little_time(void **state)
 {
     (void)state;
@@ -207,15 +207,15 @@ static void block_is_closed_and_its_parts_are_not(void **state)
         memcpy(rest[gone], side[gone + 1], (11 - gone) * sizeof side[0]);
         f = figures_of(corner, (const uint32_t(*)[3])rest, 11);
         assert_false(ifc_is_closed(&f));
-        /* an estimate: a field may lie so that it meets little of a face */
+        /* An estimate: a field may meet little of a face. */
         assert_true(f.open_m2 > 0.05 * (28 - f.area_m2));
     }
     f = figures_of(corner, side + 2, 8); /* without top and bottom: vector areas cancel */
     assert_false(ifc_is_closed(&f));
 }
 
-/* The middle of an edge is a corner of one side alone, as after a cut: edges don't pair, and the body is closed. Rounded to
- * single precision it stays so. */
+/* The middle of an edge is a corner of one side alone, as after a cut. Edges don't pair, and the body is closed.
+ * Rounded to single precision it stays so. */
 static void corner_within_an_edge_is_closed(void **state)
 {
     (void)state;

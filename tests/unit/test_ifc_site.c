@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The site of an IFC model: written files, and the house that Debian ships. */
+/* These are tests of the site of an IFC model, with files of the test and with the house that Debian ships. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,7 +17,7 @@ static char path[64];
 static struct ifc_site site;
 static struct sh_err err;
 
-/* Records in the order in which references come late: a reader may not count on one. */
+/* Records come in an order in which references are late: a reader may not rely on an order. */
 static const char base[] = "ISO-10303-21;\nHEADER;\nFILE_NAME('a;b''#1= IFCSITE(','x');\nENDSEC;\nDATA;\n"
                            "#1= IFCPROJECT('p',$,$,$,$,$,$,(#5),#2);\n"
                            "#2= IFCUNITASSIGNMENT((#4,#3));\n"
@@ -57,7 +57,7 @@ static void assert_loads(int code)
     if (code != SH_OK) fail_msg("%s", err.text);
 }
 
-/* One rounding for each term of the sum. */
+/* The bound is one rounding for each term of the sum. */
 static void assert_near(double got, double want)
 {
     if (!(fabs(got - want) <= 1e-14 * (1.0 + fabs(want)))) fail_msg("%.17g instead of %.17g", got, want);
@@ -87,13 +87,13 @@ static void what_is_not_given(void **state)
     assert_loads(load_edited("$,$,#10,$", "$,$,$,$")); /* no placement: the origin */
     assert_true(site.origin_m[0] == 0.0 && site.origin_m[1] == 0.0 && site.origin_m[2] == 0.0);
     assert_loads(load_edited("#9= ", "/* #8= IFCSITE(; */ #9= "));
-    /* A plan's own context and a site without angles count for nothing. */
+    /* A plan's own context and a site without angles do not count. */
     assert_loads(load_edited("#5= ", "#21= IFCGEOMETRICREPRESENTATIONCONTEXT($,'Plan',2,$,#6,$);\n"
                                      "#23= IFCSITE('t',$,$,$,$,$,$,$,.PARTIAL.,$,$,$,$,$);\n#5= "));
     assert_near(site.north_deg, 45.0);
 }
 
-/* A byte order mark says nothing. */
+/* A byte order mark is ignored. */
 static void byte_order_mark(void **state)
 {
     (void)state;
@@ -155,9 +155,9 @@ static void a_map_conversion(void **state)
         const char *map, *crs;
         double easting_m, x_axis_rad;
     } good[] = {
-        /* The system says its unit. */
+        /* The system gives its unit. */
         {"2000.5,1000.25,30.,0.,1.,0.001", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
-        /* It doesn't: Scale leads from millimetres to metres, or to the model's own millimetres; a grid's own scale of
+        /* It doesn't: Scale leads from millimetres to metres, or to the model's own millimetres. A grid's own scale of
          * 0.9996 changes nothing. */
         {"2000.5,1000.25,30.,$,$,0.001", "'EPSG:2056',$,$,$,$,$,$", 2000.5, 0.0},
         {"2000.5,1000.25,30.,1.,-1.,0.0009996", "'EPSG:2056',$,$,$,$,$,$", 2000.5, -M_PI / 4},
@@ -271,7 +271,7 @@ static void damaged_files_never_crash(void **state)
     }
 }
 
-/* As its record says: 52 deg 31 min N, 13 deg 24 min E, no elevation. */
+/* The values are those of its record: 52 deg 31 min N, 13 deg 24 min E, no elevation. */
 static void the_house(void **state)
 {
     (void)state;

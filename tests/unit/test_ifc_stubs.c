@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* IFC where a reader fails, waits for ever or isn't there: programs of a line in place of the two readers, and what is said of
- * theirs. The tests that need node are skipped where it is not installed. */
+/* IFC where a reader fails, waits for ever or isn't there: one-line programs take the place of the two readers, and
+ * their failures are reported. The tests that need node are skipped where it is not installed. */
 #include <math.h>
 #include <sys/stat.h>
 #include <time.h>
@@ -125,7 +125,7 @@ static void one_reader_may_fail(void **state)
     }
 }
 
-/* Both readers take it for metres. */
+/* Both readers assume metres. */
 static void missing_unit_is_said(void **state)
 {
     (void)state;
@@ -160,7 +160,8 @@ static void facets_of_ifc_lite_are_said(void **state)
     }
 }
 
-/* web-ifc never ends by itself on some broken files. It is ended 10 s after the other reader has ended, or with the limit. */
+/* web-ifc never ends by itself on some broken files. It is ended 10 s after the other reader has ended, or with the
+ * limit. */
 static void reader_that_hangs_is_ended(void **state)
 {
     (void)state;
@@ -180,7 +181,7 @@ static void reader_that_hangs_is_ended(void **state)
     if (strstr(err.text, "has not read it within 1 s") == NULL) fail_msg("%s", err.text);
 }
 
-/* Then Assimp reads it: what it gets wrong is an error, unless it was asked for. */
+/* Then Assimp reads it. Its mistakes are errors, unless it was asked for. */
 static void without_node_assimp_reads(void **state)
 {
     (void)state;

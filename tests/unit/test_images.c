@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Images: each format against the same picture, wrap modes against texels by hand, and what hostile files may
- * not do. BMP and TGA are written here byte by byte; the JPEG is libjpeg-turbo's of the same picture. */
+/* Images: each format against the same picture, wrap modes against texels by hand, and hostile files that may do no
+ * harm. BMP and TGA are written here byte by byte; the JPEG is libjpeg-turbo's of the same picture. */
 #include "tests/unit/scene_files.h"
 
 #include <math.h>
@@ -44,7 +44,7 @@ static void put(uint8_t *to, uint32_t value, int bytes)
         to[i] = (uint8_t)(value >> 8 * i);
 }
 
-/* Blue, green, red and with `channels` 4 alpha, rows from the bottom unless from the top. */
+/* Writes blue, green, red and with `channels` 4 alpha. Rows go from the bottom, or with from_top from the top. */
 static size_t pixels(uint8_t *to, int channels, int from_top)
 {
     for (int row = 0; row < SIDE; row++)
@@ -91,7 +91,7 @@ static size_t write_tga(uint8_t *tga, int channels, int from_top)
     return 18 + pixels(tga + 18, channels, from_top);
 }
 
-/* Runs of 8 texels, as the picture has them. */
+/* Runs have 8 texels, as the picture. */
 static size_t write_packed_tga(uint8_t *tga)
 {
     size_t n = 18;
@@ -159,7 +159,7 @@ static void each_format_has_the_same_picture(void **state)
     check_file(write_file("h.jpg", JPEG, sizeof JPEG), 0, 3);
 }
 
-/* Assimp hands these over unpacked, as it has them within a file. */
+/* Assimp passes these on unpacked, as it has them within a file. */
 static void unpacked_texels_have_the_same_picture(void **state)
 {
     (void)state;
@@ -176,7 +176,7 @@ static void unpacked_texels_have_the_same_picture(void **state)
     check_source(&source, 0, 3);
 }
 
-/* Many a writer leaves zeros in the fourth channel. */
+/* Many programs write zeros in the fourth channel. */
 static void a_channel_of_zeros_is_no_alpha(void **state)
 {
     (void)state;
@@ -187,8 +187,9 @@ static void a_channel_of_zeros_is_no_alpha(void **state)
     check_file(write_file("zero.tga", bytes, n), 0, 0);
 }
 
-/* What makes a hole: alpha below the share that counts as solid, just as much is none; of an opacity map the light by Rec.
- * 601, 0.299, 0.587 and 0.114 of red, green and blue. Texels in a row, each looked at in its middle. */
+/* A texel is a hole where alpha is below the share that counts as solid; one that equals it is not. For an opacity map
+ * the light counts by Rec. 601: 0.299, 0.587 and 0.114 of red, green and blue. Texels are in a row, and each is looked
+ * at in its middle. */
 static void what_makes_a_hole(void **state)
 {
     (void)state;
@@ -217,7 +218,7 @@ static void what_makes_a_hole(void **state)
 static void wrap_modes_by_hand(void **state)
 {
     (void)state;
-    /* An image of 4 x 2 texels; v grows upward, rows count from the top. */
+    /* An image of 4 x 2 texels. v grows upward, and rows count from the top. */
     static const struct {
         double u, v;
         int column[4], row[4]; /* repeat, clamp, mirror, decal */
@@ -237,7 +238,7 @@ static void wrap_modes_by_hand(void **state)
             if (texture_at(&frame, uv) != want)
                 fail_msg("%g %g, wrap %d: %d, not %d", at[i].u, at[i].v, w, (int)texture_at(&frame, uv), (int)want);
         }
-    /* Each direction has its own. */
+    /* Each direction has its own mode. */
     const struct texture_frame mixed = {4, 2, {TEXTURE_CLAMP, TEXTURE_REPEAT}};
     assert_int_equal(texture_at(&mixed, (const double[2]){3.0, 1.9}), 3);
 }
@@ -273,8 +274,8 @@ static void a_hole_is_what_is_below_the_half(void **state)
     assert_null(mask_of(cut, 1, 0.4, 0, TEXTURE_REPEAT));
 }
 
-/* Signature and header of a PNG with that size, and the name of its data's chunk, up to which newer decoders look; the
- * checksums of a file that goes no further don't count. */
+/* Makes signature and header of a PNG with that size, and the name of its data's chunk, which newer decoders look for.
+ * The checksums of a file that goes no further don't count. */
 static size_t png_of_size(uint8_t *png, uint32_t width, uint32_t height)
 {
     static const uint8_t start[16] = {0x89, 'P', 'N', 'G', 13, 10, 26, 10, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
@@ -300,7 +301,7 @@ static void fails(const char *file, const char *expected)
     unlink(file);
 }
 
-/* Each format says its size before any texel, so that what is too large is said to be that. */
+/* Each format has its size before any texel, so that too large ones are reported as such. */
 static void what_is_too_large_is_said_to_be(void **state)
 {
     (void)state;
@@ -335,7 +336,7 @@ static void what_is_too_large_is_said_to_be(void **state)
     fails(write_file("depth.png", bytes, n), "1/2/4/8/16-bit only");
 }
 
-/* A height below 0 says that the rows come from the top. */
+/* A height below 0 means that the rows come from the top. */
 static void a_bmp_from_the_top_is_read(void **state)
 {
     (void)state;

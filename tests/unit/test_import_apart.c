@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Import by Assimp in a process of its own: limits, crashes and the end of
- * either process are one line, and nothing stays behind. */
+/* These tests import by Assimp in a process of its own. Limits, crashes and the end of either process give one line,
+ * and nothing stays behind. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <poll.h>
@@ -19,7 +19,7 @@
 
 #define HOUSE "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc"
 
-/* ---- the process. Assimp hangs for a mesh of this name: the loader of libraries is the test's own. */
+/* ---- the process. Assimp hangs for a mesh of this name, as the loader of libraries is the test's own. */
 
 #define ENDLESS "endless.dae"
 
@@ -81,7 +81,7 @@ static void hang_ends_in_time(void **state)
     no_child_is_left();
 }
 
-/* As a program may be started: then there is no status of the child, and what it wrote counts. */
+/* A program may be started so. Then there is no status of the child, and its output counts. */
 static void signal_of_children_may_be_ignored(void **state)
 {
     (void)state;
@@ -95,12 +95,12 @@ static void signal_of_children_may_be_ignored(void **state)
     scene_free(s);
     const struct scene_mesh_spec broken = {.file = write_text("a.dae", "<COLLADA"), .scale = 1};
     assert_int_equal(load_spec(&broken, 1e-3, &s, &err), SH_EINPUT);
-    assert_null(strstr(err.text, "makes no sense")); /* what the child said */
+    assert_null(strstr(err.text, "makes no sense")); /* the child's words */
     signal(SIGCHLD, was);
     unlink(path);
 }
 
-/* The file is not to blame where the process has no descriptors left. */
+/* The process has no descriptors left. The file is not to blame. */
 static void no_descriptors_are_left(void **state)
 {
     (void)state;
@@ -146,7 +146,7 @@ static void memory_is_limited(void **state)
     no_child_is_left();
 }
 
-/* The house with one record of another type: Assimp takes it for a point all the same. */
+/* One record of the house has another type. Assimp takes it for a point all the same. */
 static void crash_is_one_line(void **state)
 {
     (void)state;
@@ -175,7 +175,7 @@ static void crash_is_one_line(void **state)
     no_child_is_left();
 }
 
-/* ---- looking at the child while it reads */
+/* ---- the child while it reads */
 
 static pid_t child_of(void)
 {
@@ -189,7 +189,7 @@ static pid_t child_of(void)
     return child;
 }
 
-/* The figure of a line of /proc/PID/limits; -1: none, or without limit. */
+/* Returns the figure of a line of /proc/PID/limits; -1: none, or without limit. */
 static long long limit_of(pid_t pid, const char *what)
 {
     char name[64], line[256];
@@ -208,7 +208,7 @@ struct look {
     pid_t child;
 };
 
-/* Once its limits are set, they are kept, and the load is stopped. */
+/* Keeps the child's limits once they are set, and stops the load. */
 static int look_and_stop(void *ctx)
 {
     struct look *look = ctx;
@@ -252,7 +252,7 @@ static int say_child(void *ctx)
     return child < 0;
 }
 
-/* Killed, so that it can do nothing about it. */
+/* The parent is killed, so that it can't end the child. */
 static void child_dies_with_its_parent(void **state)
 {
     (void)state;

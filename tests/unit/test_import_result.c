@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene on its way back from the process that read it: it comes as it was, and broken bytes are refused. */
+/* A scene on its way back from the process that read it: it comes unchanged, and broken bytes are refused. */
 #include <math.h>
 #include <sys/mman.h>
 
@@ -14,7 +14,7 @@ static void *copy_of(const void *data, size_t size)
     return memcpy(copy, data, size);
 }
 
-/* Two triangles of two surfaces, one with a texture that came within the file. */
+/* Makes two triangles of two surfaces, one with a texture that came within the file. */
 static struct scene *small_scene(void)
 {
     static const double vertex_m[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0.25}};
@@ -39,7 +39,7 @@ static struct scene *small_scene(void)
     return s;
 }
 
-/* As bytes. */
+/* Writes it as bytes. */
 static size_t write_result(uint8_t *bytes, size_t room)
 {
     struct sh_err err;
@@ -94,7 +94,7 @@ static void result_comes_back(void **state)
     build_release(&b);
 }
 
-/* What every user of a scene relies on. */
+/* Checks the properties that every user of a scene relies on. */
 static void check_scene(const struct scene *s)
 {
     for (uint32_t i = 0; i < s->n_vertices; i++)
@@ -126,15 +126,15 @@ static void try_result(const uint8_t *bytes, size_t n)
     build_release(&b);
 }
 
-/* The middle of what a name leaves free: any of it is like the rest. */
+/* Returns whether the byte is in the middle of a name's free bytes, of which any one is like the rest. */
 static int is_padding(const uint8_t *bytes, size_t at, size_t n)
 {
     static const uint8_t none[36];
     return at >= 16 && at + 20 <= n && memcmp(bytes + at - 16, none, sizeof none) == 0;
 }
 
-/* Every word of it with every value that means something: counts too large, indices out of range, NaN, infinite,
- * names without an end; and many lengths. */
+/* Every word of it gets every value with an effect: counts too large, indices out of range, NaN, infinite, names
+ * without an end; and many lengths. */
 static void broken_result_is_refused(void **state)
 {
     (void)state;
@@ -161,7 +161,7 @@ static void broken_result_is_refused(void **state)
     assert_int_equal(n_refused, 1);
 }
 
-/* A name that has no end, at the place where it stands. */
+/* A name has no end within its field. */
 static void names_have_an_end(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Textures as meshes name them: within the file, with wrap modes, a second set of coordinates, and
- * what the format says of alpha. */
+/* Textures of meshes: within the file, with wrap modes, with a second set of coordinates, and with the format's rules
+ * of alpha. */
 #include "tests/unit/scene_files.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ static size_t make_png(uint8_t *png, size_t room)
     return size;
 }
 
-/* A square of two triangles; its second set of coordinates has the image, the first lies all in one point. */
+/* Writes a square of two triangles. Its second set of coordinates has the image, the first is all in one point. */
 static void write_gltf(const char *material, const char *lay)
 {
     static const float p[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, zero[4][2];
@@ -83,7 +83,7 @@ static struct scene *load_mesh(const char *name, int textures)
     return scene;
 }
 
-/* Holes in the middles of the texels: alpha below the cutoff, in 255ths. */
+/* Holes are checked in the middles of the texels: alpha below the cutoff, in 255ths. */
 static void check_holes(const struct scene *scene, int below)
 {
     assert_int_equal(scene->n_triangles, 2);
@@ -120,7 +120,7 @@ static void gltf_has_it_within(void **state)
     scene_free(scene);
 }
 
-/* KHR_texture_transform: a coordinate of the image, from its upper left, is offset + scale * that of the mesh. */
+/* KHR_texture_transform: a coordinate of the image, from its upper left, is offset + scale times the mesh's. */
 static void gltf_scales_and_shifts(void **state)
 {
     (void)state;

@@ -6,9 +6,9 @@
 
 static const double TURN = 6.283185307179586477;
 
-/* What a head with such errors makes of targets in all directions around it: mirror angle, pan angle and range read,
- * for the beam of mirror angle m and pan p onto the inside of a sphere, which is met at R(beam). The head's angles are
- * those of its encoders. */
+/* The readings of a head with such errors for targets in all directions around it: mirror angle, pan angle and range.
+ * The beam of mirror angle m and pan p meets the inside of a sphere at R(beam). The head's angles are those of its
+ * encoders. */
 struct shot {
     double s[3], o[3];  /* direction and origin of the beam, socs */
     double mirror, pan; /* read, turns */
@@ -23,7 +23,8 @@ static struct shot shoot(const struct instrument *k, double mirror_turn, double 
     return shot;
 }
 
-/* True horizontal direction (clockwise from y), elevation and distance of the point at `range` along the beam. */
+/* Writes the true horizontal direction (clockwise from y), elevation and distance of the point at `range` along the
+ * beam. */
 static void true_place(const struct shot *shot, double range_m, double *pan, double *elevation, double *distance_m)
 {
     double p[3];
@@ -50,10 +51,11 @@ static void an_ideal_instrument_is_one(void **state)
     assert_true(fabs(pan - 0.3) < 1e-15 && fabs(elevation - 0.1) < 1e-15 && shot.mirror == 0.1 && shot.pan == 0.3);
 }
 
-/* Spherical triangles. Collimation c: the beam lies on a circle c off the one across the mirror's axis: tan(pan error)
- * = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t: the circle itself is tilted: tan(pan error) = sin t tan m,
- * sin(elevation) = cos t sin m. To first order Muralikrishnan's c / sin V and -t / tan V, V from the zenith. */
-/* Each error alone makes a head that is not ideal; a phase without eccentricity is none. */
+/* Spherical triangles. Collimation c: the beam lies on a circle at c from the one across the mirror's axis: tan(pan
+ * error) = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t: the circle itself is tilted: tan(pan error) = sin t
+ * tan m, sin(elevation) = cos t sin m. To first order they are Muralikrishnan's c / sin V and -t / tan V, V from the
+ * zenith. */
+/* Each error alone makes a head that is not ideal. A phase without eccentricity is no error. */
 static void each_error_alone_is_one(void **state)
 {
     (void)state;
@@ -94,7 +96,8 @@ static void tilts_follow_spherical_trigonometry(void **state)
     }
 }
 
-/* Both at once: the beam on its cone about the mirror's axis (x), then all of it turned about y, lengths kept. */
+/* Both are applied: the beam on its cone about the mirror's axis (x), then all of it turned about y, with lengths
+ * kept. */
 static void tilts_add_up(void **state)
 {
     (void)state;
@@ -113,8 +116,9 @@ static void tilts_add_up(void **state)
     }
 }
 
-/* A point at R along the beam, seen from the head's origin. Plane triangles: transit offset e ahead: distance^2 = R^2 +
- * e^2 + 2 R e cos m, in pan nothing; mirror offset e to the right: pan by atan(e / (R cos m)). */
+/* The point lies at R along the beam, seen from the head's origin. Plane triangles: for a transit offset e ahead
+ * distance^2 = R^2 + e^2 + 2 R e cos m, and the pan does not change. A mirror offset e to the right changes the pan by
+ * atan(e / (R cos m)). */
 static void offsets_make_plane_triangles(void **state)
 {
     (void)state;
@@ -153,8 +157,8 @@ static void encoders_read_by_their_errors(void **state)
     assert_true(fabs(range_m[0] - 10.021) < 1e-12 && isnan(range_m[1]));
 }
 
-/* Angles at which a head's beam meets a far target, searched by Newton's method on what the beam does, and what its
- * encoders then say. face 2: over the zenith. */
+/* Finds the angles at which a head's beam meets a far target, by Newton's method on the beam's direction, and the
+ * readings of its encoders there. face 2: over the zenith. */
 static struct shot point_at(const struct instrument *k, double pan_to, double elevation_to, double range_m, int face)
 {
     double m = face == 1 ? elevation_to : 0.5 - elevation_to, p = face == 1 ? pan_to : pan_to + 0.5;
@@ -168,7 +172,7 @@ static struct shot point_at(const struct instrument *k, double pan_to, double el
     return shoot(k, m, p, 0);
 }
 
-/* Reading in face 1 less that in face 2, taken to face 1. */
+/* Returns the reading in face 1 less that in face 2, taken to face 1. */
 static void two_faces(const struct instrument *k, double elevation, double range_m, double *pan_rad, double *mirror_rad)
 {
     struct shot one = point_at(k, 0.2, elevation, range_m, 1), two = point_at(k, 0.2, elevation, range_m, 2);
@@ -176,9 +180,9 @@ static void two_faces(const struct instrument *k, double elevation, double range
     *mirror_rad = TURN * wrapped(one.mirror - (0.5 - two.mirror));
 }
 
-/* Measured in both faces, each error shows as theory has it: collimation -2c / cos e, trunnion -2t tan e, mirror index
- * 2i, mirror offset -2 d / (R cos e), transit offset 2 d sin e / R in elevation, pan eccentricity twice its value; pan
- * index cancels. To first order: errors of 1e-5 leave 1e-9. */
+/* Measured in both faces, each error shows as theory predicts: collimation -2c / cos e, trunnion -2t tan e, mirror
+ * index 2i, mirror offset -2 d / (R cos e), transit offset 2 d sin e / R in elevation, pan eccentricity twice its
+ * value; pan index cancels. To first order: errors of 1e-5 leave 1e-9. */
 static void two_faces_show_what_they_should(void **state)
 {
     (void)state;
@@ -202,7 +206,7 @@ static void two_faces_show_what_they_should(void **state)
     }
 }
 
-/* The beam strays, each axis by its sigma; the encoders don't. 4.75 standard errors. */
+/* The beam strays, each axis by its sigma, and the encoders don't. 4.75 standard errors are allowed. */
 static void angle_noise_is_the_beams(void **state)
 {
     (void)state;
@@ -230,7 +234,7 @@ static void angle_noise_is_the_beams(void **state)
 }
 
 /* Through the caster: the range of each beam is that of its own way through the room, in both layouts and with the head
- * moving, and its reading what the encoders say. Counts of 10 um. */
+ * moving. Its angles are the encoders'. Counts are 10 um. */
 static void the_caster_sends_beams_where_they_go(void **state)
 {
     (void)state;

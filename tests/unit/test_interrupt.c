@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Signals of the command line: one is a wish to end in good order, and so are two at once; more mean now. */
+/* Signals of the command line. One asks for an end in good order, and so do two at once; more ask for an end at
+ * once. */
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -12,8 +13,8 @@
 
 #include "firmware_sim/app/app.h"
 
-/* What becomes of a process that gets these signals, one after the other (0: a second and a bit passes
- * before the next): 0 it goes on and knows of them, else the signal that ended it. */
+/* Returns the fate of a process that gets these signals, one after the other (0: a second and a bit passes before the
+ * next): 0 where it goes on and knows of them, else the signal that ended it. */
 static int outcome(const int *signals, int n)
 {
     const pid_t pid = fork();

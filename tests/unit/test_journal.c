@@ -187,7 +187,7 @@ static void what_is_no_journal_is_refused(void **ctx)
     assert_non_null(strstr(err.text, "/tmp: a directory, not a file"));
 }
 
-/* What has no end, or would wait for its writer: refused as it is opened. */
+/* A file that has no end, or would wait for its writer, is refused as it is opened. */
 static void what_is_no_file_is_refused_at_once(void **ctx)
 {
     (void)ctx;
@@ -217,7 +217,7 @@ static void a_line_is_bounded(void **ctx)
     expect_unreadable(text, sizeof text, ":1: a NUL byte");
 }
 
-/* Turned round, insertion would take the square of its length. */
+/* The lines are in reverse, so that insertion would take the square of their number. */
 static void the_order_of_the_file_costs_nothing(void **ctx)
 {
     (void)ctx;
@@ -260,7 +260,7 @@ static void a_journal_is_not_written_over_the_one_it_replays(void **ctx)
     unlink(other);
 }
 
-/* Commands that are missing would change what comes after them. */
+/* Missing commands would change the later ones. */
 static void a_journal_with_missing_commands_is_not_replayed(void **ctx)
 {
     (void)ctx;
@@ -307,7 +307,7 @@ static void a_full_disk_is_reported(void **ctx)
     assert_non_null(strstr(err.text, "/dev/full: No space left"));
     assert_null(journal_open("/nonexistent/j", NULL, &err));
     assert_non_null(strstr(err.text, "/nonexistent/j: cannot be opened for writing: No such file"));
-    /* Later: the file may grow to 100 bytes, so the second of these lines does not fit. */
+    /* The file may later grow to 100 bytes only, so the second of these lines does not fit. */
     struct rlimit before, small;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
     small = before;
@@ -318,7 +318,7 @@ static void a_full_disk_is_reported(void **ctx)
     assert_non_null(journal);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
     static const char long_line[] = "HEAD:PRR 300000 ..............................................................";
-    journal_write(journal, 1, 1, 1, long_line); /* what becomes of each, the thread decides that writes */
+    journal_write(journal, 1, 1, 1, long_line); /* the writing thread decides the fate of each */
     journal_write(journal, 2, 2, 1, long_line);
     const int closed = journal_close(journal, &err);
     setrlimit(RLIMIT_FSIZE, &before);

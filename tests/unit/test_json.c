@@ -98,7 +98,8 @@ static void one_line_has_no_blanks(void **ctx)
                 "{\"endpoints\":[{\"type\":\"a b\",\"port\":0},{\"type\":\"a b\",\"port\":1}],\"none\":[]}\n");
 }
 
-/* RFC 8259, section 7; the UTF-8 cases are those of Unicode 15, table 3-7, just in and just out. */
+/* The rules are RFC 8259, section 7. The UTF-8 cases are those of Unicode 15, table 3-7, at both sides of each
+ * limit. */
 static void strings_are_escaped(void **ctx)
 {
     (void)ctx;

@@ -130,7 +130,7 @@ static void test_records(void **state)
     assert_int_equal(rig_uint(p + 3 * POINT + 18, 2), 15000);
 }
 
-/* A second station is counted from the first one's anchor; one beyond what 32 bits reach is refused. */
+/* A second station counts from the first one's anchor. One beyond the reach of 32 bits is refused. */
 static void test_stations(void **state)
 {
     (void)state;
@@ -154,7 +154,7 @@ static void test_stations(void **state)
     assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "station 2"));
     assert_non_null(strstr(err.text, "output.scale_m"));
-    /* kept all the same, the file holds what came before: of the second station two points, 3 m nearer */
+    /* It is kept all the same: the file holds the points so far, with two of the second station, 3 m nearer. */
     assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err), SH_EFORMAT);
     free(las);
     las = rig_read(rig_path("a.las"), &las_len);
@@ -164,7 +164,7 @@ static void test_stations(void **state)
     assert_true(fabs(rig_double(las + 187) - (a.anchor[0] - 2147481)) < 1e-9);
 }
 
-/* In the polar layout points are placed in the scene by the pose, and there is no CRS. */
+/* In the polar layout the pose places points in the scene, and there is no CRS. */
 static void test_polar(void **state)
 {
     (void)state;
@@ -211,7 +211,7 @@ static void test_disk_full(void **state)
     rig_check_disk_full(rig_path("full.las"), 2000);
 }
 
-/* More points than the buffer holds, so that the header is written over in the file. */
+/* There are more points than the buffer holds, so that the header is overwritten in the file. */
 static void test_long(void **state)
 {
     (void)state;
@@ -292,7 +292,7 @@ static void test_las_12(void **state)
     }
 }
 
-/* Format 7: red, green and blue between the time and the extra bytes. */
+/* Format 7 has red, green and blue between the time and the extra bytes. */
 static void test_colour(void **state)
 {
     (void)state;

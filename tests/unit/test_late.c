@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Each library that is loaded late is found, and a call that it lacks is said. */
+/* Each library that is loaded late is found, and a call that it lacks is reported. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

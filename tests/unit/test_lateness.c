@@ -20,8 +20,8 @@ static int begin(void **state)
     return 0;
 }
 
-/* A percentile is the end of the bin that holds the exact one, and a bin is at most 1/32 of its beginning wide. A result
- * in microseconds is a rounded quotient, hence the one part in 1e15. */
+/* A percentile is the end of the bin that holds the exact one, and a bin is at most 1/32 of its beginning wide. A
+ * result in microseconds is a rounded quotient, hence the one part in 1e15. */
 static void expect_us(double q, int64_t exact_ns)
 {
     const double us = lateness_us(&lateness, q), exact_us = (double)exact_ns / 1e3;
@@ -48,7 +48,7 @@ static void percentiles_of_a_ramp(void **state)
     assert_true(lateness_us(&lateness, 0.001) < 1.04); /* the first alone */
 }
 
-/* 99 in time and one late by a second: the median knows nothing of it, p99 neither, the next share does. */
+/* 99 are in time and one is late by a second. The median does not show it, nor does p99, and the next share does. */
 static void one_in_a_hundred(void **state)
 {
     (void)state;
@@ -67,7 +67,7 @@ static int by_size(const void *a, const void *b)
 
 enum { MANY = 20000 };
 
-/* Of all sizes, beside the sorted list. */
+/* Values of all sizes are compared with the sorted list. */
 static void percentiles_beside_a_sorted_list(void **state)
 {
     (void)state;
@@ -83,7 +83,7 @@ static void percentiles_beside_a_sorted_list(void **state)
     assert_int_equal(lateness_count(&lateness), MANY);
 }
 
-/* At the borders of bins, up to the largest number that there is: each alone in the row that is its own. */
+/* Values are at the borders of bins, up to the largest number: each is alone in its own row. */
 static void rows_hold_what_is_below(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which table of leap seconds a head's clock takes: the system's where that reaches further than the built-in one, else
- * the built-in one. The system's file is one of the test's own. */
+/* The table of leap seconds that a head's clock takes: the system's where that reaches further than the built-in one,
+ * else the built-in one. The system's file is one of the test's own. */
 #include "tests/unit/device_rig.h"
 
 #include <dlfcn.h>
@@ -10,7 +10,7 @@
 
 static char list[4096]; /* the file's text; empty: the system's own */
 
-/* In place of the C library's. */
+/* It takes the place of the C library's. */
 FILE *fopen(const char *path, const char *mode)
 {
     FILE *(*next)(const char *, const char *) = NULL;
@@ -49,7 +49,7 @@ static void the_table_that_reaches_further(void **state)
     assert_int_equal(clock.table.n, builtin->n + 1);
     assert_int_equal(clock.table.expires_s, JULY_2027_S + YEAR_S);
     assert_string_equal(clock.warning, "");
-    /* An old system: its table ends before 2017, whose leap second it does not know. */
+    /* An old system: its table ends before 2017, whose leap second it does not have. */
     clock = clock_with(builtin->n - 1, 0, builtin->leap[builtin->n - 1].posix_s - 1);
     assert_int_equal(clock.table.n, builtin->n);
     assert_int_equal(clock.table.expires_s, builtin->expires_s);

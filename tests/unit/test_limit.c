@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The limit of test programs (tests/common/limit.c, tests/run_tap.sh): this program is run again with tests that hang. */
+/* The limit of test programs (tests/common/limit.c, tests/run_tap.sh). This program is run again with tests that
+ * hang. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,7 +25,7 @@ enum { DEADLINE_MS = 300000 };
 
 static const char *self;
 
-/* ---- the tests that are planted: what test_host_commands did, and one that computes for ever */
+/* ---- the planted tests: one that waits as test_host_commands did, and one that computes for ever */
 
 static void planted_first(void **state)
 {
@@ -166,8 +167,8 @@ static void test_limit_refused(void **state)
     }
 }
 
-/* A script that waits for ever, and its child that ignores SIGTERM, are ended by run_tap.sh; so is the program above by
- * itself before. Without the child's end, its end of the pipe would stay open, and run() would say so. */
+/* run_tap.sh ends a script that waits for ever, and its child that ignores SIGTERM. The program above has ended by
+ * itself before. If the child went on, its end of the pipe would stay open, and run() would report it. */
 static void test_run_tap(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Lines on their way into a file: whole, in order, and never waited for. What a file does not take is counted, in it and
- * beside it. */
+/* Lines on their way into a file are whole, in order, and never waited for. Lines that a file does not take are
+ * counted, in it and beside it. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -40,7 +40,7 @@ static struct line_writer *open_writer(int fd)
     return writer;
 }
 
-/* "line 17 ...", of 100 bytes. */
+/* The line is "line 17 ...", of 100 bytes. */
 static int put(struct line_writer *writer, enum line_kind kind, unsigned number)
 {
     char text[101];
@@ -54,7 +54,7 @@ struct found {
     uint64_t lines, missing; /* the latter as gaps say */
 };
 
-/* Each line has the number after the one before it, and a gap that of all it stands for. */
+/* Each line has the number after the one before it. A gap counts as all lines that it stands for. */
 static struct found check_lines(const char *text)
 {
     struct found found = {0, 0};
@@ -91,7 +91,7 @@ static void *read_thread(void *fd)
     return read_all(*(int *)fd);
 }
 
-/* Lines until neither pipe nor queue have room, from 0 on. Returns how many. */
+/* Puts lines until neither pipe nor queue have room, from 0 on. Returns how many. */
 static unsigned fill(struct line_writer *writer, int fd)
 {
     struct pollfd slot = {.fd = fd, .events = POLLOUT};
@@ -104,7 +104,7 @@ static unsigned fill(struct line_writer *writer, int fd)
     return n;
 }
 
-/* Faster than any disk, through a queue that is used round and round. */
+/* Lines come faster than any disk takes them, through a queue that is used round and round. */
 static void all_lines_are_in_the_file_or_counted_there(void **state)
 {
     (void)state;
@@ -126,7 +126,7 @@ static void all_lines_are_in_the_file_or_counted_there(void **state)
     fclose(file);
 }
 
-/* A pipe that nobody reads. Whoever puts a line comes back; once somebody reads, the file goes on. */
+/* No one reads the pipe. Putting a line returns all the same, and the file goes on once it is read. */
 static void a_file_that_stands_still_holds_up_nobody(void **state)
 {
     (void)state;
@@ -153,7 +153,7 @@ static void a_file_that_stands_still_holds_up_nobody(void **state)
     close(fd[0]);
 }
 
-/* The end waits 2 s and then says what is missing. */
+/* The end waits 2 s and then reports what is missing. */
 static void the_end_does_not_wait_for_ever(void **state)
 {
     (void)state;
@@ -168,12 +168,12 @@ static void the_end_does_not_wait_for_ever(void **state)
              (unsigned long long)lost);
     assert_string_equal(err.text, want);
     assert_int_equal(fcntl(fd[0], F_SETFL, O_NONBLOCK), 0);
-    char text[65537]; /* what the pipe holds: its writer goes on as soon as there is room again */
+    char text[65537]; /* fills the pipe: its writer goes on as soon as there is room again */
     const ssize_t n = read(fd[0], text, sizeof text - 1);
     assert_true(n > 0);
     text[n] = '\0';
     const struct found found = check_lines(text);
-    assert_true(found.missing < lost);               /* those that it has no gap for came last */
+    assert_true(found.missing < lost);               /* those without a gap came last */
     assert_int_equal(found.lines + lost, n_put + 1); /* with the end */
     close(fd[0]);
 }

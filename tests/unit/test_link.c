@@ -1,16 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The links null, file, fd and tcp; pty and udp have their own programs. */
+/* The links null, file and fd, and the table of all links. The other links have programs of their own. */
 #include "tests/unit/link_test.h"
 
-#include <arpa/inet.h>
 #include <fcntl.h>
-#include <netinet/in.h>
-#include <signal.h>
 #include <sys/eventfd.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 
 static void test_table(void **state)
 {
@@ -42,7 +37,7 @@ static void test_null(void **state)
     bench_close(&bench);
 }
 
-/* A thousand signals are one event, and a link without sessions hears it as well. */
+/* A thousand signals are one event, and a link without sessions gets it as well. */
 static void test_wake(void **state)
 {
     (void)state;
@@ -86,15 +81,6 @@ static void test_file(void **state)
     rmdir(dir);
 }
 
-static void expect_refused(const struct link_spec *spec, int code, const char *part)
-{
-    struct sh_err err = {0, ""};
-    void *link = NULL;
-    assert_int_equal(link_ops_get(spec->type)->open(spec, &link, &err), code);
-    assert_null(link);
-    if (strstr(err.text, part) == NULL || strchr(err.text, '\n') != NULL) fail_msg("'%s' without '%s'", err.text, part);
-}
-
 static void test_file_refusals(void **state)
 {
     (void)state;
@@ -129,25 +115,6 @@ static void test_file_full(void **state)
     bench_close(&bench);
 }
 
-static void fill_bytes(uint8_t *data, size_t len)
-{
-    for (size_t i = 0; i < len; i++)
-        data[i] = (uint8_t)(i ^ i >> 8);
-}
-
-static void exchange(struct bench *bench, int session, int fd)
-{
-    uint8_t out[2048], back[2048];
-    fill_bytes(out, sizeof out);
-    bench_write_all(bench, session, out, sizeof out);
-    fd_read_all(fd, back, sizeof back);
-    assert_memory_equal(out, back, sizeof out);
-    memset(back, 0, sizeof back);
-    assert_int_equal(write(fd, out, sizeof out), sizeof out);
-    bench_read_all(bench, session, back, sizeof back);
-    assert_memory_equal(out, back, sizeof out);
-}
-
 static void test_fd(void **state)
 {
     (void)state;
@@ -170,7 +137,7 @@ static void test_fd(void **state)
     bench_close(&bench);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     spec.fd = pair[0];
-    bench = bench_open(&spec); /* ended from this side: what was written goes out before */
+    bench = bench_open(&spec); /* ended from this side: written bytes are sent before */
     bench_expect(&bench, LINK_OPENED, 0);
     bench_write_all(&bench, 0, "last", 4);
     bench.ops->end(bench.link, 0);
@@ -182,7 +149,7 @@ static void test_fd(void **state)
     bench_close(&bench);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     spec.fd = pair[0];
-    bench = bench_open(&spec); /* what the other end wrote before it went is read first */
+    bench = bench_open(&spec); /* bytes that the other end wrote before it went are read first */
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(pair[1], "q", 1), 1);
     close(pair[1]);
@@ -201,294 +168,12 @@ static void test_fd(void **state)
     expect_refused(&spec, SH_EINPUT, "fd:-1");
 }
 
-static int tcp_port(const struct bench *bench)
-{
-    char text[96];
-    int port = 0;
-    bench->ops->endpoint(bench->link, text, sizeof text);
-    assert_int_equal(sscanf(text, "tcp:127.0.0.1:%d", &port), 1);
-    assert_in_range(port, 1, 65535);
-    return port;
-}
-
-static int tcp_client(int port)
-{
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
-    return fd;
-}
-
-static void test_tcp_sessions(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
-    struct bench bench = bench_open(&spec);
-    const int port = tcp_port(&bench);
-    int a = tcp_client(port);
-    assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
-    int b = tcp_client(port);
-    struct link_event event = bench_expect(&bench, LINK_OPENED, 0);
-    assert_int_equal(event.session, 1);
-    assert_int_equal(strncmp(event.peer, "127.0.0.1:", 10), 0);
-    exchange(&bench, 0, a);
-    exchange(&bench, 1, b);
-    int c = tcp_client(port);
-    bench_expect(&bench, LINK_REFUSED, 0);
-    char byte;
-    assert_int_equal(fd_read(c, &byte, 1), 0); /* told, not left waiting */
-    close(c);
-    exchange(&bench, 1, b);
-    close(a);
-    assert_int_equal(bench_expect(&bench, LINK_SHUT, 3).session, 0);
-    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
-    assert_int_equal(bench_expect(&bench, LINK_CLOSED, 3).session, 0);
-    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED);
-    a = tcp_client(port);
-    assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
-    exchange(&bench, 0, a);
-    assert_int_equal(bench.ops->write(bench.link, 7, "x", 1), SH_ECLOSED);
-    assert_int_equal(bench.ops->read(bench.link, -1, &byte, 1), SH_ECLOSED);
-    close(a);
-    close(b);
-    bench_close(&bench);
-}
-
-static void test_tcp_endings(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
-    struct bench bench = bench_open(&spec);
-    char byte;
-    /* half closed, with something still to read */
-    int fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    assert_int_equal(write(fd, "q", 1), 1);
-    assert_int_equal(shutdown(fd, SHUT_WR), 0);
-    bench_read_all(&bench, 0, &byte, 1);
-    assert_int_equal(byte, 'q');
-    bench_expect(&bench, LINK_SHUT, 0);
-    assert_int_equal(bench_poll(&bench, 0, 0), 0); /* said once */
-    assert_int_equal(bench.ops->read(bench.link, 0, &byte, 1), 0);
-    assert_int_equal(bench.ops->write(bench.link, 0, "r", 1), 1);
-    assert_int_equal(fd_read(fd, &byte, 1), 1); /* it gets what is due to it */
-    assert_int_equal(byte, 'r');
-    bench.ops->end(bench.link, 0);
-    bench_expect(&bench, LINK_CLOSED, 0);
-    assert_int_equal(fd_read(fd, &byte, 1), 0);
-    close(fd);
-    /* and somebody else comes before that has been read: the session is not free yet, but will be */
-    fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    assert_int_equal(write(fd, "q", 1), 1);
-    close(fd);
-    fd = tcp_client(tcp_port(&bench));
-    bench_poll(&bench, 0, DEADLINE_MS);
-    bench_read_all(&bench, 0, &byte, 1);
-    bench_expect(&bench, LINK_SHUT, 0);
-    bench_expect(&bench, LINK_CLOSED, 0);
-    bench_expect(&bench, LINK_OPENED, 0);
-    exchange(&bench, 0, fd);
-    /* closed, which shows by the first byte that is written to it */
-    close(fd);
-    bench_expect(&bench, LINK_SHUT, 0);
-    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
-    bench_expect(&bench, LINK_CLOSED, 0);
-    /* reset, while frames are on their way */
-    fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    bench_fill(&bench, 0);
-    const struct linger reset = {.l_onoff = 1, .l_linger = 0};
-    setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
-    close(fd);
-    bench_expect(&bench, LINK_CLOSED, 1);
-    /* noticed by write before poll came to it */
-    fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
-    close(fd);
-    ssize_t n = 0;
-    for (const int64_t end_ms = give_up_ms(); n >= 0 && now_ms() < end_ms;)
-        n = bench.ops->write(bench.link, 0, "x", 1);
-    assert_int_equal(n, SH_ECLOSED);
-    bench_expect(&bench, LINK_CLOSED, 0);
-    assert_int_equal(bench_poll(&bench, 1, 0), 0);
-    bench_close(&bench);
-}
-
-static void test_tcp_full(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
-    struct bench bench = bench_open(&spec);
-    int lazy = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    int other = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    size_t held = bench_fill(&bench, 0);
-    exchange(&bench, 1, other); /* one lazy reader does not hold up another */
-    fd_drain(lazy, held);
-    assert_int_equal(bench_expect(&bench, LINK_WRITABLE, 1).session, 0);
-    close(lazy);
-    close(other);
-    bench_close(&bench);
-}
-
-/* The child is killed in the middle of its reading and writing. */
-static void test_tcp_kill(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
-    struct bench bench = bench_open(&spec);
-    int fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    pid_t child = fork();
-    if (child == 0) {
-        char data[4096];
-        while (read(fd, data, sizeof data) > 0 && write(fd, data, 16) > 0)
-            ;
-        _exit(0);
-    }
-    close(fd);
-    char data[10000] = "";
-    bench_write_all(&bench, 0, data, sizeof data);
-    bench_read_all(&bench, 0, data, 16);
-    kill(child, SIGKILL);
-    waitpid(child, NULL, 0);
-    const int64_t end_ms = give_up_ms();
-    for (int closed = 0; !closed;) { /* what the child wrote comes first */
-        if (now_ms() > end_ms) give_up("the end of a client that was killed");
-        while (bench.ops->read(bench.link, 0, data, sizeof data) > 0)
-            ;
-        bench.n_queue = 0;
-        bench_poll(&bench, 0, 1000);
-        closed = bench.n_queue > 0 && bench.queue[0].kind == LINK_CLOSED;
-        if (bench.n_queue > 0 && bench.queue[0].kind == LINK_SHUT) bench.ops->write(bench.link, 0, data, 1);
-    }
-    bench_close(&bench);
-}
-
-/* Without a free descriptor the client is turned away and poll waits again. */
-static void test_tcp_descriptors(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 4};
-    struct bench bench = bench_open(&spec);
-    int fd = tcp_client(tcp_port(&bench)), hog[64], n = 0;
-    struct rlimit before, few;
-    getrlimit(RLIMIT_NOFILE, &before);
-    few = (struct rlimit){.rlim_cur = (rlim_t)fd + 8, .rlim_max = before.rlim_max};
-    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
-    while (n < 64 && (hog[n] = dup(fd)) >= 0)
-        n++;
-    bench_expect(&bench, LINK_REFUSED, 0);
-    assert_int_equal(bench_poll(&bench, 0, 0), 0);
-    while (n > 0)
-        close(hog[--n]);
-    setrlimit(RLIMIT_NOFILE, &before);
-    char byte;
-    assert_int_equal(fd_read(fd, &byte, 1), 0);
-    close(fd);
-    fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    exchange(&bench, 0, fd);
-    close(fd);
-    bench_close(&bench);
-}
-
-/* Events that do not fit into the caller's array come with the next call. */
-static void test_tcp_small_array(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
-    struct bench bench = bench_open(&spec);
-    struct link_event event;
-    int fd[3], seen[6] = {0};
-    for (int i = 0; i < 3; i++)
-        fd[i] = tcp_client(tcp_port(&bench));
-    for (int i = 0; i < 3; i++) {
-        assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
-        seen[event.kind]++;
-    }
-    const struct linger reset = {.l_onoff = 1, .l_linger = 0};
-    for (int i = 0; i < 3; i++) {
-        setsockopt(fd[i], SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
-        close(fd[i]);
-    }
-    for (int i = 0; i < 2; i++) {
-        assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
-        seen[event.kind]++;
-    }
-    assert_int_equal(seen[LINK_OPENED], 2);
-    assert_int_equal(seen[LINK_REFUSED], 1);
-    assert_int_equal(seen[LINK_CLOSED], 2);
-    bench_close(&bench);
-}
-
-static void test_tcp_refusals(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
-    struct bench bench = bench_open(&spec);
-    char want[64];
-    spec.port = tcp_port(&bench);
-    snprintf(want, sizeof want, "tcp:127.0.0.1:%d: cannot listen: Address already in use", spec.port);
-    expect_refused(&spec, SH_EINPUT, want);
-    bench_close(&bench);
-    spec.port = 65536;
-    expect_refused(&spec, SH_EINPUT, "0 to 65535");
-    spec.port = 0;
-    spec.max_sessions = LINK_MAX_SESSIONS + 1;
-    expect_refused(&spec, SH_EINPUT, "1 to 8");
-    spec.max_sessions = 1;
-    snprintf(spec.address, sizeof spec.address, "300.1.1.1");
-    expect_refused(&spec, SH_EINPUT, "tcp:300.1.1.1:0");
-    snprintf(spec.address, sizeof spec.address, "192.0.2.1"); /* TEST-NET: never an address of ours */
-    expect_refused(&spec, SH_EINPUT, "tcp:192.0.2.1:0: cannot listen");
-}
-
-/* As a user without rights: the error says which one is needed. */
-static void test_tcp_privileged_port(void **state)
-{
-    (void)state;
-    int least = 0;
-    FILE *f = fopen("/proc/sys/net/ipv4/ip_unprivileged_port_start", "r");
-    if (f == NULL || fscanf(f, "%d", &least) != 1 || least <= 80) skip();
-    fclose(f);
-    pid_t pid = fork();
-    if (pid == 0) {
-        struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1, .port = 80};
-        struct sh_err err = {0};
-        void *link;
-        if (getuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(2);
-        int rc = link_ops_get(LINK_TCP)->open(&spec, &link, &err);
-        _exit(rc != SH_EPERM || strstr(err.text, "tcp:127.0.0.1:80") == NULL ||
-              strstr(err.text, "CAP_NET_BIND_SERVICE") == NULL);
-    }
-    int status = 0;
-    assert_int_equal(waitpid(pid, &status, 0), pid);
-    assert_int_equal(status, 0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_table),
-        cmocka_unit_test(test_null),
-        cmocka_unit_test(test_wake),
-        cmocka_unit_test(test_file),
-        cmocka_unit_test(test_file_refusals),
-        cmocka_unit_test(test_file_full),
+        cmocka_unit_test(test_table), cmocka_unit_test(test_null),          cmocka_unit_test(test_wake),
+        cmocka_unit_test(test_file),  cmocka_unit_test(test_file_refusals), cmocka_unit_test(test_file_full),
         cmocka_unit_test(test_fd),
-        cmocka_unit_test(test_tcp_sessions),
-        cmocka_unit_test(test_tcp_endings),
-        cmocka_unit_test(test_tcp_full),
-        cmocka_unit_test(test_tcp_kill),
-        cmocka_unit_test(test_tcp_descriptors),
-        cmocka_unit_test(test_tcp_small_array),
-        cmocka_unit_test(test_tcp_refusals),
-        cmocka_unit_test(test_tcp_privileged_port),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

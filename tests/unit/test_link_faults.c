@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of links on request: what ends, what its client sees, and that the link is as before once they are over. */
+/* Faults of links on request: the ended sessions, their clients' view, and the link after the fault, which is as
+ * before. */
 #include <arpa/inet.h>
 #include <limits.h>
 #include <netinet/in.h>
@@ -21,7 +22,7 @@ static int port_of(const struct bench *bench)
     return atoi(strrchr(name, ':') + 1);
 }
 
-/* A client of a port of this machine; -1: it was refused. */
+/* Opens a client of a port of this machine; -1: it was refused. */
 static int dial(int port)
 {
     struct sockaddr_in at = {
@@ -33,7 +34,7 @@ static int dial(int port)
     return -1;
 }
 
-/* The end of the connection is a reset. */
+/* The connection must end with a reset. */
 static void expect_reset(int fd)
 {
     char byte;
@@ -42,7 +43,7 @@ static void expect_reset(int fd)
     close(fd);
 }
 
-/* Each kind of link, and what it can have. */
+/* Each kind of link, and the faults that it can have. */
 static void test_table(void **state)
 {
     (void)state;
@@ -65,7 +66,7 @@ static void test_table(void **state)
     }
 }
 
-/* One client is cut off, its neighbour is not; what the kernel still holds for the first is gone. */
+/* One client is cut off, but not its neighbour. The kernel's bytes for the first are gone. */
 static void test_tcp_disconnect(void **state)
 {
     (void)state;
@@ -82,7 +83,7 @@ static void test_tcp_disconnect(void **state)
     assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_OK);
     expect_reset(a);
     assert_int_equal(bench.ops->write(bench.link, 0, "abc", 3), SH_ECLOSED);
-    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* nobody is there */
+    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* there is no client */
     bench.n_queue = 0;
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 0);
     bench_write_all(&bench, 1, "def", 3);
@@ -98,7 +99,7 @@ static void test_tcp_disconnect(void **state)
     bench_close(&bench);
 }
 
-/* While it is unplugged the system refuses clients; at the end the port is the same. */
+/* While it is unplugged the system refuses clients. Afterwards the port is the same. */
 static void check_unplugged_port(struct bench *bench, int n_sessions, int port)
 {
     assert_int_equal(cut(bench, LINK_FAULT_UNPLUG, 0), SH_OK);
@@ -108,7 +109,7 @@ static void check_unplugged_port(struct bench *bench, int n_sessions, int port)
     assert_int_equal(dial(port), -1);
     bench_poll(bench, 0, 0);
     assert_true(is_calm(bench, 3));
-    /* somebody else takes the port, and gives it back */
+    /* Another program takes the port, and gives it back. */
     struct sockaddr_in at = {
         .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK), .sin_port = htons((uint16_t)port)};
     const int other = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), one = 1;
@@ -143,7 +144,7 @@ static void test_tcp_unplug(void **state)
     bench_close(&bench); /* unplugged as it is */
 }
 
-/* A WebSocket, and the link's answer to it. */
+/* Opens a WebSocket, and reads the link's answer to it. */
 static int upgrade(struct bench *bench, int port)
 {
     char text[300], answer[1000];
@@ -165,7 +166,7 @@ static int upgrade(struct bench *bench, int port)
     return fd;
 }
 
-/* No close frame, and nothing of a message that is on its way. */
+/* There is no close frame, and nothing of a message that is on its way. */
 static void test_web(void **state)
 {
     (void)state;
@@ -207,7 +208,7 @@ static void test_web(void **state)
     bench_close(&bench);
 }
 
-/* The client's terminal is hung up; under the same name there is another one, empty and raw. */
+/* The client's terminal is hung up. Under the same name there is another one, empty and raw. */
 static void test_pty_disconnect(void **state)
 {
     (void)state;
@@ -215,7 +216,7 @@ static void test_pty_disconnect(void **state)
     char *dir = test_dir(), byte, before[PATH_MAX], after[PATH_MAX];
     snprintf(spec.path, sizeof spec.path, "%s/scan0", dir);
     struct bench bench = bench_open(&spec);
-    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* nobody is there */
+    assert_int_equal(cut(&bench, LINK_FAULT_DISCONNECT, 0), SH_ESTATE); /* there is no client */
     for (int round = 0; round < 3; round++) {
         assert_non_null(realpath(spec.path, before));
         int fd = client_open(&bench);
@@ -308,7 +309,7 @@ static void test_udp(void **state)
     assert_int_equal(recvfrom(fd, text, sizeof text, 0, (struct sockaddr *)&again, &len), 3);
     assert_memory_equal(text, "two", 3);
     assert_int_equal(again.sin_port, from.sin_port);
-    /* unplugged and plugged in between two polls: a session ends all the same */
+    /* Unplugged and plugged in between two polls, a session ends all the same. */
     assert_int_equal(cut(&bench, LINK_FAULT_UNPLUG, 0), SH_OK);
     assert_int_equal(cut(&bench, LINK_FAULT_PLUG, 0), SH_OK);
     assert_int_equal(bench.ops->write(bench.link, 0, "no", 2), SH_ECLOSED);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The pty link: one client after the other, and the path it is found at. */
+/* These are tests of the pty link: one client after the other, and the path of its terminal. */
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <termios.h>
@@ -15,7 +15,7 @@ static void test_raw_both_ways(void **state)
     uint8_t out[4096], back[4096];
     for (size_t i = 0; i < sizeof out; i++) /* all values, at steps of 1, 2, .. 16 */
         out[i] = (uint8_t)(i * (1 + i / 256));
-    assert_int_equal(bench.ops->write(bench.link, 0, out, 1), SH_ECLOSED); /* nobody there */
+    assert_int_equal(bench.ops->write(bench.link, 0, out, 1), SH_ECLOSED); /* there is no client */
     int fd = client_open(&bench);
     bench_expect(&bench, LINK_OPENED, 0);
     bench_write_all(&bench, 0, out, sizeof out);
@@ -25,7 +25,7 @@ static void test_raw_both_ways(void **state)
     assert_int_equal(write(fd, out, sizeof out), sizeof out);
     bench_read_all(&bench, 0, back, sizeof back);
     assert_memory_equal(out, back, sizeof out);
-    /* no echo: what went in either way does not come back */
+    /* There is no echo: written bytes do not come back, in either way. */
     int waiting = -1;
     assert_int_equal(ioctl(fd, FIONREAD, &waiting), 0);
     assert_int_equal(waiting, 0);
@@ -56,7 +56,7 @@ static void test_full(void **state)
     bench_close(&bench);
 }
 
-/* What one client did not read, and how it left the terminal, is not there for the next. */
+/* The bytes that one client did not read, and its settings of the terminal, are gone for the next. */
 static void test_fresh_for_next(void **state)
 {
     (void)state;
@@ -91,7 +91,7 @@ static void test_fresh_for_next(void **state)
     bench_close(&bench);
 }
 
-/* A client leaves while this process has no descriptors: the port rests all the same, and serves the next one. */
+/* A client leaves while this process has no descriptors. The port rests all the same, and serves the next one. */
 static void test_no_descriptors(void **state)
 {
     (void)state;
@@ -124,7 +124,7 @@ static void test_no_descriptors(void **state)
     bench_close(&bench);
 }
 
-/* echo '*RST' > /dev/pts/3: over before we look, and still heard. */
+/* echo '*RST' > /dev/pts/3 is over before the link looks, and still accepted. */
 static void test_written_and_gone(void **state)
 {
     (void)state;
@@ -141,7 +141,7 @@ static void test_written_and_gone(void **state)
     bench_close(&bench);
 }
 
-/* The next client comes before we look: there is never a hang-up to see. */
+/* The next client comes before the link looks, so there is never a hang-up to see. */
 static void test_unseen_change(void **state)
 {
     (void)state;
@@ -164,7 +164,7 @@ static void test_unseen_change(void **state)
     bench_close(&bench);
 }
 
-/* What is still to be written for a client that is gone does not reach the one that came since. */
+/* Bytes still to be written for a client that is gone do not reach the one that came since. */
 static void test_nothing_of_the_one_before(void **state)
 {
     (void)state;
@@ -250,7 +250,7 @@ static void test_symlink(void **state)
     assert_int_equal(rmdir(dir), 0); /* and nothing lies about */
 }
 
-/* A head was killed, and another program has got its terminal's number: the link is older than that terminal. */
+/* A head was killed, and another program has got its terminal's number. The link is older than that terminal. */
 static void test_left_symlink(void **state)
 {
     (void)state;
@@ -274,7 +274,7 @@ static void test_left_symlink(void **state)
     assert_int_equal(rmdir(dir), 0);
 }
 
-/* Ordinary users cannot open a terminal again on which a client left TIOCEXCL: the head makes a new one. */
+/* Ordinary users cannot open a terminal again on which a client left TIOCEXCL, so the head makes a new one. */
 static void exclusive_child(const char *path)
 {
     struct link_spec spec = {.type = LINK_PTY};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The pty link: clients that come and go at the moments when nobody watches the terminal. The link's own calls of the
- * kernel go through here, so that a client can act within them. */
+/* The pty link: clients come and go at moments when the terminal is not watched. The link's own calls of the kernel go
+ * through here, so that a client can act within them. */
 #include <poll.h>
 #include <sys/inotify.h>
 #include <sys/syscall.h>
@@ -61,7 +61,7 @@ static void begin(void)
     bench_expect(&bench, LINK_OPENED, 0);
 }
 
-/* A client has its session, and is heard and answered. */
+/* A client has its session, and gets its answers. */
 static void expect_served(int fd)
 {
     char text[8];
@@ -77,7 +77,7 @@ static void expect_served(int fd)
     assert_true(is_calm(&bench, 1));
 }
 
-/* A client leaves; while nobody watches the terminal, another one does that. */
+/* A client leaves. While the terminal is not watched, another one does that. */
 static void begin_with(void (*next)(void))
 {
     begin();
@@ -87,7 +87,7 @@ static void begin_with(void (*next)(void))
     bench_expect(&bench, LINK_OPENED, 0);
 }
 
-/* A client that wrote and left meanwhile is heard, and the one after it is not taken for it. */
+/* A client that wrote and left meanwhile is accepted, and the next one is not confused with it. */
 static void test_written_and_gone_unwatched(void **state)
 {
     (void)state;
@@ -98,7 +98,7 @@ static void test_written_and_gone_unwatched(void **state)
     bench_close(&bench);
 }
 
-/* The same, where the next client comes before the link has read what is there: it has a session of its own. */
+/* The next client comes before the link has read those bytes: it has a session of its own. */
 static void test_next_after_written_and_gone(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The pty link against clients that come and go as fast as they can, many at once, and killed. */
+/* The pty link with clients that come and go as fast as they can, many at once, and killed. */
 #include <poll.h>
 
 #include "tests/unit/pty_rig.h"
@@ -38,8 +38,7 @@ static pid_t spawn_cycles(const char *path, int cycles)
     _exit(0);
 }
 
-/* Follows the events while children open and close as fast as they can; order and balance must hold
- * throughout. */
+/* Follows the events while children open and close as fast as they can. Order and balance must hold throughout. */
 static void follow(struct bench *bench, const pid_t *children, int n_children, size_t *bytes)
 {
     char data[256];
@@ -62,7 +61,7 @@ static void follow(struct bench *bench, const pid_t *children, int n_children, s
         }
         for (ssize_t n; open_now && (n = bench->ops->read(bench->link, 0, data, sizeof data)) > 0;)
             *bytes += (size_t)n;
-        /* The children were gone before this look, and it found nothing: that was all. */
+        /* The children were gone before this look, and it found nothing, so there is no more. */
         if (left == 0 && !open_now && bench->n_queue == 0) break;
     }
     bench->n_queue = 0;
@@ -94,8 +93,8 @@ static void test_quick_cycles(void **state)
     bench_close(&bench);
 }
 
-/* Opens, asks, waits for the answer, closes, and comes back at once: into whatever we do at the end of a
- * session. A client may ask again after a second, as real ones do. */
+/* Opens, asks, waits for the answer, closes, and comes back at once, so that it meets all moments of a session's end. A
+ * client may ask again after a second, as real ones do. */
 static void ask_again_and_again(const char *path, int cycles)
 {
     for (int i = 0; i < cycles; i++) {
@@ -137,14 +136,14 @@ static void test_nobody_missed(void **state)
     }
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
-    /* One each. A client that comes while we are at the end of the one before may be told as one with it: how often
-     * depends on how the machine schedules us, so the lower limit only says that most are told apart. */
+    /* There is one session each. A client that comes at the end of the one before may be counted with it. How often
+     * depends on the machine's scheduling, so the lower limit only shows that most are told apart. */
     assert_in_range(sessions, 1500, 3000);
     if (open_now) read_to_end(&bench);
     bench_close(&bench);
 }
 
-/* A child is killed while it writes and does not read; another one keeps the session up. */
+/* A child is killed while it writes and does not read. Another one keeps the session up. */
 static void test_kill(void **state)
 {
     (void)state;
@@ -154,7 +153,7 @@ static void test_kill(void **state)
         if (with_other) bench_expect(&bench, LINK_OPENED, 0);
         int fd = client_open(&bench);
         if (!with_other) bench_expect(&bench, LINK_OPENED, 0);
-        bench_fill(&bench, 0); /* nobody reads: what is left in the terminal must not keep the session up */
+        bench_fill(&bench, 0); /* no client reads, and bytes left in the terminal must not keep the session up */
         pid_t child = fork_child();
         if (child == 0) {
             char data[512] = "";

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What every TCP socket of a head has, whoever accepted it: a peer that vanishes without a word is noticed, and one that
- * comes when there are no descriptors is turned away. The test finds the link's end of a connection among this process's
- * own descriptors. */
+/* Properties of every TCP socket of a head, for any link: a peer that vanishes without a word is noticed, and one that
+ * comes when there are no descriptors is turned away. The test finds the link's end of a connection among this
+ * process's own descriptors. */
 #include "tests/unit/link_test.h"
 
 #include <arpa/inet.h>
@@ -61,7 +61,7 @@ static int option(int fd, int level, int name)
     return value;
 }
 
-/* impatient: noticed with bytes under way, too; otherwise a peer that only rests for long is not cut off. */
+/* impatient: it is noticed with bytes under way, too; otherwise a peer that only rests for long is not cut off. */
 static void check(const struct link_spec *spec, int impatient)
 {
     struct bench bench = bench_open(spec);
@@ -84,7 +84,8 @@ static void check(const struct link_spec *spec, int impatient)
     bench_close(&bench);
 }
 
-/* One after the other finds no descriptor: each is turned away and said, and none is left to wake the link again. */
+/* One after the other finds no descriptor. Each is turned away and reported, and none is left to wake the link
+ * again. */
 static void starve(const struct link_spec *spec)
 {
     enum { CLIENTS = 5, HOGS = 64 };
@@ -177,7 +178,7 @@ static void *turn_away(void *arg)
     return NULL;
 }
 
-/* Two threads without descriptors: neither takes what the other gives up for a moment. */
+/* Two threads are without descriptors. Neither takes the one that the other gives up for a moment. */
 static void starve_two_doors(void)
 {
     int client[2 * IN_VAIN], n = 0;
@@ -230,7 +231,7 @@ static void test_web(void **state)
     starve(&(struct link_spec){.type = LINK_WEB, .max_sessions = 1});
 }
 
-/* Where clients come for a request, the one that has been silent for longest makes room; elsewhere nobody does. */
+/* If clients come for a request, the one that has been silent for longest makes room. Otherwise none does. */
 static void test_brief(void **state)
 {
     (void)state;

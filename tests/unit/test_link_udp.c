@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The udp link: a write is a datagram, whoever listens or doesn't; where packets may go, and where not. */
+/* The udp link: a write is a datagram, with or without a receiver; allowed and refused destinations. */
 #include "tests/unit/link_test.h"
 
 #include <arpa/inet.h>
@@ -9,7 +9,7 @@
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 
-/* A receiver, and the spec of a link to it. */
+/* Opens a receiver, and writes the spec of a link to it. */
 static int open_receiver(struct link_spec *spec)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -58,7 +58,7 @@ static void a_write_is_a_datagram(void **state)
     close(fd);
 }
 
-/* A link to a port that nobody has. */
+/* Opens a link to a port without a receiver. */
 static struct bench open_without_receiver(struct sockaddr_in *at)
 {
     struct link_spec spec;
@@ -71,19 +71,19 @@ static struct bench open_without_receiver(struct sockaddr_in *at)
     return bench;
 }
 
-/* A receiver comes to that port, and gets what is sent then. */
+/* A receiver comes to that port, and gets the next datagrams. */
 static void end_with_receiver(struct bench *bench, const struct sockaddr_in *at)
 {
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     assert_int_equal(bind(fd, (const struct sockaddr *)at, sizeof *at), 0);
     assert_int_equal(bench->ops->write(bench->link, 0, "here", 4), 4);
     expect_datagram(fd, "here", 4);
-    assert_true(bench->ops->refused(bench->link) > 0); /* what went before; not this one */
+    assert_true(bench->ops->refused(bench->link) > 0); /* earlier datagrams were refused, this one was not */
     bench_close(bench);
     close(fd);
 }
 
-/* Nobody there: each send succeeds, poll stays calm; a receiver that comes later gets what is sent then. */
+/* Without a receiver each send succeeds, and poll stays calm. A receiver that comes later gets the next datagrams. */
 static void a_receiver_that_is_not_there(void **state)
 {
     (void)state;
@@ -98,7 +98,7 @@ static void a_receiver_that_is_not_there(void **state)
     end_with_receiver(&bench, &at);
 }
 
-/* The same, and the refusal is met by a write, not by poll: nothing that is sent afterwards is lost for it. */
+/* The same, where a write meets the refusal, and not poll. No later datagram is lost by it. */
 static void a_refusal_costs_no_later_datagram(void **state)
 {
     (void)state;
@@ -170,7 +170,7 @@ static void where_packets_may_go(void **state)
     }
 }
 
-/* The next datagram, and the source's address and port, TTL where the socket asks for it. */
+/* Takes the next datagram, and checks the source's address and port, and TTL where the socket asks for it. */
 static void expect_from(int fd, const char *address, int port, int ttl)
 {
     struct sockaddr_in from;
@@ -189,8 +189,8 @@ static void expect_from(int fd, const char *address, int port, int ttl)
     assert_int_equal(had, ttl);
 }
 
-/* Two heads send from a port that their receiver has, too, on one machine: it tells them apart by address, and gets all
- * that they send. None of it comes back to them, nor what others send. */
+/* Two heads on one machine send from a port that their receiver has, too. It tells them apart by address, and gets all
+ * their datagrams. None of them, and none of others', come back to the heads. */
 static void sources_share_their_port(void **state)
 {
     (void)state;
@@ -227,8 +227,8 @@ static void sources_share_their_port(void **state)
     close(fd);
 }
 
-/* Another program has the port for itself: said once where the port was not asked for, else the link is refused. Its
- * receiver's own place is no source. */
+/* Another program has the port for itself. That is reported once where the port was not asked for; else the link is
+ * refused. The place of its receiver is no source. */
 static void a_source_port_that_is_taken(void **state)
 {
     (void)state;

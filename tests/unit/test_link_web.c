@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The web link: what requests get, sessions by WebSocket, and what it does not let in. Clients are bytes on a socket, as
- * RFC 9112 and RFC 6455 write them. */
+/* The web link: answers to requests, sessions by WebSocket, and refusals. Clients are bytes on a socket, in the form of
+ * RFC 9112 and RFC 6455. */
 #include <sys/socket.h>
 #include <arpa/inet.h>
 #include <errno.h>
@@ -10,7 +10,8 @@
 
 #include "tests/unit/web_rig.h"
 
-/* What a browser holds the page to: nothing from elsewhere, no frame around it, no type guessed, no other site's script. */
+/* The rules that a browser enforces for the page: nothing from elsewhere, no frame around it, no type guessed, no other
+ * site's script. */
 static void test_headers(void **state)
 {
     (void)state;
@@ -97,7 +98,7 @@ static void test_one_request_each(void **state)
     bench_close(&bench);
 }
 
-/* Half a request, and the client is gone: so is its connection, at once. */
+/* A client sends half a request and leaves. Its connection ends at once. */
 static void test_half_request(void **state)
 {
     (void)state;
@@ -118,7 +119,7 @@ static void test_half_request(void **state)
     bench_close(&bench);
 }
 
-/* Without a descriptor for it, a connection is closed, not left to wake the link for ever. */
+/* Without a descriptor for it, a connection is closed, so that it does not wake the link for ever. */
 static void test_no_descriptors(void **state)
 {
     (void)state;
@@ -208,7 +209,7 @@ static void test_session(void **state)
     bench_close(&bench);
 }
 
-/* A client in a thread of its own: takes all until the link says goodbye, and answers that. */
+/* The client runs in a thread of its own. It takes all until the link says goodbye, and answers that. */
 struct taker {
     int fd;
     uint8_t bytes[300000];
@@ -225,7 +226,7 @@ static void *take_all(void *ctx)
     return NULL;
 }
 
-/* What was written before the end arrives, whole, and then why there is no more. */
+/* Bytes that were written before the end arrive whole. Then the reason for the end comes. */
 static void test_goodbye(void **state)
 {
     (void)state;
@@ -278,7 +279,7 @@ static void test_turned_down(void **state)
     bench_close(&bench);
 }
 
-/* What is no message of commands ends its session, with the reason, and nothing else. */
+/* A message that is no command ends its session, with the reason, and does nothing else. */
 static void test_bad_messages(void **state)
 {
     (void)state;

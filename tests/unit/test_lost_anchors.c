@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What was to be said in ticks that are lost is said again: descriptor and anchor, on a drive along which the anchor
- * changes. */
+/* Frames of lost ticks are sent again: descriptor and anchor, on a drive along which the anchor changes. */
 #include "tests/unit/device_rig.h"
 
 static const char DRIVE[] = "x_m,y_m,z_m,speed_m_s\n0,0,0,900\n0,9000,0,900\n";
 
-/* A scan on a drive of 10 s, of which each stretch takes 2.2. */
+/* A scan on a drive of 10 s; each stretch takes 2.2 s. */
 static struct rig *drive(char path[96])
 {
     char way[128];
@@ -86,7 +85,7 @@ static void an_anchor_lost_late_comes_late(void **state)
     unlink(path);
 }
 
-/* The tick that says it again may be lost, too. */
+/* The tick that repeats it may be lost, too. */
 static void an_anchor_lost_again_comes_again(void **state)
 {
     (void)state;

@@ -67,7 +67,7 @@ static int is_white(const uint8_t *rgb)
     return rgb[0] == 255 && rgb[1] == 255 && rgb[2] == 255;
 }
 
-/* Rec. 709 weights on the encoded values: enough to tell dark from light. */
+/* Rec. 709 weights on the encoded values are enough to tell dark from light. */
 static double brightness(const uint8_t *rgb)
 {
     return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
@@ -109,7 +109,7 @@ static void test_size(void **state)
     map_free(NULL);
 }
 
-/* Each point by itself: its pixel and the eight about it, and no other. */
+/* Each point sets its own pixel and the eight about it, and no other. */
 static void test_place(void **state)
 {
     (void)state;
@@ -217,8 +217,7 @@ static void test_station(void **state)
     map_free(map);
 }
 
-/* The bar is as long as its label says: 2 m at 1 cm are 200 pixels, found as the longest dark run below the
- * map. */
+/* The bar is as long as its label says: 2 m at 1 cm are 200 pixels, found as the longest dark run below the map. */
 static void test_scale_bar(void **state)
 {
     (void)state;
@@ -286,7 +285,7 @@ static void test_refusals(void **state)
         assert_null(map);
         if (strstr(err.text, bad[i].part) == NULL) fail_msg("'%s' without '%s'", err.text, bad[i].part);
     }
-    /* the pixel size that the text proposes is allowed */
+    /* The proposed pixel size is allowed. */
     for (int i = 0; i < 3; i++) {
         struct map_spec spec = bad[i == 1 ? 0 : i].spec;
         struct map *map = NULL;
@@ -318,7 +317,7 @@ static void test_bad_path(void **state)
     assert_int_equal(mkdir(in_dir("taken.png"), 0700), 0);
     expect_no_write(map, in_dir("taken.png"), SH_EINPUT);
     assert_int_equal(rmdir(in_dir("taken.png")), 0);
-    /* a full disk: what was there before is whole */
+    /* On a full disk the earlier file stays whole. */
     int fd = open(in_dir("old.png"), O_CREAT | O_WRONLY, 0600);
     assert_int_equal(write(fd, "old", 3), 3);
     close(fd);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Names on the map, and the map as SVG: read back by a small reader of XML, its image by libpng. */
+/* Names on the map, and the map as SVG. A small reader of XML reads it back, and libpng its image. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -44,7 +44,7 @@ static void add(struct map *map, double x_m, double y_m, double heading_rad, con
     if (map_add_station(map, &s, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Checks all labels that have places, by each other and by the stations at x_m, y_m. Returns how many have one. */
+/* Checks all labels that have places, against each other and the stations at x_m, y_m. Returns how many have one. */
 static uint32_t check_labels(const struct map_label *label, uint32_t n, const double (*place_px)[2])
 {
     uint32_t placed = 0;
@@ -64,8 +64,8 @@ static uint32_t check_labels(const struct map_label *label, uint32_t n, const do
     return placed;
 }
 
-/* 60 stations at random places of 600 x 600 pixels: a label is about 110 x 35 pixels, so all of them would cover two
- * thirds of the map, and not each finds room. Of 12 on a grid of 150 pixels each does. */
+/* 60 stations are at random places of 600 x 600 pixels. A label is about 110 x 35 pixels, so all of them would cover
+ * two thirds of the map, and some find no room. All 12 on a grid of 150 pixels do. */
 static void test_labels(void **state)
 {
     (void)state;
@@ -103,7 +103,7 @@ static void test_labels(void **state)
     map_free(map);
 }
 
-/* Where there is a wall to the right of a station, its name goes elsewhere. */
+/* With a wall to the right of a station, its name goes elsewhere. */
 static void test_walls(void **state)
 {
     (void)state;
@@ -131,7 +131,8 @@ struct element {
     const char *attributes; /* up to > */
 };
 
-/* Walks well-formed XML: each element that opens is given to `seen`, and closes in order; no & without its entity. */
+/* Walks well-formed XML. Each element that opens is given to `seen`, and closes in order; there is no & without its
+ * entity. */
 static void walk(const char *xml, void (*seen)(void *ctx, const struct element *e), void *ctx)
 {
     char open[16][32];
@@ -239,7 +240,7 @@ static size_t decode(const char *text, uint8_t *out)
     return n;
 }
 
-/* The image in the SVG shows what the PNG's map shows: one point, and white. */
+/* The image in the SVG shows the PNG's map: one point, and white. */
 static void check_image(const char *href, const struct map_layout *at)
 {
     static const char kind[] = "data:image/png;base64,";
@@ -311,8 +312,8 @@ static uint64_t ink_of(const char *text, double *width)
     return hash;
 }
 
-/* Each printable character of ASCII and each letter of Latin-1 looks different from all others, and none is the box of
- * an unknown one, but for the few that the font lacks. */
+/* Each printable character of ASCII and each letter of Latin-1 looks different from all others. None is the box of an
+ * unknown one, but for the few that the font lacks. */
 static void test_font(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What single precision takes from a mesh: as much as the format holds is allowed, said, and planned with. */
+/* These are tests of the error of single precision in a mesh. Errors that the format makes are allowed, reported, and
+ * planned with. */
 #include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 
@@ -9,7 +10,7 @@
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"
 
-/* A hall of 30 m: its farthest coordinate is off by 31 * 6e-8 = 1.86e-6 m, told with two digits. */
+/* A hall of 30 m: the error of its farthest coordinate is 31 * 6e-8 = 1.86e-6 m, printed with two digits. */
 static const char HALL[] = COLLADA_TRIANGLE("-1 -1 0 31 -1 0 0 31 0");
 
 static int remove_files(void **state)
@@ -42,7 +43,7 @@ static int load_hall(const char *mesh, const char *tolerance, const char *more, 
     return rc == SH_OK ? load_site(cfg, &report, site, err) : rc;
 }
 
-/* The one row of a stage. */
+/* Returns the one row of a stage. */
 static const struct plan_row *row_of(const char *stage, const struct site *site)
 {
     const struct plan_row *found = NULL;
@@ -83,7 +84,7 @@ static void as_much_as_the_format_holds_is_allowed(void **state)
     check_accepted("hall.dae", "  tolerance_m: 2e-6\n", "plan: {tolerance_m: 1e-6}\n");
 }
 
-/* A tenth of what the plan may be off by, where that is said; the figure that is named is enough. */
+/* The default is a tenth of the plan's tolerance, where that is given. The figure that the refusal names is enough. */
 static void a_refusal_names_key_and_figure(void **state)
 {
     (void)state;
@@ -98,7 +99,7 @@ static void a_refusal_names_key_and_figure(void **state)
     check_accepted("hall.dae", "  tolerance_m: 1.9e-6\n", "plan: {tolerance_m: 1e-5}\n");
 }
 
-/* Float columns of a binary PLY: the reader is exact, the writer was not. */
+/* Float columns of a binary PLY: the reader is exact, but the writer was not. */
 static void float_columns_of_ply_are_told(void **state)
 {
     (void)state;
@@ -113,10 +114,10 @@ static void float_columns_of_ply_are_told(void **state)
     memcpy(ply + sizeof head - 1 + sizeof v, face, sizeof face);
     write_file("hall.ply", ply, sizeof ply);
     check_accepted("hall.ply", "", "");
-    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* what is done is done: never refused */
+    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* a step that is done is never refused */
 }
 
-/* A millimetre shows in a scan: then the warning says what to do. */
+/* A millimetre shows in a scan, so the warning gives the remedy. */
 static void a_coarse_mesh_is_to_be_moved(void **state)
 {
     (void)state;
@@ -137,9 +138,8 @@ static void a_coarse_mesh_is_to_be_moved(void **state)
     }
 }
 
-/* Corners at 0 and 1, made 100 times larger and then 100 times smaller: in units of 6e-8 the corner is off
- * by 1, then by 100 and 100 for the factor, then by 2 and 1 for the other factor. That they were at 100 is
- * no error. */
+/* Corners at 0 and 1 are made 100 times larger and then 100 times smaller. In units of 6e-8 the corner's error is 1,
+ * then 100 and 100 for the factor, then 2 and 1 for the other factor. The place at 100 is no error. */
 static void an_error_is_scaled_as_the_mesh_is(void **state)
 {
     (void)state;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes written, and read back by readers that share nothing with the writers: our own of .obj and .ply, Assimp's of .gltf,
- * .glb and .fbx. */
+/* Meshes are written, and read back by readers that share nothing with the writers: our own of .obj and .ply, Assimp's
+ * of .gltf, .glb and .fbx. */
 #include <math.h>
 
 #include "core/studio/mesh.h"
 #include "core/studio/picture.h"
 #include "tests/unit/scene_files.h"
 
-/* A sheet of four triangles in two parts. Its coordinates are all different, so that an axis that is swapped shows, and
- * multiples of 1/64, which float holds exactly. */
+/* A sheet of four triangles in two parts. Its coordinates all differ, so that a swapped axis shows. They are multiples
+ * of 1/64, which float holds exactly. */
 enum { N_VERTICES = 7, N_FACES = 4 };
 static const double xyz[N_VERTICES][3] = {{1, 2, 3},       {2.5, 2.125, 3.25}, {2.75, 4, 3.5}, {1.25, 4.5, 3.75},
                                           {-7, 0.5, 1.75}, {-6, 0.75, 2},      {-6.5, 2, 9}};
@@ -52,7 +52,7 @@ static void write_ok(const char *name, const struct mesh *mesh)
     if (mesh_write(at(name), mesh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Nothing is left of what is refused. */
+/* A refused mesh leaves no file. */
 static void write_refused(const char *name, const struct mesh *mesh, const char *expected)
 {
     char part[160];
@@ -83,7 +83,7 @@ static void write_image(const char *name)
     picture_free(&image);
 }
 
-/* Triangle i of the scene is a face of the sheet, from whichever corner on, with its texture coordinates. */
+/* Triangle i of the scene is a face of the sheet, beginning at any corner, with its texture coordinates. */
 static void assert_triangle(const struct scene *s, uint32_t i, unsigned found[N_FACES])
 {
     for (uint32_t f = 0; f < N_FACES; f++)
@@ -159,7 +159,7 @@ static void each_format_is_read_back(void **state)
     }
 }
 
-/* Text whose every character is worked out from the format's rules. */
+/* Every character of the text is worked out from the format's rules. */
 static void ply_as_text(void **state)
 {
     (void)state;
@@ -248,8 +248,8 @@ static void what_is_refused(void **state)
     write_refused("a.glb", &mesh, "a texture without texture coordinates");
 }
 
-/* Half a step of float at 5.4e6 m is 0.25 m: 5.4e6 lies between 2^22 and 2^23, where floats are 2^-1 apart. The bound is
- * 2^-24 of the coordinate, 0.32 m. A mesh of 12 m may have errors of 12 micrometres. */
+/* Half a step of float at 5.4e6 m is 0.25 m: 5.4e6 lies between 2^22 and 2^23, where floats are 2^-1 apart. The bound
+ * is 2^-24 of the coordinate, 0.32 m. A mesh of 12 m may have errors of 12 micrometres. */
 static void floats_that_are_too_coarse(void **state)
 {
     (void)state;
@@ -274,7 +274,7 @@ static int stop_now(void *ctx)
     return 1;
 }
 
-/* A file that was there stays as it was. */
+/* An earlier file does not change. */
 static void whole_or_not_at_all(void **state)
 {
     (void)state;
@@ -305,7 +305,7 @@ static uint64_t get64(const char *p)
     return v;
 }
 
-/* Nodes from `from` to `end`; each list of nodes ends with 25 zeros. Returns how many there are. */
+/* Counts the nodes from `from` to `end`; each list of nodes ends with 25 zeros. */
 static unsigned count_nodes(const char *fbx, size_t from, size_t end, int is_top)
 {
     static const char zero[25];
@@ -326,7 +326,8 @@ static unsigned count_nodes(const char *fbx, size_t from, size_t end, int is_top
     return 0;
 }
 
-/* As Blender wants it; and the same bytes each time, though the exporter writes the time of day. */
+/* The file has the ends that Blender needs. The bytes are the same each time, though the exporter writes the time of
+ * day. */
 static void fbx_has_all_ends(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Images of grids that are larger than a texture may be: how many lines and rows share a texel is said, of that scan where
- * it is most. */
+/* Images of grids that are larger than a texture may be. The number of lines and rows that share a texel is reported,
+ * for the scan with the largest. */
 #include "tests/unit/recorder_rig.h"
 
 enum { PULSES = 20000 }; /* of a line, 1000 a second as the rig has them */
@@ -31,7 +31,7 @@ static void begin_scan(uint32_t scan)
     rig_anchor(&a);
 }
 
-/* Two lines of two shots, which make triangles, and one more shot in that many rows. */
+/* Two lines of two shots make triangles, and there is one more shot in that many rows. */
 static void put_wall(uint32_t rows)
 {
     for (uint32_t line = 0; line < 2; line++) {
@@ -44,7 +44,7 @@ static void put_wall(uint32_t rows)
     }
 }
 
-/* A texture has up to 16384 rows: two of 16385 share one, whatever scan comes before or after. */
+/* A texture has up to 16384 rows. Two of 16385 share one, whatever scan comes before or after. */
 static void the_largest_step_is_said(void **state)
 {
     (void)state;

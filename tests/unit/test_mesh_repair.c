@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes whose recorder was killed while it wrote them, wherever they end. */
+/* Meshes whose recorder was killed while it wrote them, at any length. */
 #include "core/studio/mesh.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/killed_rig.h"
@@ -9,7 +9,7 @@ enum { EACH = SANITIZED ? 37 : 1 }; /* of the bytes */
 static char *whole;
 static size_t whole_len;
 
-/* Two parts of a square each; colours and normals make the lines as long as they get. */
+/* Two parts have a square each. Colours and normals make the longest lines. */
 static char *write_mesh(const char *path, int ascii, size_t *len)
 {
     static const double xyz_m[8][3] = {{0, 0, 0},    {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
@@ -72,7 +72,7 @@ static void test_cuts(void **state)
         assert_int_equal(r.n_kept, n);
         assert_int_equal(r.n_scans, lines_that_begin(whole, end, "o "));
         assert_int_equal(r.cut_bytes, cut - end);
-        assert_int_equal(r.was_whole, 0); /* nobody can tell */
+        assert_int_equal(r.was_whole, 0); /* it can't be known */
         char *now = (char *)rig_read(path, &len);
         assert_memory_equal(now, whole, end);
         assert_memory_equal(now + end, NOTE, sizeof NOTE - 1);
@@ -87,7 +87,7 @@ static void test_cuts(void **state)
     unlink(rig_path("cut.obj.part"));
 }
 
-/* A whole file is as it was; other files, damage and absurd numbers are refused in a line. */
+/* A whole file does not change. Other files, damage and absurd numbers are refused in a line. */
 static void test_refused(void **state)
 {
     (void)state;
@@ -111,7 +111,7 @@ static void test_refused(void **state)
     unlink(path);
 }
 
-/* A .ply is all there, or nothing of it is kept. */
+/* A .ply is complete, or none of it is kept. */
 static void test_ply(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SITE:POSE in the device, without threads: a scan from a station that was moved has the bytes of one whose configuration
- * says that place; what is shared stays; what is not used is freed, once; and what can't be done changes nothing. */
+/* These are tests of SITE:POSE in the device, without threads. A scan from a moved station has the bytes of one whose
+ * configuration has that place. Shared parts stay, unused ones are freed once, and a failed move changes nothing. */
 #include "tests/unit/device_rig.h"
 
 #include <math.h>
@@ -10,14 +10,14 @@
 
 /* A frame of 10 degrees: 55 ms, 16,667 pulses. */
 #define SHORT "head.pan_stop_deg=10", "head.frames=1"
-/* A map of each station, whatever it pays. */
+/* Each station has a map, whether it pays or not. */
 #define MAPS "cast.sight=on", "cast.sight_mib=1"
 
 #define TRIPOD "stations[0].tripod.leg_m=2.5", "stations[0].tripod.head_above_m=0.2"
 
 /* ---- a session by hand */
 
-/* As the loop does it; the reply. */
+/* Moves as the loop does, and returns the reply. */
 static const char *move(struct rig *rig, const char *line)
 {
     static struct command_result result;
@@ -57,7 +57,7 @@ struct bytes {
     size_t len;
 };
 
-/* What stream_sha256 is made of, of the ticks up to the scan's end. */
+/* Takes the bytes that stream_sha256 includes, of the ticks up to the scan's end. */
 static struct bytes take_scan(struct rig *rig)
 {
     struct bytes b = {NULL, 0};
@@ -95,7 +95,7 @@ static void expect_same(const struct bytes *a, const struct bytes *b)
     assert_memory_equal(a->at, b->at, a->len);
 }
 
-/* ---- a place is a place */
+/* ---- any way to a place is the same */
 
 static void compare(const char *const *more, int n_more, const char *place, const char *const keys[4])
 {
@@ -117,7 +117,7 @@ static void compare(const char *const *more, int n_more, const char *place, cons
     rig_close(there);
 }
 
-/* High up and near to two walls: where the first place sees the floor, this one sees a wall. */
+/* The place is high up and near two walls: the first place sees the floor where this one sees a wall. */
 static void a_scan_has_the_bytes_of_a_configuration_with_that_place(void **state)
 {
     (void)state;
@@ -218,7 +218,7 @@ static void who_asks_holds_the_site_of_now(void **state)
     assert_true(fabs(at.foot_radius_m - sqrt(2.5 * 2.5 - 1.8 * 1.8)) < 1e-9);
     expect_moved(rig, "SITE:POSE 1, 0,0,0.5,90,0,0");
     expect_moved(rig, "SITE:POSE 1, 0,0,0.4,90,0,0");
-    assert_true(site->station[0].at.position_m[2] == 0.0); /* as it was */
+    assert_true(site->station[0].at.position_m[2] == 0.0); /* it is as it was */
     device_give_back(version);
     device_get_station(rig->device, 0, &at);
     assert_true(at.place.position_m[2] == 0.4 && at.place.heading_deg == 90.0 && fabs(at.height_m - 2.2) < 1e-9);
@@ -227,7 +227,7 @@ static void who_asks_holds_the_site_of_now(void **state)
     rig_close(rig);
 }
 
-/* ---- what can't be done */
+/* ---- failures */
 
 static void a_move_that_fails_changes_nothing(void **state)
 {

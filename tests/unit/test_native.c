@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames encoded and decoded: every field at its place, with extreme values. */
+/* Frames are encoded and decoded: every field is at its place, with extreme values. */
 #include "tests/unit/native_rig.h"
 
 static uint8_t out[1 << 20];
@@ -217,7 +217,7 @@ static void test_surfaces(void **state)
     assert_int_equal(seen.n, 3);
     assert_int_equal(seen.first, 3);
     assert_int_equal(strlen(seen.last), 257);
-    /* nothing is called for a payload that is wrong at its end */
+    /* No call is made for a payload that is wrong at its end. */
     seen.n = 0;
     assert_int_equal(native_decode_surfaces(out + 28, payload - 1, see, &seen), SH_EFORMAT);
     out[28 + 2] = 1; /* first label beyond 65534 */
@@ -246,7 +246,7 @@ static void test_surfaces_split(void **state)
     assert_int_equal(native_encode_surfaces(out, sizeof out, 4096, &one, 1), 0);
 }
 
-/* ANCHOR.md, 8 poses: each byte of a pose where the table says, and what is refused. */
+/* ANCHOR.md, 8 poses: each byte of a pose is where the table says; wrong ones are refused. */
 static void test_poses(void **state)
 {
     (void)state;
@@ -293,7 +293,7 @@ static void test_poses(void **state)
     assert_int_equal(native_decode_poses(payload, 8 + 80, &n), SH_EFORMAT);
 }
 
-/* DESCRIPTOR.md, 10 emitter: each field where the table says, and what is refused. */
+/* DESCRIPTOR.md, 10 emitter: each field is where the table says; wrong ones are refused. */
 static void test_emitter(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of attributes, byte by byte: sent behind their points, cut with them, refused where they are wrong. */
+/* Frames of attributes, byte by byte. They are sent after their points, cut with them, and refused where they are
+ * wrong. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -26,7 +27,7 @@ static uint64_t wire(const uint8_t *p, int bytes)
     return v;
 }
 
-/* Each pulse has `echoes` echoes; amplitudes and widths count up, and so name the entry. */
+/* Each pulse has `echoes` echoes. Amplitudes and widths count up, and so name the entry. */
 static struct line_block make_block(uint32_t n_points, uint32_t echoes)
 {
     for (uint32_t i = 0; i < n_points; i++) {
@@ -95,7 +96,7 @@ static void test_bytes(void **state)
     assert_int_equal(one.width_cns, 400);
 }
 
-/* A payload cut anywhere, and counts that it can't hold. */
+/* A payload is cut anywhere, and has counts that it can't hold. */
 static void test_refused(void **state)
 {
     (void)state;
@@ -111,12 +112,12 @@ static void test_refused(void **state)
     assert_int_equal(native_decode_attributes(p, 28, &head), SH_EFORMAT);
     p[15] = 0xff;
     assert_int_equal(native_decode_attributes(p, 28, &head), SH_EFORMAT);
-    /* No room for them is no room for the block. */
+    /* Without room for them there is no room for the block. */
     assert_int_equal(native_encode_points(out, len - 1, &block, 0), 0);
     assert_int_equal(native_encode_points(out, 28 + 40 + 3 * 20, &block, 0), 0);
 }
 
-/* As many frames as the points have, each with its own. */
+/* There are as many frames as for the points, each with its own. */
 static void check_cut(uint32_t n_points, uint32_t echoes)
 {
     struct line_block block = make_block(n_points, echoes);
@@ -156,7 +157,7 @@ static void test_cut_with_their_points(void **state)
     check_cut(2 * NATIVE_MAX_POINTS + 2, 15 * 2 / 3);
 }
 
-/* The descriptor says so, and is as it always was where there are none. */
+/* The descriptor announces them, and does not change where there are none. */
 static void test_descriptor(void **state)
 {
     (void)state;
@@ -174,8 +175,8 @@ static void test_descriptor(void **state)
     assert_int_equal(back.content, 0);
 }
 
-/* A frame of a type that nobody knows, such as this was before, is a frame like any other to the parser: in the count,
- * in the sequence, and nothing is broken. */
+/* A frame of a type that the parser does not know, as this one was before, is like any other: it counts, it is in the
+ * sequence, and nothing is broken. */
 static void test_parser_passes_unknown_types(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of colours, byte by byte: sent after their points, and after the attributes of these, cut with them, refused where
- * they are wrong. */
+/* Frames of colours, byte by byte. They are sent after their points and these points' attributes, cut with them, and
+ * refused where they are wrong. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,7 +27,7 @@ static uint64_t wire(const uint8_t *p, int bytes)
     return v;
 }
 
-/* Each pulse has `echoes` echoes; colours count up, and so name the entry. */
+/* Each pulse has `echoes` echoes. Colours count up, and so name the entry. */
 static struct line_block make_block(uint32_t n_points, uint32_t echoes, int attributes)
 {
     for (uint32_t i = 0; i < n_points; i++) {
@@ -84,7 +84,7 @@ static void test_bytes(void **state)
     }
 }
 
-/* A payload cut anywhere, and counts that it can't hold; no room for it is no room for the block. */
+/* A payload is cut anywhere, and has counts that it can't hold. Without room for it there is no room for the block. */
 static void test_refused(void **state)
 {
     (void)state;
@@ -104,7 +104,7 @@ static void test_refused(void **state)
     assert_int_equal(native_encode_points(out, len - 25 - 28, &block, 0), 0);
 }
 
-/* As many frames as the points have, each with its own, in the room that is said to be enough. */
+/* There are as many frames as for the points, each with its own, in the room that is promised to be enough. */
 static void test_cut_with_their_points(void **state)
 {
     (void)state;
@@ -133,7 +133,7 @@ static void test_cut_with_their_points(void **state)
     }
 }
 
-/* The descriptor says so in its second bit. */
+/* The descriptor announces them in its second bit. */
 static void test_descriptor(void **state)
 {
     (void)state;

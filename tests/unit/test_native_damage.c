@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The parser against every single damage. */
+/* These tests give the parser every single damage. */
 #include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"
 
 enum { SIZES_EACH = SANITIZED ? 1 : 4 }; /* of the pieces in which each damage is fed */
 
-/* How many counted frames a hurt range costs, from the layout of the stream: a jump is only seen between good
- * ones. */
+/* Returns how many counted frames a damaged range costs, from the layout of the stream: a jump is only seen between
+ * good ones. */
 static void check_seq(size_t hurt_from, size_t hurt_to)
 {
     uint64_t lost = 0, gaps = 0, pending = 0;
@@ -46,7 +46,7 @@ static void run_hurt(const uint8_t *bytes, size_t len, size_t from, size_t to)
     }
 }
 
-/* From one byte of the stream that is hurt to the next. */
+/* Returns the distance from one damaged byte of the stream to the next. */
 static size_t step(void)
 {
     return (size_t)thorough(1, 3);
@@ -86,11 +86,11 @@ static void test_parser_every_byte_added(void **state)
     for (size_t at = 0; at <= stream_len; at += at < stream_len - 3 ? step() : 1) {
         memcpy(hurt, stream, at);
         hurt[at] = added[at % 3];
-        /* a byte like a neighbour could as well stand on that neighbour's other side, outside the frame */
+        /* A byte like a neighbour could as well be on that neighbour's other side, outside the frame. */
         while (at < stream_len && (hurt[at] == stream[at] || (at > 0 && hurt[at] == stream[at - 1])))
             hurt[at]++;
         memcpy(hurt + at + 1, stream + at, stream_len - at);
-        /* a byte before the first byte of a frame hurts nothing */
+        /* A byte before the first byte of a frame damages nothing. */
         size_t inside = at;
         for (int i = 0; i < n_pieces; i++)
             if (piece[i].at == at) inside = at + 1;
@@ -126,10 +126,10 @@ static int is_boundary(size_t at)
     return at == stream_len;
 }
 
-/* Losing [from, to) leaves the same bytes as losing that stretch some bytes later, where the bytes after both
- * ends are equal, or earlier, where those before are (headers begin alike, payloads end in zeros). If such a
- * shift makes the loss begin where a piece ends, or end where one begins, that piece is whole after all; the
- * first of two takes the bytes. */
+/* Losing [from, to) leaves the same bytes as losing that stretch some bytes later, where the bytes after both ends are
+ * equal, or earlier, where those before are (headers begin alike, payloads end in zeros). If such a shift makes the
+ * loss begin where a piece ends, or end where one begins, that piece is whole after all; the first of two takes the
+ * bytes. */
 static void slide_to_piece(size_t *from, size_t *to)
 {
     for (size_t n = 0;; n++) {

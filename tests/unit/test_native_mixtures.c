@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Random mixtures of faults on a synthetic stream whose truth is known: the parser gives exactly the frames that came
- * whole, in order and for the first time, and notices each thing at its byte.
+/* Random mixtures of faults on a synthetic stream whose truth is known. The parser gives exactly the frames that came
+ * whole, in order and for the first time, and notices each fault at its byte.
  *
- * The truth is found from the list of what was put on the wire, with numbers that don't wrap and a table of what came.
- * Seeds are fixed. Two accidents could make the truth wrong, and neither happens with these seeds: a hurt frame whose
- * checksum is right all the same, and bytes lost at an end that equal those that follow. */
+ * The truth follows from the list of the parts on the wire, with numbers that don't wrap and a table of received
+ * frames. Seeds are fixed. Two accidents could make the truth wrong, and neither happens with these seeds: a damaged
+ * frame whose checksum is right all the same, and bytes lost at an end that equal those that follow. */
 #include "tests/unit/native_stream.h"
 
 enum { N_FRAMES = 80, WIRE_MAX = 1 << 16, NOTES_MAX = 600, SEEDS = 1000, DELAY_MAX = 20, PAYLOAD_MAX = 200 };
 
-/* ---- what is put on the wire */
+/* ---- the parts on the wire */
 
 enum condition { WHOLE, BAD_PAYLOAD, CUT_IN_PAYLOAD, NOISE };
 
@@ -42,7 +42,7 @@ static int is_local(int frame)
     return (frame_bytes[frame][3] & NATIVE_LOCAL) != 0;
 }
 
-/* Frames of any size from 0 on, full of sync bytes; their numbers run over 2^32. */
+/* Frames have any size from 0 on, and are full of sync bytes. Their numbers run over 2^32. */
 static void make_frames(void)
 {
     uint64_t next = UINT64_C(0x100000000) - roll(2 * N_FRAMES) + N_FRAMES / 2;
@@ -100,7 +100,7 @@ static void put_cut(int frame)
     put(frame, len < NATIVE_HEADER_LEN ? NOISE : CUT_IN_PAYLOAD, frame_bytes[frame], len);
 }
 
-/* Frames on their way, each with a time to go: of those that wait longer than their turn, the copies and the delayed. */
+/* Frames on their way, each with a time to go. They wait longer than their turn: the copies and the delayed. */
 static struct {
     int frame, left;
 } waiting[2 * N_FRAMES];
@@ -121,7 +121,7 @@ static void wait_for(int frame, int left)
     waiting[n_waiting++].left = left;
 }
 
-/* A LOCAL frame is not delayed: nothing says where it belongs. */
+/* A LOCAL frame is not delayed, as nothing shows where it belongs. */
 static void put_with_fault(int i)
 {
     enum { DROP, COPY, DELAY, HURT, CUT, GARBAGE, FAULTS };
@@ -140,7 +140,7 @@ static void put_with_fault(int i)
     }
 }
 
-/* The first frame is left alone, since nobody can miss it, and so are the last, so that the end hides nothing. */
+/* The first frame is not touched, since its loss can't be noticed. Nor are the last, so that the end hides nothing. */
 static void put_stream(uint32_t seed)
 {
     dice = seed;
@@ -170,7 +170,7 @@ static void expect_notice(struct native_notice notice)
     truth[n_truth++] = notice;
 }
 
-/* The run of bad bytes that ends where part i begins, from its parts. */
+/* Expects the run of bad bytes that ends where part i begins, from its parts. */
 static void expect_bad(int from, int to, int64_t t_ns)
 {
     for (int i = from; i < to;) {
@@ -179,7 +179,7 @@ static void expect_bad(int from, int to, int64_t t_ns)
                                        .seq = header ? (uint32_t)number[part[i].frame] : 0,
                                        .at_byte = part[i].at,
                                        .t_ns = header ? 1000 + part[i].frame : t_ns};
-        /* what a broken frame still has room for is taken for its own */
+        /* Bytes that fit into a broken frame's length count as its own. */
         const size_t most = header ? len_of(part[i].frame) : SIZE_MAX;
         notice.n = part[i].len;
         for (i++; i < to && part[i].condition == NOISE; i++)
@@ -236,7 +236,7 @@ static void find_truth(void)
     assert_int_equal(bad_from, n_parts);
 }
 
-/* ---- what the parser says */
+/* ---- the parser's notices */
 
 static void on_notice(void *ctx, const struct native_notice *notice)
 {
@@ -311,7 +311,7 @@ static void test_mixtures(void **state)
         all_late += late;
         all_bad += bad_bytes;
     }
-    /* the mixtures have something of everything: on average more than one of each */
+    /* The mixtures have some of everything: on average more than one of each. */
     assert_true(all_lost > SEEDS && all_repeated > SEEDS && all_late > SEEDS && all_bad > SEEDS);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the parser notices of a hurt stream: each thing once, at its byte, however the bytes are cut. */
+/* The parser's notices of a damaged stream: each fault once, at its byte, however the bytes are cut. */
 #include "tests/unit/native_stream.h"
 
 enum { NOTICES_MAX = 400 };
@@ -58,7 +58,7 @@ static size_t put_text(const char *text)
     return at;
 }
 
-/* Runs `check` on the bytes as they are, and in pieces of every size up to 2 frames, and split once at each byte. */
+/* Runs `check` on the whole bytes, in pieces of every size up to 2 frames, and split once at each byte. */
 static void in_all_pieces(void (*check)(void))
 {
     for (size_t chunk = 1; chunk <= n_bytes; chunk = chunk < 2 * FRAME ? chunk + 1 : n_bytes) {
@@ -214,7 +214,7 @@ static void check_hidden(void)
 static void check_garbage_at_end(void)
 {
     assert_int_equal(n_noticed, 1);
-    expect(0, NATIVE_BAD_BYTES, at[1], 0, 4); /* whatever the sync byte in it promises */
+    expect(0, NATIVE_BAD_BYTES, at[1], 0, 4); /* the promise of its sync byte does not matter */
 }
 
 static void test_end(void **state)
@@ -242,7 +242,7 @@ static void test_end(void **state)
     at[4] = put(9, 0);
     n_bytes = at[4] + 10;
     in_all_pieces(check_cut_later);
-    /* a frame whose length reaches beyond the end, and a whole one within it */
+    /* A frame's length reaches beyond the end, and a whole one is within it. */
     n_bytes = 0;
     put(5, 0);
     at[1] = put(6, 0);
@@ -319,7 +319,7 @@ static void test_resume(void **state)
     assert_int_equal(parser.stats.bytes, 5 * FRAME + 50);
 }
 
-/* A head that was started again meanwhile sends the same frames, and they are not those of before. */
+/* A head that was started again meanwhile sends the same frames, but they are not the earlier ones. */
 static void test_resume_with_old_numbers(void **state)
 {
     (void)state;
@@ -336,12 +336,13 @@ static void test_resume_with_old_numbers(void **state)
     assert_int_equal(parser.stats.frames, 4);
 }
 
-/* The client attaches again in the middle of a frame, whichever byte that is. What comes then, a frame or a reply, is
- * whole; what was had of the frame before is lost, and is said to be. */
+/* The client attaches again in the middle of a frame, at any byte. The next frame or reply is whole. The first part of
+ * the frame before is lost, and reported. */
 static void test_resume_in_a_frame(void **state)
 {
     (void)state;
-    for (int i = 0; i < 4; i++) /* a reply or a frame; told of the end of the bytes, or cut off by the client itself */
+    /* A reply or a frame follows. The end of the bytes is reported, or the client itself cuts them off. */
+    for (int i = 0; i < 4; i++)
         for (size_t had = 1; had < FRAME; had++) {
             n_bytes = 0;
             put(5, 0);
@@ -365,7 +366,7 @@ static void test_resume_in_a_frame(void **state)
         }
 }
 
-/* Nobody listens: the same counts. */
+/* Without a listener the counts are the same. */
 static void test_nobody_listens(void **state)
 {
     (void)state;

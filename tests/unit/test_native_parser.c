@@ -108,7 +108,7 @@ static void test_parser_text_limits(void **state)
     feed((const uint8_t *)line, 513, 100);
     assert_int_equal(n_texts, 0);
     assert_int_equal(parser.stats.bad_bytes, 513);
-    /* out of step: a line is not taken for a reply */
+    /* Out of step, a line does not count as a reply. */
     feed((const uint8_t *)"OK\r\n", 4, 4);
     assert_int_equal(n_texts, 0);
 }
@@ -124,7 +124,7 @@ static void test_seq_jumps_back(void **state)
         assert_int_equal(native_seal(out, seq[i]), len);
         feed(out, len, len);
     }
-    /* 15 after 11: three lost; 0 after 15: a jump back, nobody knows; the second 1 came already */
+    /* 15 after 11: three are lost. 0 after 15 is a jump back, of unknown size. The second 1 came already. */
     assert_int_equal(parser.stats.seq_gaps, 2);
     assert_int_equal(parser.stats.seq_lost, 3);
     assert_int_equal(parser.stats.restarts, 1);
@@ -132,9 +132,9 @@ static void test_seq_jumps_back(void **state)
     assert_int_equal(parser.stats.frames, 5);
 }
 
-/* Garbage made to be slow: sync bytes only, and headers without payload whose length hides what follows. The
- * work is counted in CRC checks: the parser reads a good header at most once per frame start, so the number
- * is bounded. */
+/* Garbage made to be slow: only sync bytes, and headers without payload whose length hides the following bytes. The
+ * work is counted in CRC checks. The parser reads a good header at most once per frame start, so the number is
+ * bounded. */
 static void test_parser_resync_cost(void **state)
 {
     (void)state;

@@ -60,8 +60,8 @@ static void test_empty_block(void **state)
     assert_int_equal(head.n_points, 0);
 }
 
-/* Pulses of 1..15 echoes, in blocks of all sizes around the cut: nothing lost, no pulse torn, times and
- * numbers right. */
+/* Pulses of 1..15 echoes come in blocks of all sizes around the cut. Nothing is lost, no pulse is torn, and times and
+ * numbers are right. */
 static void check_cut(uint32_t n_points, uint32_t echoes)
 {
     struct line_block block = make_block(n_points);

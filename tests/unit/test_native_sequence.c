@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sequence numbers of frames: what is missing, came already, came too late, or begins anew. */
+/* The sequence numbers of frames: missing, repeated, late ones, and restarts. */
 #include "tests/unit/native_rig.h"
 
 static struct native_sequence sequence;
@@ -29,7 +29,7 @@ static void expect(uint32_t seq, enum native_notice_kind kind, uint32_t want_fir
     assert_int_equal(n, want_n);
 }
 
-/* The same story from several first numbers, among them such that it runs over 2^32. */
+/* The same story is told from several first numbers; with some of them it runs over 2^32. */
 static void tell_story(uint32_t s)
 {
     memset(&sequence, 0, sizeof sequence);
@@ -48,10 +48,10 @@ static void tell_story(uint32_t s)
     expect(s + 12, NATIVE_REPEATED, s + 12, 1);
     expect(s + 14, NATIVE_GAP, s + 13, 1);
     expect(s + 13, NATIVE_LATE, s + 13, 1);
-    /* number s + 2 has come, but not this frame */
+    /* Number s + 2 has come, but not this frame. */
     assert_int_equal(take(s + 2, 1), NATIVE_RESTARTED);
     assert_int_equal(first, s + 2);
-    /* what was missing before belongs to another sequence */
+    /* Earlier losses belong to another sequence. */
     expect(s + 3, NATIVE_NO_NOTICE, s + 3, 1);
     expect(s + 14, NATIVE_GAP, s + 4, 10);
     expect(s + 4, NATIVE_LATE, s + 4, 1);
@@ -67,7 +67,7 @@ static void test_story(void **state)
         tell_story(0 - back);
 }
 
-/* What is known of a sequence ends with it. */
+/* All knowledge of a sequence ends with it. */
 static void test_forgets(void **state)
 {
     (void)state;
@@ -80,7 +80,7 @@ static void test_forgets(void **state)
         assert_int_equal(take(20, 1), NATIVE_RESTARTED);
         expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* came, was missing: before */
     }
-    /* a late frame fills its place: another one of its number is of another sequence */
+    /* A late frame fills its place. Another one with its number is of another sequence. */
     memset(&sequence, 0, sizeof sequence);
     expect(10, NATIVE_NO_NOTICE, 10, 1);
     expect(15, NATIVE_GAP, 11, 4);
@@ -97,7 +97,7 @@ static void test_memory(void **state)
     expect(1000 - NATIVE_SEEN, NATIVE_REPEATED, 1000 - NATIVE_SEEN, 1);
     /* further back nothing is known: another sequence */
     expect(1000 - NATIVE_SEEN - 1, NATIVE_RESTARTED, 1000 - NATIVE_SEEN - 1, 1);
-    /* every third frame is missing: the gaps of the last 3 NATIVE_GAPS numbers are remembered */
+    /* Every third frame is missing. The gaps of the last 3 NATIVE_GAPS numbers are remembered. */
     memset(&sequence, 0, sizeof sequence);
     for (uint32_t seq = 1; seq < 900; seq++)
         if (seq % 3 != 0) assert_int_equal(take(seq, 0), seq % 3 == 1 && seq > 1 ? NATIVE_GAP : NATIVE_NO_NOTICE);
@@ -113,18 +113,18 @@ static void test_long_gaps(void **state)
     expect(0, NATIVE_NO_NOTICE, 0, 1);
     expect(NATIVE_GAP_MOST + 1, NATIVE_GAP, 1, NATIVE_GAP_MOST);
     expect(1, NATIVE_LATE, 1, 1);
-    /* too long to wait for: a number within it begins another sequence, and none of its frames is dropped */
+    /* It is too long to wait for. A number within it begins another sequence, and none of its frames is dropped. */
     expect(2 * NATIVE_GAP_MOST + 3, NATIVE_GAP, NATIVE_GAP_MOST + 2, NATIVE_GAP_MOST + 1);
     for (uint32_t seq = NATIVE_GAP_MOST + 5; seq < NATIVE_GAP_MOST + 400; seq++)
         expect(seq, seq == NATIVE_GAP_MOST + 5 ? NATIVE_RESTARTED : NATIVE_NO_NOTICE, seq, 1);
-    /* half of the numbers and more: back */
+    /* A jump by half of the numbers or more is one back. */
     memset(&sequence, 0, sizeof sequence);
     expect(0, NATIVE_NO_NOTICE, 0, 1);
     expect(0x80000000u, NATIVE_GAP, 1, 0x7fffffffu);
     expect(1, NATIVE_RESTARTED, 1, 1);
 }
 
-/* A head that started again, and whose numbers were all missing: it is dropped no longer than for a while. */
+/* A head started again, and its numbers were all missing. It is dropped only for a while. */
 static void test_late_run(void **state)
 {
     (void)state;
@@ -135,7 +135,7 @@ static void test_late_run(void **state)
         expect(i - 3, NATIVE_LATE, i - 3, 1);
     expect(NATIVE_LATE_RUN - 3, NATIVE_RESTARTED, NATIVE_LATE_RUN - 3, 1);
     expect(NATIVE_LATE_RUN - 2, NATIVE_NO_NOTICE, NATIVE_LATE_RUN - 2, 1);
-    /* late ones with another frame between, or with a hole */
+    /* Late ones come with another frame between, or with a hole. */
     memset(&sequence, 0, sizeof sequence);
     expect(0, NATIVE_NO_NOTICE, 0, 1);
     expect(5000, NATIVE_GAP, 1, 4999);
@@ -149,7 +149,7 @@ static void test_late_run(void **state)
 static void test_resumed(void **state)
 {
     (void)state;
-    /* the same head: what was missed is a gap, and a frame of an older gap may come yet */
+    /* It is the same head. Missed frames are a gap, and a frame of an older gap may still come. */
     memset(&sequence, 0, sizeof sequence);
     expect(5, NATIVE_NO_NOTICE, 5, 1);
     expect(8, NATIVE_GAP, 6, 2);
@@ -157,18 +157,18 @@ static void test_resumed(void **state)
     expect(12, NATIVE_GAP, 9, 3);
     expect(6, NATIVE_LATE, 6, 1);
     expect(13, NATIVE_NO_NOTICE, 13, 1);
-    /* the last frame once more */
+    /* The last frame comes again. */
     native_sequence_resume(&sequence);
     expect(13, NATIVE_REPEATED, 13, 1);
     expect(14, NATIVE_NO_NOTICE, 14, 1);
-    /* a head that started again, and sends what it sent then: neither repeated nor late */
+    /* A head that started again sends its first frames anew: they are neither repeated nor late. */
     native_sequence_resume(&sequence);
     expect(5, NATIVE_RESTARTED, 5, 1);
     for (uint32_t seq = 6; seq < 20; seq++)
         expect(seq, NATIVE_NO_NOTICE, seq, 1);
     native_sequence_resume(&sequence);
     expect(7, NATIVE_RESTARTED, 7, 1);
-    /* nor is it late, though its number was missing */
+    /* It is not late either, though its number was missing. */
     expect(9, NATIVE_GAP, 8, 1);
     native_sequence_resume(&sequence);
     expect(8, NATIVE_RESTARTED, 8, 1);
@@ -182,7 +182,7 @@ static void test_local(void **state)
     memset(&sequence, 0, sizeof sequence);
     assert_int_equal(native_sequence_take(&sequence, &local, &first, &n), NATIVE_NO_NOTICE);
     expect(100, NATIVE_NO_NOTICE, 100, 1);
-    /* equal ones are a head's right, but not twice in a row */
+    /* Equal ones are allowed, but not twice in a row. */
     assert_int_equal(native_sequence_take(&sequence, &local, &first, &n), NATIVE_NO_NOTICE);
     assert_int_equal(native_sequence_take(&sequence, &local, &first, &n), NATIVE_REPEATED);
     local.t_ns++;
@@ -192,7 +192,7 @@ static void test_local(void **state)
     expect(101, NATIVE_NO_NOTICE, 101, 1); /* their number, 0, does not count */
 }
 
-/* Everything that makes a frame another one. */
+/* Each of these makes a frame another one. */
 static void test_same_number(void **state)
 {
     (void)state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Counters that begin near their wrap, as a fault on request has them: they pass it as the protocol's page says. */
+/* Counters begin near their wrap, as a fault on request sets them. They pass it as the protocol's page says. */
 #include "tests/unit/cola_rig.h"
 #include "tests/unit/scip_rig.h"
 
-/* The session anew, with counters so many below their wrap. */
+/* Opens the session anew, with counters so far below their wrap. */
 static void open_again(struct protocol_rig *r, uint32_t near_wrap)
 {
     struct sh_err err;
@@ -15,7 +15,8 @@ static void open_again(struct protocol_rig *r, uint32_t near_wrap)
     protocol_rig_clear(r);
 }
 
-/* Telegrams and scans: 16 bits, 3 below. Telegrams begin with the session, scans with the head's first turn. */
+/* Telegrams and scans have 16 bits, 3 below the wrap. Telegrams begin with the session, scans with the head's first
+ * turn. */
 static void cola_counts_telegrams_and_scans(void **state)
 {
     (void)state;
@@ -43,7 +44,8 @@ static void cola_counts_telegrams_and_scans(void **state)
     cola_close();
 }
 
-/* Times: us in 32 bits. 2 s below, so that it wraps 2 s after power-up: turns begin at 1.8 s, 15 a second. */
+/* Times are us in 32 bits, 2 s below the wrap, so that they wrap 2 s after power-up. Turns begin at 1.8 s, 15 a
+ * second. */
 static void cola_times_pass_the_wrap(void **state)
 {
     (void)state;
@@ -67,7 +69,7 @@ static void cola_times_pass_the_wrap(void **state)
     cola_close();
 }
 
-/* The time stamp: ms in 24 bits. 75 ms below: of turns of 25 ms the fourth begins at the wrap. */
+/* The time stamp is ms in 24 bits, 75 ms below the wrap. The fourth of the turns of 25 ms begins at it. */
 static void scip_times_pass_the_wrap(void **state)
 {
     (void)state;
@@ -81,7 +83,7 @@ static void scip_times_pass_the_wrap(void **state)
         assert_int_equal(scan.time_ms, (line * 25 + 0x1000000 - 75) % 0x1000000);
         protocol_rig_clear(&rig);
     }
-    /* RS sets it to 0, as ever; after a reboot it begins as at power-up */
+    /* RS sets it to 0, as always. After a reboot it begins as at power-up. */
     scip_ask("RS\nTM0\nTM1\nTM2\n", "RS\n00P\n\nTM0\n00P\n\nTM1\n00P\n00000\n\nTM2\n00P\n\n");
     scip_ask("RB\nRB\n", "RB\n01Q\n\nRB\n00P\n\n");
     rig.ops->time(rig.protocol, INT64_C(1150000000)); /* 1 s later */

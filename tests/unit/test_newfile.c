@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that the program makes: links are not followed, only files are replaced, and two writers never end in one file. */
+/* Files that the program makes. Links are not followed, only files are replaced, and two writers never end in one
+ * file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <setjmp.h>
@@ -35,7 +36,7 @@ static void act(void (**fn)(void))
     if (now != NULL) now();
 }
 
-/* In place of libc's. */
+/* It takes the place of libc's. */
 int flock(int fd, int operation)
 {
     act(&before_lock);
@@ -110,7 +111,7 @@ static void test_links(void **state)
     assert_int_equal(link(other, part), 0);
     expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "2 names (hard links)");
     unlink(part);
-    /* one that leads nowhere makes no file there */
+    /* A link that leads nowhere makes no file there. */
     assert_int_equal(symlink("nowhere", path), 0);
     expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "symbolic link to nowhere");
     unlink(path);
@@ -118,7 +119,7 @@ static void test_links(void **state)
     unlink(other);
 }
 
-/* A link that comes while the file is written is not followed and stays. */
+/* A link that comes while the file is written is not followed, and stays. */
 static void test_late_link(void **state)
 {
     (void)state;
@@ -134,7 +135,7 @@ static void test_late_link(void **state)
     unlink(other);
 }
 
-/* /dev/fd/N and the like lead to what we have open. */
+/* /dev/fd/N and the like lead to our own open files. */
 static void test_own_descriptors(void **state)
 {
     (void)state;
@@ -151,7 +152,7 @@ static void test_own_descriptors(void **state)
     close(pipe_fd[1]);
 }
 
-/* ---- what is no file */
+/* ---- paths that are no files */
 
 static void test_kinds(void **state)
 {
@@ -180,7 +181,7 @@ static void test_kinds(void **state)
     rmdir(path);
 }
 
-/* A node like /dev/full, made here. Before the recording, and while it is written. */
+/* A node like /dev/full is made here, before the recording and while it is written. */
 static void test_device(void **state)
 {
     (void)state;
@@ -233,8 +234,8 @@ static void begin_second(void)
     expect_error(outfile_open(&second, path, &err), SH_EINPUT, part, "is being written by process");
 }
 
-/* The first one ends between the second one's open and its lock: what the second one has opened is the finished file
- * by then, which it must not empty. */
+/* The first writer ends between the second one's open and its lock. The second one has then opened the finished file,
+ * and must not empty it. */
 static void test_end_between_open_and_lock(void **state)
 {
     (void)state;
@@ -249,7 +250,7 @@ static void test_end_between_open_and_lock(void **state)
     unlink(path);
 }
 
-/* The second one begins just before the first one's file gets its name: it is still being written. */
+/* The second writer begins just before the first one's file gets its name, which is still being written. */
 static void test_begin_before_rename(void **state)
 {
     (void)state;
@@ -263,7 +264,7 @@ static void test_begin_before_rename(void **state)
     unlink(path);
 }
 
-/* A file that is written in place has one writer, and what the first one wrote stays. */
+/* A file that is written in place has one writer, and the first one's bytes stay. */
 static void test_one_writer_in_place(void **state)
 {
     (void)state;
@@ -284,7 +285,8 @@ static void test_one_writer_in_place(void **state)
     unlink(path);
 }
 
-/* A file that is begun in place while another is on its way to that name stays, and the other stays beside it. */
+/* A file is begun in place while another is on its way to that name. The first stays, and so does the other beside
+ * it. */
 static void test_begun_in_place_meanwhile(void **state)
 {
     (void)state;
@@ -313,7 +315,7 @@ static void test_append(void **state)
     assert_int_equal(write(fd, "one", 3), 3);
     expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, "is being written by process");
     close(fd);
-    assert_int_equal(newfile_append(path, &fd, &err), 0); /* as it is, and free again */
+    assert_int_equal(newfile_append(path, &fd, &err), 0); /* it is unchanged, and free again */
     assert_int_equal(pread(fd, &c, 1, 0), 1);
     assert_int_equal(c, 'o');
     assert_int_equal(write(fd, "two", 3), 3); /* at the end, though nothing was sought */
@@ -332,7 +334,7 @@ static void test_append(void **state)
     unlink(other);
 }
 
-/* The user's umask holds, and nothing that is made may be run. */
+/* The user's umask holds, and no made file is executable. */
 static void test_rights(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* NMEA sentences against published examples and a reader that shares nothing with the encoder. */
+/* NMEA sentences, compared with published examples and read by a reader that shares nothing with the encoder. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -34,7 +34,7 @@ static struct nmea_fix munich(void)
                              .sigma_m = {0.01, 0.02, 0.03}};
 }
 
-/* As they stand in manuals and tutorials everywhere (the first two are the "Munich" ones). */
+/* The sentences are those of many manuals and tutorials (the first two are the "Munich" ones). */
 static void published_checksums(void **state)
 {
     (void)state;
@@ -82,7 +82,7 @@ static void the_example_comes_out(void **state)
     assert_string_equal(line.field[8], "0.0300");
 }
 
-/* Half a step of the last digit: 0.5e-7 of a minute, and what a double of 180 degrees loses. */
+/* The tolerance is half a step of the last digit, 0.5e-7 of a minute, and the rounding of 180 degrees in a double. */
 #define HALF_STEP_DEG (0.5e-7 / 60 + 1e-13)
 
 static void check_place(double lat_deg, double lon_deg)
@@ -167,7 +167,7 @@ static void speed_and_course(void **state)
     assert_string_equal(line.field[8], "000.0"); /* not empty: the head stands, and sscanf's %[^,] needs a character */
 }
 
-/* Mode letters of RMC as NMEA 0183 has them, beside the quality of GGA. */
+/* Mode letters of RMC by NMEA 0183, beside the quality of GGA. */
 static void qualities(void **state)
 {
     (void)state;
@@ -193,7 +193,7 @@ static void qualities(void **state)
     }
 }
 
-/* The longest there can be fits; into one byte less nothing goes, and nothing is written behind the end. */
+/* The longest sentence fits. With one byte less nothing is written, and nothing behind the end. */
 static void room_is_kept(void **state)
 {
     (void)state;

@@ -18,7 +18,7 @@ static void open_rig(int64_t t_ns)
     rig.ops->open(rig.protocol, t_ns);
 }
 
-/* A fix each second: its sentences come once its time has passed, as one unit, and each once. */
+/* There is a fix each second. Its sentences come once its time has passed, as one unit, and each once. */
 static void each_fix_once_and_after_its_time(void **state)
 {
     (void)state;
@@ -26,7 +26,7 @@ static void each_fix_once_and_after_its_time(void **state)
     open_rig(0);
     for (int64_t t = 1; t <= 2500; t++) {
         rig.ops->time(rig.protocol, t * ms);
-        /* fixes at 0, 1000 and 2000 ms; time(t) says that all before t has come */
+        /* Fixes are at 0, 1000 and 2000 ms; time(t) means that all before t has come. */
         assert_int_equal(rig.n_units, 1 + (t > 1000) + (t > 2000));
     }
     assert_int_equal(rig.ops->next_ns(rig.protocol), 3000 * ms);
@@ -40,7 +40,7 @@ static void each_fix_once_and_after_its_time(void **state)
     protocol_rig_close(&rig);
 }
 
-/* A client that comes later gets the fixes from then on; all that a jump of time passed come at once. */
+/* A client that comes later gets the fixes from then on. A jump of time sends all of its fixes at once. */
 static void from_the_session_s_begin_on(void **state)
 {
     (void)state;
@@ -53,7 +53,7 @@ static void from_the_session_s_begin_on(void **state)
     protocol_rig_close(&rig);
 }
 
-/* It takes no commands: what comes is counted, and answered by nothing. */
+/* It takes no commands: received bytes are counted, and get no answer. */
 static void what_comes_is_counted(void **state)
 {
     (void)state;

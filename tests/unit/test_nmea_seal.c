@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* NMEA, position packets and data packets: units that are changed on request, with checksums that are right where they
- * have some. */
+/* NMEA, position packets and data packets: units are changed on request, with right checksums where they have some. */
 #include <stdlib.h>
 
 #include "tests/common/nmea_reader.h"
@@ -34,7 +33,7 @@ static void open_rig(enum protocol_id id)
     assert_int_equal(rig.n_units, 1);
 }
 
-/* The sentences of a unit, one after the other; angles and times of day are within their limits. */
+/* Reads the sentences of a unit, one after the other. Angles and times of day must be within their limits. */
 static size_t read_sentences(const uint8_t *unit, size_t len, int wanted, char *said)
 {
     const char *at = (const char *)unit;
@@ -62,7 +61,7 @@ static const void *read_fix(const uint8_t *unit, size_t len, size_t *size)
     return said;
 }
 
-/* The packet beside its sentence is as it was. */
+/* The packet outside of its sentence is unchanged. */
 static const void *read_position(const uint8_t *unit, size_t len, size_t *size)
 {
     enum { AT_NMEA = 0xce };
@@ -74,7 +73,7 @@ static const void *read_position(const uint8_t *unit, size_t len, size_t *size)
     return said;
 }
 
-/* Azimuths, time and mode are as they were. */
+/* Azimuths, time and mode are unchanged. */
 static const void *read_data(const uint8_t *unit, size_t len, size_t *size)
 {
     assert_int_equal(len, 1206);
@@ -87,14 +86,14 @@ static const void *read_data(const uint8_t *unit, size_t len, size_t *size)
     return said;
 }
 
-/* Decimals alone: 2 of each time of day, 7 of each minute, and so on. */
+/* Only decimals change: 2 of each time of day, 7 of each minute, and so on. */
 static void sentences_say_something_else(void **state)
 {
     (void)state;
     open_rig(PROTOCOL_NMEA);
     seal_check(rig.ops, rig.bytes, rig.len, read_fix);
     seal_check_broken(rig.ops, rig.bytes, rig.len);
-    /* 030405.00: three bits of each 0 behind the point, none before it */
+    /* 030405.00: three bits of each 0 after the point, none before it. */
     uint8_t time[] = "$GPZDA,030405.00,02,01,2026,,*00\r\n", mask[sizeof time] = {0};
     rig.ops->content(time, sizeof time - 1, mask);
     for (size_t i = 0; i < sizeof time; i++)
@@ -111,7 +110,7 @@ static void positions_say_something_else(void **state)
     protocol_rig_close(&rig);
 }
 
-/* A data packet has no checksum of its own: its ranges change all the same. */
+/* A data packet has no checksum of its own. Its ranges change all the same. */
 static void ranges_say_something_else(void **state)
 {
     (void)state;

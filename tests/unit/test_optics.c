@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Glass and mirrors, against rooms whose images can be written down; and detection that asks for nothing. */
+/* Glass and mirrors, compared with rooms whose images can be worked out; and detection that changes nothing. */
 #include "tests/unit/optics_rig.h"
 
 #include "core/surface.h"
 
-/* The wall ahead is a mirror: the room goes on behind it as its own image, and each ray as if there were none. */
+/* The wall ahead is a mirror. The room continues in it as its own image, and each ray as if there were no mirror. */
 static void a_mirror_shows_the_room_behind_it(void **state)
 {
     (void)state;
@@ -30,7 +30,7 @@ static void a_mirror_shows_the_room_behind_it(void **state)
     close_optics(&o);
 }
 
-/* Two mirrors face each other: their images go on for ever, a pulse is followed through four. */
+/* Two mirrors face each other. Their images go on for ever, and a pulse is followed through four. */
 static void facing_mirrors_end_at_the_depth(void **state)
 {
     (void)state;
@@ -60,8 +60,8 @@ static void facing_mirrors_end_at_the_depth(void **state)
     close_optics(&o);
 }
 
-/* Three echoes: both sides of the pane, and the wall, whose light passes four of them. Only the middle of the line. Of
- * more than are asked for, the weakest is left out: the pane's far side, then its near one. */
+/* There are three echoes: both sides of the pane, and the wall, whose light passes four sides. Only the middle of the
+ * line has them. When fewer are asked for, the weakest is left out: the pane's far side, then its near one. */
 static void a_pane_and_what_is_behind_it(void **state)
 {
     (void)state;
@@ -103,8 +103,8 @@ static void a_pane_and_what_is_behind_it(void **state)
     close_optics(&o);
 }
 
-/* With a range resolution of 10 cm both sides of the pane are one echo, between them by what each sends back, and their
- * sum; the wall stays apart. Without the pane's far side in reach of the resolution (1 mm), three. */
+/* With a range resolution of 10 cm both sides of the pane are one echo, between them by their returned light, and with
+ * its sum. The wall stays separate. With a resolution of 1 mm there are three. */
 static void what_is_too_near_is_one_echo(void **state)
 {
     (void)state;
@@ -136,7 +136,7 @@ static void what_is_too_near_is_one_echo(void **state)
     close_optics(&o);
 }
 
-/* The same light from the same pulses, however a line is cut, with noise on everything, in both layouts. */
+/* The same pulses return the same light, however a line is cut, with all noise on, in both layouts. */
 static void cuts_leave_no_trace(void **state)
 {
     (void)state;
@@ -194,7 +194,7 @@ static void cuts_leave_no_trace(void **state)
     close_optics(&o);
 }
 
-/* Where nothing is asked for, or nothing of it is met, the bytes are those of the plain caster. */
+/* If nothing is asked for, or none of it is met, the bytes are those of the plain caster. */
 static void nothing_asked_for_changes_nothing(void **state)
 {
     (void)state;
@@ -222,8 +222,8 @@ static void nothing_asked_for_changes_nothing(void **state)
     close_optics(&o);
 }
 
-/* A room whose ceiling and more is out of range: those shots keep their scheduled angles and a range of 0 to the bit,
- * whatever noise there is; the others don't. */
+/* A room whose ceiling and more is out of range. Those shots keep their scheduled angles and a range of 0 to the bit,
+ * with any noise; the others don't. */
 static void noise_never_touches_empty_shots(void **state)
 {
     (void)state;
@@ -259,8 +259,8 @@ static void noise_never_touches_empty_shots(void **state)
     close_optics(&o);
 }
 
-/* A mirror on a body that moves: turned by 45 degrees about z through (0, 2, 0), then 1 m ahead. Beams that meet it go
- * on to the wall at x = 6: the way there plus what is left, at right angles. */
+/* A mirror is on a body that moves: it is turned by 45 degrees about z through (0, 2, 0), then 1 m ahead. Beams that
+ * meet it go on to the wall at x = 6: the way there plus the rest, at right angles. */
 static void a_mirror_that_moves(void **state)
 {
     (void)state;
@@ -295,7 +295,8 @@ static void a_mirror_that_moves(void **state)
     schedule_start(&o.rig->segment, &o.rig->spec);
     schedule_get_line(&o.rig->segment, 0, &line);
     cast_some(o.rig, &line, 500, 1); /* straight ahead */
-    /* from (0.5, 0.25) along y to y = 2.5 on the plane; dir (0, 1, 0) becomes (-1, 0, 0): to the wall at x = -4 */
+    /* The beam goes from (0.5, 0.25) along y to y = 2.5 on the plane; dir (0, 1, 0) becomes (-1, 0, 0): to the wall at
+     * x = -4. */
     assert_int_equal(o.rig->block.label[0], 7 + 0);
     near_range(o.rig, 0, 2.25L + 4.5L);
     close_optics(&o);

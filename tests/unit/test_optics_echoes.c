@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Echoes behind glass, in mirrors and on bodies: which are ghosts, which are sent, and what of them is met. */
+/* Echoes behind glass, in mirrors and on bodies: ghosts, sent echoes, and the hits among them. */
 #include "tests/unit/optics_rig.h"
 
-/* A mirror ahead, a pane behind the head, a wall behind that: pane and wall, seen in the mirror, are both ghosts, and
- * are met by nobody. Straight at the pane they are none. Their ranges are those of the folded way. */
+/* A mirror is ahead, a pane behind the head, and a wall behind that. Pane and wall, seen in the mirror, are both
+ * ghosts, and are no hits. Seen directly they are none. Their ranges are those of the folded way. */
 static void glass_in_a_mirror(void **state)
 {
     (void)state;
@@ -34,7 +34,7 @@ static void glass_in_a_mirror(void **state)
     close_optics(&o);
 }
 
-/* Of a pane and a dark wall behind it a head sends the first, the last or the strongest. */
+/* For a pane and a dark wall behind it a head sends the first, the last or the strongest. */
 static void one_of_a_pulse_s_echoes(void **state)
 {
     (void)state;
@@ -65,8 +65,8 @@ static void one_of_a_pulse_s_echoes(void **state)
     close_optics(&o);
 }
 
-/* What does not fit into 31 bits of counts is no echo, and counted: of the pane's two sides and the wall the wall. The
- * others are numbered as two. Where none fits one entry stays, without echo. */
+/* An echo that does not fit into 31 bits of counts is dropped and counted. Here the wall does not fit, while the pane's
+ * two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
 static void echoes_that_do_not_fit(void **state)
 {
     (void)state;
@@ -97,7 +97,7 @@ static void echoes_that_do_not_fit(void **state)
     close_optics(&o);
 }
 
-/* A head that moves along x: all three echoes of a pulse lie where its own beam has gone, on the planes and at its x. */
+/* The head moves along x. All three echoes of a pulse lie where its own beam has gone, on the planes and at its x. */
 static void echoes_of_a_moving_head(void **state)
 {
     (void)state;
@@ -120,14 +120,15 @@ static void echoes_of_a_moving_head(void **state)
     assert_int_equal(cast_some(o.rig, &line, level, 500), 1500);
     for (uint32_t i = 0; i < 1500; i++) {
         const double x_m = 20.0 * (double)schedule_time_ns(&o.rig->segment, level + i / 3) / 1e7;
-        /* half a count; from the station, as counts are */
+        /* The bound is half a count; places are from the station, as counts are. */
         assert_true(fabs((int32_t)o.rig->block.b[i] * 1e-6 - (y[i % 3] - STATION[1])) < 0.5e-6 + 1e-9);
         assert_true(fabs((int32_t)o.rig->block.a[i] * 1e-6 - (x_m - STATION[0])) < 0.5e-6 + 1e-9);
     }
     close_optics(&o);
 }
 
-/* A plate on a body, met from its front; with the body turned by 180 degrees in its place, from its back. */
+/* A plate on a body is met from its front. With the body turned by 180 degrees in its place, it is met from its
+ * back. */
 static void which_side_of_a_body_is_met(void **state)
 {
     (void)state;
@@ -164,7 +165,7 @@ static void which_side_of_a_body_is_met(void **state)
     scene_free(body);
 }
 
-/* What lies below the threshold is not met, just as it has no echo: of a room whose walls are seen to 4 m. */
+/* A surface below the threshold is no hit, just as it has no echo. The room's walls are seen up to 4 m. */
 static void what_is_too_faint_is_not_met(void **state)
 {
     (void)state;

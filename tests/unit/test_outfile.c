@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* drivers/record/outfile.h: beyond OUTFILE_DIRECT_FROM a file is written past the system's cache, in whole blocks. Its bytes
- * are those that were given, whatever their pieces, and whether the file system can do that or not. Files begin with a hole
- * up to there, so that the tests cost little. */
+/* drivers/record/outfile.h: beyond OUTFILE_DIRECT_FROM a file is written past the system's cache, in whole blocks. Its
+ * bytes are the given ones, in any pieces, and on any file system. Files begin with a hole up to there, so that the
+ * tests cost little. */
 #include <errno.h>
 #include <fcntl.h>
 #include <setjmp.h>
@@ -25,7 +25,7 @@ static char dir[] = "/tmp/test_outfile_XXXXXX", path[64];
 static uint8_t data[DATA_LEN], back[DATA_LEN];
 static struct sh_err err;
 
-/* ---- in place of libc's: what is written direct is whole blocks, of memory that is aligned */
+/* ---- replacements of libc's: direct writes are whole blocks, of aligned memory */
 
 static enum { AS_IT_IS, NOT_DIRECT, HALF_OF_IT, FULL } disk;
 static int n_direct;
@@ -71,7 +71,7 @@ static void expect_data(uint64_t at, size_t len)
     close(fd);
 }
 
-/* Pieces of all kinds of lengths, from byte `from` of data on. */
+/* Writes pieces of all kinds of lengths, from byte `from` of data on. */
 static size_t write_pieces(struct outfile *file, size_t from)
 {
     static const size_t piece[] = {1, 4096, 70001, 123, OUTFILE_BUFFER - 1, 512, 8191, OUTFILE_BUFFER + 1, 65536, 3};
@@ -85,7 +85,7 @@ static size_t write_pieces(struct outfile *file, size_t from)
 
 /* ---- tests */
 
-/* On the border, one byte before it, one after it. */
+/* Files begin on the border, one byte before it, and one after it. */
 static void test_pieces(void **state)
 {
     (void)state;
@@ -103,7 +103,7 @@ static void test_pieces(void **state)
     disk = AS_IT_IS;
 }
 
-/* A whole buffer may be asked for, while it holds less than the block that the file's end is in. */
+/* A whole buffer may be asked for, while it holds less than the block of the file's end. */
 static void test_whole_buffer(void **state)
 {
     struct outfile file;
@@ -118,7 +118,7 @@ static void test_whole_buffer(void **state)
     expect_data(OUTFILE_DIRECT_FROM + 5, 10 + OUTFILE_BUFFER);
 }
 
-/* A file that ends where direct writing begins is none of it. */
+/* A file that ends where direct writing begins uses none of it. */
 static void test_border(void **state)
 {
     struct outfile file;
@@ -146,7 +146,7 @@ static void test_full(void **state)
     assert_int_equal(mkdir(dir, 0700), 0);
 }
 
-/* Bytes of disk that the part has, beyond its length as well. */
+/* Returns the bytes of disk that the part has, including those beyond its length. */
 static uint64_t room(void)
 {
     struct stat st;
@@ -157,7 +157,7 @@ static uint64_t room(void)
     return (uint64_t)st.st_blocks * 512;
 }
 
-/* Whether the file system has room beyond a file's end. */
+/* Returns whether the file system has room beyond a file's end. */
 static int can_have_room(void)
 {
     char probe[80];
@@ -169,7 +169,7 @@ static int can_have_room(void)
 }
 
 /* Without a limit on files their ends have room on the disk, where the file system can do that. With a limit there is
- * none: it would lie beyond the limit. */
+ * none, as it would lie beyond the limit. */
 static void test_room_and_limits(void **state)
 {
     enum { ROOM = 1 << 20, LIMIT = 1 << 26 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which pulses outlines are near to, beside the geometry alone: a pulse whose footprint reaches an edge is found, wherever
- * it looks and whatever pulses are looked up together with it. */
+/* Pulses near outlines, by geometry alone. A pulse whose footprint reaches an edge is found, in any direction, and
+ * among any other pulses. */
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"
 
@@ -12,7 +12,7 @@
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
 
-/* A triangle whose edge 0 - 1 is the one in question; all three are outlines. */
+/* A triangle whose edge 0 - 1 is tested. All three are outlines. */
 static struct beam_outlines *outlines_of(const double corner[3][3], const struct beam *beam)
 {
     static const uint32_t triangle[1][3] = {{0, 1, 2}};
@@ -51,7 +51,7 @@ static void look_up(const struct beam_outlines *o, const struct beam *beam, cons
         found[near[i].pulse] = 1;
 }
 
-/* Towards a point of a - b, and beside it by an angle across the edge. */
+/* Aims towards a point of a - b, and beside it by an angle across the edge. */
 static void beside(const double a[3], const double b[3], double at, double angle_rad, double d[3])
 {
     double p[3], across[3];
@@ -63,7 +63,8 @@ static void beside(const double a[3], const double b[3], double at, double angle
         d[k] = p[k] / range_m + tan(angle_rad) * across[k] / length;
 }
 
-/* An edge of 2 m at 10 m from the station, around a direction and at an angle to it; the third corner is 2 m aside. */
+/* Makes an edge of 2 m at 10 m from the station, around a direction and at an angle to it. The third corner is 2 m
+ * aside. */
 static void make_edge(const double around[3], double turn_rad, double corner[3][3])
 {
     double e1[3], e2[3], dir[3];
@@ -79,9 +80,9 @@ static void make_edge(const double around[3], double turn_rad, double corner[3][
     }
 }
 
-/* Directions with three components of the same size, with two, and with one: where faces of a cube meet, where the cells
- * of a face are the most oblique. The beam is half of 20 mrad wide, many cells; up to 0.99 of that the footprint reaches
- * the edge for sure, as directions are rounded to floats by 1e-7. */
+/* Directions have three components of the same size, two, or one: where faces of a cube meet, and where the cells of a
+ * face are the most oblique. The beam is half of 20 mrad wide, many cells. Up to 0.99 of that the footprint surely
+ * reaches the edge, as directions are rounded to floats by 1e-7. */
 static void edges_are_found_in_any_direction(void **state)
 {
     (void)state;
@@ -111,7 +112,7 @@ static void edges_are_found_in_any_direction(void **state)
     }
 }
 
-/* Pulses in steps towards an edge and over it: of any number of them together, each that reaches it is found. */
+/* Pulses go in steps towards an edge and over it. In groups of any size, each that reaches it is found. */
 static void groups_are_looked_up_to_their_ends(void **state)
 {
     (void)state;
@@ -140,8 +141,7 @@ static void groups_are_looked_up_to_their_ends(void **state)
     beam_outlines_free(outlines);
 }
 
-/* A mirror that turns back, or a pan that has gone on: one step is larger than all others, and the edge is where it leads
- * to. */
+/* A mirror turns back, or a pan has gone on: one step is larger than all others, and leads to the edge. */
 static void a_step_may_lead_to_an_edge(void **state)
 {
     (void)state;

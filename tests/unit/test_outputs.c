@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that a command is to write: none may destroy another, or what is read. */
+/* Files that a command writes: none may destroy another, or one that is read. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -94,7 +94,7 @@ static void files_are_apart(void **state)
     unlink("run.yaml");
 }
 
-/* Files of single scans are known by the pattern of their names, and those beside a file by their endings. */
+/* Files of single scans are known by the pattern of their names, and sidecars by their endings. */
 static void files_beside_a_file(void **state)
 {
     (void)state;
@@ -114,7 +114,7 @@ static void files_beside_a_file(void **state)
     }
 }
 
-/* What a mesh names is read, too. */
+/* The files that a mesh names are read, too. */
 static void files_of_a_mesh(void **state)
 {
     (void)state;
@@ -134,7 +134,7 @@ static void files_of_a_mesh(void **state)
     unlink("m.mtl");
 }
 
-/* Each option that names a file says whether it is read or written: otherwise nobody compares it. */
+/* Each option that names a file says whether it is read or written; otherwise it would not be compared. */
 static void options_say_what_their_files_are(void **state)
 {
     (void)state;

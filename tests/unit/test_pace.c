@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The pacing thread's decisions on a machine with a clock of its own: in time, late, after the machine stood still. The
- * naive ways are tried beside ours: to sleep up to the next beat while late, and to give a stall no credit. */
+/* The pacing thread's decisions on a machine with a clock of its own: in time, late, and after the machine stood still.
+ * Two naive ways are tried beside ours: to sleep up to the next beat while late, and to give a stall no credit. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,8 +13,8 @@
 enum { MAX_TICKS = 400 };
 static const int64_t MS = 1000000, NEVER = INT64_MAX / 4;
 
-/* One pacing thread, and one caster that is at most ahead_ticks ahead and takes cast_ns for a tick. Both stand still for
- * still_ns once it is still_at_ns. */
+/* One pacing thread, and one caster that is at most ahead_ticks ahead and takes cast_ns for a tick. Both stand still
+ * for still_ns from still_at_ns on. */
 struct machine {
     struct pace pace;
     struct device_counters counters;
@@ -44,7 +44,7 @@ static struct machine *machine_of(int64_t tick_ns, int64_t late_ns, uint64_t ahe
     return m;
 }
 
-/* What is busy from a time on, for so long, is done then: the machine may stand still meanwhile. */
+/* Returns when work that begins at a time, and takes so long, is done: the machine may stand still meanwhile. */
 static int64_t after(const struct machine *m, int64_t from_ns, int64_t for_ns)
 {
     const int64_t at_ns = m->pace.epoch_ns + m->still_at_ns;
@@ -52,7 +52,7 @@ static int64_t after(const struct machine *m, int64_t from_ns, int64_t for_ns)
     return end_ns > at_ns && from_ns <= at_ns ? end_ns + m->still_ns : end_ns;
 }
 
-/* What happens at a time happens when the machine goes on. */
+/* An event at that time happens when the machine goes on. */
 static int64_t when(const struct machine *m, int64_t t_ns)
 {
     const int64_t at_ns = m->pace.epoch_ns + m->still_at_ns;
@@ -105,7 +105,7 @@ static int64_t late_of(const struct machine *m, uint64_t tick)
     return m->out_ns[tick] - m->pace.epoch_ns - (int64_t)(tick + 1) * m->pace.tick_ns;
 }
 
-/* All in time: each wake-up is late by as much as it takes, and a release by its cost more. */
+/* All is in time: each wake-up is late by its own duration, and a release by its cost more. */
 static void known_latenesses(void **state)
 {
     (void)state;
@@ -120,7 +120,7 @@ static void known_latenesses(void **state)
     assert_int_equal(atomic_load(&m->counters.late_blocks), 0);
 }
 
-/* Late by a whole tick is not yet late by more than that. */
+/* A delay of exactly one tick does not count as more than one. */
 static void late_ticks_are_counted(void **state)
 {
     (void)state;
@@ -134,8 +134,8 @@ static void late_ticks_are_counted(void **state)
     assert_int_equal(lateness_count(&m->pace.late), 8);
 }
 
-/* The machine stands still for 300 ms. A head with one tick ahead gains 9 ms on each of the 10 ms that follow, as its
- * caster takes 1 ms: it has caught up after ceil(300 / 9) ticks and the one that was waited for. */
+/* The machine stands still for 300 ms. A head with one tick ahead gains 9 ms on each of the next 10 ms, as its caster
+ * takes 1 ms. It has caught up after ceil(300 / 9) ticks and the one that was waited for. */
 static void a_stall_is_caught_up(void **state)
 {
     (void)state;
@@ -158,8 +158,7 @@ static void a_stall_is_caught_up(void **state)
     }
 }
 
-/* Late ticks go out when they are ready, not on a beat: a caster that is slow for once makes nothing but its own tick
- * late. */
+/* Late ticks are sent when they are ready, not on a beat. A caster that is slow once delays only its own tick. */
 static void a_late_tick_goes_out_at_once(void **state)
 {
     (void)state;
@@ -184,8 +183,8 @@ static uint64_t lost_by_a_stall(int naive_credit, int64_t still_at_ns)
     return m->n_lost;
 }
 
-/* Ticks that are late since all stood still are not given up, wherever the thread was then: asleep, in a release, or
- * waiting for a tick. */
+/* Ticks that are late since all stood still are not given up, wherever the thread was: asleep, in a release, or waiting
+ * for a tick. */
 static void a_stall_costs_nothing(void **state)
 {
     (void)state;
@@ -195,7 +194,7 @@ static void a_stall_costs_nothing(void **state)
     }
 }
 
-/* Credit ends with the stall: who has caught up gives up a tick after late_ns, within a beat. */
+/* Credit ends with the stall: a thread that has caught up gives up a tick after late_ns, within a beat. */
 static void credit_ends(void **state)
 {
     (void)state;
@@ -212,7 +211,7 @@ static void credit_ends(void **state)
     assert_in_range(m->now_ns - m->pace.epoch_ns, 301 * MS + 5 * MS + 1, 301 * MS + 6 * MS + 1);
 }
 
-/* Credit is as long as the stall: casters that then make nothing any more get that and late_ns. */
+/* Credit is as long as the stall. When casters then make no more, the limit is that and late_ns. */
 static void credit_is_as_long_as_the_stall(void **state)
 {
     (void)state;
@@ -224,7 +223,8 @@ static void credit_is_as_long_as_the_stall(void **state)
     m->still_ns = 200 * MS;
     run(m, 21);
     assert_int_equal(m->n_lost, 1);
-    /* Asleep up to 21 ms, it woke at 220.5: it stood still for 199.5 ms. The last look before that sum is at 225 ms. */
+    /* Asleep up to 21 ms, the thread woke at 220.5, so it stood still for 199.5 ms. The last look before that sum is at
+     * 225 ms. */
     assert_in_range(m->now_ns - m->pace.epoch_ns, 225 * MS, 227 * MS);
 }
 

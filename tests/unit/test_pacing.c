@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The pacing thread allocates nothing, takes no lock and calls the system for nothing but the clock, the semaphores of
- * threads that sleep, and wake-ups. It is watched (pacing_rig.h) while a head with several links, clients, faults and a hash
- * starts and stops scans, changes its rate so that slots grow, comes too late and catches up again. */
+/* The pacing thread allocates nothing, takes no lock, and calls the system only for the clock, the semaphores of
+ * sleeping threads, and wake-ups. It is watched (pacing_rig.h) while a head with several links, clients, faults and a
+ * hash works. The head starts and stops scans, changes its rate so that slots grow, is late and catches up again. */
 #include "tests/unit/pacing_rig.h"
 
 #ifndef SH_SANITIZE
@@ -42,10 +42,11 @@ static void start(struct run *run, const char *const *sets, int n_sets, double d
     need(loop_start(run->loop, &err), &err);
 }
 
-/* The run's own end is far off: its clients end it. */
+/* The run's own end is far away, and its clients end it. */
 enum { ENDLESS_S = 3600 };
 
-/* Between two beats: what clients of the run do, every 5 ms at most. A beat that returns 0 ends the run. It gives up after minutes. */
+/* Between two beats clients of the run act, every 5 ms at most. A beat that returns 0 ends the run. It gives up after
+ * minutes. */
 static void finish(struct run *run, int (*beat)(struct run *run, int turn))
 {
     const int64_t until_ns = clock_now_ns() + 240000000000;
@@ -62,7 +63,7 @@ static void finish(struct run *run, int (*beat)(struct run *run, int turn))
     rig_close(run->rig);
 }
 
-/* ---- what it must not do is found */
+/* ---- planted calls are found */
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int pipe_fd[2];
@@ -214,7 +215,7 @@ static void open_clients(const struct run *run)
     assert_int_equal(n, CLIENTS);
 }
 
-/* Sends a line. Who was cut off comes back first. */
+/* Sends a line. A client that was cut off comes back first. */
 static void say(struct run *run, const char *line)
 {
     struct link_place place;
@@ -225,8 +226,8 @@ static void say(struct run *run, const char *line)
     (void)!write(client[0], line, strlen(line));
 }
 
-/* The head has booted after 0.2 s: 40 turns. It goes on until all has been said, two scans have begun, and the pacing thread
- * has stood still. */
+/* The head has booted after 0.2 s: 40 turns. It goes on until all lines are sent, two scans have begun, and the pacing
+ * thread has stood still. */
 static int use(struct run *run, int turn)
 {
     static const char *const said[] = {"HEAD:PRR MAX\n",   "SCAN:STOP\n", "HEAD:STATE?\n", "SCAN:START\n",
@@ -247,7 +248,7 @@ static int use(struct run *run, int turn)
     return turn < 160 || device_last_scan(run->rig->device, NULL) < 2 || pacing_sleeps() < 350;
 }
 
-/* It comes too late, and catches up. */
+/* The thread is late, and catches up. */
 static void stand_still(int sleep)
 {
     if (sleep == 300) syscall(SYS_clock_nanosleep, CLOCK_MONOTONIC, 0, &STILL_60_MS, NULL);
@@ -282,8 +283,8 @@ static void stand_still_for_200_ms(int sleep)
     if (sleep == 25) syscall(SYS_clock_nanosleep, CLOCK_MONOTONIC, 0, &STILL_200_MS, NULL);
 }
 
-/* With one tick of 10 ms ahead, 20 ticks are late, and those that follow until it has caught up. Waiting for a beat for
- * each, it would be late for the rest of the run: some 58 ticks. A machine with other work only adds late ones, so one of
+/* With one tick of 10 ms ahead, 20 ticks are late, and those until it has caught up. If it waited for a beat for each,
+ * it would be late for the rest of the run: some 58 ticks. A machine with other work only adds late ones, so one of
  * TRIES runs has to show it. */
 enum { TRIES = 20 };
 

@@ -16,7 +16,7 @@ enum { POINTS_OF_FRAME = 3000 };
 
 static uint8_t raw[NATIVE_MAX_FRAME];
 
-/* A frame with a payload of zeros, but for its first byte; n: points of it. */
+/* Gives a frame with a payload of zeros, but for its first byte; n: its points. */
 static void give(struct past *past, int type, int flags, uint32_t seq, uint32_t n, uint8_t mark)
 {
     const size_t payload = type == SCANHEAD_POINTS ? NATIVE_POINTS_HEAD_LEN + (size_t)NATIVE_POINT_LEN * n : 64;
@@ -40,7 +40,7 @@ static void give(struct past *past, int type, int flags, uint32_t seq, uint32_t 
     past_take(past, &frame, 7);
 }
 
-/* A scan: what places its points, then so many frames of them, whose numbers go on from *seq. */
+/* Gives a scan: the frames that place its points, then so many frames of them. Their numbers go on from *seq. */
 static void give_scan(struct past *past, uint32_t *seq, uint32_t frames, uint8_t mark)
 {
     give(past, SCANHEAD_DESCRIPTOR, 0, (*seq)++, 0, mark);
@@ -75,7 +75,7 @@ static void read_frames(struct reading *r, const uint8_t *frame, const uint8_t *
     }
 }
 
-/* All that is kept, from a position on, as a page reads it. */
+/* Reads all kept frames, from a position on, as a page does. */
 static struct reading read_all(struct past *past, uint64_t from)
 {
     struct reading r = {.at = from, .end = from + 1, .descriptor = -1, .anchor = -1};
@@ -116,7 +116,7 @@ static void any_piece_can_be_the_first(void **state)
     assert_int_equal(all.gone, 0);
     assert_int_equal(all.lost, 7);
     assert_true(all.pieces > 3);
-    /* More that comes is read from where the reader was, and nothing twice. */
+    /* Later frames are read from the reader's position on, and none twice. */
     const uint32_t before = seq - 1;
     give(past, SCANHEAD_POINTS, 0, seq++, POINTS_OF_FRAME, 2);
     char query[32];
@@ -132,7 +132,7 @@ static void any_piece_can_be_the_first(void **state)
     past_free(past);
 }
 
-/* Whole pieces go, so that less than a piece more is kept than asked for. */
+/* Whole pieces are dropped, so less than a piece more is kept than asked for. */
 static void the_oldest_go_and_are_counted(void **state)
 {
     (void)state;
@@ -168,7 +168,7 @@ static void a_wrong_query_is_refused(void **state)
     past_free(past);
 }
 
-/* A piece ends before poses or points, not between points and what belongs to them. */
+/* A piece ends before poses or points, not between points and the frames that belong to them. */
 static void what_belongs_together_is_in_one_piece(void **state)
 {
     (void)state;

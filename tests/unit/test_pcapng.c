@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* pcapng, block by block: every frame is a packet with its bytes and its device time. And read back, whole, cut and
- * damaged. */
+/* pcapng, block by block: every frame is a packet with its bytes and its device time. Files are read back whole, cut
+ * and damaged. */
 #include "core/rng.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/pcapng.h"
@@ -59,7 +59,7 @@ static void test_disk_full(void **state)
     rig_check_disk_full(rig_path("full.pcapng"), 3000);
 }
 
-/* A file of two interfaces and 40 packets of 0 to 39 bytes, packet i with the time i * 1,000,000,007 ns. */
+/* Writes a file of two interfaces and 40 packets of 0 to 39 bytes; packet i has the time i * 1,000,000,007 ns. */
 static size_t put_file(uint8_t *to)
 {
     uint8_t data[40];
@@ -73,8 +73,8 @@ static size_t put_file(uint8_t *to)
     return len;
 }
 
-/* Gives the bytes from `at` on to the reader, `piece` more at a time. Returns how many packets there were; *end: what was
- * not a whole block, or no block. */
+/* Gives the bytes from `at` on to the reader, `piece` more at a time. Returns how many packets there were; *end: the
+ * place of the first bytes that are no whole block. */
 static uint32_t read_packets(const uint8_t *bytes, size_t len, size_t piece, size_t *end, int *rc)
 {
     struct pcapng_reader reader = {0};
@@ -119,7 +119,7 @@ static void test_read(void **state)
     }
 }
 
-/* Whatever the bytes are, packets lie within them. */
+/* For any bytes, packets lie within them. */
 static void test_damaged(void **state)
 {
     (void)state;
@@ -144,7 +144,7 @@ static void test_damaged(void **state)
     }
 }
 
-/* As capinfos reads it: 64-bit options behind interface and time. */
+/* The layout is that of capinfos: 64-bit options after interface and time. */
 static void test_statistics(void **state)
 {
     (void)state;
@@ -162,7 +162,7 @@ static void test_statistics(void **state)
     assert_true(rig_uint(file + 32, 4) == (7 | 8 << 16) && rig_uint(file + 36, 8) == 7);
 }
 
-/* The count of lost packets stands behind the padded data. */
+/* The count of lost packets comes after the padded data. */
 static void test_loss(void **state)
 {
     (void)state;
@@ -181,7 +181,7 @@ static void test_loss(void **state)
     assert_int_equal(rig_uint(with + 48, 4), 0);
 }
 
-/* As other programs write: microseconds, an unknown block, a simple packet, cut by the interface's limit. */
+/* Other programs write microseconds, an unknown block, or a simple packet that is cut by the interface's limit. */
 static void test_of_others(void **state)
 {
     (void)state;

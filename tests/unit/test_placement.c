@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From a configuration to where its stations stand. Run from the top of the source tree. */
+/* From a configuration to the places of its stations. Run from the top of the source tree. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -10,7 +10,7 @@
 
 static struct site *site;
 
-/* A floor of 60 x 60 m about (x, y), at z. */
+/* Makes a floor of 60 x 60 m about (x, y), at z. */
 static void write_floor(double x, double y, double z)
 {
     char text[512];
@@ -53,7 +53,7 @@ static void assert_position(uint32_t i, double x, double y, double z, double tol
     assert_near(p[2], z, tolerance);
 }
 
-/* A corner of the scene in the CRS, from each station; they have to agree. */
+/* A corner of the scene in the CRS is the same from each station. */
 static void assert_corner_agrees(const double corner[3])
 {
     double first[3];
@@ -73,8 +73,8 @@ static void assert_corner_agrees(const double corner[3])
     }
 }
 
-/* Forms of one place give one place; the UTM and ECEF figures come from the place itself, and 4 decimals of metres in
- * the text leave 5e-5. */
+/* All forms of one place give one place. The UTM and ECEF figures come from the place itself, and 4 decimals of metres
+ * in the text leave 5e-5. */
 static void each_form_leads_to_the_same_place(void **state)
 {
     (void)state;
@@ -103,7 +103,7 @@ static void each_form_leads_to_the_same_place(void **state)
     }
 }
 
-/* One grid for a scene, UPS and the hemisphere's false northing included. */
+/* A scene has one grid, UPS and the hemisphere's false northing included. */
 static void the_equator_and_the_edge_of_ups_do_not_part_stations(void **state)
 {
     (void)state;
@@ -118,7 +118,7 @@ static void the_equator_and_the_edge_of_ups_do_not_part_stations(void **state)
     assert_corner_agrees((const double[3]){30, 30, 0});
     assert_int_equal(georef_epsg(site->station[1].georef), 32661);
     assert_string_equal(warned, "");
-    /* a station given in the southern grid, on the equator */
+    /* The station is given in the southern grid, on the equator. */
     double anchor[3];
     ok(load("",
             "  - {position_m: [0, 0, 2], utm_zone: 33, hemisphere: south, easting_m: 500000, northing_m: 10000000, "
@@ -149,7 +149,7 @@ static void a_zone_border_does_not_part_stations(void **state)
             "  - {position_m: [-20, 0, 2]}\n  - {position_m: [20, 0, 2]}", "utm"));
     assert_corner_agrees((const double[3]){30, 30, 0});
     assert_string_equal(warned, "");
-    /* Each for itself they don't, and it is said. */
+    /* Without an anchor they don't, and there is a warning. */
     ok(load("",
             "  - {position_m: [-20, 0, 2], lat_deg: 50, lon_deg: 11.9997, height_m: 0}\n"
             "  - {position_m: [20, 0, 2], lat_deg: 50, lon_deg: 12.0003, height_m: 0}",
@@ -157,7 +157,7 @@ static void a_zone_border_does_not_part_stations(void **state)
     assert_non_null(strstr(warned, "EPSG 32633, station station-1 in 32632"));
 }
 
-/* A mesh in UTM: stations by UTM are the scene's coordinates to the last bit, those by lat and lon come near. */
+/* A mesh in UTM: stations given in UTM have the scene's coordinates to the last bit, those by lat and lon nearly. */
 static void a_mesh_in_utm(void **state)
 {
     (void)state;
@@ -183,8 +183,8 @@ static void a_mesh_in_utm(void **state)
     assert_corner_agrees(corner);
 }
 
-/* At the equator a place 1 km south of it lies at 9,999 km in the southern grid, and at -1 km in the northern one that
- * the scene is in: 500 m east of the middle that is so to the nanometre. */
+/* At the equator a place 1 km south of it lies at 9,999 km in the southern grid. In the northern grid of the scene it
+ * is at -1 km. 500 m east of the middle that is so to the nanometre. */
 static void a_place_in_the_other_hemisphere_s_grid(void **state)
 {
     (void)state;
@@ -194,7 +194,7 @@ static void a_place_in_the_other_hemisphere_s_grid(void **state)
     assert_position(0, 500500, -1000, 2, 1e-6);
 }
 
-/* A scene in ECEF: the floor is down the plumb line, the head upright; at (a, 0, 0) down is -X. */
+/* In a scene in ECEF the floor is down the plumb line, and the head upright; at (a, 0, 0) down is -X. */
 static void a_mesh_in_ecef(void **state)
 {
     (void)state;
@@ -251,7 +251,7 @@ static void what_has_no_place_is_refused(void **state)
     }
 }
 
-/* The y axis' azimuth as printed: from true north, from grid north. */
+/* Reads the printed azimuth of the y axis: from true north, and from grid north. */
 static void read_azimuths(double *azimuth_deg, double *from_grid_deg)
 {
     char *text = NULL;
@@ -265,8 +265,8 @@ static void read_azimuths(double *azimuth_deg, double *from_grid_deg)
     free(text);
 }
 
-/* Headings count from the scene's y axis; convergence parts true from grid north. On a sphere
- * tan(convergence) = tan(dlon) sin(lat); the ellipsoid adds less than 1e-4 of it. */
+/* Headings count from the scene's y axis; convergence separates true from grid north. On a sphere tan(convergence) =
+ * tan(dlon) sin(lat); the ellipsoid adds less than 1e-4 of it. */
 static void headings_and_convergence(void **state)
 {
     (void)state;
@@ -333,7 +333,8 @@ static void the_house_has_its_site(void **state)
     }
 }
 
-/* A slab of 8 x 8 m. Its x axis points 30 deg to the left of grid east; scene and grid agree but for the grid's scale. */
+/* Makes a slab of 8 x 8 m. Its x axis points 30 deg to the left of grid east. Scene and grid agree but for the grid's
+ * scale. */
 static const char mapped_ifc[] =
     "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('a','2026-01-01T00:00:00',(''),(''),'','','');\n"
     "FILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n#1=IFCPERSON($,'a',$,$,$,$,$,$);\n"
@@ -372,7 +373,7 @@ static void a_map_conversion_goes_before_a_site(void **state)
     assert_near(site->station[0].at.place.lat_deg, want.lat_deg, 1.5e-8);
     assert_near(site->station[0].at.place.lon_deg, want.lon_deg, 1.5e-8);
     assert_near(site->station[0].at.place.height_m, 522, 1e-5);
-    /* Heading 0 is the model's y, 30 deg left of grid north; the second angle is from the grid. */
+    /* Heading 0 is the model's y, 30 deg left of grid north. The second angle is from the grid. */
     read_azimuths(&azimuth_deg, &from_grid_deg);
     assert_near(remainder(from_grid_deg + 30, 360), 0, 1e-6);
     assert_non_null(strstr(warned, "OrthogonalHeight counts from the sea"));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which of several options, and what the plan says about it. */
+/* The choice among several options, and the plan's row about it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -37,7 +37,7 @@ static uint32_t choose(struct plan_row *row, const char *stage, const struct pla
     return plan_choose(&(struct plan_choice){stage, option, n, forced, key, TOLERANCE}, row);
 }
 
-/* Of those whose bounds hold the cheapest, wherever it stands; equal to the tolerance holds. */
+/* The cheapest of those whose bounds hold is chosen, in any order. A bound that equals the tolerance holds. */
 static void test_cheapest_that_holds(void **state)
 {
     (void)state;
@@ -65,7 +65,8 @@ static void test_forced(void **state)
     expect(&row, "a", 1, "forced by beam.mode; does not hold");
 }
 
-/* By how often the tolerance it is off: a by 2, b by 3, and so a, however close b's ranges come. */
+/* The options are compared by the ratio of error and tolerance: a has 2 and b 3, so a is chosen, however good b's
+ * ranges are. */
 static void test_least_off(void **state)
 {
     (void)state;
@@ -74,10 +75,10 @@ static void test_least_off(void **state)
     some[0].echo_share = 3e-2;
     assert_int_equal(choose(&row, "beam", some, 3, -1, ""), 1);
     expect(&row, "a", 0, "the one with the least error; does not hold");
-    /* five times the range that is allowed is worse than twice the share of other echo counts */
+    /* Five times the allowed range error is worse than twice the share of other echo counts. */
     const struct plan_option two[2] = {{"f", 5e-3, 0.0, 1.0, ""}, {"g", 1e-4, 2e-2, 2.0, ""}};
     assert_int_equal(choose(&row, "beam", two, 2, -1, ""), 1);
-    /* options go from rough to exact: where all miss by as much, the last that can be had */
+    /* Options go from rough to exact. If all miss by as much, the last possible one is chosen. */
     struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, ""},
                                   {"1", 0.0, 1.0, 1.0, ""},
                                   {"2", 0.0, 1.0, 2.0, ""},
@@ -85,7 +86,7 @@ static void test_least_off(void **state)
     assert_int_equal(choose(&row, "optics", same, 4, -1, ""), 2);
 }
 
-/* What can't be had is not taken, whatever its figures; what is left may be unknown. */
+/* An impossible option is not taken, whatever its figures. The figures of the rest may be unknown. */
 static void test_what_cannot_be_had(void **state)
 {
     (void)state;
@@ -97,7 +98,7 @@ static void test_what_cannot_be_had(void **state)
     assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
 }
 
-/* Nothing is chosen there: the row says what is always done. */
+/* Nothing is chosen there: the row has the method that is always used. */
 static void test_cast(void **state)
 {
     (void)state;
@@ -122,7 +123,7 @@ static void choose_sight(const struct plan_sight_need *need, const struct plan_s
     assert_true(row.error_m == 0.0 && (need->forced >= 0 || row.cost_ns <= 0.0));
 }
 
-/* A map is made where the pulses of a scan pay for it, whatever else is said. */
+/* A map is made where the pulses of a scan pay for it, whatever else is configured. */
 static void test_sight_pays(void **state)
 {
     (void)state;
@@ -135,15 +136,15 @@ static void test_sight_pays(void **state)
     need.pulses = 1e4;
     assert_false(plan_sight_may_pay(&need));
     choose_sight(&need, NULL, "none", "0.01 million pulses of a scan are too few");
-    need.n_triangles = 0; /* what it saves by triangle is lost to what it takes in any case */
+    need.n_triangles = 0; /* the saving by triangle is lost to the fixed cost */
     assert_false(plan_sight_may_pay(&need));
     need = SIGHT;
     need.memory_bytes = 1 << 20; /* most cells do not fit, and ask the BVH */
     choose_sight(&need, &(struct plan_sight_found){.one = 0.5, .few = 0.5}, "none", "a map saves nothing");
 }
 
-/* Rays cost what they do in packets of that width; of one that is not in the table, in those of the next smaller. Rays
- * that meet nothing have no other costs: what a map saves differs by just that. A nanosecond in 1e9 pulses is left out. */
+/* Rays have the cost of packets of that width, or of the next smaller one in the table. Rays that meet nothing have no
+ * other costs, so a map's saving differs by just that. A nanosecond in 1e9 pulses is allowed. */
 static void test_sight_packets(void **state)
 {
     (void)state;

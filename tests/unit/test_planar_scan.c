@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of a planar head into whole turns, alone: what is where, and what is missing. A head of 16 steps a turn,
- * of which 3 to 14 are cast and 6 looks ahead; 100 turns a second. */
+/* Frames of a planar head become whole turns: the places of shots, and missing frames. The head has 16 steps a turn, of
+ * which 3 to 14 are cast and 6 looks ahead, and 100 turns a second. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@ static struct protocol_rig rig;
 static struct planar_scan scan;
 static struct planar_news news; /* of all frames since clear() */
 static struct protocol_rig_shot shot[N];
-static int left_out; /* the so many-th frame from now on, from 1; 0: none */
+static int left_out; /* drops the so many-th frame from now on, from 1; 0: none */
 
 static void frame(void *protocol, const uint8_t *bytes, size_t len)
 {
@@ -55,7 +55,7 @@ static void expect(int begun, int whole, uint32_t broken)
     news = (struct planar_news){0, 0, 0};
 }
 
-/* Shots from..to of a turn, in the order of firing, as one frame of points. */
+/* Feeds shots from..to of a turn, in the order of firing, as one frame of points. */
 static void part(uint32_t line, int from, int to)
 {
     static const double level[N];
@@ -85,7 +85,7 @@ static void line_end(uint32_t line, uint32_t status)
     protocol_rig_line_end(&rig, &end);
 }
 
-/* Three frames and the end. */
+/* Feeds three frames and the end. */
 static void turn(uint32_t line)
 {
     part(line, 0, 3);
@@ -94,8 +94,8 @@ static void turn(uint32_t line)
     line_end(line, 0);
 }
 
-/* The rig looks to the right by turn * (step - 6) / 16 of a turn. To the left of the head, counter-clockwise, is a
- * higher number, and the number of the way ahead is `front`. */
+/* The rig looks to the right by turn * (step - 6) / 16 of a turn. To the left of the head, counter-clockwise, numbers
+ * are higher, and the number ahead is `front`. */
 static void echoes_stand_where_they_look(void **state)
 {
     (void)state;
@@ -120,7 +120,7 @@ static void echoes_stand_where_they_look(void **state)
     }
 }
 
-/* An encoder with few more counts than steps: the nearest step is the right one while a count is less than a step. */
+/* An encoder has few more counts than steps. The nearest step is right while a count is less than a step. */
 static void coarse_encoders(void **state)
 {
     (void)state;
@@ -173,7 +173,7 @@ static void times_and_numbers(void **state)
     assert_int_equal(scan.whole->number, 11);
 }
 
-/* Six echoes: four are kept, the first three and the last; each has its own amplitude. */
+/* There are six echoes. Four are kept, the first three and the last, each with its own amplitude. */
 static void many_echoes(void **state)
 {
     (void)state;
@@ -220,7 +220,7 @@ static void shots_without_echo(void **state)
         assert_int_equal(scan.whole->n[i], i % 2);
 }
 
-/* One frame of a turn is missing, whichever: 3 of points, each with attributes or without. It is counted once. */
+/* Any one frame of a turn is missing: 3 of points, each with attributes or without. It is counted once. */
 static void a_frame_is_missing(void **state)
 {
     (void)state;
@@ -241,7 +241,8 @@ static void a_frame_is_missing(void **state)
         }
 }
 
-/* The last attributes of a turn are lost, and of the next turn's frame, with as many points, all but the attributes. */
+/* The last attributes of a turn are lost. The next turn's frame has as many points, and all of it but the attributes is
+ * lost. */
 static void attributes_of_another_turn(void **state)
 {
     (void)state;
@@ -273,7 +274,7 @@ static void turns_are_missing(void **state)
     expect(1, 1, 2);
 }
 
-/* Those that never were to be whole. */
+/* These turns were never to be whole. */
 static void what_is_no_loss(void **state)
 {
     (void)state;
@@ -290,7 +291,7 @@ static void what_is_no_loss(void **state)
     turn(9);
     expect(2, 1, 0);
     open_head(-1, 0);
-    part(0, 0, 3); /* from its first step on, it is the client's */
+    part(0, 0, 3); /* from its first step on, so it is the client's */
     line_end(0, 0);
     expect(1, 0, 1);
 }
@@ -320,7 +321,7 @@ static void parts_of_two_turns_make_none(void **state)
     assert_int_equal(scan.whole->n[0], 2);
 }
 
-/* Descriptor and emitter come again at a change of speed, and for those who join: the turn goes on. */
+/* Descriptor and emitter are repeated at a change of speed, and for readers that join. The turn goes on. */
 static void repeated_descriptors(void **state)
 {
     (void)state;

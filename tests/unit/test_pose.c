@@ -1,109 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* core/pose: the attitude convention, what lies between poses, trajectories and their knots. */
+/* core/pose: trajectories and their knots. */
 #include "tests/unit/pose_rig.h"
-
-/* The convention written out: R = Rz(-heading) Rx(pitch) Ry(roll) from three elementary matrices. */
-static void matrix_by_hand(double heading, double pitch, double roll, double out[9])
-{
-    const double h = -heading;
-    const double z[9] = {cos(h), -sin(h), 0, sin(h), cos(h), 0, 0, 0, 1};
-    const double x[9] = {1, 0, 0, 0, cos(pitch), -sin(pitch), 0, sin(pitch), cos(pitch)};
-    const double y[9] = {cos(roll), 0, sin(roll), 0, 1, 0, -sin(roll), 0, cos(roll)};
-    double zx[9] = {0};
-    memset(out, 0, 9 * sizeof *out);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            for (int k = 0; k < 3; k++)
-                zx[3 * i + j] += z[3 * i + k] * x[3 * k + j];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            for (int k = 0; k < 3; k++)
-                out[3 * i + j] += zx[3 * i + k] * y[3 * k + j];
-}
-
-static void test_convention(void **state)
-{
-    (void)state;
-    uint64_t random = 3;
-    for (int n = 0; n < 1000; n++) {
-        double heading = 2.0 * M_PI * case_unit(&random), pitch = (case_unit(&random) - 0.5) * 3.0,
-               roll = (case_unit(&random) - 0.5) * 6.0, quat[4], got[9], want[9], back[3];
-        pose_from_angles(heading, pitch, roll, quat);
-        pose_matrix(quat, got);
-        matrix_by_hand(heading, pitch, roll, want);
-        for (int i = 0; i < 9; i++) /* products of a dozen roundings */
-            assert_true(fabs(got[i] - want[i]) < 2e-15);
-        pose_to_angles(quat, &back[0], &back[1], &back[2]);
-        /* pitch stays 0.07 rad from the pole: errors grow by 1 / cos, 14 times */
-        assert_true(fabs(back[0] - heading) < 1e-13 && fabs(back[1] - pitch) < 1e-13 && fabs(back[2] - roll) < 1e-13);
-        pose_from_matrix(want, quat);
-        pose_matrix(quat, got);
-        for (int i = 0; i < 9; i++)
-            assert_true(fabs(got[i] - want[i]) < 1e-13);
-    }
-    /* In words: heading 90 looks east, pitch lifts the nose, roll lowers the right side. */
-    double quat[4], out[3];
-    const double forward[3] = {0, 1, 0}, right[3] = {1, 0, 0};
-    pose_from_angles(90 * DEG, 0, 0, quat);
-    pose_rotate(quat, forward, out);
-    assert_true(fabs(out[0] - 1.0) < 1e-15 && fabs(out[1]) < 1e-15);
-    pose_from_angles(90 * DEG, 10 * DEG, 5 * DEG, quat);
-    pose_rotate(quat, forward, out);
-    assert_true(fabs(out[2] - sin(10 * DEG)) < 1e-15);
-    pose_rotate(quat, right, out);
-    assert_true(out[2] < -0.08);
-}
-
-/* Nose straight up or down: heading and roll turn about one axis, and only their sum or difference counts. The angles that
- * come back give the same attitude, also just beside the pole. Nearer to it than 1e-9 roll is put into the heading. */
-static void test_pole(void **state)
-{
-    (void)state;
-    static const double pitch_deg[] = {90, -90, 90 - 1e-5, -90 + 1e-5, 90 - 1e-7};
-    for (size_t i = 0; i < sizeof pitch_deg / sizeof pitch_deg[0]; i++)
-        for (int heading_deg = 0; heading_deg < 360; heading_deg += 45)
-            for (int roll_deg = -150; roll_deg <= 180; roll_deg += 30) {
-                double quat[4], again[4], matrix[9], h, p, r;
-                matrix_by_hand(heading_deg * DEG, pitch_deg[i] * DEG, roll_deg * DEG, matrix);
-                pose_from_angles(heading_deg * DEG, pitch_deg[i] * DEG, roll_deg * DEG, quat);
-                pose_to_angles(quat, &h, &p, &r);
-                assert_true(h >= 0 && h < 2 * M_PI + 1e-9 && fabs(p - pitch_deg[i] * DEG) < 1e-12);
-                pose_from_angles(h, p, r, again);
-                if (pose_angle_between(quat, again) > 2e-15) /* products of a dozen roundings */
-                    fail_msg("%d %.9g %d: off by %g", heading_deg, pitch_deg[i], roll_deg,
-                             pose_angle_between(quat, again));
-                pose_from_matrix(matrix, again);
-                assert_true(pose_angle_between(quat, again) < 2e-15);
-            }
-}
-
-static void test_between(void **state)
-{
-    (void)state;
-    struct pose a = {.position_m = {1, 2, 3}}, b = {.position_m = {3, 2, -1}}, mid;
-    pose_from_angles(350 * DEG, 0, 0, a.quat);
-    pose_from_angles(30 * DEG, 0, 0, b.quat);
-    for (int i = 0; i < 4; i++)
-        b.quat[i] = -b.quat[i]; /* the same attitude: the shorter way is found all the same */
-    for (double f = 0; f <= 1.0; f += 0.125) {
-        double h, p, r;
-        pose_between(&a, &b, f, &mid);
-        pose_to_angles(mid.quat, &h, &p, &r);
-        double want = fmod(350 + 40 * f, 360.0) * DEG;
-        assert_true(fabs(h - want) < 1e-14 || fabs(fabs(h - want) - 2 * M_PI) < 1e-14);
-        assert_true(fabs(mid.position_m[0] - (1 + 2 * f)) < 1e-15 && fabs(mid.position_m[2] - (3 - 4 * f)) < 1e-15);
-    }
-    assert_true(fabs(pose_angle_between(a.quat, b.quat) - 40 * DEG) < 1e-14);
-    struct pose mount = {.position_m = {0, 2, 0.5}}, head;
-    pose_from_angles(90 * DEG, 0, 0, mount.quat);
-    pose_from_angles(90 * DEG, 0, 0, a.quat);
-    pose_mount(&a, &mount, &head); /* two metres ahead of a platform that looks east; the head looks south */
-    assert_true(fabs(head.position_m[0] - 3) < 1e-15 && fabs(head.position_m[1] - 2) < 1e-15 &&
-                fabs(head.position_m[2] - 3.5) < 1e-15);
-    double out[3];
-    pose_rotate(head.quat, (const double[3]){0, 1, 0}, out);
-    assert_true(fabs(out[1] + 1) < 1e-15);
-}
 
 static struct trajectory *make(const struct pose_sample *samples, size_t n)
 {
@@ -113,55 +10,7 @@ static struct trajectory *make(const struct pose_sample *samples, size_t n)
     return tr;
 }
 
-/* A quaternion and its negative are one attitude: the way between two is the short one, whatever their signs. */
-static void test_short_way(void **state)
-{
-    (void)state;
-    uint64_t random = 8;
-    for (int n = 0; n < 100; n++) {
-        struct pose a = {.position_m = {0}}, b = {.position_m = {0}}, mid, other;
-        double axis[3], r[9], want[9];
-        pose_from_angles(6.0 * case_unit(&random), case_unit(&random), case_unit(&random), a.quat);
-        pose_from_angles(6.0 * case_unit(&random), case_unit(&random), case_unit(&random), b.quat);
-        const double turn = pose_angle_between(a.quat, b.quat);
-        pose_between(&a, &b, 0.25, &mid);
-        for (int k = 0; k < 4; k++)
-            b.quat[k] = -b.quat[k];
-        pose_between(&a, &b, 0.25, &other);
-        pose_matrix(mid.quat, want);
-        pose_matrix(other.quat, r);
-        assert_true(turn <= M_PI && fabs(pose_angle_between(a.quat, b.quat) - turn) < 1e-12);
-        assert_true(fabs(pose_angle_between(a.quat, other.quat) - 0.25 * turn) < 1e-12);
-        for (int i = 0; i < 9; i++)
-            assert_true(fabs(r[i] - want[i]) < 1e-12);
-        pose_turn(a.quat, b.quat, axis, r);
-        assert_true(fabs(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2] - 1.0) < 1e-12);
-    }
-}
-
-/* Straight up and straight down heading and roll turn about one axis: their difference, or sum, is said as heading. */
-static void test_straight_up(void **state)
-{
-    (void)state;
-    for (int up = 0; up < 2; up++)
-        for (int n = 0; n < 12; n++) {
-            const double heading = (25 + 30 * n) * DEG, roll = (n % 3) * 10 * DEG, pitch = (up ? 90 : -90) * DEG;
-            double quat[4], said[3], r[9], want[9];
-            pose_from_angles(heading, pitch, roll, quat);
-            pose_matrix(quat, want);
-            pose_to_angles(quat, &said[0], &said[1], &said[2]);
-            /* the cosine of the pitch is what rounding leaves, of which the pitch is the root's error: 2e-8 */
-            assert_true(fabs(said[1] - pitch) < 5e-8 && said[2] == 0.0);
-            const double off = said[0] - (up ? heading - roll : heading + roll);
-            assert_true(fabs(remainder(off, 2.0 * M_PI)) < 1e-12);
-            pose_from_matrix(want, quat);
-            pose_matrix(quat, r);
-            for (int i = 0; i < 9; i++)
-                assert_true(fabs(r[i] - want[i]) < 5e-8);
-        }
-}
-
-/* A knot counts from its own time on; before the first it is the first. */
+/* A knot counts from its own time on. Before the first knot, the first one counts. */
 static void test_find_knot(void **state)
 {
     (void)state;
@@ -200,8 +49,8 @@ static void test_samples_too_near(void **state)
     }
 }
 
-/* Velocities are those of a parabola through three samples, at the ends too: what is a parabola stays one, with samples
- * at any distance. Rounding: 1e-15 of 30 m, some times. */
+/* Velocities are those of a parabola through three samples, at the ends too. So a parabola stays one, with samples at
+ * any distance. Rounding: 1e-15 of 30 m, some times. */
 static void test_parabola(void **state)
 {
     (void)state;
@@ -219,7 +68,7 @@ static void test_parabola(void **state)
     trajectory_free(tr);
 }
 
-/* Where two samples have one place the body stands between them, and comes to rest there. */
+/* Between two samples at one place the body stands, and it comes to rest there. */
 static void test_pause(void **state)
 {
     (void)state;
@@ -256,7 +105,7 @@ static void test_straight_line(void **state)
     }
     trajectory_at(tr, 5.2, &p, &frame);
     assert_true(fabs(frame - 1.5) < 1e-12);
-    trajectory_at(tr, 4.0, &p, &frame); /* before and behind, it stands */
+    trajectory_at(tr, 4.0, &p, &frame); /* before and after, it stands */
     assert_true(p.position_m[0] == 15.0 && frame == 0.0);
     trajectory_at(tr, 9.0, &p, &frame);
     assert_true(p.position_m[0] == 18.0 && frame == 4.0);
@@ -266,7 +115,7 @@ static void test_straight_line(void **state)
 enum { TURN_SAMPLES = 100 };
 static const double RADIUS_M = 10.0, RATE = 1.0, STEP_S = 0.1;
 
-/* A car that drives a circle at 10 m/s, nose along the way: at t on the circle's angle t, heading -t. */
+/* A car drives a circle at 10 m/s, nose along the way: at t it is at the circle's angle t, with heading -t. */
 static void on_circle(double t, struct pose *pose)
 {
     *pose = (struct pose){.position_m = {RADIUS_M * cos(RATE * t), RADIUS_M * sin(RATE * t), 0.0}};
@@ -283,8 +132,8 @@ static struct trajectory *circle(void)
     return make(s, TURN_SAMPLES);
 }
 
-/* With x = RATE * STEP_S: the parabola's derivative on a circle is the true one times sin(x)/x. Put into the cubic,
- * that is off along the way by R x^3/6 times the largest of f(1-f)(1-2f), 0.0962, and across it by R x^4 3/128; higher
+/* With x = RATE * STEP_S: the parabola's derivative on a circle is the true one times sin(x)/x. In the cubic that gives
+ * an error along the way of R x^3/6 times the largest of f(1-f)(1-2f), 0.0962, and across it of R x^4 3/128. Higher
  * powers of x = 0.1 add below 2 %. By chords it would be R x^2/8. */
 static void test_constant_turn(void **state)
 {
@@ -297,7 +146,7 @@ static void test_constant_turn(void **state)
         trajectory_at(tr, t, &got, &frame);
         on_circle(t, &want);
         worst = fmax(worst, distance(got.position_m, want.position_m));
-        assert_true(pose_angle_between(got.quat, want.quat) < 1e-14); /* constant rate is what slerp does */
+        assert_true(pose_angle_between(got.quat, want.quat) < 1e-14); /* slerp has a constant rate */
         double i = floor(t / STEP_S);
         on_circle(i * STEP_S, &a);
         on_circle((i + 1) * STEP_S, &b);
@@ -311,8 +160,8 @@ static void test_constant_turn(void **state)
     trajectory_free(tr);
 }
 
-/* A parabola is what three samples show: position and speed are exact at the first and the last one, too, whatever lies
- * between their times. */
+/* Three samples define a parabola. Position and speed are exact at the first and the last sample, too, with any times
+ * between. */
 static void test_ends(void **state)
 {
     (void)state;
@@ -339,8 +188,7 @@ static void test_ends(void **state)
     trajectory_free(tr);
 }
 
-/* Between its knots the head moves as pose_between says: within the stated bound of the trajectory, lever arm included.
- */
+/* Between its knots the head moves by pose_between: within the stated bound of the trajectory, lever arm included. */
 static void test_knots(void **state)
 {
     (void)state;
@@ -374,7 +222,7 @@ static void test_knots(void **state)
     trajectory_free(tr);
 }
 
-/* Cut at end_s: the same poses up to there, and the one of that time as the last. */
+/* The path is cut at end_s: it has the same poses up to there, and the pose of that time as its last. */
 static void test_knots_to_an_end(void **state)
 {
     (void)state;
@@ -399,7 +247,7 @@ static void test_knots_to_an_end(void **state)
     trajectory_free(tr);
 }
 
-/* As many knots as the way needs, however long it takes; and a limit. */
+/* There are as many knots as the way needs, however long it takes, up to a limit. */
 static void test_slow_knots(void **state)
 {
     (void)state;
@@ -440,20 +288,9 @@ static void test_slow_knots(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_short_way),
-        cmocka_unit_test(test_find_knot),
-        cmocka_unit_test(test_straight_up),
-        cmocka_unit_test(test_parabola),
-        cmocka_unit_test(test_pause),
-        cmocka_unit_test(test_convention),
-        cmocka_unit_test(test_between),
-        cmocka_unit_test(test_straight_line),
-        cmocka_unit_test(test_constant_turn),
-        cmocka_unit_test(test_knots),
-        cmocka_unit_test(test_knots_to_an_end),
-        cmocka_unit_test(test_slow_knots),
-        cmocka_unit_test(test_pole),
-        cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_find_knot),        cmocka_unit_test(test_parabola),      cmocka_unit_test(test_pause),
+        cmocka_unit_test(test_straight_line),    cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),
+        cmocka_unit_test(test_knots_to_an_end),  cmocka_unit_test(test_slow_knots),    cmocka_unit_test(test_ends),
         cmocka_unit_test(test_samples_too_near),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -55,7 +55,7 @@ static void test_csv(void **state)
     trajectory_free(quats);
 }
 
-/* Nose up and nose down may be said, and are the same by quaternion. */
+/* Nose up and nose down are allowed, and are the same by quaternion. */
 static void test_csv_upright(void **state)
 {
     (void)state;
@@ -115,7 +115,7 @@ static void test_csv_errors(void **state)
     struct trajectory *tr;
     struct sh_err err;
     assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", NULL, &tr, &err), SH_EINPUT);
-    /* a number does not end at a byte 0 */
+    /* A number does not end at a byte 0. */
     static const char zero[] = NAMES "0,1\0002,2,3,4\n";
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
@@ -132,7 +132,7 @@ static void test_waypoints(void **state)
     struct trajectory *tr;
     struct pose p;
     double frame, h, pitch, roll, first, last;
-    /* North at 5 m/s for 20 m, stand for 2 s, on for 10 m at 2 m/s. */
+    /* The way goes north at 5 m/s for 20 m, stands for 2 s, and goes on for 10 m at 2 m/s. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,1,5,0\n0,10,1,5,0\n0,20,1,2,2\n0,30,1,2,0\n");
     if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_span(tr, &first, &last);
@@ -145,8 +145,8 @@ static void test_waypoints(void **state)
         trajectory_at(tr, t, &p, &frame);
         assert_true(fabs(p.position_m[1] - 20) < 1e-12 && fabs(frame - 2) < 1e-12);
     }
-    /* It comes to rest, and sets off from it: of a leg's last or first share f it does f * (2 - f), twice f * f at most.
-     * The curve there has 3 times the mean speed at most. */
+    /* The body comes to rest, and starts from it. In a leg's last or first share f it covers f * (2 - f), twice f * f
+     * at most. The curve there has 3 times the mean speed at most. */
     static const double f = 0.05;
     trajectory_at(tr, 4.0 - 2.0 * f, &p, &frame);
     assert_true(20 - p.position_m[1] > 0 && 20 - p.position_m[1] < 3 * 10 * 2 * f * f);
@@ -167,12 +167,12 @@ static void test_waypoints(void **state)
         before = p;
     }
     trajectory_free(tr);
-    /* A corner: heading turns from north to east, in the end along the last leg. */
+    /* A corner: the heading turns from north to east, in the end along the last leg. */
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,10\n0,50,0,10\n50,50,0,10\n100,50,0,10\n");
     if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(tr, 5.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);
-    assert_true(fabs(h - 45 * DEG) < 1e-3); /* equal times before and behind: the parabola halves the angle */
+    assert_true(fabs(h - 45 * DEG) < 1e-3); /* equal times before and after: the parabola halves the angle */
     trajectory_at(tr, 15.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);
     assert_true(fabs(h - 90 * DEG) < 1e-3);
@@ -187,8 +187,8 @@ static void test_waypoints(void **state)
     }
 }
 
-/* 10 m at 1 mm/s are as many samples as they are long; more than there is room for, and a time that is no count of
- * nanoseconds, are errors. */
+/* 10 m at 1 mm/s give as many samples as their length needs. More than there is room for are an error, and so is a time
+ * beyond the nanosecond counter. */
 static void test_slow_waypoints(void **state)
 {
     (void)state;
@@ -225,7 +225,7 @@ static void test_slow_waypoints(void **state)
     assert_non_null(strstr(err.text, "allowed 4e+09"));
 }
 
-/* East in a scene in ECEF: up is the ellipsoid's normal, forward is east, wherever on the Earth. */
+/* The way goes east in a scene in ECEF. Up is the ellipsoid's normal and forward is east, anywhere on the Earth. */
 static void test_level_waypoints(void **state)
 {
     (void)state;
@@ -250,7 +250,7 @@ static void test_level_waypoints(void **state)
         pose_matrix(p.quat, r);
         for (int k = 0; k < 3; k++) {
             assert_true(fabs(r[3 * k + 2] - up[k]) < 1e-9);
-            /* differences of coordinates that are right to 1e-9 m, over 1 mm, or 0.1 mm when it is slow */
+            /* These are differences of coordinates that are right to 1e-9 m, over 1 mm, or 0.1 mm when it is slow. */
             assert_true(fabs(r[3 * k + 1] - east[k]) < 3e-5);
         }
         trajectory_free(tr);
@@ -262,7 +262,7 @@ static void keep_warning(void *ctx, const char *text)
     snprintf(ctx, 64, "%s", text);
 }
 
-/* What a file holds may be a command for the terminal that shows the message. */
+/* The text of a file may be a command for the terminal that shows the message. */
 static void test_messages_are_lines(void **state)
 {
     (void)state;

@@ -16,7 +16,7 @@ static void expect(const struct pps *pps, int64_t t_ns, enum protocol_pps state,
     assert_int_equal(was_set, set);
 }
 
-/* Pulses at seconds 1 to 4, none at 5 and 6, at 7 to 9; then the clock jumps by 0.3 s. */
+/* Pulses come at seconds 1 to 4, not at 5 and 6, and at 7 to 9. Then the clock jumps by 0.3 s. */
 static void states_follow_the_pulses(void **state)
 {
     (void)state;
@@ -40,7 +40,7 @@ static void states_follow_the_pulses(void **state)
     expect(&pps, 11 * SECOND + 700000000, PROTOCOL_PPS_LOCKED, 1);
 }
 
-/* Sentences without pulses: the time of day is not set before the first pulse. */
+/* There are sentences without pulses: the time of day is not set before the first pulse. */
 static void without_pulses_no_time_is_set(void **state)
 {
     (void)state;
@@ -55,7 +55,7 @@ static void without_pulses_no_time_is_set(void **state)
     expect(&pps, 102 * SECOND, PROTOCOL_PPS_ERROR, 1);
 }
 
-/* A power cycle begins anew, and what was before it stays known. */
+/* A power cycle begins anew, and earlier facts stay known. */
 static void a_power_cycle_begins_anew(void **state)
 {
     (void)state;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs of a head, by command: HEAD:PRR within a scan changes reach, echoes and smallest range as the table
- * of the head says, from the pulse on at which the rate changes. The tables below were typed from the profiles'
- * sources, not read from the program. */
+/* Programs of a head, by command. HEAD:PRR within a scan changes reach, echoes and smallest range as the table of the
+ * head says, from the pulse on at which the rate changes. The tables below were typed from the profiles' sources, not
+ * read from the program. */
 #include <math.h>
 
 #include "tests/common/thorough.h"
 #include "tests/unit/device_rig.h"
 
-/* The scene: a strip of a cylinder about the mirror's axis, a metre away, of facets of 0.5 deg. So each pulse of
- * a line meets it head on to 0.25 deg, and its range is that of the cylinder less 1e-5 of it at most. */
+/* The scene is a strip of a cylinder about the mirror's axis, a metre away, of facets of 0.5 deg. So each pulse of a
+ * line meets it head on to 0.25 deg, and its range is that of the cylinder less 1e-5 of it at most. */
 enum { FACETS = 220 };
 static const double FACET_DEG = 0.5, FIRST_DEG = -42.0;
 
@@ -124,7 +124,7 @@ struct seen {
     uint64_t shots, echoes;
 };
 
-/* Adds up the points of the last tick claimed, one for each pulse. */
+/* Adds up the points of the last claimed tick, one for each pulse. */
 static void add_tick(struct rig *rig, struct seen *seen)
 {
     const struct ring_tick *tick = rig_fill(rig);
@@ -143,8 +143,9 @@ static void add_tick(struct rig *rig, struct seen *seen)
     }
 }
 
-/* By hand from core/detect.h: the reflectance that is just seen, through the two reaches of the program, and the
- * share of pulses that see a target: noise of 1/8 of the threshold (threshold_snr). */
+/* Computes the expected share by core/detect.h. First comes the reflectance that is just seen, from the two reaches
+ * of the program. Then comes the share of pulses that see the target, with noise of 1/8 of the threshold
+ * (threshold_snr). */
 static double expected_share(const struct program *p, double reflectance, double range_m)
 {
     if (range_m > p->reach_90_m) return 0.0; /* nothing is seen beyond it */
@@ -153,10 +154,9 @@ static double expected_share(const struct program *p, double reflectance, double
     return 0.5 * erfc(-8.0 * (reflectance / least - 1.0) / M_SQRT2);
 }
 
-/* 2 % before the reach and 2 % behind it, of targets of 90 and 20 %. Each rate is set by command within the scan,
- * which began at another one. At least 20,000 pulses each: 4.75 standard errors are 0.017 of p = 1/2; 104
- * comparisons, false alarm 2e-4 in all. Facets and cosines move the range by 1e-5 of it, and so the share by
- * 1e-4. */
+/* Targets of 90 and 20 % stand 2 % before the reach and 2 % behind it. Each rate is set by command within the scan,
+ * which began at another one. At least 20,000 pulses each: 4.75 standard errors are 0.017 of p = 1/2; 104 comparisons,
+ * false alarm 2e-4 in all. Facets and cosines move the range by 1e-5 of it, and so the share by 1e-4. */
 static void targets_vanish_at_the_reach_of_each_program(void **state)
 {
     (void)state;
@@ -184,13 +184,13 @@ static void targets_vanish_at_the_reach_of_each_program(void **state)
                      reflectance, range_m, share, expected);
         rig_close(rig);
     }
-    /* The cases differ: half of the pulses is not what all of them expect. */
+    /* The cases differ: not all of them expect half of the pulses. */
     assert_true(expected_share(&heads[0].program[0], 0.9, 784.0) > 0.6);
     assert_true(expected_share(&heads[0].program[0], 0.2, 408.0) < 0.4);
 }
 
-/* Signals without noise: a target between the reaches of two rates is seen by each pulse of one and by none of the
- * other, from the very pulse on at which the command took effect. */
+/* Signals have no noise. Each pulse of one rate sees a target between the reaches of two rates, and no pulse of the
+ * other rate does. That holds from the very pulse at which the command took effect. */
 static void a_rate_changes_the_reach_at_its_pulse(void **state)
 {
     (void)state;
@@ -211,7 +211,7 @@ static void a_rate_changes_the_reach_at_its_pulse(void **state)
     rig_close(rig);
 }
 
-/* The descriptor that follows a change says what the new rate has. */
+/* The descriptor after a change has the new rate's figures. */
 static void the_descriptor_follows(void **state)
 {
     (void)state;
@@ -232,7 +232,7 @@ static void the_descriptor_follows(void **state)
     }
 }
 
-/* Six upright bars side by side across one footprint (18 mm of radius at 100 m), each a metre farther. */
+/* Six upright bars are side by side across one footprint (18 mm of radius at 100 m), each a metre farther. */
 static int write_bars(void)
 {
     char path[96];
@@ -248,7 +248,7 @@ static int write_bars(void)
     return fclose(f);
 }
 
-/* Points a pulse, in rates one after the other: `many` at 600 kHz, which has 8 echoes, and 4 at 1.2 MHz. */
+/* Counts points a pulse, in rates one after the other: `many` at 600 kHz, which has 8 echoes, and 4 at 1.2 MHz. */
 static void expect_echoes(struct rig *rig, uint64_t many)
 {
     for (int i = 0; i < 6; i++) {
@@ -271,7 +271,7 @@ static void expect_echoes(struct rig *rig, uint64_t many)
     }
 }
 
-/* Four panes and a wall, 2 m apart, are five echoes; the bars are six. A rate that reports four leaves out the
+/* Four panes and a wall, 2 m apart, are five echoes, and the bars are six. A rate that reports four leaves out the
  * weakest. */
 static void a_rate_changes_the_echoes(void **state)
 {
@@ -303,7 +303,7 @@ static void a_rate_changes_the_echoes(void **state)
     rig_close(rig);
 }
 
-/* Nearer than the smallest range of one rate and not of the other; here no signal is modelled. */
+/* The target is nearer than the smallest range of one rate, but not of the other. No signal is modelled here. */
 static void a_rate_changes_the_smallest_range(void **state)
 {
     (void)state;
@@ -337,7 +337,7 @@ static void a_rate_between_them_is_refused(void **state)
 
 enum { TICKS = 160 };
 
-/* A session that goes through all rates; or its journal replayed, without a command. What each tick saw. */
+/* A session goes through all rates, or its journal is replayed, without a command. It keeps the counts of each tick. */
 static void run_session(const struct device_options *options, struct seen seen[TICKS])
 {
     static const char *const sets[] = {"scene.meshes[0].scale=230", "surfaces[0].reflectance=0.2"};

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs of head profiles as the configuration reads them: what is completed, what is refused and at which
- * line; widths by their definitions; grades of the profiles that come with the program. */
+/* Programs of head profiles as the configuration reads them: completed values, refusals with their line, widths by
+ * their definitions, grades of the profiles that come with the program. */
 #include <dirent.h>
 #include <math.h>
 
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
-/* A profile with programs; each line is a case's to change. Line 17 is the first program. */
+/* A profile with programs; each case changes one line. Line 17 is the first program. */
 static const char head[] = "maker: M\nmodel: H\n"                          /* 1 */
                            "prr_min_hz: { value: 100000, from: quoted }\n" /* 3 */
                            "prr_max_hz: { value: 400000, from: quoted }\n" /* 4 */
@@ -77,7 +77,7 @@ static void what_the_file_leaves_out_is_the_heads(void **state)
     assert_true(config_rate_below(p, 1) == 100000000000 && config_rate_below(p, INT64_MAX) == 400000000000);
 }
 
-/* Without reaches of their own, programs have the head's. */
+/* Programs without reaches of their own have the head's. */
 static void reaches_may_be_the_heads(void **state)
 {
     (void)state;
@@ -181,7 +181,7 @@ static void only_rates_of_programs_are_taken(void **state)
     }
 }
 
-/* ---- widths. By hand: sqrt(2) = 1.41421356; sqrt(2 / ln 2) = sqrt(2 / 0.69314718) = 1.69864360. */
+/* ---- widths, worked out by hand: sqrt(2) = 1.41421356; sqrt(2 / ln 2) = sqrt(2 / 0.69314718) = 1.69864360 */
 
 static void widths_become_full_ones_at_1_e2(void **state)
 {
@@ -215,8 +215,7 @@ static void widths_become_full_ones_at_1_e2(void **state)
     }
 }
 
-/* The definitions again, from irradiance alone: at half the given width it has fallen to the share that the
- * definition names. */
+/* The definitions again, from irradiance alone: at half the given width it has fallen to the definition's share. */
 static void irradiance_falls_as_defined(void **state)
 {
     (void)state;
@@ -235,7 +234,7 @@ static void irradiance_falls_as_defined(void **state)
 
 /* ---- the profiles that come with the program */
 
-/* What each maker gives, and what comes of it at 1/e2, by hand. */
+/* Each maker's figures, and their value at 1/e2, worked out by hand. */
 static void shipped_widths_are_the_makers(void **state)
 {
     (void)state;
@@ -258,7 +257,7 @@ static void shipped_widths_are_the_makers(void **state)
     }
 }
 
-/* Whether the file's first lines say of all figures of a grade where they are from. */
+/* Returns whether the file's first lines give the source of all figures of a grade. */
 static int is_said_of_all(const char *text, const char *grade)
 {
     char said[32];
@@ -278,8 +277,8 @@ static void check_grade(const char *path, const char *text, const char *figure)
             fail_msg("%s: %s without a source: %.60s", path, sourced[i], figure);
 }
 
-/* Every line of a profile that has a value has a grade. What was found somewhere says where: there, or before the
- * first key for all figures of the grade. */
+/* Every line of a profile that has a value has a grade. A figure with a source names it: there, or before the first key
+ * for all figures of the grade. */
 static void shipped_figures_have_a_grade(void **state)
 {
     (void)state;
@@ -304,7 +303,7 @@ static void shipped_figures_have_a_grade(void **state)
     assert_true(files >= 10);
 }
 
-/* Accuracy is shown and never drawn: where a profile has both, the noise is less. */
+/* Accuracy is shown and never drawn. If a profile has both, the noise is less. */
 static void accuracy_is_not_noise(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How far work is, and how long it will take. */
+/* The progress of work, and the time that it will take. */
 #include "firmware_sim/app/progress.h"
 #include "tests/unit/recorder_rig.h"
 

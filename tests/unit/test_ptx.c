@@ -25,7 +25,7 @@ static void expect_line(const char *want)
     at += len + 1;
 }
 
-/* The head of a grid: size, pose twice; a quarter turn clockwise, vectors being rows. */
+/* The head of a grid: size, and the pose twice; a quarter turn clockwise, with vectors as rows. */
 static void expect_head(int columns, int rows, const char *shift)
 {
     char line[256];
@@ -49,7 +49,7 @@ static void expect_head(int columns, int rows, const char *shift)
 
 static const struct rig_point none = {0, 0, 0, INT16_MIN, 0xffff, 0, 0};
 
-/* Lines of three, two and four shots, and one that was lost: a grid of four columns and four rows. */
+/* Lines have three, two and four shots, and one was lost: a grid of four columns and four rows. */
 static void test_grid(void **state)
 {
     (void)state;
@@ -115,7 +115,7 @@ static void test_scans(void **state)
     assert_string_equal(rig_notes, "");
 }
 
-/* What the head measured stands as it is; the pose is that in the scene. */
+/* The head's measurements are unchanged; the pose is that in the scene. */
 static void test_polar(void **state)
 {
     (void)state;
@@ -195,7 +195,7 @@ static void put_shots(uint32_t frames, const uint32_t *line, const uint32_t *row
 }
 
 /* Lines and pulses that no scan of this descriptor has are not filled up to: another grid begins, and no point is lost.
- * A scan has 2 x (10 + 1) lines and 20 + 1 pulses in each, as far as the descriptor says. */
+ * A scan has 2 x (10 + 1) lines and 20 + 1 pulses in each, by the descriptor. */
 static void test_far(void **state)
 {
     (void)state;
@@ -223,7 +223,7 @@ static void test_far(void **state)
     }
 }
 
-/* What earlier files of the recording were filled up by is gone. */
+/* The padding of earlier files of the recording is gone. */
 static void test_shared_padding(void **state)
 {
     (void)state;
@@ -248,7 +248,7 @@ static int stop(void *ctx)
     return ++asked >= stop_at;
 }
 
-/* The sweep at the end asks, and gives the file up: at the first column, and within long ones. */
+/* The pass at the end asks, and gives the file up: at the first column, and within long ones. */
 static void test_stop(void **state)
 {
     (void)state;

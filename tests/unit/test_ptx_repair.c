@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/* PTX files whose recorder was killed, or whose disk was full: what a repair makes of them and of the grid beside them,
- * wherever these end. */
+/* PTX files whose recorder was killed, or whose disk was full: the result of a repair, for them and the grid beside
+ * them, wherever these end. */
 #include "tests/common/thorough.h"
 #include "tests/unit/killed_rig.h"
 
 enum { HEAD_LEN = 120, CELL_LEN = 40, MAX_SHOTS = 512, MAX_STATES = 64 };
 
-/* A shot's place is its coordinates: x and y in the head's frame are (line + 1) and (row + 1) mm. */
+/* A shot's coordinates give its place: x and y in the head's frame are (line + 1) and (row + 1) mm. */
 struct shot {
     int scan, line, row, has_echo;
 };
 static struct shot shot[MAX_SHOTS];
 static int n_shots, coloured;
 
-/* What is on the disk after each frame. */
+/* The disk's contents after each frame. */
 static struct state {
     uint8_t *text, *grid;
     size_t text_len, grid_len;
@@ -43,8 +43,8 @@ static void forget(void)
     n_states = n_shots = 0;
 }
 
-/* Lines of unequal length, which begin at different rows; every third shot has no echo, and of the second scan all have
- * one. */
+/* Lines have unequal lengths, and begin at different rows. Every third shot has no echo, but all of the second scan
+ * have one. */
 static void put_line(int scan, uint32_t line, uint32_t row, int n)
 {
     static struct rig_point p[32];
@@ -80,7 +80,7 @@ static void record_scans(void)
     unlink(path);
 }
 
-/* ---- what is in a file */
+/* ---- a file's contents */
 
 static const char *next_line(const char *at)
 {
@@ -89,8 +89,8 @@ static const char *next_line(const char *at)
     return at + 1;
 }
 
-/* Each grid has the shape that its header says, and its points are where their coordinates say. They are the first ones of
- * the stream, and as many as are returned. */
+/* Each grid has the shape of its header, and its points are where their coordinates say. They are the first ones of the
+ * stream. Returns how many there are. */
 static uint64_t check_text(const uint8_t *text, uint64_t *n_grids)
 {
     const char *at = (const char *)text;
@@ -129,8 +129,8 @@ static uint64_t check_text(const uint8_t *text, uint64_t *n_grids)
     return n;
 }
 
-/* How many echoes are in the first n cells of a grid's file: a cell for each shot that has one, or that lies beyond all
- * before it. */
+/* Returns how many echoes are in the first n cells of a grid's file. There is a cell for each shot that has an echo, or
+ * that lies beyond all before it. */
 static int echoes_in(int scan, size_t n)
 {
     int low = 0, high = 0, last = -1, echoes = 0, first = 1;
@@ -173,7 +173,7 @@ static void remove_state(void)
     unlink(rig_path("cut.ptx.grid"));
 }
 
-/* The file after a repair that succeeds: whole, with `want` points, and the grid is gone. */
+/* The file after a repair that succeeds: it is whole, with `want` points, and the grid is gone. */
 static uint8_t *repair_well(uint64_t want, size_t *len)
 {
     struct repair r;
@@ -196,7 +196,7 @@ static uint8_t *repair_well(uint64_t want, size_t *len)
     return text;
 }
 
-/* Grids that are there as text, up to the place of the one that is not. */
+/* Returns how many grids are there as text, up to the place of the incomplete one. */
 static int grids_in(const uint8_t *text)
 {
     const char *at = (const char *)text;
@@ -210,7 +210,7 @@ static int grids_in(const uint8_t *text)
     return n;
 }
 
-/* Whenever it is killed: what was saved is there. The file of the last grid may end anywhere. */
+/* Whenever the recorder is killed, the saved points are there. The file of the last grid may end anywhere. */
 static void test_killed(void **state)
 {
     (void)state;
@@ -238,7 +238,7 @@ static void test_killed(void **state)
     remove_state();
 }
 
-/* The end of all shots, and however much of the last grid's text had been written: the whole file comes out to the byte. */
+/* All shots have come, and any part of the last grid's text is written. The whole file comes out to the byte. */
 static void test_completing(void **state)
 {
     (void)state;
@@ -258,7 +258,7 @@ static void test_completing(void **state)
     remove_state();
 }
 
-/* Points in the first n bytes of the whole text, whose lines are whole. */
+/* Returns the points in the first n bytes of the whole text, in its whole lines. */
 static uint64_t points_in(size_t n, int *any)
 {
     const char *at = (const char *)whole, *end = at + n;
@@ -278,7 +278,7 @@ static uint64_t points_in(size_t n, int *any)
     return points;
 }
 
-/* The text alone, cut anywhere: no point that is there is lost. */
+/* The text alone is cut anywhere, and loses none of its points. */
 static void test_text_alone(void **state)
 {
     (void)state;
@@ -317,7 +317,7 @@ static void check_refused(const char *text, const void *grid, size_t grid_len, c
 
 #define POSE "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 
-/* Other files, damage, absurd numbers: a line that says so, and nothing is touched. */
+/* Other files, damage and absurd numbers give a line that says so, and nothing is changed. */
 static void test_refused(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client in Python: figures that few streams show (python_figures.py), with numpy and without. Run from the top of the
- * source tree. */
+/* The client in Python: figures that few streams have (python_figures.py), with numpy and without. Run from the top of
+ * the source tree. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw`: what came at several sockets is passed on in its order, whenever it is asked for; and the escapes of
- * --send. */
+/* `record --raw`: pieces that came at several sockets are passed on in their order, whenever they are asked for. And
+ * the escapes of --send. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,8 +14,8 @@
 
 enum { INPUTS = 3, PIECES = 3000 };
 
-/* A world in which a piece comes at each step of a clock, at one of the sockets. Whenever a socket is asked, the clock may
- * go on before. */
+/* In this world a piece comes at each step of a clock, at one of the sockets. When a socket is asked, the clock may go
+ * on before. */
 struct world {
     int64_t now;
     uint64_t asked;

@@ -6,7 +6,7 @@ enum { POINT = 32 };
 
 static uint8_t *las;
 
-/* East, north, up are the head's axes: its scan angles count from straight down. */
+/* East, north and up are the head's axes: its scan angles count from straight down. */
 static struct native_anchor place(double lat_deg, double lon_deg, uint32_t station)
 {
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_GEODETIC, 4979, station);
@@ -44,8 +44,8 @@ static const uint8_t *record_las(void)
     return las + rig_uint(las + 96, 4);
 }
 
-/* Latitude first; 1e-11 degrees are a micrometre, and rounding to 12 decimals adds half of the last one. A double
- * of 180 degrees steps by 2.8e-14. */
+/* Latitude is first. 1e-11 degrees are a micrometre, and rounding to 12 decimals adds half of the last one. A double of
+ * 180 degrees steps by 2.8e-14. */
 static void test_ply_digits(void **state)
 {
     (void)state;
@@ -64,7 +64,7 @@ static void test_ply_digits(void **state)
     free(text);
 }
 
-/* Longitudes go on beyond 180: of the first station's points, and of a station on the other side. */
+/* Longitudes go on beyond 180, for the first station's points, and for a station on the other side. */
 static void test_antimeridian(void **state)
 {
     (void)state;
@@ -84,8 +84,8 @@ static void test_antimeridian(void **state)
     assert_true(fabs(rig_double(las + 187) - 179.9999) < 1e-9); /* the least */
 }
 
-/* A head that lies on its side: its z axis points east, x north, y up. So an angle says east from north and from up.
- * Radii of the ellipsoid differ from the sphere's 6371 km by less than 0.6 %: at 45 degrees 0.003 rad. */
+/* A head lies on its side: its z axis points east, x north, y up. So an angle counts east from north and from up. Radii
+ * of the ellipsoid differ from the sphere's 6371 km by less than 0.6 %: at 45 degrees 0.003 rad. */
 static void test_scan_angle(void **state)
 {
     (void)state;
@@ -113,7 +113,7 @@ static void test_scan_angle(void **state)
     }
 }
 
-/* Of a moving head's micrometres become tenths of a millimetre, also in degrees. */
+/* A moving head's micrometres become tenths of a millimetre, also in degrees. */
 static void test_moving_scale(void **state)
 {
     (void)state;

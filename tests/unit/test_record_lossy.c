@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams that lost frames between scans: no point goes to another station, row or pose than its own. */
+/* Streams that lost frames between scans. No point gets another station, row or pose than its own. */
 #include "tests/unit/e57_rig.h"
 
 static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
@@ -51,7 +51,7 @@ static void begin(void)
     rig_points(0, 0, 100, &one, 1);
 }
 
-/* The descriptor of the second scan is lost, its anchor is not: the points are of another station. */
+/* The descriptor of the second scan is lost, but not its anchor: the points are of another station. */
 static void test_another_station(void **state)
 {
     (void)state;
@@ -62,7 +62,7 @@ static void test_another_station(void **state)
     assert_non_null(strstr(e57rig_xml, "scan 2, station 2"));
 }
 
-/* Nothing came of its beginning. Pulses go back, or the number of the scan is another. */
+/* All frames of its beginning are lost. Pulses go back, or the number of the scan differs. */
 static void test_same_station(void **state)
 {
     (void)state;
@@ -81,8 +81,8 @@ static void test_same_station(void **state)
     }
 }
 
-/* A head that started again counts its scans from 1 again: its pulses alone go back. The first frame is lost for want of
- * a descriptor. */
+/* A head that started again counts its scans from 1 again, so only its pulses go back. The first frame is lost for want
+ * of a descriptor. */
 static void test_same_number(void **state)
 {
     (void)state;
@@ -95,7 +95,7 @@ static void test_same_number(void **state)
     assert_non_null(strstr(rig_notes, "1 points left out that came before the descriptor"));
 }
 
-/* The end of a line says where the next one begins: not in another scan. Row 2 by the times. */
+/* The end of a line shows where the next one begins, but not in another scan. Row 2 follows from the times. */
 static void test_rows_of_another_scan(void **state)
 {
     (void)state;
@@ -117,7 +117,7 @@ static void put_poses(int64_t from_ms, int64_t to_ms, double y_m)
     rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
 }
 
-/* A moving head's second scan loses its first poses: those of the first scan are of the same times, and not its own. */
+/* A moving head's second scan loses its first poses. The first scan's poses have the same times, but do not count. */
 static void test_poses_of_another_scan(void **state)
 {
     (void)state;
@@ -151,7 +151,7 @@ static void test_poses_of_another_scan(void **state)
     free(text);
 }
 
-/* An anchor that holds up to 100 ms; the next one is lost: its points have no place. */
+/* An anchor holds up to 100 ms, and the next one is lost: its points have no place. */
 static void test_anchor_of_another_stretch(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes of recorded grids, and points spread over them: streams whose triangles are counted by hand. */
+/* Meshes of recorded grids, and points spread over them. The triangles of the streams are counted by hand. */
 #include "core/scene.h"
 #include "tests/unit/recorder_rig.h"
 
@@ -9,7 +9,8 @@ static struct sh_err err;
 
 enum { PULSES = 1000, FULL = 10 }; /* of a line; lines of a full turn */
 
-/* 1 line a second of 1000 pulses, of which a tenth is cast; the pan turns by 36 degrees a second: ten lines a turn. */
+/* There is 1 line a second of 1000 pulses, of which a tenth is cast. The pan turns by 36 degrees a second: ten lines a
+ * turn. */
 static struct native_descriptor descriptor(uint32_t scan)
 {
     return (struct native_descriptor){.idn = "Maker,Model,SN1,1.0",
@@ -35,7 +36,7 @@ static void put_descriptor(const struct native_descriptor *d)
     rig_put(out, native_encode_descriptor(out, sizeof out, d, 0, 0));
 }
 
-/* The scene's own frame: the station is the anchor. */
+/* In the scene's own frame the station is the anchor. */
 static struct native_anchor anchor_of(uint32_t station)
 {
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, station);
@@ -62,7 +63,7 @@ static void put_line(uint32_t line, uint32_t row, const struct rig_point *p, uin
     rig_points(line, pulse, pulse + row, p, n);
 }
 
-/* A shot that met something at x y z metres from the head. */
+/* A shot with a hit at x y z metres from the head. */
 static struct rig_point hit(double x, double y, double z, uint16_t label)
 {
     return (struct rig_point){
@@ -128,7 +129,7 @@ static void a_step_as_ply(void **state)
     has(text, "element vertex 12\n");
     has(text, "property double z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty double range\n"
               "property float reflectance\nproperty ushort label\nproperty ushort station\nelement face 8\n");
-    /* the first point: 10 m away, a reflectance of -5 dB; its normal points to the head */
+    /* The first point is 10 m away, with a reflectance of -5 dB. Its normal points to the head. */
     has(text, "end_header\n10 30 30 0 -1 0 10 -5 0 3\n");
     has(text, "\n13 31 32 0 -1 0 "); /* the last one */
     assert_int_equal(count_of(text, "\n3 "), 8);
@@ -156,7 +157,7 @@ static void a_step_as_ply(void **state)
     free(text);
 }
 
-/* 4 m2: 400 points at 100 a square metre. They lie on the walls, labelled as these are. */
+/* 4 m2 have 400 points at 100 a square metre. They lie on the walls, with their labels. */
 static void points_spread_over_the_step(void **state)
 {
     (void)state;
@@ -185,8 +186,8 @@ static void points_spread_over_the_step(void **state)
         const int is_far = label == 1;
         assert_true(fabs(y - (is_far ? 31 : 30)) < 1e-9 && x >= 10 + 2 * is_far && x <= 11 + 2 * is_far);
         assert_true(z >= 30 && z <= 32 && station == 3 && reflectance == -5);
-        /* between the ranges of corners, which are at most 0.2 m apart, and above the true one: the mean of a convex
-         * function's values is more than its value at the mean */
+        /* The range lies between those of the corners, which are at most 0.2 m apart, and above the true one: the mean
+         * of a convex function's values is more than its value at the mean. */
         const double there = sqrt((x - 10) * (x - 10) + (y - 20) * (y - 20) + (z - 30) * (z - 30));
         assert_true(range >= there - 1e-6 && range < there + 0.1);
     }
@@ -196,7 +197,7 @@ static void points_spread_over_the_step(void **state)
 
 /* ---- meshes with a material */
 
-/* Ten lines of four shots on a tube of 5 m radius, rows 0.5 m apart: closed, 10 * 3 cells of two. */
+/* Ten lines of four shots are on a tube of 5 m radius, rows 0.5 m apart. It is closed: 10 * 3 cells of two. */
 static void put_tube(uint32_t lines)
 {
     for (uint32_t line = 0; line < lines; line++) {
@@ -275,7 +276,7 @@ static void two_stations_are_two_objects(void **state)
     free(text);
 }
 
-/* ---- what there is beside */
+/* ---- more of the stream */
 
 static void later_echoes_and_lines_that_go_back(void **state)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams that change: what one file can hold of it, and what it says; rows and grids of heads that are no line heads; parts
- * of meshes. */
+/* Streams that change: the part that one file can hold, and its notes; rows and grids of heads that are no line heads;
+ * parts of meshes. */
 #include "drivers/record/mesh_grid.h"
 #include "drivers/record/mesh_sparse.h"
 #include "tests/unit/e57_rig.h"
@@ -43,7 +43,7 @@ static char *read_of(const char *name)
     return text;
 }
 
-/* Two heads of one model: their names are kept apart. Two models: LAS calls them MERGE. */
+/* The names of two heads of one model are kept apart. For two models LAS has MERGE. */
 static void test_several_heads(void **state)
 {
     (void)state;
@@ -99,7 +99,7 @@ static void test_other_kinds(void **state)
     expect_refused(&a, &b, "stops on a trajectory");
 }
 
-/* What PLY says of its coordinates; as float degrees would be wrong by metres. */
+/* PLY describes its coordinates. As float, degrees would be wrong by metres. */
 static void test_ply_says(void **state)
 {
     (void)state;
@@ -131,8 +131,8 @@ static void put_emitter(const struct native_emitter *e, const struct native_beam
     rig_put(out, native_encode_emitter(out, sizeof out, e, beam, 0, 0));
 }
 
-/* Four beams a microsecond apart, every 10 us. A turn that begins at 12 us begins with the third beam of the second
- * sequence, firing 6; the frame begins with firing 8, row 2 of its line. The line's end was lost. */
+/* Four beams fire a microsecond apart, every 10 us. A turn that begins at 12 us begins with the third beam of the
+ * second sequence, firing 6. The frame begins with firing 8, row 2 of its line. The line's end was lost. */
 static void test_rows_of_beams(void **state)
 {
     (void)state;
@@ -171,7 +171,7 @@ static void test_rows_of_beams(void **state)
     assert_int_equal(e57rig_record[0].row, 2);
 }
 
-/* A sphere of ten rings has ten lines: the first and the last one are of one grid. */
+/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. */
 static void test_lines_of_rings(void **state)
 {
     (void)state;
@@ -197,7 +197,7 @@ static void test_lines_of_rings(void **state)
     free(text);
 }
 
-/* Elevations are rounded to 1e-6 degrees: what is a degree from the pole is a ring. */
+/* Elevations are rounded to 1e-6 degrees. An elevation a degree from the pole is a ring. */
 static void test_poles(void **state)
 {
     (void)state;
@@ -208,8 +208,8 @@ static void test_poles(void **state)
     assert_false(mesh_grid_is_pole(&g, 0));
 }
 
-/* Points spread over a triangle have the label of the nearest corner by weight: here, as its corners are where weights are
- * x, y and the rest. */
+/* Points spread over a triangle have the label of the corner with the largest weight. The corners here are where the
+ * weights are x, y and the rest. */
 static void test_sparse_labels(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files of poses: stations, stops, ways; each pose once, what is missing, and what links the scene to the Earth. */
+/* Files of poses: stations, stops, ways. Each pose is there once, gaps are reported, and the link of the scene to the
+ * Earth is there. */
 #include "tests/unit/recorder_rig.h"
 
 static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
@@ -33,7 +34,7 @@ static void put_poses(int64_t from_ms, int64_t to_ms, double y_m)
     rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
 }
 
-/* Heading 90 degrees, clockwise: a turn by -90 about z. Geodetic positions are not metres: NaN. */
+/* The heading is 90 degrees, clockwise: a turn by -90 about z. Geodetic positions are not metres, so they are NaN. */
 static void test_stations(void **state)
 {
     (void)state;
@@ -90,7 +91,7 @@ static void test_moving(void **state)
     put_scan(0, 1, &a);
     put_poses(0, 100, 5);
     put_poses(100, 200, 6);
-    put_poses(300, 400, 7); /* those of 200 to 300 ms are lost */
+    put_poses(300, 400, 7); /* the poses of 200 to 300 ms are lost */
     put_scan(0, 2, &a);
     put_poses(0, 50, 8);
     const char *at = record();

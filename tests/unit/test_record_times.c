@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What recordings say of the time: creation day, GPS times, the start of each scan, and a clock that comes late. */
+/* The times in recordings: creation day, GPS times, the start of each scan, and a clock that comes late. */
 #include "tests/unit/e57_rig.h"
 
 enum { POINT = 32, POINT_12 = 28 };
@@ -15,7 +15,7 @@ static void put_event(uint32_t code, uint64_t a, uint64_t at_s, uint64_t gps)
     rig_put(out, native_encode_event(out, sizeof out, &e, (int64_t)(at_s * S), 0));
 }
 
-/* A scan that begins at that device time, in s; a point 2 ms later. */
+/* A scan begins at that device time, in s; a point comes 2 ms later. */
 static void put_scan(uint32_t scan, uint64_t at_s)
 {
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, scan);
@@ -25,7 +25,7 @@ static void put_scan(uint32_t scan, uint64_t at_s)
     rig_points(0, 0, 2, &one, 1);
 }
 
-/* Two scans, a minute apart; each says its time at its start. */
+/* Two scans, a minute apart. Each has its time at its start. */
 static void put_two(void)
 {
     rig_begin();
@@ -98,7 +98,8 @@ static void test_ply(void **state)
     expect_ply("comment the first scan starts at GPS week 2347 second 259190.000000\n", 1);
 }
 
-/* Said after the first points: of the scan that runs it is the start's time all the same; LAS stays with what it began. */
+/* The time comes after the first points. For the running scan it is the start's time all the same. LAS keeps the time
+ * that it began with. */
 static void put_late(uint32_t code, uint64_t gps)
 {
     rig_begin();
@@ -129,7 +130,7 @@ static void test_late_clock(void **state)
     }
 }
 
-/* Said in the second scan alone: nothing is known of the first one's start. */
+/* Only the second scan has the time. The first one's start stays unknown. */
 static void put_second_alone(void)
 {
     rig_begin();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Recorders: a file is whole or not there, the raw stream is kept byte by byte, and endings are known. */
+/* Recorders: a file is whole or missing, the raw stream is kept byte by byte, and endings are known. */
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -65,7 +65,7 @@ static void test_disk_full(void **state)
     assert_int_equal(raw, SH_EIO);
     assert_non_null(strstr(err.text, part));
     assert_int_equal(access(path, F_OK), -1);
-    /* what came to the disk stays */
+    /* The bytes on the disk stay. */
     assert_int_equal(repair_file(out_path, NULL, &file, &err), 0);
     assert_true(file.was_left && file.n_kept > 0);
     repair_free(&file);

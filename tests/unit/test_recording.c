@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Taking a scan: a head by script, over TCP, loses frames to the recorder and is unplugged; which scans count as
+/* Taking a scan: a scripted head, over TCP, loses frames to the recorder and is unplugged. Some scans count as
  * broken. */
 #include <arpa/inet.h>
 #include <pthread.h>
@@ -18,7 +18,7 @@
 #include "firmware_sim/app/studio/record/recording.h"
 #include "firmware_sim/command/head.h"
 
-/* What the head does, one after the other. */
+/* The head's actions, one after the other. */
 enum deed {
     END,
     PULSES,   /* some of a scan */
@@ -50,7 +50,7 @@ static void send_frame(uint8_t *frame, size_t len)
     atomic_fetch_add(&head.sent, 1);
 }
 
-/* Of scan 3 with 100 pulses, 60 of them cast and 7 of those lost by the head. */
+/* Sends telemetry of scan 3 with 100 pulses, 60 of them cast and 7 of those lost by the head. */
 static void send_telemetry(uint32_t state)
 {
     uint8_t frame[256];
@@ -129,7 +129,7 @@ static void *play(void *arg)
     return NULL;
 }
 
-/* Not before the recorder has seen all of it. */
+/* Only after the recorder has seen all of it. */
 static int is_over(void)
 {
     return atomic_load(&head.over) && atomic_load(&head.taken) >= atomic_load(&head.sent);
@@ -181,7 +181,7 @@ static void record(const enum deed *script, struct recording_result *result)
     struct sh_err err = {0, ""};
     int rc = recording_run(sh, &options, result, &err);
     scanhead_close(sh);
-    shutdown(head.listener, SHUT_RDWR); /* whatever the head waits for */
+    shutdown(head.listener, SHUT_RDWR); /* this ends any wait of the head */
     pthread_join(thread, NULL);
     close(head.fd);
     close(head.listener);
@@ -200,7 +200,7 @@ static void test_unplugged_within_a_scan(void **state)
     assert_int_equal(result.counts.pulses, 2);
 }
 
-/* The scan was over, though its end was lost: nothing was left to break. */
+/* The scan was over, though its end was lost, so nothing was left to break. */
 static void test_unplugged_after_a_lost_end(void **state)
 {
     (void)state;
@@ -209,7 +209,7 @@ static void test_unplugged_after_a_lost_end(void **state)
     record(after, &result);
     assert_int_equal(result.replugs, 1);
     assert_int_equal(result.broken_scans, 0);
-    /* the silence took two seconds, within which came reports: of a source of a million bytes, two frames */
+    /* In the two seconds of silence came reports: for a source of a million bytes, of two frames. */
     assert_true(last_fraction > 0 && last_fraction < 0.01);
 }
 
@@ -223,8 +223,8 @@ static void check_counts(const struct recording_counts *counts, uint64_t pulses)
     assert_int_equal(counts->missing, 60 - 7 - pulses);
 }
 
-/* Whoever lost a scan's end has its counts from the next telemetry, and a head that is unplugged then breaks no
- * scan. */
+/* A recorder that lost a scan's end has its counts from the next telemetry. When the head is unplugged then, no scan is
+ * broken. */
 static void test_telemetry_after_a_lost_end(void **state)
 {
     (void)state;
@@ -235,7 +235,7 @@ static void test_telemetry_after_a_lost_end(void **state)
     check_counts(&result.counts, 2);
 }
 
-/* Whoever joined within a scan knows at its end how much came before. */
+/* A recorder that joined within a scan knows at its end how much came before. */
 static void test_joined_within_a_scan(void **state)
 {
     (void)state;
@@ -245,7 +245,7 @@ static void test_joined_within_a_scan(void **state)
     check_counts(&result.counts, 1);
 }
 
-/* A head that is much too slow says an end again after the mirror has come to rest: it is one scan. */
+/* A head that is much too slow sends an end again after the mirror has come to rest. It is one scan. */
 static void test_an_end_after_telemetry(void **state)
 {
     (void)state;
@@ -255,7 +255,7 @@ static void test_an_end_after_telemetry(void **state)
     check_counts(&result.counts, 2);
 }
 
-/* Nor does the next scan take a break of this one for its own. */
+/* The next scan does not take over a break of this one. */
 static void test_broken_once_more_after_a_lost_end(void **state)
 {
     (void)state;
@@ -266,7 +266,7 @@ static void test_broken_once_more_after_a_lost_end(void **state)
     assert_int_equal(result.broken_scans, 2);
 }
 
-/* A hostile stream's: the sanitizer sees a difference that does not fit. */
+/* A hostile stream: the sanitizer sees a difference that does not fit. */
 static void test_times_far_apart(void **state)
 {
     (void)state;
@@ -288,7 +288,7 @@ static void test_order_is_said(void **state)
     assert_int_equal(recording_describe_order(&result, text, sizeof text), 1);
     assert_string_equal(text, "3 frames came twice (taken once), 2 frames came after newer ones (lost)");
     struct sh_err err = {0};
-    /* a broken frame whose copy came is not lost; those at the ends of a stream are */
+    /* A broken frame whose copy came is not lost; those at the ends of a stream are. */
     result.stream = (struct scanhead_stats){.bad_payload = 5};
     assert_int_equal(recording_check_complete(&result, &err), SH_OK);
     result.stream = (struct scanhead_stats){.bad_payload = 5, .bad_unseen = 2, .seq_lost = 3, .dropped = 4};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The counts of a recording: what a scan lost on its way, and scans whose end did not come. */
+/* The counts of a recording: a scan's losses on its way, and scans whose end did not come. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -32,7 +32,7 @@ static enum recording_news descriptor(struct recording_counts *c, uint32_t scan)
     return recording_count(c, &frame, 0);
 }
 
-/* 100 pulses came, the head left out 50 for a slow reader, and lost 10 itself, of 200 that it fired. */
+/* 100 pulses came of the 200 fired ones. The head left out 50 for a slow reader, and lost 10 itself. */
 static void test_left_out(void **state)
 {
     struct recording_counts c = {0};
@@ -45,14 +45,15 @@ static void test_left_out(void **state)
     assert_int_equal(event(&c, SCANHEAD_EV_SCAN_END, 1, 200, 10), RECORDING_SCAN_OVER);
     assert_true(c.scans == 1 && c.pulses == 100 && c.fired == 200);
     assert_true(c.cast == 160 && c.lost == 10 && c.left_out == 50 && c.missing == 50);
-    /* the next one has none of it */
+    /* The next scan does not include it. */
     event(&c, SCANHEAD_EV_SCAN_START, 2, 0, 0);
     points(&c, 70);
     event(&c, SCANHEAD_EV_SCAN_END, 2, 70, 0);
     assert_true(c.scans == 2 && c.cast == 230 && c.missing == 50);
 }
 
-/* Frames of another scan: the end of the one before was lost, also where a head that started again counts from 1. */
+/* Frames of another scan come: the end of the one before was lost. This includes a head that started again and counts
+ * from 1. */
 static void test_end_lost(void **state)
 {
     static const uint32_t next[] = {2, 7, 1};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* USB faults on request over usbredir: what a virtual machine's end sees of each. */
+/* USB faults on request over usbredir, as a virtual machine's end sees them. */
 #ifdef HAVE_USBREDIR
 
 #include "drivers/protocol/bytes.h"
@@ -25,12 +25,12 @@ static void turn_until(struct guest *g, const int *count, int value)
     assert_int_equal(*count, value);
 }
 
-/* The device goes from the channel, which stays; then it is there again. A reset is the same without a pause. */
+/* The device goes from the channel, which stays. Then it is there again. A reset is the same without a pause. */
 static void test_unplug(void **state)
 {
     (void)state;
     struct bench bench = redir_bench(1);
-    assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_ESTATE); /* nobody has it */
+    assert_int_equal(fault(&bench, LINK_FAULT_BUS_RESET, 0, 0.0), SH_ESTATE); /* no guest has it */
     struct guest *g = guest_new(&bench);
     for (int round = 0; round < 3; round++) {
         guest_configure(g);
@@ -115,7 +115,7 @@ static void test_stall(void **state)
     bench_close(&bench);
 }
 
-/* Every request takes its time, those that have packets of their own as well. */
+/* Every request takes its time, including those that have packets of their own. */
 static void test_slow(void **state)
 {
     (void)state;
@@ -134,7 +134,7 @@ static void test_slow(void **state)
     usbredirparser_send_set_alt_setting(g->parser, 7, (struct usb_redir_set_alt_setting_header *)(uintptr_t)&alt);
     assert_int_equal(guest_await(g, n_seen + 1)->type, usb_redir_alt_setting_status);
     assert_true(now_ms() - from_ms >= 3 * SLOW_MS - 1); /* a clock that is rounded down */
-    /* one is given up, and its answer says so; another is left behind at the end */
+    /* One is given up, and its answer says so; another is left behind at the end. */
     struct usb_redir_control_packet_header h = {.endpoint = 0x80, .requesttype = 0x80, .length = 2};
     usbredirparser_send_control_packet(g->parser, 21, &h, NULL, 0);
     usbredirparser_send_control_packet(g->parser, 22, &h, NULL, 0);

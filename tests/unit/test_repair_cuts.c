@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair, in process: a small file of each format cut at every byte, damaged at every third, of another format, and with
- * numbers beyond all reason. What comes out holds the whole units and is whole, or it is as it was. */
+/* These tests repair in process. A small file of each format is cut at every byte, damaged at every third, replaced by
+ * another format, and given absurd numbers. The result holds the whole units and is whole, or nothing has changed. */
 #include "tests/common/thorough.h"
 #include "tests/unit/repair_rig.h"
 
 enum { EACH = SANITIZED ? 101 : 1 }; /* of the bytes */
 
-/* Repairs what is in repair_part; 1: it is whole now, as *file says, and the bytes are in *got. 0: it was refused, and stays. */
+/* Repairs the file at repair_part. Returns 1 where it is whole now, as *file says, with the bytes in *got; 0 where it
+ * was refused, and stays. */
 static int repair(const void *data, size_t len, struct repaired *file, struct bytes *got)
 {
     repair_write_file(repair_part, data, len);
@@ -37,7 +38,7 @@ static int repair(const void *data, size_t len, struct repaired *file, struct by
     return 1;
 }
 
-/* Where both begin to be the same: behind the header, which a repair changes. */
+/* Returns where both begin to be the same: after the header, which a repair changes. */
 static size_t begin_of(const struct bytes *b)
 {
     static const char last[] = "\nend_header\n";
@@ -56,7 +57,7 @@ static size_t end_of(const struct bytes *b)
 
 /* ---- tests */
 
-/* All points are there: but for what says that the end is missing, the header is that of the whole file. */
+/* All points are there. The header is the whole file's, but for the note of the missing end. */
 static void expect_header(const struct bytes *got, const struct bytes *all)
 {
     const size_t begin = begin_of(all);
@@ -70,7 +71,7 @@ static void expect_header(const struct bytes *got, const struct bytes *all)
     }
 }
 
-/* What is cut at a byte has as many units as are whole before it, and these are the first of the whole file. */
+/* A file cut at a byte has as many units as are whole before it, and these are the first of the whole file. */
 static void test_cut(void **state)
 {
     (void)state;
@@ -98,7 +99,7 @@ static void test_cut(void **state)
     }
 }
 
-/* A finished file that was cut later, as by a copy. */
+/* A finished file was cut later, as by a copy. */
 static void test_cut_whole(void **state)
 {
     (void)state;
@@ -125,7 +126,8 @@ static void test_cut_whole(void **state)
     }
 }
 
-/* Another byte here and there: nothing crashes, and what is not refused is whole. Where damage can be seen, it is refused. */
+/* Bytes are changed here and there. Nothing crashes, and an accepted file is whole. If damage can be seen, it is
+ * refused. */
 static void test_damaged(void **state)
 {
     (void)state;
@@ -145,7 +147,7 @@ static void test_damaged(void **state)
     }
 }
 
-/* Zeros at the end, as a power cut leaves them. */
+/* Zeros are at the end, as a power cut leaves them. */
 static void test_zeros(void **state)
 {
     (void)state;
@@ -165,7 +167,7 @@ static void test_zeros(void **state)
     }
 }
 
-/* A file of another format under that ending is not touched. */
+/* A file of another format with that ending is not touched. */
 static void test_other_format(void **state)
 {
     (void)state;
@@ -175,7 +177,7 @@ static void test_other_format(void **state)
             struct bytes got;
             if (strcmp(strchr(repair_formats[i].name, '.'), strchr(repair_formats[k].name, '.')) == 0) continue;
             repair_name(repair_formats[i].name);
-            /* a capture holds whole frames, which a stream's reader finds */
+            /* A capture holds whole frames, which a stream's reader finds. */
             const int finds =
                 strcmp(repair_formats[i].name, "a.shs") == 0 && strcmp(repair_formats[k].name, "a.pcapng") == 0;
             if (!finds && repair(repair_left[k].data, repair_left[k].len, &file, &got))
@@ -206,7 +208,7 @@ static void test_huge_numbers(void **state)
         "ply\nformat binary_little_endian 1.0\nelement vertex -3\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3 y\nproperty double x\nend_header\n12345678",
         "ply\nformat ascii 1.0\nelement edge 3\nproperty double x\nend_header\n1\n"};
-    /* the first has eight bytes, and is made right where its header has room for that: by blanks it has */
+    /* The first has eight bytes, and is made right where its header has room for that: by blanks it has. */
     for (size_t i = 1; i < sizeof ply / sizeof ply[0]; i++)
         expect_refused("h.ply", ply[i], strlen(ply[i]));
     struct repaired file;
@@ -215,7 +217,7 @@ static void test_huge_numbers(void **state)
     assert_int_equal(repair(ply[0], strlen(ply[0]), &file, &got), 1);
     assert_int_equal(file.n_kept, 1);
     free(got.data);
-    /* a digit less: a blank more */
+    /* There is one digit less, and one blank more. */
     static const char digit[] =
         "ply\nformat ascii 1.0\ncomment crs x\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
     assert_int_equal(repair(digit, sizeof digit - 1, &file, &got), 1);
@@ -248,7 +250,7 @@ static void test_huge_numbers(void **state)
     expect_refused("h.glb", "v 0 0 0\n", 8);
 }
 
-/* A meshless gap: where good lines follow a bad one, no recorder has left it so. */
+/* Good lines follow a bad one. No recorder leaves a file so. */
 static void test_damage_within_text(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair and the files of other programs: these may end or go on in ways that no recorder knows. So they are checked, and
- * never changed. */
+/* Repair and the files of other programs. These may end or go on in ways that no recorder writes. So they are checked,
+ * and never changed. */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -18,7 +18,7 @@
 #define PCAPNG_SECTION   "\x0a\x0d\x0d\x0a\x1c\0\0\0\x4d\x3c\x2b\x1a\x01\0\0\0\xff\xff\xff\xff\xff\xff\xff\xff\x1c\0\0\0"
 #define PCAPNG_INTERFACE "\x01\0\0\0\x14\0\0\0\x01\0\0\0\0\0\0\0\x14\0\0\0"
 
-/* SH_OK, or what the repair said; the bytes are the same in any case. */
+/* Returns SH_OK, or the repair's error. The bytes stay the same in any case. */
 static int repair_untouched(const char *name, const void *data, size_t len)
 {
     struct repaired file = {0};
@@ -34,7 +34,7 @@ static int repair_untouched(const char *name, const void *data, size_t len)
     return rc;
 }
 
-/* Whole for their programs: without a last newline, with tabs, an empty line, kinds of lines that are not ours. */
+/* They are whole for their programs: without a last newline, with tabs, an empty line, or unknown kinds of lines. */
 static void test_whole_elsewhere(void **state)
 {
     (void)state;
@@ -84,8 +84,8 @@ static void test_absurd_grid(void **state)
     }
 }
 
-/* The capture of a short recording is no longer than what a full disk may have cut off: damage is told from a cut by what
- * follows it. */
+/* The capture of a short recording is no longer than the part that a full disk may have cut off. The bytes after it
+ * tell damage from a cut. */
 static void test_damaged_capture(void **state)
 {
     (void)state;

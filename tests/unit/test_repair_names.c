@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair, in process: which file is meant, that none is replaced, that who gives up finds it as it was; and when a recorder
- * writes what it has. */
+/* Repair, in process: it finds the meant file, replaces none, and changes nothing when given up. And the moments at
+ * which a recorder writes its bytes. */
 #include <sys/stat.h>
 
 #include "core/newfile.h"
 #include "drivers/record/outfile.h"
 #include "tests/unit/repair_rig.h"
 
-/* A row that never came to the disk is zeros; one of other bytes that are all alike did. */
+/* A row that never came to the disk is zeros. A row of other equal bytes did come. */
 static void test_zeros(void **state)
 {
     static const uint8_t none[5], some[5] = {0, 0, 0, 0, 1}, first[5] = {1}, alike[5] = {7, 7, 7, 7, 7};
@@ -16,7 +16,7 @@ static void test_zeros(void **state)
     assert_true(!repair_is_zero(some, 5) && !repair_is_zero(first, 5) && !repair_is_zero(alike, 5));
 }
 
-/* Which file is meant, and that none is replaced. */
+/* The meant file is found, and none is replaced. */
 static void test_names(void **state)
 {
     (void)state;
@@ -45,7 +45,7 @@ static void test_names(void **state)
     assert_int_equal(symlink("/dev/null", repair_part), 0);
     assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EINPUT);
     assert_int_equal(unlink(repair_part), 0);
-    /* one that is still being written */
+    /* This file is still being written. */
     assert_int_equal(outfile_open(&writer, repair_path, &repair_err), 0);
     assert_int_equal(outfile_write(&writer, repair_left[REPAIR_LAS].data, repair_left[REPAIR_LAS].len, &repair_err), 0);
     assert_int_equal(outfile_flush(&writer, &repair_err), 0);
@@ -57,7 +57,7 @@ static void test_names(void **state)
     assert_int_equal(unlink(repair_part), 0);
 }
 
-/* What is not to be written to is checked, and no more. */
+/* A file that may not be written to is only checked. */
 static void test_not_ours(void **state)
 {
     (void)state;
@@ -95,7 +95,7 @@ static void test_moving_poses(void **state)
     assert_int_equal(unlink(repair_path), 0);
 }
 
-/* The disk was full for a while, and points were lost: what is written later makes no whole file of it. */
+/* The disk was full for a while, and points were lost. Later writes do not make the file whole. */
 static void test_full_for_a_while(void **state)
 {
     (void)state;
@@ -136,7 +136,7 @@ static int stop(void *ctx)
     return 1;
 }
 
-/* Who gives it up finds it as it was. */
+/* A repair that is given up leaves the file as it was. */
 static void test_stopped(void **state)
 {
     (void)state;
@@ -154,7 +154,7 @@ static void test_stopped(void **state)
     }
 }
 
-/* Nothing waits for longer than two calls, and a file that is written anyway is left alone. */
+/* Bytes wait for two calls at most. A file that is written anyway is left alone. */
 static void test_save(void **state)
 {
     (void)state;

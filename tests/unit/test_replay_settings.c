@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a replay says of its head's settings, from what the recording says of itself. */
+/* The settings that a replay reports for its head follow from the recording. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,8 @@
 
 #include "firmware_sim/replay/replay_state.h"
 
-/* A sphere's step is the turn by its steps; a firing sequence lasts num / den ns; an anchor says the station. */
+/* A sphere's step is the turn divided by its steps. A firing sequence lasts num / den ns. An anchor gives the
+ * station. */
 static void test_settings(void **state)
 {
     struct replay *r = calloc(1, sizeof *r);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording that is replayed, without its threads: when its frames went out, and the states it had. */
+/* A recording is replayed, without threads: the times at which its frames are sent, and its states. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -43,7 +43,7 @@ static void put_event(FILE *f, enum native_event_code code, int64_t t_ns)
     put(f, frame, native_encode_event(frame, sizeof frame, &event, t_ns, 0));
 }
 
-/* The first n pulses of a scan, one each microsecond. The head computes 16 at a time. */
+/* Writes the first n pulses of a scan, one each microsecond. The head computes 16 at a time. */
 static void put_points(FILE *f, uint32_t n)
 {
     static uint32_t dt_ns[16], zero[16];
@@ -82,7 +82,7 @@ static FILE *begin_file(void)
     return f;
 }
 
-/* Ten pulses of sixteen went out with the sixteenth, or with what came earlier. */
+/* Ten of sixteen pulses were sent with the sixteenth, or with an earlier frame. */
 static void points_go_out_with_what_follows(void **state)
 {
     (void)state;
@@ -105,7 +105,7 @@ static void points_go_out_with_what_follows(void **state)
     }
 }
 
-/* What a recording says at its end is not known when it begins anew: here the rate. */
+/* Facts at the end of a recording are not known when it begins anew: here the rate. */
 static void it_begins_anew_as_it_began(void **state)
 {
     (void)state;
@@ -139,7 +139,7 @@ static struct {
     struct native_header header;
 } played[MOST];
 
-/* What goes out, from a tick on, until the end or `most` frames; returns how many. */
+/* Plays from a tick on, until the end or `most` frames. Returns how many were sent. */
 static int play(const struct replay_options *given, uint64_t first_tick, int most)
 {
     struct config *cfg = calloc(1, sizeof *cfg);
@@ -164,8 +164,8 @@ static int play(const struct replay_options *given, uint64_t first_tick, int mos
     return n;
 }
 
-/* Frames go out at the end of the tick that has their time; at half the speed that is one later. Time that goes back by
- * more than a second is that of another head, whose first frame comes with the next tick. */
+/* Frames are sent at the end of the tick that has their time; at half the speed that is one later. Time that goes back
+ * by more than a second is that of another head, whose first frame comes with the next tick. */
 static void frames_go_out_in_their_ticks(void **state)
 {
     (void)state;
@@ -193,7 +193,7 @@ static void frames_go_out_in_their_ticks(void **state)
     }
 }
 
-/* Played again and again, each time is a sequence of its own; frames for one reader have no number. */
+/* When it is repeated, each time is a sequence of its own. Frames for one reader have no number. */
 static void each_time_has_its_numbers(void **state)
 {
     (void)state;
@@ -220,7 +220,7 @@ static void each_time_has_its_numbers(void **state)
     }
 }
 
-/* Of a part: from 5 ms to 12 ms, both included. Who listens is told first which head it was. */
+/* A part goes from 5 ms to 12 ms, both included. A reader first gets the head's description. */
 static void a_part_begins_with_the_head(void **state)
 {
     (void)state;
@@ -249,7 +249,7 @@ static const char *state_at(struct replay *r, uint64_t released)
     return result.reply;
 }
 
-/* A state is that of the head once the tick that says it is released: ticks 0 to n - 1 are when n are. */
+/* A state holds once the tick that contains it is released: ticks 0 to n - 1 are when n are. */
 static void a_state_holds_from_its_tick_on(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Charts of the report's page: bars as high as their counts, figures of the axes where their values are. */
+/* Charts of the report's page: bars are as high as their counts, and figures of the axes are at their values. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,7 @@
 
 #include "firmware_sim/app/studio/report/page.h"
 
-/* Of charts.c, in units of the picture. Places are written with one or two decimals. */
+/* The values of charts.c, in units of the picture. Places are written with one or two decimals. */
 static const double LEFT = 70.0, RIGHT = 625.0, BOTTOM = 245.0, ROUNDED = 0.051;
 
 static const struct figures_histogram DEVIATIONS = {.from = -0.002, .width = 0.001, .bins = 4, .count = {0, 10, 5, 1}};
@@ -38,7 +38,7 @@ struct rect {
     double x, y, width, height;
 };
 
-/* The next bar of a class after *at, which is moved on. */
+/* Finds the next bar of a class after *at, and moves *at on. */
 static int next_bar(const char **at, const char *class, struct rect *r)
 {
     char begin[40];
@@ -75,7 +75,7 @@ static void test_bars_stand_on_the_axis(void **state)
     free(svg);
 }
 
-/* In mm, each in its place; the scale at the left side is of counts. */
+/* Figures are in mm, each in its place. The scale at the left side is of counts. */
 static void test_axis_of_bins(void **state)
 {
     (void)state;
@@ -107,7 +107,7 @@ static void draw_bars(FILE *out)
     page_bars(out, &bars);
 }
 
-/* Side by side in the group's part of the axis; what is not known has no bar; what is expected is a line. */
+/* Bars are side by side in the group's part of the axis. An unknown value has no bar, and an expected one is a line. */
 static void test_groups(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a report says of a cloud: by its bound, by its noise, or that nothing can be said. */
+/* A report's verdict on a cloud: by its bound, by its noise, or that no verdict is possible. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,7 +10,7 @@
 
 #include "firmware_sim/app/studio/report/verdict.h"
 
-/* 1,000 points on smooth faces, all of known noise; z as it should be. */
+/* 1,000 points on smooth faces, all of known noise, with this z. */
 static struct figures noisy(double z_mean, double z_rms)
 {
     return (struct figures){
@@ -26,8 +26,8 @@ static enum report_judgement judge(const struct figures *f)
     return v.judgement;
 }
 
-/* Of 1,000 points z^2 is within 1 +- (6 sqrt(2 / 1000) + 0.02) = 0.71 to 1.29, the mean within 6 / sqrt(1000) + 0.01 =
- * 0.20 (verdict.c): so 0.85 to 1.13 for the RMS pass, and 0.83 and 1.15 do not. */
+/* For 1,000 points z^2 is within 1 +- (6 sqrt(2 / 1000) + 0.02) = 0.71 to 1.29, and the mean within 6 / sqrt(1000) +
+ * 0.01 = 0.20 (verdict.c). So 0.85 to 1.13 for the RMS pass, and 0.83 and 1.15 do not. */
 static void test_noise(void **state)
 {
     static const struct {
@@ -49,8 +49,8 @@ static void test_noise(void **state)
     assert_int_equal(judge(&few), REPORT_BEYOND);
 }
 
-/* By the bound: with a footprint, points beside smooth faces don't count. It is 1.001 mm here: ideal
- * encoders, no counts. */
+/* By the bound: with a footprint, points beside smooth faces don't count. The bound is 1.001 mm here: ideal encoders,
+ * no counts. */
 static void test_bound(void **state)
 {
     struct deviation_head head = {.setup = {.layout = LINE_GEO, .mirror_counts = 0x1p32, .pan_counts = 0x1p32},

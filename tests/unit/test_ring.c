@@ -94,7 +94,7 @@ static void only_the_last_ticks_are_kept(void **state)
         for (uint64_t old = 0; old <= tick; old++)
             assert_int_equal(read_tick(old, "text"), old + QUEUE > tick ? RING_READ : RING_LOST);
     }
-    /* old ticks are still in their slots for a while: so long a reader may take to finish a copy */
+    /* Old ticks are still in their slots for a while, and a reader may take so long to finish a copy. */
     assert_true(ring.n_slots >= AHEAD + QUEUE + SPARE);
 }
 
@@ -128,8 +128,8 @@ static void a_tick_lost_while_it_is_filled_is_not_read(void **state)
     assert_int_equal(read_tick(ring.n_slots, "text"), RING_READ);
 }
 
-/* Casters are so late that the ring has come round before them: the slot of their tick says that a later one is lost. What
- * they then made for it would be neither released nor lost. */
+/* Casters are so late that the ring has come round before them: the slot of their tick says that a later one is lost.
+ * If they filled it, that would be neither released nor lost. */
 static void a_tick_lost_a_round_ago_is_not_filled(void **state)
 {
     (void)state;
@@ -142,7 +142,7 @@ static void a_tick_lost_a_round_ago_is_not_filled(void **state)
     assert_int_equal(read_tick(late, NULL), RING_READ);
 }
 
-/* The same for a tick that a caster has in hand. */
+/* The same for a tick that a caster is filling. */
 static void a_tick_lost_a_round_ago_is_not_ready(void **state)
 {
     (void)state;
@@ -213,7 +213,7 @@ static uint64_t longer_slots(void)
     return n;
 }
 
-/* The size of a ring is that of what is in it: room for usual ticks, and for longer ones while they are in it. */
+/* The size of a ring follows its contents: room for usual ticks, and for longer ones while they are in it. */
 static void a_slot_is_as_long_as_its_tick(void **state)
 {
     (void)state;
@@ -226,7 +226,7 @@ static void a_slot_is_as_long_as_its_tick(void **state)
     mark[0].frame_at = 7;
     mark[1].frame_at = LONG - 1;
     for (uint64_t tick = 0; tick < 3 * ring.n_slots; tick++) {
-        /* odd lengths: marks are aligned for themselves */
+        /* Lengths are odd, as marks are aligned by themselves. */
         const int is_long = tick / ring.n_slots == 1; /* the second round */
         struct ring_tick made = {.bytes = text, .len = is_long ? LONG - 1 : 3, .mark = mark, .n_marks = 2};
         struct ring_slot *slot = ring_claim(&ring, tick);
@@ -244,7 +244,7 @@ static void a_slot_is_as_long_as_its_tick(void **state)
     assert_int_equal(longer_slots(), 0);
 }
 
-/* The tick is then released without frames, and says that its line has a gap; the next one that fits is whole. */
+/* The tick is then released without frames, and says that its line has a gap. The next one that fits is whole. */
 static void without_memory_a_tick_is_empty(void **state)
 {
     (void)state;
@@ -289,8 +289,8 @@ static void *claim_one(void *arg)
     return NULL;
 }
 
-/* Starts the claim, lets it run a thousand times as long as it needs, and sees that it waits; then lets go
- * what holds it. */
+/* Starts the claim, lets it run a thousand times as long as it needs, and sees that it waits. Then it releases the
+ * hold. */
 static void check_claim_waits(uint64_t tick, _Atomic uint64_t *hazard, _Atomic int *busy)
 {
     pthread_t thread;
@@ -306,7 +306,7 @@ static void check_claim_waits(uint64_t tick, _Atomic uint64_t *hazard, _Atomic i
     assert_int_equal(atomic_load(&claimed), 1);
 }
 
-/* A reader in the middle of a copy, and a caster that still writes for a tick long lost. */
+/* A reader is in the middle of a copy, and a caster still writes for a tick long lost. */
 static void a_slot_in_use_is_not_claimed(void **state)
 {
     (void)state;

@@ -10,11 +10,10 @@
 
 #include "tests/unit/ring_rig.h"
 
-/* Two casters fill slots with what only a tick's number tells; the pacing thread
- * releases them, numbers their frames, and gives up what is not ready where the test says so; it waits for
- * two of the readers, as in the pace `fast`, and not for the slow ones; one of these looks at slots where they lie.
- * Slots grow all the while. For one tick in seven caster and pacing thread race: 8,600 times, so that what goes wrong
- * once in 2,900 races is seen in 95 of 100 runs. */
+/* Two casters fill slots with contents that depend only on the tick's number. The pacing thread releases them, numbers
+ * their frames, and gives up late ones where the test says so. It waits for two of the readers, as in the pace `fast`,
+ * and not for the slow ones. One of these reads slots in place. Slots grow all the while. For one tick in seven caster
+ * and pacing thread race: 8,600 times, so that an error in one of 2,900 races is seen in 95 of 100 runs. */
 enum { TICKS = SANITIZED ? 20000 : 40000 };
 enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES };
 
@@ -23,7 +22,7 @@ static struct {
     uint64_t next_tick; /* under claim_lock */
     _Atomic uint64_t cursor[READERS];
     _Atomic int done;
-    uint8_t head_lost[TICKS]; /* by the pacing thread, before the tick is released */
+    uint8_t head_lost[TICKS]; /* marked by the pacing thread, before the tick is released */
     _Atomic uint64_t bad;
     uint64_t got[READERS], too_old[READERS], lost_by_head[READERS];
 } all;
@@ -38,7 +37,7 @@ static uint8_t byte_of(uint64_t tick, uint32_t i)
     return (uint8_t)((tick * 131 + i) * 0x9e3779b97f4a7c15ULL >> 56);
 }
 
-/* Of these the caster and the pacing thread decide at the same time whether they are lost. */
+/* For these the caster and the pacing thread decide at the same time whether they are lost. */
 static int is_raced(uint64_t tick)
 {
     return tick % 7 == 3;

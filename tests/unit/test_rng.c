@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The random generator. All seeds are fixed, so a run can't fail by chance; the limits are chosen as if they
- * weren't: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for
- * one in 700). */
+/* These are tests of the random generator. All seeds are fixed, so a run can't fail by chance. The limits are chosen as
+ * if they weren't: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for one
+ * in 700). */
 #include "tests/common/cases.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ static double *normals(uint64_t key)
     return x;
 }
 
-/* Outputs of SplitMix64 for the seed 1234567, as published with the algorithm. */
+/* These are outputs of SplitMix64 for the seed 1234567, as published with the algorithm. */
 static void the_finaliser_is_that_of_splitmix64(void **state)
 {
     (void)state;
@@ -108,8 +108,8 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Kolmogorov and Smirnov: P(sqrt(n) D > 2.5) = 2 exp(-2 * 2.5^2) = 7.5e-6. Steps of 2^-32 in the uniform
- * numbers are far below 1/sqrt(n). */
+/* Kolmogorov and Smirnov: P(sqrt(n) D > 2.5) = 2 exp(-2 * 2.5^2) = 7.5e-6. Steps of 2^-32 in the uniform numbers are
+ * far below 1/sqrt(n). */
 static void the_distribution_is_normal(void **state)
 {
     (void)state;
@@ -121,8 +121,7 @@ static void the_distribution_is_normal(void **state)
     }
     print_message("# Kolmogorov-Smirnov: sqrt(n) D = %.3f\n", d * sqrt(N));
     assert_true(d * sqrt(N) < 2.5);
-    /* Beyond 4 sigma: 63.3 expected; a Poisson number below 30 or above 105 has a chance of 3e-6 or less
-     * each. */
+    /* 63.3 are expected beyond 4 sigma. A Poisson number below 30 or above 105 has a chance of 3e-6 or less each. */
     int beyond = 0;
     for (int i = 0; i < N; i++)
         beyond += fabs(x[i]) > 4.0;
@@ -130,7 +129,7 @@ static void the_distribution_is_normal(void **state)
     free(x);
 }
 
-/* -2 log(2^-33) is the most: the smallest uniform number is half a step of 2^-32. */
+/* The largest value is -2 log(2^-33): the smallest uniform number is half a step of 2^-32. */
 static void nothing_lies_beyond_the_largest(void **state)
 {
     (void)state;
@@ -154,7 +153,7 @@ static double error_of(uint64_t bits)
     return fabs((double)((long double)rng_normal_of(bits) - radius * sinl(two_pi * (fabsl(a - 0.5L) - 0.25L))));
 }
 
-/* The tail, too: all radii down to the smallest and up to the largest, at angles all around. */
+/* The tail is included: all radii down to the smallest and up to the largest, at angles all around. */
 static void the_arithmetic_is_good_to_4e_12(void **state)
 {
     (void)state;
@@ -173,7 +172,7 @@ static void the_arithmetic_is_good_to_4e_12(void **state)
     assert_true(worst < 4e-12);
 }
 
-/* Blocks give what pulses give one by one. */
+/* Blocks give the same as single pulses. */
 static void a_block_is_its_pulses(void **state)
 {
     (void)state;
@@ -187,7 +186,7 @@ static void a_block_is_its_pulses(void **state)
     assert_true(bits[4] == rng_u64(key, pulse[RNG_BLOCK + 4]));
 }
 
-/* Quantile of chi-square by Wilson and Hilferty, good to 1 % in the tail from 64 degrees of freedom on. */
+/* Computes the quantile of chi-square by Wilson and Hilferty, good to 1 % in the tail from 64 degrees of freedom on. */
 static double chi2_limit(double dof, double z)
 {
     double c = 1.0 - 2.0 / (9.0 * dof) + z * sqrt(2.0 / (9.0 * dof));
@@ -222,7 +221,7 @@ static void bits_are_even(void **state)
     check_chi2("bits that change from pulse to pulse", 0, chi_flips, 64);
 }
 
-/* Pulse numbers one after the other, and with the strides that blocks and lines have. */
+/* Pulse numbers come one after the other, and with the strides of blocks and lines. */
 static void bytes_are_even(void **state)
 {
     (void)state;
@@ -252,7 +251,7 @@ int main(void)
         cmocka_unit_test(a_number_depends_on_seed_purpose_and_pulse_only),
         cmocka_unit_test(moments_are_those_of_a_normal),
         cmocka_unit_test(neighbours_are_uncorrelated),
-#ifndef SH_SANITIZE /* a million numbers each, by the code that the others run: as shipped alone */
+#ifndef SH_SANITIZE /* they draw a million numbers each with the code of the others, so only as shipped */
         cmocka_unit_test(streams_are_uncorrelated),
         cmocka_unit_test(the_distribution_is_normal),
 #endif

@@ -1,133 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The mesh of a scan's grid: counts worked out by hand, surfaces that must close, points spread over them. */
+/* The mesh of a scan's grid: counts worked out by hand, normals, points spread over it. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "core/rng.h"
-#include "core/studio/scan_mesh.h"
-
-enum { MAX_POINTS = 4096, MAX_COLUMNS = 128 };
-
-static const double PI = 3.14159265358979323846;
-
-/* A grid under construction, and what comes of it. */
-static struct {
-    double xyz[MAX_POINTS][3];
-    uint32_t row[MAX_POINTS];
-    struct scan_column column[MAX_COLUMNS];
-    struct scan_grid grid;
-    struct scan_faces faces;
-    struct sh_err err;
-} t;
-
-static void begin(void)
-{
-    scan_faces_free(&t.faces);
-    memset(&t.grid, 0, sizeof t.grid);
-    t.grid.xyz_m = (const double(*)[3])t.xyz;
-    t.grid.row = t.row;
-    t.grid.column = t.column;
-}
-
-static void add_column(uint32_t line, int is_pole)
-{
-    t.column[t.grid.n_columns++] = (struct scan_column){line, t.grid.n_points, is_pole};
-}
-
-static void add_point(uint32_t row, double x, double y, double z)
-{
-    double *p = t.xyz[t.grid.n_points];
-    t.row[t.grid.n_points++] = row;
-    p[0] = x;
-    p[1] = y;
-    p[2] = z;
-}
-
-static void make(double long_edge)
-{
-    scan_faces_free(&t.faces);
-    t.grid.long_edge = long_edge;
-    if (scan_faces_make(&t.grid, &t.faces, NULL, &t.err) != SH_OK) fail_msg("%s", t.err.text);
-}
-
-static void assert_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance)) fail_msg("%.15g instead of %.15g", got, want);
-}
-
-/* ---- by another way: each face's edges into one list */
-
-struct edge {
-    uint32_t low, high;
-    int up; /* as the face goes along it: from low to high */
-};
-
-static int by_ends(const void *a, const void *b)
-{
-    const struct edge *p = a, *q = b;
-    if (p->low != q->low) return p->low < q->low ? -1 : 1;
-    return p->high != q->high ? (p->high < q->high ? -1 : 1) : p->up - q->up;
-}
-
-struct edges {
-    uint64_t n, n_once, n_unlike; /* different; in one face alone; in more than two, or twice in one direction */
-    double mean_m;
-};
-
-static struct edges edges_of(void)
-{
-    struct edges sum = {0};
-    const size_t n = 3 * (size_t)t.faces.n_faces;
-    struct edge *edge = malloc((n + 1) * sizeof *edge);
-    assert_non_null(edge);
-    for (size_t i = 0; i < n; i++) {
-        const uint32_t p = t.faces.face[i / 3][i % 3], q = t.faces.face[i / 3][(i + 1) % 3];
-        edge[i] = (struct edge){p < q ? p : q, p < q ? q : p, p < q};
-    }
-    qsort(edge, n, sizeof *edge, by_ends);
-    for (size_t i = 0, end; i < n; i = end) {
-        const double *a = t.xyz[edge[i].low], *b = t.xyz[edge[i].high];
-        for (end = i + 1; end < n && edge[end].low == edge[i].low && edge[end].high == edge[i].high;)
-            end++;
-        sum.n++;
-        sum.n_once += end - i == 1;
-        sum.n_unlike += end - i > 2 || (end - i == 2 && edge[i].up == edge[i + 1].up);
-        sum.mean_m += sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
-    }
-    sum.mean_m /= (double)sum.n;
-    free(edge);
-    return sum;
-}
-
-/* 1e-12: a sum of thousands of lengths, each rounded to 1e-16. */
-static void assert_edges_as_counted(const struct edges *edges)
-{
-    assert_int_equal(t.faces.n_edges, edges->n);
-    assert_near(t.faces.mean_edge_m, edges->mean_m, 1e-12 * edges->mean_m);
-}
-
-static void assert_faces_the_head(void)
-{
-    for (uint32_t i = 0; i < t.faces.n_faces; i++) {
-        const double *a = t.xyz[t.faces.face[i][0]], *b = t.xyz[t.faces.face[i][1]], *c = t.xyz[t.faces.face[i][2]];
-        double u[3], v[3], w[3];
-        for (int k = 0; k < 3; k++) {
-            u[k] = b[k] - a[k];
-            v[k] = c[k] - a[k];
-            w[k] = t.grid.head_m[k] - a[k];
-        }
-        assert_true((u[1] * v[2] - u[2] * v[1]) * w[0] + (u[2] * v[0] - u[0] * v[2]) * w[1] +
-                        (u[0] * v[1] - u[1] * v[0]) * w[2] >
-                    0);
-    }
-}
+#include "tests/unit/scan_mesh_rig.h"
 
 /* ---- a wall with a step, 10 m away: four columns and three rows 1 m apart, the last two columns 1 m further away
  *
@@ -184,7 +61,7 @@ static void cells_with_three_corners(void **state)
     assert_faces_the_head();
 }
 
-/* Neither a line nor a row that is missing is bridged. */
+/* A missing line or row is not bridged. */
 static void gaps_stay_open(void **state)
 {
     (void)state;
@@ -219,7 +96,7 @@ static void the_shorter_diagonal(void **state)
         }
 }
 
-/* Where the head lies in the plane of a triangle, and where it has no area. */
+/* The head lies in the plane of a triangle, or the triangle has no area. */
 static void what_faces_nowhere_is_counted(void **state)
 {
     (void)state;
@@ -244,138 +121,6 @@ static void what_faces_nowhere_is_counted(void **state)
     assert_int_equal(t.faces.n_faces, 0);
 }
 
-/* ---- surfaces without an edge */
-
-/* The first wall of a box from -2 -1 -1 to 3 2 1.5 in a direction. */
-static void add_in_box(uint32_t row, double azimuth, double elevation)
-{
-    static const double low[3] = {-2, -1, -1}, high[3] = {3, 2, 1.5};
-    const double d[3] = {cos(elevation) * sin(azimuth), cos(elevation) * cos(azimuth), sin(elevation)};
-    double range = 100;
-    for (int k = 0; k < 3; k++)
-        if (d[k] != 0) range = fmin(range, (d[k] > 0 ? high[k] : low[k]) / d[k]);
-    add_point(row, range * d[0], range * d[1], range * d[2]);
-}
-
-static void make_sphere(uint32_t rings, uint32_t steps)
-{
-    begin();
-    t.grid.rows_per_turn = steps;
-    for (uint32_t ring = 0; ring < rings; ring++) {
-        const int is_pole = ring == 0 || ring == rings - 1;
-        const double elevation = PI * ring / (rings - 1) - PI / 2;
-        add_column(ring, is_pole);
-        for (uint32_t step = 0; step < (is_pole ? 1 : steps); step++)
-            add_in_box(step, 2 * PI * step / steps, elevation);
-    }
-    make(0);
-}
-
-/* A sphere of R rings and S steps: 2 + (R - 2) S points, two fans of S and (R - 3) S cells of two. The box is convex and the
- * head inside it: all cells face the head. V - E + F = 2 for a sphere (Euler). */
-static void a_sphere_in_a_box_is_closed(void **state)
-{
-    (void)state;
-    static const uint32_t size[][2] = {{5, 8}, {19, 36}, {37, 72}, {3, 3}};
-    for (size_t i = 0; i < sizeof size / sizeof size[0]; i++) {
-        const uint32_t rings = size[i][0], steps = size[i][1];
-        make_sphere(rings, steps);
-        assert_int_equal(t.grid.n_points, 2 + (rings - 2) * steps);
-        assert_int_equal(t.faces.n_faces, 2 * (rings - 2) * steps);
-        assert_int_equal(t.faces.n_flat, 0);
-        const struct edges edges = edges_of();
-        assert_edges_as_counted(&edges);
-        assert_int_equal(edges.n_once, 0);
-        assert_int_equal(edges.n_unlike, 0);
-        assert_int_equal((int64_t)t.grid.n_points - (int64_t)edges.n + (int64_t)t.faces.n_faces, 2);
-        assert_faces_the_head();
-    }
-}
-
-/* The volume within, by the divergence theorem, is below that of the box (whose edges and corners are cut off) and comes
- * to it: normals are inward, so that it is negative. */
-static double volume(void)
-{
-    double sum = 0;
-    for (uint32_t i = 0; i < t.faces.n_faces; i++) {
-        const double *a = t.xyz[t.faces.face[i][0]], *b = t.xyz[t.faces.face[i][1]], *c = t.xyz[t.faces.face[i][2]];
-        sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-               a[2] * (b[0] * c[1] - b[1] * c[0]);
-    }
-    return sum / 6;
-}
-
-static void the_sphere_has_the_boxs_volume(void **state)
-{
-    (void)state;
-    make_sphere(37, 72);
-    /* cells of 5 degrees: what is cut off at an edge is below (cell / 2)^2 of area along 12 edges of at most 5 m, and a
-     * cell on the walls is at most 5 degrees * 4 m (slant 1.7) = 0.6 m wide */
-    assert_in_range((uint64_t)(-1000 * volume()), 1000 * 5 * 3 * 2.5 - 1000 * 12 * 5 * 0.09, 1000 * 5 * 3 * 2.5);
-}
-
-/* A ring of 36 columns and 5 rows, a tube: V - E + F = 0, the two borders of 36 edges each are in one face. */
-static void a_full_turn_closes(void **state)
-{
-    (void)state;
-    for (int closes = 0; closes < 2; closes++) {
-        begin();
-        t.grid.closes = closes;
-        for (uint32_t column = 0; column < 36; column++) {
-            add_column(column, 0);
-            for (uint32_t row = 0; row < 5; row++)
-                add_in_box(row, 2 * PI * column / 36, 0.1 * row);
-        }
-        make(0);
-        const struct edges edges = edges_of();
-        assert_edges_as_counted(&edges);
-        assert_int_equal(t.faces.n_faces, (35 + (uint32_t)closes) * 4 * 2);
-        assert_int_equal(edges.n_once, closes ? 2 * 36 : 2 * 35 + 2 * 4);
-        assert_int_equal(edges.n_unlike, 0);
-        assert_int_equal(t.grid.n_points - edges.n + t.faces.n_faces, closes ? 0 : 1);
-        assert_faces_the_head();
-    }
-}
-
-/* Two columns have nothing between them but the one wall, also where the grid closes. */
-static void two_columns_do_not_close(void **state)
-{
-    (void)state;
-    begin();
-    t.grid.closes = 1;
-    for (uint32_t column = 0; column < 2; column++) {
-        add_column(column, 0);
-        for (uint32_t row = 0; row < 5; row++)
-            add_in_box(row, 2 * PI * column / 36, 0.1 * row);
-    }
-    make(0);
-    assert_int_equal(t.faces.n_faces, 4 * 2);
-}
-
-/* Points at random places of the grid: the edges are those that the faces have, whatever is missing. Faces without a
- * direction can't be among them: no point lies in the plane of two others and the head but by chance. */
-static void edges_of_a_ragged_grid(void **state)
-{
-    (void)state;
-    const uint64_t key = rng_key(3, RNG_SCENE);
-    for (uint32_t share = 1; share < 8; share++) {
-        begin();
-        t.grid.rows_per_turn = 20;
-        for (uint32_t column = 0; column < 30; column++) {
-            add_column(column, 0);
-            for (uint32_t row = 0; row < 20; row++)
-                if (rng_u64(key, 1000 * share + 20 * column + row) % 8 < share)
-                    add_in_box(row, 2 * PI * row / 20, 0.1 * column - 1.45);
-        }
-        make(0);
-        const struct edges edges = edges_of();
-        assert_int_equal(t.faces.n_flat, 0);
-        if (t.faces.n_faces > 0) assert_edges_as_counted(&edges);
-        assert_int_equal(edges.n_unlike, 0);
-        assert_faces_the_head();
-    }
-}
-
 /* ---- normals, loose points */
 
 static void normals_are_those_of_the_walls(void **state)
@@ -393,7 +138,7 @@ static void normals_are_those_of_the_walls(void **state)
     assert_true(normal[0][0] == 0 && normal[0][1] == 0 && normal[0][2] == 0);
 }
 
-/* A point of a floor and a wall three times as large: the mean of their normals, by their areas. */
+/* A point of a floor and of a wall three times as large has the mean of their normals, weighted by area. */
 static void normals_at_a_corner(void **state)
 {
     (void)state;
@@ -417,8 +162,8 @@ static void loose_points_are_left_out(void **state)
         for (uint32_t row = 0; row < 3; row++)
             add_point(row, column, column == 2 ? 50 : 5, row);
     }
-    /* the two cells to the third column, 45 m further away, are left out: the mean is (9 + 2 root 2 + 3 * 45.01 + 2 *
-     * 45.02) / 16 = 14.8 m */
+    /* The two cells to the third column, 45 m further away, are left out: the mean is (9 + 2 root 2 + 3 * 45.01 + 2 *
+     * 45.02) / 16 = 14.8 m. */
     make(2.9);
     assert_int_equal(t.faces.n_long, 4);
     assert_int_equal(t.faces.n_faces, 4);
@@ -453,9 +198,9 @@ static void sparse_counts_by_hand(void **state)
     scan_sampler_free(&s);
 }
 
-/* 32 cells of 1/4 x 1/4 m on each of the two walls. With 6400 points 100 a cell are expected. Chi-square has 63 degrees of
- * freedom: it is above 126.1 for 4.5 in a million seeds, and below 25 for 5 in a million (Wilson and Hilferty 1931). The
- * seed is fixed, so that the test does not vary. */
+/* There are 32 cells of 1/4 x 1/4 m on each of the two walls. With 6400 points 100 a cell are expected. Chi-square has
+ * 63 degrees of freedom: it is above 126.1 for 4.5 in a million seeds, and below 25 for 5 in a million (Wilson and
+ * Hilferty 1931). The seed is fixed, so that the test does not vary. */
 static void sparse_points_are_even(void **state)
 {
     (void)state;
@@ -521,11 +266,6 @@ int main(void)
         cmocka_unit_test(gaps_stay_open),
         cmocka_unit_test(the_shorter_diagonal),
         cmocka_unit_test(what_faces_nowhere_is_counted),
-        cmocka_unit_test(a_sphere_in_a_box_is_closed),
-        cmocka_unit_test(the_sphere_has_the_boxs_volume),
-        cmocka_unit_test(a_full_turn_closes),
-        cmocka_unit_test(two_columns_do_not_close),
-        cmocka_unit_test(edges_of_a_ragged_grid),
         cmocka_unit_test(normals_are_those_of_the_walls),
         cmocka_unit_test(normals_at_a_corner),
         cmocka_unit_test(loose_points_are_left_out),

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Stations with scanners of their own: what they take from the file and what not, faults, and what their sites share. */
+/* Stations with scanners of their own: the keys that they take from the file, errors, and the shared parts of their
+ * sites. */
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/device/device.h"
@@ -8,7 +9,7 @@
 
 static struct config own; /* of another station than head.station's */
 
-/* Three stations in the room of config/scenes; the lines are counted in faults below. */
+/* Three stations in the room of config/scenes. The errors below count the lines. */
 #define HEAD     "head: {profile: riegl-vz400i, prr_hz: 100000, lines_hz: 50, serial: A}\n"  /* 1 */
 #define REST     "noise: {range: on, seed: 7}\ninstrument: {range_offset_m: 0.1}\n"          /* 2, 3 */
 #define STATIONS "stations:\n  - {position_m: [0, 0, 1.7]}\n  - position_m: [1, 0.5, 1.7]\n" /* 4 to 6 */
@@ -83,7 +84,7 @@ static void head_station_says_whose_configuration_it_is(void **state)
     assert_true(own.head.settings.lines_uhz == 50000000);
 }
 
-/* The only station's is the head's, also where it stops on a trajectory. */
+/* The only station has the head's scanner, even where it stops on a trajectory. */
 static void stops_have_the_scanner_of_their_station(void **state)
 {
     (void)state;
@@ -108,7 +109,7 @@ static void sets_reach_the_file_or_one_scanner(void **state)
     assert_true(!config_serves(cfg, 2));
 }
 
-/* Also a list: the scanner's stands in for all of the file's. */
+/* A list of the scanner replaces all of the file's. */
 static void lists_are_replaced(void **state)
 {
     (void)state;
@@ -154,7 +155,7 @@ static void wrong_ones_are_refused(void **state)
         {"{head: {profile: nobody}}", 7, "stations[1].scanner.head.profile: no profile \"nobody\""},
         {"{surfaces: [{glass: 2}]}", 7, "stations[1].scanner.surfaces[0].glass: \"2\" is out of range; allowed 0 to 1"},
         {"{noise: {range: signal}}", 7, "stations[1].scanner.noise.range: signal, but no signal is modelled"},
-        /* Of two keys that don't fit, one is the file's. */
+        /* One of two contradicting keys is the file's. */
         {"{head: {prr_hz: 123}}", 7, "stations[1].scanner.head.prr_hz: 123 is no pulse rate of head profile"},
         {"{signal: {visibility_m: 9, extinction_1_km: 1}}", 7,
          "stations[1].scanner.signal.extinction_1_km: given togeth"},
@@ -195,7 +196,7 @@ static struct site *load_site(const struct config *of, const struct site *other)
     return site;
 }
 
-/* Faults are those of all scanners, of the file and of a scenario. The links that they name are not. */
+/* The faults of all scanners are those of the file and of a scenario, but for the faults of links. */
 static void each_has_the_faults(void **state)
 {
     (void)state;
@@ -213,7 +214,7 @@ static void each_has_the_faults(void **state)
         assert_int_equal(own.faults.fault[0].kind, FAULT_STALL);
         assert_int_equal(own.faults.fault[2].kind, FAULT_MIRROR_SLOW);
     }
-    /* What one of them can't have is said when it is loaded. */
+    /* A fault that one of them can't have is reported when it is loaded. */
     assert_loads(load_second("{head: {profile: sphere}}", NULL, 0));
     assert_int_equal(config_add_scenario(cfg, scenario, &faults), SH_OK);
     assert_int_equal(config_load_scanner(cfg, 2, &own, &err), SH_EINPUT);
@@ -221,7 +222,7 @@ static void each_has_the_faults(void **state)
     unlink(scenario);
 }
 
-/* One load of the scene and one BVH serve all, whatever the second scanner needs of them. */
+/* One load of the scene and one BVH serve all, whatever the second scanner needs. */
 static void sites_share_scene_and_bvh(void **state)
 {
     (void)state;

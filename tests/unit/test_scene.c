@@ -61,8 +61,8 @@ static void files_add_up(void **state)
 static void zero_area_is_counted(void **state)
 {
     (void)state;
-    /* a point, a repeated corner, three in line (also where 1/3 rounds), then needles that are real: 100 m
-     * long and 1 nm wide, and a wire of 0.1 mm over 1 km */
+    /* A point, a repeated corner, and three in line (even where 1/3 rounds) have no area. Needles do: 100 m long and 1
+     * nm wide, and a wire of 0.1 mm over 1 km. */
     struct scene *s = load_text("zero.obj", "v 0 0 0\nv 1 1 1\nv 3 3 3\nv 0.1 0.3 0.7\nv 0.2 0.6 1.4\n"
                                             "v 100 0 0\nv 50 1e-9 0\nv 1000 0 0\nv 1000 1e-4 0\n"
                                             "f 1 1 1\nf 1 2 2\nf 1 2 3\nf 1 4 5\nf 1 6 7\nf 1 8 9\n");
@@ -73,7 +73,7 @@ static void zero_area_is_counted(void **state)
     scene_free(s);
 }
 
-/* Two names that differ in their last byte alone, and whose cut would fall into a character of two bytes, stay two. */
+/* Two names that differ only in their last byte, and whose cut would fall into a character of two bytes, stay two. */
 static void long_names_are_cut(void **state)
 {
     (void)state;
@@ -193,7 +193,7 @@ static void a_huge_list_is_refused(void **state)
     refuse("huge.ply", data, n + 24, expected);
 }
 
-/* Bounds are those of all corners in use, the first one of a triangle too; a vertex that nobody uses is none. */
+/* Bounds are those of all corners in use, including the first one of a triangle. An unused vertex does not count. */
 static void bounds_are_of_all_corners(void **state)
 {
     (void)state;

@@ -49,7 +49,7 @@ static void stl_is_read(void **state)
     scene_free(s);
 }
 
-/* 5.8e6 * 6e-8 = 0.35 m: refused where that is not allowed, with the figures. */
+/* 5.8e6 * 6e-8 = 0.35 m is refused where it is not allowed, with the figures. */
 static void single_precision_is_refused(void **state)
 {
     (void)state;
@@ -67,7 +67,7 @@ static void single_precision_is_refused(void **state)
     unlink(path);
 }
 
-/* A large shift that a node below takes back has rounded the coordinates all the same. */
+/* A large shift that a node below undoes has rounded the coordinates all the same. */
 static void single_precision_within_the_tree(void **state)
 {
     (void)state;
@@ -95,7 +95,8 @@ static void single_precision_within_the_tree(void **state)
     scene_free(s);
 }
 
-/* glTF's colours are linear: 0.2140 of the light is 0.5 in sRGB. What Assimp makes up for STL is none. */
+/* glTF's colours are linear: 0.2140 of the light is 0.5 in sRGB. The colour that Assimp invents for STL does not
+ * count. */
 static void colours_come_with_materials(void **state)
 {
     (void)state;
@@ -161,8 +162,8 @@ static void boxes(void **state)
     }
 }
 
-/* Assimp applies Collada's unit (cube_triangulate.dae has centimetres and an edge of 100) and turns to y up;
- * it leaves FBX's unit alone (global_settings.fbx has a factor of 500 and a cube from about -4 to 7). */
+/* Assimp applies Collada's unit (cube_triangulate.dae has centimetres and an edge of 100) and turns to y up. It does
+ * not apply FBX's unit (global_settings.fbx has a factor of 500 and a cube from about -4 to 7). */
 static void units(void **state)
 {
     (void)state;
@@ -205,7 +206,8 @@ static void units(void **state)
     scene_free(s);
 }
 
-/* A polygon's area and box: half the length of the sum of its corners' cross products, from the first corner. */
+/* Measures a polygon's area and box. The area is half the length of the sum of its corners' cross products, from the
+ * first corner. */
 static double measure_polygon(const struct aiMesh *mesh, const struct aiFace *face, double low[3], double high[3])
 {
     double p[2][3], base[3], sum[3] = {0};
@@ -225,9 +227,10 @@ static double measure_polygon(const struct aiMesh *mesh, const struct aiFace *fa
     return 0.5 * sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
 }
 
-/* Assimp's own flattening of the node tree, which the loader does itself, with `triangulate` after its own triangulation;
- * without it beside the polygons as they are, which the loader makes n - 2 triangles of the same area. Warped quads need
- * the first. Large polygons need the second: Assimp 5.4's triangulation leaves out a twentieth of ConcavePolygon.dae. */
+/* Compares with Assimp's own flattening of the node tree, which the loader does itself. With `triangulate` it comes
+ * after Assimp's triangulation. Without it the polygons stay, and the loader makes n - 2 triangles of the same area.
+ * Warped quads need the first. Large polygons need the second: Assimp 5.4's triangulation leaves out a twentieth of
+ * ConcavePolygon.dae. */
 static void check_against_flattened(const char *file, unsigned triangulate)
 {
     SKIP_WITHOUT(file);
@@ -249,7 +252,7 @@ static void check_against_flattened(const char *file, unsigned triangulate)
     double size = 0;
     for (int k = 0; k < 3; k++)
         size = fmax(size, fmax(fabs(low[k]), fabs(high[k])));
-    /* Assimp multiplies the tree in float: some roundings of 6e-8 for each level */
+    /* Assimp multiplies the tree in float: some roundings of 6e-8 for each level. */
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s->min_m[k] - low[k]) < 2e-6 * size && fabs(s->max_m[k] - high[k]) < 2e-6 * size);
     if (fabs(total_area(s) - area) > 1e-4 * area) fail_msg("%s: area %.9g, not %.9g", file, total_area(s), area);
@@ -266,7 +269,8 @@ static void node_trees(void **state)
     check_against_flattened(MODELS "FBX/cubes_with_mirroring_and_pivot.fbx", aiProcess_Triangulate);
 }
 
-/* The house without its site, which other records refer to: Assimp crashes on it, and others leave out what they miss. */
+/* The house has lost its site, which other records refer to. Assimp crashes on it, and others leave out the records
+ * that depend on it. */
 static void ifc_with_a_record_missing(void **state)
 {
     (void)state;
@@ -289,7 +293,7 @@ static void ifc_with_a_record_missing(void **state)
     unlink(name);
 }
 
-/* Nothing below main prints, Assimp's logger included. */
+/* Nothing below main prints, not even Assimp's logger. */
 static void nothing_is_printed(void **state)
 {
     (void)state;
@@ -325,7 +329,7 @@ static void nothing_is_printed(void **state)
     assert_int_equal(st.st_size, 0);
 }
 
-/* What a mesh names is opened as the mesh itself: it must be a regular file. A FIFO would be waited for; the limit of time
+/* The files that a mesh names must be regular files, as the mesh itself. Opening a FIFO would wait; the limit of time
  * is there for a program that does so. */
 static void a_buffer_must_be_a_file(void **state)
 {

@@ -5,7 +5,7 @@
 #include "core/scene_objects.h"
 #include "tests/unit/scene_files.h"
 
-/* A box of 2 x 3 x 4 m, without its top, which follows. 52 m2, 24 m3. */
+/* The box has 2 x 3 x 4 m, and its top follows separately. It has 52 m2 and 24 m3. */
 #define CORNERS "v 0 0 0\nv 2 0 0\nv 2 3 0\nv 0 3 0\nv 0 0 4\nv 2 0 4\nv 2 3 4\nv 0 3 4\n"
 #define SIDES   "f 4 3 2 1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
 #define BOX     CORNERS "o box\n" SIDES
@@ -36,7 +36,7 @@ static int take(void *ctx, const double a[3], const double b[3], struct sh_err *
     return SH_OK;
 }
 
-/* The edges that are handed out are those that are counted. */
+/* The returned edges are the counted ones. */
 static void find(const struct scene *scene, struct scene_objects *o)
 {
     static const struct scene_open_edges all = {NULL, take}, *edges = &all;
@@ -50,7 +50,7 @@ static void find(const struct scene *scene, struct scene_objects *o)
     assert_int_equal(n_taken, n_open);
 }
 
-/* A metre near 5,000 km is rounded to 1e-9, and each of 12 faces takes some of it. */
+/* A metre near 5,000 km is rounded to 1e-9, and each of 12 faces adds some of it. */
 static void is_near(double value, double expected)
 {
     if (!(fabs(value - expected) <= 1e-7 * fabs(expected))) fail_msg("%.12g, not %.12g", value, expected);
@@ -86,7 +86,8 @@ static void bodies_are_judged(void **state)
         one(BOX "f 8 7 6 5\n", x_m, SCENE_OBJECT_TURNED, 0, 52, 0);
         /* The top's edges have corners in their middles, which the sides don't have. */
         one(BOX "v 1 0 4\nv 1 3 4\nf 5 9 10 8\nf 9 6 7 10\n", x_m, SCENE_OBJECT_CLOSED, 0, 52, 24);
-        /* Half the top: its own three edges that others have are closed, and an edge of 3 m is left on either side. */
+        /* Half of the top: its own three edges that others have are closed, and an edge of 3 m is left on either
+         * side. */
         one(BOX "f 5 6 7\n", x_m, SCENE_OBJECT_OPEN, 3, 49, 0);
     }
 }
@@ -120,7 +121,7 @@ static void a_small_hole_is_open(void **state)
         0, SCENE_OBJECT_OPEN, 4, 52 - 1e-6, 0);
 }
 
-/* Objects by name, whatever their materials are and however they follow each other. */
+/* Objects are known by name, whatever their materials and order. */
 static void surfaces_of_a_name_are_one_object(void **state)
 {
     (void)state;
@@ -144,7 +145,7 @@ static void surfaces_of_a_name_are_one_object(void **state)
     scene_free(scene);
 }
 
-/* Copies count with their scales, each for itself or all as one. */
+/* Copies count with their scales, each by itself or all as one. */
 static void copies_count(void **state)
 {
     (void)state;

@@ -47,7 +47,7 @@ static void obj_is_read(void **state)
     scene_free(s);
 }
 
-/* Colours by material, from the library beside the mesh; the first that is given, of what is a colour. */
+/* Colours come by material, from the library beside the mesh. The first given one counts, if it is a colour. */
 static void obj_takes_colours_from_its_library(void **state)
 {
     (void)state;
@@ -104,7 +104,7 @@ static void obj_numbers_are_exact(void **state)
     char with_limit[sizeof text];
     strcpy(with_limit, text);
     const struct scene_mesh_spec spec = {.file = write_text("n.obj", with_limit), .scale = 0x1p-100};
-    /* 1e22 is beyond the allowed 1e9 m, hence a scale that is a power of two: exact for all but the tiny */
+    /* 1e22 is beyond the allowed 1e9 m, hence a scale that is a power of two: exact for all but the tiny. */
     int rc = load_spec(&spec, 1, &s, &err);
     unlink(path);
     if (rc != SH_OK) fail_msg("%s", err.text);
@@ -113,7 +113,7 @@ static void obj_numbers_are_exact(void **state)
     scene_free(s);
 }
 
-/* strtod is the other implementation. Sets a locale with a decimal comma where there is one. */
+/* strtod is the other implementation. The test sets a locale with a decimal comma where there is one. */
 static void obj_random_numbers_are_exact(void **state)
 {
     (void)state;
@@ -213,7 +213,7 @@ static void ply_is_read_exactly(void **state)
         check_utm_scene(load(write_file("utm.ply", data, n)));
         unlink(path);
         assert_non_null(strstr(warnings, "element 'camera' (1 of it) ignored"));
-        /* cut off anywhere, it is refused */
+        /* Cut anywhere, it is refused. */
         for (size_t cut = 0; cut < n; cut += SANITIZED ? 91 : 13)
             refuse("cut.ply", data, cut, "");
     }

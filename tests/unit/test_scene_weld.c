@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes in binary PLY that have a vertex for each corner: those at the same place become one, as by a naive comparison of
- * all of them. Meshes that share vertices stay as they are. */
+/* Some meshes in binary PLY have a vertex for each corner. Vertices at the same place become one, as by a naive
+ * comparison of all of them. Meshes that share vertices stay as they are. */
 #include "core/rng.h"
 #include "tests/unit/scene_files.h"
 
-/* Places on a grid, each met some six times, in an order that repeats near and far; some coordinates are -0. Triangles are
- * at random among them, so some have no area. */
+/* Places are on a grid, each used some six times, in an order that repeats near and far. Some coordinates are -0.
+ * Triangles are random among them, so some have no area. */
 struct torn {
     uint32_t n_vertices, n_faces;
     double (*v)[3];
@@ -56,7 +56,7 @@ static void free_torn(struct torn *t)
     free(t->bytes);
 }
 
-/* number[i]: the first vertex with the bits of vertex i, counted among those that are first. Returns how many are. */
+/* number[i]: the first vertex with the bits of vertex i, counted among the first ones. Returns how many there are. */
 static uint32_t weld_naively(const struct torn *t, uint32_t *number)
 {
     uint32_t n = 0;
@@ -101,8 +101,8 @@ static int compare_places(const void *a, const void *b)
     return memcmp(a, b, 3 * sizeof(double));
 }
 
-/* 10 MB, which go while they are read. The table grows: there are more places than it begins with room for. A second file
- * of the same places has vertices of its own. */
+/* The file has 10 MB, which are freed while they are read. The table grows, as there are more places than its first
+ * size. A second file of the same places has vertices of its own. */
 static void large_and_twice(void **state)
 {
     (void)state;
@@ -131,7 +131,7 @@ static void large_and_twice(void **state)
     free_torn(&t);
 }
 
-/* No more vertices than faces: they are as the file has them, also two at one place. */
+/* If there are no more vertices than faces, they are those of the file, even two at one place. */
 static void shared_vertices_stay(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* OBJ, MTL, PLY and STL as other programs write them: names of other machines, orders and parts that few files have. What
- * is left out is said, with its file and line. Colours of vertices: test_vertex_colours.c. */
+/* These tests read OBJ, MTL, PLY and STL in the forms of other programs: names of other machines, rare orders and
+ * parts. Parts that are left out are reported, with file and line. Colours of vertices are in test_vertex_colours.c. */
 #include <math.h>
 #include <sys/stat.h>
 
@@ -33,7 +33,7 @@ static void remove_made(void)
         remove(made[--n_made]);
 }
 
-/* With colours and textures. NULL: refused, why in *err. */
+/* Loads it with colours and textures. NULL: it was refused, with the reason in *err. */
 static struct scene *load_coloured(const char *name, const char *text, struct sh_err *err)
 {
     struct scene *s = NULL;
@@ -52,7 +52,7 @@ static struct scene *take(const char *name, const char *text)
     return s;
 }
 
-/* The surface's colour, 0xrgb with a digit a channel: 15 is 1; -1: it has none. */
+/* Returns the surface's colour, 0xrgb with a digit a channel: 15 is 1; -1: it has none. */
 static int colour_of(const struct scene *s, uint32_t i)
 {
     const float *c = s->surface[i].colour;
@@ -71,7 +71,7 @@ static void check_red_green(const char *name, const char *text)
     scene_free(s);
 }
 
-/* The names of two materials differ beyond the bytes that a name has: each has its own colour. */
+/* The names of two materials differ only beyond the bytes of a name. Each has its own colour. */
 static void long_names_keep_their_colours(void **state)
 {
     (void)state;
@@ -150,7 +150,7 @@ static void missing_things_are_named(void **state)
                    "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; it belongs beside");
 }
 
-/* Whatever is in it: a file of that name is the texture. */
+/* For any contents, a file of that name is the texture. */
 static void check_texture(const char *library_line, const char *map, const char *file)
 {
     char library[256], text[1024], expected[192];
@@ -180,7 +180,7 @@ static void textures_are_found(void **state)
     check_texture("mat\\m.mtl", "beside.png", "beside.png");
 }
 
-/* Vertices that come later, indices without anything after the slash. */
+/* Vertices come later, and indices have nothing after the slash. */
 static void faces_are_read(void **state)
 {
     (void)state;
@@ -211,10 +211,10 @@ static void ply_in_any_order(void **state)
     assert_true(fabs(total_area(s) - 1.0) < 1e-12);
     assert_int_equal(n_warnings, 0);
     scene_free(s);
-    /* a strip of two triangles, and after -1 one of one */
+    /* A strip of two triangles, and after -1 one of one. */
     s = take("a.ply", PLY_HEAD XYZ(4) "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" SQUARE
                                       "8 0 1 3 2 -1 1 2 3\n");
-    static const uint32_t triangle[3][3] = {{0, 1, 3}, {3, 1, 2}, {1, 2, 3}}; /* by the right-hand rule all look up */
+    static const uint32_t triangle[3][3] = {{0, 1, 3}, {3, 1, 2}, {1, 2, 3}}; /* by the right-hand rule all face up */
     assert_int_equal(s->n_triangles, 3);
     for (int i = 0; i < 3; i++) { /* where each begins doesn't matter */
         uint32_t turned[3] = {s->triangle[i][2], s->triangle[i][0], s->triangle[i][1]};
@@ -252,7 +252,7 @@ static void ply_vertices_that_nothing_uses(void **state)
     assert_non_null(strstr(err.text, "a.ply, line 13: vertex 4 (1 nan 0) is not finite, and a face uses it"));
 }
 
-/* Texture coordinates by face and by vertex; one texture or several. */
+/* Texture coordinates come by face and by vertex, for one texture or several. */
 static void ply_textures(void **state)
 {
     (void)state;

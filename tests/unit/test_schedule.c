@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The schedule against a model of its own: each pulse's time, place and angle as one fraction in 128-bit
- * integers. */
+/* These tests compare the schedule with a model of their own: each pulse's time, place and angle as one fraction in
+ * 128-bit integers. */
 #include "tests/common/cases.h"
 
 #include <inttypes.h>
@@ -94,7 +94,7 @@ static void times_are_exact_floors(void **state)
     }
 }
 
-/* 2.2 MHz for a day is a whole number of pulses, and nothing is a nanosecond off at its end. */
+/* 2.2 MHz for a day is a whole number of pulses, and at its end the time is right to the nanosecond. */
 static void a_day_has_no_drift(void **state)
 {
     (void)state;
@@ -130,7 +130,7 @@ static void pulse_at_is_the_first_at_or_after(void **state)
     }
 }
 
-/* The way that casters take: start of the run, then a quotient and a remainder that carries. */
+/* Casters compute times in this way: the start of the run, then a quotient and a remainder that carries. */
 static void check_run_times(const struct schedule_segment *seg, uint64_t n_line)
 {
     struct schedule_line line;
@@ -162,7 +162,7 @@ static void runs_have_the_same_times(void **state)
 
 /* --- lines and the cast window --- */
 
-/* Phase of pulse k in its sweep is phase/prr; a scan without changes. */
+/* Returns the phase of pulse k in its sweep, which is phase/prr, for a scan without changes. */
 static u128 model_phase(const struct schedule_spec *s, uint64_t k)
 {
     return (u128)k * (u128)s->lines_uhz % (u128)s->prr_uhz;
@@ -231,7 +231,7 @@ static void every_pulse_is_cast_or_blind_as_its_angle_says(void **state)
     }
 }
 
-/* 100 pulses a line over 100 degrees: pulse i stands at i degrees exactly. */
+/* With 100 pulses a line over 100 degrees, pulse i is at exactly i degrees. */
 static void both_ends_of_the_window_are_cast(void **state)
 {
     (void)state;
@@ -299,7 +299,7 @@ static void cuts_share_the_pulses_out(void **state)
             struct schedule_line line;
             schedule_get_line(&seg, schedule_line_of(&seg, cut), &line);
             assert_true((cut - line.pulse0) % SCHEDULE_PACKET == 0);
-            /* nothing of an earlier line is held back */
+            /* Nothing of an earlier line is held back. */
             schedule_get_line(&seg, schedule_line_of(&seg, due), &line);
             assert_true(cut >= line.pulse0);
             at = cut;
@@ -330,7 +330,7 @@ static void a_frame_has_the_lines_that_its_sweep_needs(void **state)
             uint64_t first = lines * f;
             schedule_get_line(&seg, first, &line);
             assert_true(line.frame == f && line.last_of_frame == (lines == 1));
-            /* each frame begins at the start, to the last bit that a turn has in a double */
+            /* Each frame begins at the start, to the last bit of a turn in a double. */
             assert_true(schedule_pan_turn(&seg, line.pulse0) == (double)spec.pan_start_udeg / 360e6);
             schedule_get_line(&seg, first + lines - 1, &line);
             assert_true(line.frame == f && line.last_of_frame);
@@ -375,7 +375,7 @@ static void without_frames_there_is_no_end(void **state)
     assert_true(seg.end_pulse == UINT64_MAX);
 }
 
-/* The end lies beyond what 64 bits hold: as good as none, and not a small number that wrapped. */
+/* The end is beyond 64 bits. It counts as none, and not as a small number that wrapped. */
 static void an_end_beyond_all_numbers_is_never_reached(void **state)
 {
     (void)state;
@@ -413,8 +413,8 @@ static void mirror_and_pan_turn_as_the_rates_say(void **state)
         long double pan =
             (spec.pan_start_udeg + (long double)k * (long double)spec.pan_udeg_s * HZ / (long double)spec.prr_uhz) /
             360e6L;
-        /* At most half a turn and a few roundings of 2^-53; the pan is a whole number of 2^-24 udeg (1.7e-16
-         * turns). */
+        /* The angle is at most half a turn, with a few roundings of 2^-53. The pan is a whole number of 2^-24 udeg
+         * (1.7e-16 turns). */
         assert_true(fabsl(schedule_mirror_turn(&seg, k) - mirror) < 5e-16L);
         assert_true(fabsl(schedule_pan_turn(&seg, k) - pan) < 5e-16L);
         struct schedule_line line;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings that change in the middle of a scan: nothing lost or doubled, and time, mirror and pan go on where
- * they were. */
+/* Settings that change in the middle of a scan. Nothing is lost or doubled, and time, mirror and pan continue from
+ * where they were. */
 #include "tests/common/cases.h"
 
 #include <inttypes.h>
@@ -46,13 +46,13 @@ static struct schedule_spec any_spec(uint64_t *seed, struct schedule_spec s)
     return s;
 }
 
-/* r of pulse k in its line. */
+/* Returns r of pulse k in its line. */
 static uint64_t place(const struct schedule_segment *seg, uint64_t k)
 {
     return (uint64_t)(((u128)seg->r0 + (u128)(k - seg->k0) * seg->num) % seg->den);
 }
 
-/* Pan of pulse k in steps of 2^-24 udeg, with its fraction. */
+/* Returns the pan of pulse k in steps of 2^-24 udeg, with its fraction. */
 static long double exact_pan(const struct schedule_segment *seg, uint64_t k, const struct schedule_line *line)
 {
     uint64_t first = seg->k0;
@@ -85,7 +85,7 @@ static void check_continuity(const struct schedule_segment *before, const struct
     assert_true(schedule_pan_turn(after, k) == (double)after->pan0_fine / (360e6 * 16777216.0));
 }
 
-/* The frame at hand ends with the first line whose end has the pan at its stop, or with the line at hand. */
+/* The current frame ends with the first line whose end has the pan at its stop, or with the current line. */
 static void check_frame_end(const struct schedule_segment *seg)
 {
     long double stop = (long double)seg->spec.pan_stop_udeg * FINE;
@@ -127,8 +127,8 @@ static void nothing_jumps_when_everything_changes(void **state)
     }
 }
 
-/* Every pulse of a scan in order, as ticks take it, with changes on the way: lines follow each other without
- * a gap, none begins twice, and each pulse is cast or blind as its phase says. */
+/* Takes every pulse of a scan in order, as ticks do, with changes on the way. Lines follow each other without a gap,
+ * none begins twice, and each pulse is cast or blind by its phase. */
 static void lines_stay_whole_through_changes(void **state)
 {
     (void)state;
@@ -169,8 +169,7 @@ static void lines_stay_whole_through_changes(void **state)
     }
 }
 
-/* A change to what is there already, at any moment, doesn't move the frame's end: in a line that begins at
- * phase 0. */
+/* A change to the present settings, at any moment, doesn't move the frame's end, in a line that begins at phase 0. */
 static void a_change_of_nothing_changes_nothing(void **state)
 {
     (void)state;
@@ -236,7 +235,7 @@ static void frames_fewer_than_done_end_with_the_one_at_hand(void **state)
                 seg.end_pulse == 3000 * 3000);
 }
 
-/* In the third frame: as many as are done, that many with the one at hand, and one more. */
+/* In the third frame: as many frames as are done, that many with the current one, and one more. */
 static void frames_may_be_set_to_those_done(void **state)
 {
     (void)state;
@@ -269,8 +268,8 @@ static void a_pan_that_stops_ends_its_frame_and_keeps_its_angle(void **state)
     assert_true(line.last_of_frame && line.frame == 1);
 }
 
-/* Anything that a profile and a configuration allow, anywhere up to 2^50 pulses and 146 years. Under UBSan
- * this finds what overflows or divides by zero. */
+/* Any settings that a profile and a configuration allow, anywhere up to 2^50 pulses and 146 years. UBSan then finds
+ * overflows and divisions by zero. */
 static struct schedule_spec wild_spec(uint64_t *seed)
 {
     struct schedule_spec s = {0};
@@ -337,9 +336,10 @@ static void whatever_is_allowed_is_consistent(void **state)
     }
 }
 
-/* 2.2 MHz is 454.54 ns a pulse. However often settings change, and to whatever: back at one rate for m pulses, these
- * take floor of the whole, and what was left of a nanosecond goes along. Here every seventh pulse, from 2.2 to 1.1 MHz
- * (twice as long) and back: the time of pulse k is the floor of the sum, to the nanosecond, after 20,000 changes. */
+/* 2.2 MHz is 454.54 ns a pulse. Settings change any number of times. Back at one rate for m pulses, these take the
+ * floor of the whole, and the rest of a nanosecond is carried along. Here the rate changes every seventh pulse, from
+ * 2.2 to 1.1 MHz (twice as long) and back. The time of pulse k is the floor of the sum, to the nanosecond, after 20,000
+ * changes. */
 static void no_part_of_a_nanosecond_is_lost(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* SCIP, the sensor's side: commands and their answers. What is expected was written from Hokuyo's description
- * of the protocol, sums added up apart from this program; whole replies of an URG-04LX are those that its
- * maker has published. */
+/* SCIP, the sensor's side: commands and their answers. Expected answers were written from Hokuyo's description of the
+ * protocol, with sums added up apart from this program. Whole replies of an URG-04LX are those that its maker has
+ * published. */
 #include "tests/unit/scip_rig.h"
 
 #define VV_URG                                                                                                 \
@@ -18,7 +18,7 @@ static void open_published(void)
     strcpy(rig.identity.serial, "H0614967");
 }
 
-/* What urg_library sends first, and what it can't do without. */
+/* urg_library sends these first, and needs their answers. */
 static void urg_library_opens(void **state)
 {
     (void)state;
@@ -32,7 +32,7 @@ static void urg_library_opens(void **state)
     scip_close();
 }
 
-/* What rawlog-grabber sends to a UTM-30LX on a serial line, up to the first scan's command. */
+/* rawlog-grabber sends these to a UTM-30LX on a serial line, up to the first scan's command. */
 static void rawlog_grabber_opens(void **state)
 {
     (void)state;
@@ -61,7 +61,7 @@ static void state_of_the_sensor(void **state)
     assert_non_null(strstr((char *)rig.bytes, "\nLASR:ON;9\n"));
     assert_null(strstr((char *)rig.bytes, "MESM:IDLE"));
     scip_close();
-    /* A UST gives the time as four characters: 16000000 is "m2@0" (C-42-03320B, encoding). */
+    /* A UST sends the time as four characters: 16000000 is "m2@0" (C-42-03320B, encoding). */
     scip_open("UST-20LX");
     rig.ops->time(rig.protocol, 16000000000000);
     protocol_rig_input(&rig, "II\n");
@@ -123,7 +123,7 @@ static void what_is_no_command(void **state)
         {"UTM-30LX", "MF0000108001000", "0Ee"},
         {"UTM-30LX", "GF0000108001", "0Ee"},
         {"UTM-30LX", "MG0000108001000", "0Ee"},
-        /* what a model hasn't got */
+        /* commands that a model does not have */
         {"URG-04LX", "ME0044072501000", "0Ee"},
         {"URG-04LX", "HD0044072501", "0Ee"},
         {"URG-04LX", "RB", "0Ee"},
@@ -203,7 +203,7 @@ static void the_head_is_started(void **state)
     scip_close();
 }
 
-/* 16000000 ms are "m2@0" in C-42-03320B; the sum: 109 + 50 + 64 + 48 = 271, 271 - 4 * 64 + 48 = '?'. */
+/* 16000000 ms are "m2@0" in C-42-03320B; the sum is 109 + 50 + 64 + 48 = 271, 271 - 4 * 64 + 48 = '?'. */
 static void time_adjustment(void **state)
 {
     (void)state;
@@ -307,7 +307,7 @@ static void reset_and_reboot(void **state)
     assert_false(rig.hung_up); /* the power cycle ends it */
     scip_close();
 
-    /* There is no head to reboot: the session alone begins anew, and the device's time goes on. */
+    /* There is no head to reboot. Only the session begins anew, and the device's time goes on. */
     static const struct protocol_rig_reply recorded[] = {{"HEAD:REBOOT", "ERR", -221}, {NULL, NULL, 0}};
     scip_open("UTM-30LX");
     rig.replies = recorded;
@@ -318,12 +318,12 @@ static void reset_and_reboot(void **state)
     scip_close();
 }
 
-/* A head that is not planar, or has more steps than a unit has room for, has no scans to give. */
+/* A head that is not planar, or has more steps than a unit has room for, gives no scans. */
 static void heads_that_dont_fit(void **state)
 {
     (void)state;
     protocol_rig_open(&rig, PROTOCOL_SCIP, "Hokuyo", "UTM-30LX");
-    protocol_rig_input(&rig, "PP\nMD0000108001000\nVV\n"); /* before the head has said what it is */
+    protocol_rig_input(&rig, "PP\nMD0000108001000\nVV\n"); /* before the head has described itself */
     assert_memory_equal(rig.bytes, "PP\n0Aa\n\nMD0000108001000\n0Aa\n\nVV\n00P\n", 36);
     scip_close();
     scip_open_head("UTM-30LX", 5760, 0, 2879, 1440, -1, 40);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SCIP, the sensor's side: what a line may bring, and a client that sends nonsense. */
+/* SCIP, the sensor's side: any bytes of a line, and a client that sends nonsense. */
 #include "tests/unit/scip_rig.h"
 
 static void bytes_in(const void *bytes, size_t len)
@@ -7,7 +7,7 @@ static void bytes_in(const void *bytes, size_t len)
     rig.ops->input(rig.protocol, bytes, len);
 }
 
-/* Noise, of a wrong bit rate for example, is not answered, but counted. What follows it is. */
+/* Noise, of a wrong bit rate for example, is counted, but not answered. The line after it is. */
 static void noise(void **state)
 {
     (void)state;
@@ -22,7 +22,7 @@ static void noise(void **state)
     scip_close();
 }
 
-/* More than fits: the echo of what did, and 0B. A client's line of 72 bytes has room for it. */
+/* A line that is too long gets an echo of the part that fits, and 0B. A client's line of 72 bytes has room for it. */
 static void overlong_lines(void **state)
 {
     (void)state;
@@ -49,8 +49,7 @@ static void overlong_lines(void **state)
     scip_close();
 }
 
-/* Each of many lines that come at once has its answer, in order; those that have no room are their owner's to
- * count. */
+/* Each of many lines that come at once has its answer, in order. The owner counts those without room. */
 static void ten_thousand_at_once(void **state)
 {
     (void)state;
@@ -80,8 +79,7 @@ static void ten_thousand_at_once(void **state)
     scip_close();
 }
 
-/* A scan that has no room is lost; the next one comes, and the count goes on as it would from a sensor on a
- * bad line. */
+/* A scan without room is lost. The next one comes, and the count goes on as from a sensor on a bad line. */
 static void scans_without_room(void **state)
 {
     (void)state;
@@ -124,7 +122,7 @@ static uint32_t dice(uint32_t *seed, uint32_t n)
     return (*seed >> 8) % n;
 }
 
-/* Lines near to commands: one of them, with up to three bytes changed, left out or put in. */
+/* Makes a line near a command: with up to three bytes changed, left out or put in. */
 static size_t odd_line(uint32_t *seed, char *line)
 {
     static const char *const good[] = {"QT\n",
@@ -173,9 +171,8 @@ static size_t odd_line(uint32_t *seed, char *line)
     return len;
 }
 
-/* Odd lines among turns with frames missing: the session goes on, units stay within their bound (the rig
- * asserts it), and at the end it answers as ever. Fixed seed; with sanitizers where the unit tests run with
- * them. */
+/* Odd lines come among turns with missing frames. The session goes on, units stay within their bound (the rig asserts
+ * it), and at the end it answers as usual. The seed is fixed. Sanitizers are in where the unit tests have them. */
 static void nonsense(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SCIP, the sensor's side: what each model says of itself, and of its state. Whole replies of the URG-04LX and the
- * UTM-30LX are those of real devices (SCIP.md, source D), with their sums; sums of the others were added up apart from
+/* SCIP, the sensor's side: each model's description of itself, and of its state. Whole replies of the URG-04LX and the
+ * UTM-30LX are those of real devices (SCIP.md, source D), with their sums. Sums of the others were added up apart from
  * this program. */
 #include "tests/unit/scip_rig.h"
 
@@ -9,7 +9,7 @@ static const struct protocol_rig_reply BOOTS[] = {{"HEAD:STATE?", "boot", 0}, {N
                                        AT_40[] = {{"HEAD:LINES?", "40", 0}, {NULL, NULL, 0}},
                                        AT_10[] = {{"HEAD:LINES?", "10", 0}, {NULL, NULL, 0}};
 
-/* A session of a model whose firmware is known when it begins. */
+/* Opens a session of a model whose firmware is known when it begins. */
 static void open_with(const char *model, const char *firmware, const char *serial, double min_m, double max_m)
 {
     struct sh_err err;
@@ -30,7 +30,7 @@ static void time_is_ms(int64_t ms)
     rig.ops->time(rig.protocol, ms * 1000000);
 }
 
-/* That a reply to `line` has these pieces. */
+/* A reply to `line` has these pieces. */
 static void expect_in(const char *line, const char *const *pieces)
 {
     protocol_rig_input(&rig, line);
@@ -134,7 +134,7 @@ static void numbers_of_states(void **state)
     scip_close();
 }
 
-/* No model then says what clients take for a sensor that works. */
+/* No model then sends the text that clients take for a working sensor. */
 static void boots_and_fails(void **state)
 {
     (void)state;
@@ -157,7 +157,7 @@ static void boots_and_fails(void **state)
         }
 }
 
-/* The device's time since power came: of a session after a reboot, too. */
+/* The device's time counts from power-up, in a session after a reboot, too. */
 static void time_since_power_up(void **state)
 {
     (void)state;
@@ -180,7 +180,7 @@ static uint64_t us_of(const char *text)
     return value;
 }
 
-/* Firmware 4.1 of a UST: eleven characters, microseconds, which do not wrap with the 24 bits of the others. */
+/* Firmware 4.1 of a UST has eleven characters with microseconds, which do not wrap with the 24 bits of the others. */
 static void times_in_microseconds(void **state)
 {
     (void)state;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* SCIP, the sensor's side: what a scan has. Bytes by hand from the protocol's description, and a decoder written from
- * it. */
+/* SCIP, the sensor's side: the contents of a scan. The bytes are worked out by hand from the protocol's description,
+ * and a decoder is written from it. */
 #include "tests/unit/scip_rig.h"
 
 static struct scip_decoded got;
 
-/* Five steps, 0 to 4, and a scan of them with all kinds of value: 1234 mm, 5432 mm, no echo, too near, 30000
- * mm. The description encodes 1234 as CB in two characters, 5432 as 1Dh in three and 16000000 as m2@0 in
- * four. 30000 is 7 * 4096 + 20 * 64 + 48. */
+/* Five steps, 0 to 4, and a scan of them with all kinds of value: 1234 mm, 5432 mm, no echo, too near, 30000 mm. The
+ * description encodes 1234 as CB in two characters, 5432 as 1Dh in three and 16000000 as m2@0 in four. 30000 is 7 *
+ * 4096 + 20 * 64 + 48. */
 static void open_five(const char *model)
 {
     scip_open_head(model, 360, 0, 4, 2, -1, 10);
@@ -37,7 +37,7 @@ static void bytes_by_hand(void **state)
     scip_close();
 }
 
-/* Ranges of 0.1 to 30 m in steps of 1 um, which the description rounds to mm. */
+/* Draws ranges of 0.1 to 30 m in steps of 1 um, which the description rounds to mm. */
 static uint32_t random_um(uint32_t *seed)
 {
     *seed = *seed * 1664525u + 1013904223u;
@@ -70,8 +70,8 @@ static void ranges_to_the_millimetre(void **state)
     scip_close();
 }
 
-/* Without end the two digits stay 00, and a scan is as long as the description makes it: 6717 bytes of 1081
- * steps with intensity, in lines of 64 characters and a sum. */
+/* In an endless stream the two digits stay 00. A scan is as long as the description makes it: 6717 bytes of 1081 steps
+ * with intensity, in lines of 64 characters and a sum. */
 static void without_end(void **state)
 {
     (void)state;
@@ -89,9 +89,8 @@ static void without_end(void **state)
     scip_close();
 }
 
-/* Steps count counter-clockwise seen from above: what stands to the left, 90 degrees from the front, is a
- * quarter of a turn above the front step. The rig places a shot by its pan, which is clockwise from the
- * front. */
+/* Steps count counter-clockwise seen from above. A target to the left, 90 degrees from the front, is a quarter of a
+ * turn above the front step. The rig places a shot by its pan, which is clockwise from the front. */
 static void left_is_left(void **state)
 {
     (void)state;
@@ -123,7 +122,7 @@ static void left_is_left(void **state)
     scip_close();
 }
 
-/* The least range of a cluster, errors left out; an error where there is nothing else. */
+/* A cluster has its least range, without errors. It has an error where there is nothing else. */
 static void clusters(void **state)
 {
     (void)state;
@@ -165,8 +164,8 @@ static void several_echoes(void)
     shot[1] = (struct protocol_rig_shot){.n = 0};
 }
 
-/* 1000 is 15 * 64 + 40: a matt white surface. 20 dB below it is a tenth: 100, 64 + 36. An amplitude of 0 dB
- * is 100, of 40 dB a hundred times that: 10000, 2 * 4096 + 28 * 64 + 16. */
+/* 1000 is 15 * 64 + 40: a matt white surface. 20 dB below it is a tenth: 100, 64 + 36. An amplitude of 0 dB is 100, of
+ * 40 dB a hundred times that: 10000, 2 * 4096 + 28 * 64 + 16. */
 static void echoes_and_intensity(void **state)
 {
     (void)state;
@@ -197,7 +196,7 @@ static void echoes_and_intensity(void **state)
     }
 }
 
-/* Marks may stand at the end of a line of 64 characters: all places come by in a scan of two echoes. */
+/* Marks may be at the end of a line of 64 characters: a scan of two echoes tries all places. */
 static void marks_anywhere(void **state)
 {
     (void)state;
@@ -217,7 +216,7 @@ static void marks_anywhere(void **state)
     scip_close();
 }
 
-/* What stands in a range's place. 44 is the URG-04LX's first step; 40 to 43 can't be measured. */
+/* These codes take a range's place. 44 is the URG-04LX's first step; 40 to 43 can't be measured. */
 static void codes_of_a_urg(void **state)
 {
     (void)state;

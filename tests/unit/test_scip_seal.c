@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SCIP: scans whose values are changed on request, with sums that are right. Read by a decoder written from the
- * protocol's description alone. */
+/* SCIP: scans whose values are changed on request, with right sums. A decoder written from the protocol's description
+ * alone reads them. */
 #include "tests/unit/scip_rig.h"
 #include "tests/unit/seal_rig.h"
 
@@ -22,7 +22,7 @@ static const void *read_scan(const uint8_t *unit, size_t len, size_t *size)
     return &scan;
 }
 
-/* Forty steps, some with several echoes: more than one line of data. */
+/* Forty steps, some with several echoes, take more than one line of data. */
 static void open_forty(void)
 {
     scip_open_head("UTM-30LX-EW", 1440, 0, 39, 20, -1, 40);
@@ -48,7 +48,7 @@ static void check_scans(const char *request, int chars, int with_intensity, uint
     scip_close();
 }
 
-/* Four bits a character: 40 steps, or 53 echoes, as every third step has two. */
+/* There are four bits a character: 40 steps, or 53 echoes, as every third step has two. */
 static void values_of_all_kinds(void **state)
 {
     (void)state;
@@ -59,7 +59,7 @@ static void values_of_all_kinds(void **state)
     check_scans("GD0000003901\n", 3, 0, 4 * 40 * 3);
 }
 
-/* Other replies have nothing that is measured. Their sums are made right, too: of a key line without its ';'. */
+/* Other replies have no measured values. Their sums are made right, too; that of a key line is without its ';'. */
 static void other_replies_keep_their_sums(void **state)
 {
     (void)state;
@@ -82,7 +82,7 @@ static void other_replies_keep_their_sums(void **state)
     scip_close();
 }
 
-/* Scans with a % are scans, too. 1035 mm are "0@;": the line of data looks as a key line. */
+/* Scans with a % are scans, too. 1035 mm are "0@;": the line of data looks like a key line. */
 static void a_scan_in_microseconds(void **state)
 {
     (void)state;

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* SCIP, the sensor's side: how scans follow each other. Streams, their begin and end, what is lost between them, and
- * time. */
+/* SCIP, the sensor's side: the order of scans. Streams, their begin and end, losses between them, and time. */
 #include "tests/unit/scip_rig.h"
 
 static struct scip_decoded got;
 
-/* Which of ten turns come, by their time stamps. */
+/* Checks which of ten turns come, by their time stamps. */
 static void check_turns(const char *command, const char *want)
 {
     char line[40], times[80] = "";
@@ -34,7 +33,7 @@ static void skipped_scans(void **state)
 }
 
 /* A turn that is left out may as well be broken. */
-/* Somebody stops the head, and a client asks for scans while the last ones still come. */
+/* Another client stops the head, and a client asks for scans while the last ones still come. */
 static void asked_while_it_stops(void **state)
 {
     (void)state;
@@ -52,7 +51,7 @@ static void asked_while_it_stops(void **state)
     rig.ops->time(rig.protocol, 1000000000);
     assert_int_equal(rig.n_lines, 3);
     assert_string_equal(rig.line[2], "SCAN:START");
-    /* The first scan has come: who stops the head now means it. */
+    /* The first scan has come. A stop after that is meant. */
     scip_turn(41);
     assert_true(rig.len > 3000);
     protocol_rig_clear(&rig);
@@ -103,7 +102,7 @@ static void the_first_comes_at_once(void **state)
     scip_close();
 }
 
-/* A scan goes out once its last step has come, before the turn is over. */
+/* A scan is sent once its last step has come, before the turn is over. */
 static void sent_after_the_last_step(void **state)
 {
     (void)state;
@@ -121,7 +120,7 @@ static void sent_after_the_last_step(void **state)
     scip_close();
 }
 
-/* QT ends a stream within a turn; a second M takes the first one's place, a refused one doesn't. */
+/* QT ends a stream within a turn. A second M replaces the first one, and a refused one doesn't. */
 static void streams_end(void **state)
 {
     (void)state;
@@ -146,8 +145,8 @@ static void streams_end(void **state)
     scip_close();
 }
 
-/* M gives what was measured after it was asked for, G the next scan that is whole and was measured with the
- * laser on. */
+/* M gives scans that were measured after it was asked for. G gives the next scan that is whole and was measured with
+ * the laser on. */
 static void measured_when(void **state)
 {
     (void)state;
@@ -199,7 +198,7 @@ static void handshakes(void **state)
     scip_close();
 }
 
-/* A turn with missing frames is not sent and counted; those that were asked for all come. */
+/* A turn with missing frames is not sent, but counted. All requested ones come. */
 static void lost_frames(void **state)
 {
     (void)state;
@@ -266,7 +265,7 @@ static void lost_attributes(void **state)
     scip_close();
 }
 
-/* What never was, is not lost: the turn within which the scan was stopped, or the client joined. */
+/* A turn that never was is not lost: the turn within which the scan was stopped, or the client joined. */
 static void turns_that_are_not_lost(void **state)
 {
     (void)state;
@@ -288,8 +287,8 @@ static void turns_that_are_not_lost(void **state)
     scip_close();
 }
 
-/* Parts of two turns never make one: of two scans, each with a turn of that number, or the same part sent
- * over again. */
+/* Parts of two turns never make one. They may be of two scans, each with a turn of that number, or the same part sent
+ * twice. */
 static void turns_are_not_mixed(void **state)
 {
     (void)state;
@@ -315,8 +314,8 @@ static void turns_are_not_mixed(void **state)
     scip_close();
 }
 
-/* A change of speed within a turn sends descriptor and emitter again, and takes nothing from the turn;
- * another number of steps begins anew. */
+/* A change of speed within a turn sends descriptor and emitter again, and does not change the turn. Another number of
+ * steps begins anew. */
 static void speed_changes_within_a_turn(void **state)
 {
     (void)state;
@@ -365,7 +364,7 @@ static void the_clock_wraps(void **state)
     scip_close();
 }
 
-/* All that came since, a line each: the two digits of an echo and its status, or only the status. */
+/* Writes all replies since, a line each: the two digits of an echo and its status, or only the status. */
 static void check_played(const char *want)
 {
     char text[512] = "";

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A sight's hits are those of the BVH, bit by bit: random scenes with all that makes surfaces hard to order, and rays
+/* A sight's hits are those of the BVH, bit by bit. Random scenes have surfaces that are hard to order, and rays are
  * aimed at edges, corners and the borders of the map's cells. */
 #include <math.h>
 #include <stdlib.h>
@@ -9,151 +9,12 @@
 #include "core/vec3.h"
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"
+#include "tests/unit/soups.h"
 
 #ifndef SCENES
 #define SCENES (SANITIZED ? 2 : 24) /* of each kind */
 #endif
-enum { MOST = 400, RAYS = 6001, SHOWN = 5 };
-
-/* A scene is put together triangle by triangle; corners in one place are one vertex. */
-struct soup {
-    double vertex[3 * MOST][3];
-    uint32_t triangle[MOST][3];
-    uint16_t label[MOST];
-    uint32_t n_vertices, n;
-};
-
-static double between(uint64_t *state, double lo, double hi)
-{
-    return lo + (hi - lo) * case_unit(state);
-}
-
-static uint32_t add_vertex(struct soup *s, const double p[3])
-{
-    for (uint32_t i = 0; i < s->n_vertices; i++)
-        if (memcmp(s->vertex[i], p, sizeof s->vertex[i]) == 0) return i;
-    memcpy(s->vertex[s->n_vertices], p, sizeof s->vertex[0]);
-    return s->n_vertices++;
-}
-
-static void add(struct soup *s, const double a[3], const double b[3], const double c[3])
-{
-    if (s->n == MOST) return;
-    s->label[s->n] = (uint16_t)(s->n % 5);
-    const uint32_t t[3] = {add_vertex(s, a), add_vertex(s, b), add_vertex(s, c)};
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return;
-    memcpy(s->triangle[s->n++], t, sizeof t);
-}
-
-static void any_point(uint64_t *state, double half, double p[3])
-{
-    for (int k = 0; k < 3; k++)
-        p[k] = between(state, -half, half);
-}
-
-static void near_point(uint64_t *state, const double at[3], double most, double p[3])
-{
-    any_point(state, most, p);
-    vec3_add(p, at, p);
-}
-
-/* Triangles anywhere, of all sizes; every third one a needle. */
-static void soup_of_any(struct soup *s, uint64_t *state)
-{
-    const uint32_t n = (uint32_t)case_between(state, 2, 300);
-    for (uint32_t i = 0; i < n; i++) {
-        double a[3], b[3], c[3], size = exp(between(state, -5.0, 2.5));
-        any_point(state, 10.0, a);
-        near_point(state, a, size, b);
-        near_point(state, i % 3 == 0 ? b : a, i % 3 == 0 ? size * exp(between(state, -12.0, -1.0)) : size, c);
-        add(s, a, b, c);
-    }
-}
-
-/* Sheets in common planes, cut into triangles in different ways, some of them faces that stand there already. */
-static void soup_of_overlaps(struct soup *s, uint64_t *state)
-{
-    const uint32_t sheets = (uint32_t)case_between(state, 2, 30);
-    const double tilt = case_between(state, 0, 1) ? 0.0 : 0.37;
-    for (uint32_t i = 0; i < sheets; i++) {
-        const int axis = (int)case_between(state, 0, 2);
-        const double at = 0.5 * (double)case_between(state, -8, 8), x0 = 0.25 * (double)case_between(state, -20, 16),
-                     y0 = 0.25 * (double)case_between(state, -20, 16), w = 0.25 * (double)case_between(state, 1, 24),
-                     h = 0.25 * (double)case_between(state, 1, 24);
-        double corner[4][3];
-        for (int k = 0; k < 4; k++) {
-            const double x = x0 + (k == 1 || k == 2 ? w : 0.0), y = y0 + (k >= 2 ? h : 0.0);
-            corner[k][axis] = at + tilt * x;
-            corner[k][(axis + 1) % 3] = x;
-            corner[k][(axis + 2) % 3] = y;
-        }
-        add(s, corner[0], corner[1], corner[2]);
-        add(s, corner[0], corner[2], corner[3]);
-        if (case_between(state, 0, 3) == 0) add(s, corner[2], corner[0], corner[1]); /* twice */
-        if (case_between(state, 0, 3) == 0) add(s, corner[1], corner[3], corner[0]);
-    }
-}
-
-/* Sheets one after the other, as near as float can hardly tell them apart. */
-static void soup_of_layers(struct soup *s, uint64_t *state)
-{
-    const uint32_t n = (uint32_t)case_between(state, 2, 60);
-    double a[3], b[3], c[3];
-    for (uint32_t i = 0; i < n; i++) {
-        if (i % 6 == 0) {
-            any_point(state, 8.0, a);
-            any_point(state, 8.0, b);
-            any_point(state, 8.0, c);
-        }
-        const double gap = exp(between(state, -32.0, -9.0));
-        double p[3], q[3], r[3];
-        near_point(state, a, gap, p);
-        near_point(state, b, gap, q);
-        near_point(state, c, gap, r);
-        add(s, p, q, r);
-    }
-}
-
-/* Sheets that are folded at shared edges and corners, at all angles. */
-static void soup_of_folds(struct soup *s, uint64_t *state)
-{
-    const uint32_t n = (uint32_t)case_between(state, 1, 40);
-    for (uint32_t i = 0; i < n; i++) {
-        double a[3], b[3], c[3], d[3], e[3];
-        any_point(state, 8.0, a);
-        any_point(state, 8.0, b);
-        any_point(state, 8.0, c);
-        near_point(state, c, exp(between(state, -12.0, 2.0)), d);
-        near_point(state, b, exp(between(state, -12.0, 2.0)), e);
-        add(s, a, b, c);
-        add(s, d, b, a);
-        if (i % 2 == 0) add(s, e, d, a);
-    }
-}
-
-/* Boxes with common corners and faces, some within others. */
-static void soup_of_boxes(struct soup *s, uint64_t *state)
-{
-    static const int face[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-    const uint32_t n = (uint32_t)case_between(state, 1, 24);
-    for (uint32_t i = 0; i < n; i++) {
-        double lo[3], hi[3], corner[8][3];
-        for (int k = 0; k < 3; k++) {
-            lo[k] = 0.5 * (double)case_between(state, -12, 8);
-            hi[k] = lo[k] + 0.5 * (double)case_between(state, 1, 12);
-        }
-        for (int c = 0; c < 8; c++)
-            for (int k = 0; k < 3; k++)
-                corner[c][k] = c >> k & 1 ? hi[k] : lo[k];
-        for (int f = 0; f < 12; f++)
-            add(s, corner[face[f][0]], corner[face[f][1]], corner[face[f][2]]);
-    }
-}
-
-static void (*const KINDS[])(struct soup *, uint64_t *) = {soup_of_any, soup_of_overlaps, soup_of_layers, soup_of_folds,
-                                                           soup_of_boxes};
-enum { N_KINDS = sizeof KINDS / sizeof *KINDS };
+enum { RAYS = 6001, SHOWN = 5 };
 
 struct hits {
     double range_m[RAYS];
@@ -236,7 +97,7 @@ static void aim(struct rig *r, uint32_t i, const double d[3])
     r->z[i] = d[2] / length;
 }
 
-/* Some units of the last place away. */
+/* Moves a number by some units of the last place. */
 static double shaken(double x, uint64_t *state)
 {
     for (int64_t k = case_between(state, -4, 4); k != 0; k += k < 0 ? 1 : -1)
@@ -244,7 +105,7 @@ static double shaken(double x, uint64_t *state)
     return x;
 }
 
-/* The border of a cell, for any number of cells up to 2,048; on the borders of faces, too. */
+/* Aims at the border of a cell, for any number of cells up to 2,048, and on the borders of faces, too. */
 static void aim_at_cell(struct rig *r, uint32_t i, uint64_t *state)
 {
     const int axis = (int)case_between(state, 0, 2), both = (int)case_between(state, 0, 1);
@@ -260,7 +121,7 @@ static void aim_at_cell(struct rig *r, uint32_t i, uint64_t *state)
     aim(r, i, d);
 }
 
-/* At a corner, an edge or the inside of a triangle, to the last places. */
+/* Aims at a corner, an edge or the inside of a triangle, to the last places. */
 static void aim_at_triangle(struct rig *r, uint32_t i, uint64_t *state)
 {
     const struct soup *s = &r->soup;
@@ -318,7 +179,7 @@ static void compare(struct rig *r, const char *what, uint32_t n)
     }
 }
 
-/* All rays, at once, by both. */
+/* Casts all rays, at once, in both ways. */
 static void cast_both(struct rig *r, const char *what, uint32_t n)
 {
     const struct bvh_rays want = rays_of(r, &r->want, n), got = rays_of(r, &r->got, n);
@@ -327,13 +188,13 @@ static void cast_both(struct rig *r, const char *what, uint32_t n)
     compare(r, what, n);
 }
 
-/* A scene of a kind, a station in it, and where both are. */
+/* Opens a scene of a kind, with a station in it, and places both. */
 static void open_kind(struct rig *r, uint32_t kind, uint64_t *state)
 {
     static const double far_m[3] = {512345.678, 5412345.678, 321.5};
     r->soup.n = r->soup.n_vertices = 0;
     while (r->soup.n == 0)
-        KINDS[kind](&r->soup, state);
+        SOUPS[kind](&r->soup, state);
     any_point(state, case_between(state, 0, 1) ? 2.0 : 12.0, r->station_m);
     if (case_between(state, 0, 3) == 0)
         for (int k = 0; k < 3; k++)
@@ -360,7 +221,7 @@ static void hits_are_those_of_the_bvh(void **state)
 {
     (void)state;
     static struct rig r;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         r.few = r.asked = 0;
         for (uint64_t seed = 0; seed < SCENES; seed++)
             run_kind(&r, kind, 1000 * kind + seed);
@@ -370,14 +231,14 @@ static void hits_are_those_of_the_bvh(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Whatever the width of packets, and for any number of rays, in chunks or not. */
+/* Packets may have any width, and there may be any number of rays, in chunks or not. */
 static void packets_and_numbers_make_no_difference(void **state)
 {
     (void)state;
     static const uint32_t width[] = {1, 4, 8, 16}, number[] = {1, 3, 17, 1023, 1024, 1025, 2049, 5000};
     static struct rig r;
     uint64_t seed = 4711;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         open_kind(&r, kind, &seed);
         for (uint32_t k = 0; k < sizeof width / sizeof *width; k++) {
             bvh_set_packet(r.bvh, width[k]);
@@ -392,14 +253,14 @@ static void packets_and_numbers_make_no_difference(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Labels and steepness left out change no range; nothing is written beyond the last ray. */
+/* Labels and steepness that are left out change no range. Nothing is written beyond the last ray. */
 static void what_is_not_asked_for_is_left_alone(void **state)
 {
     (void)state;
     enum { N = 1500 };
     static struct rig r;
     uint64_t seed = 815;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         open_kind(&r, kind, &seed);
         aim_all(&r, &seed);
         struct bvh_rays rays = rays_of(&r, &r.want, N);
@@ -418,13 +279,14 @@ static void what_is_not_asked_for_is_left_alone(void **state)
     }
 }
 
-/* Once, with steepness asked for, doubt was counted in other units: at edges of large triangles float alone decided. */
+/* In an earlier version, doubt was counted in other units when steepness was asked for: at edges of large triangles
+ * float alone decided. */
 static void steepness_decides_nothing(void **state)
 {
     (void)state;
     static struct rig r;
     uint64_t seed = 99;
-    for (uint32_t kind = 0; kind < N_KINDS; kind++) {
+    for (uint32_t kind = 0; kind < N_SOUPS; kind++) {
         open_kind(&r, kind, &seed);
         aim_all(&r, &seed);
         struct bvh_rays rays = rays_of(&r, &r.want, RAYS);
@@ -457,7 +319,7 @@ static void a_face_that_stands_twice_is_a_twin(void **state)
     close_rig(&r);
 }
 
-/* No ray meets anything; and directions with components of nearly nothing. */
+/* No ray meets anything. Some directions have components of nearly nothing. */
 static void nothing_to_be_seen(void **state)
 {
     (void)state;
@@ -482,8 +344,8 @@ static void nothing_to_be_seen(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Two sheets folded at a common edge, or crossing at a common corner. Rays beside the edge, nearer to it than float can
- * tell the sheets apart: the nearer one is met. */
+/* Two sheets are folded at a common edge, or cross at a common corner. Rays pass beside the edge, nearer to it than
+ * float can tell the sheets apart. The nearer one is met. */
 static void folded_sheets_are_ordered(void **state)
 {
     (void)state;
@@ -510,7 +372,7 @@ static void folded_sheets_are_ordered(void **state)
         bvh_hits(r.work, r.bvh, &rays);
         for (uint32_t i = 0; i < RAYS; i++) {
             if (r.got.triangle[i] == BVH_NO_TRIANGLE) continue;
-            /* Near the middle of the edge both are met, and the planes tell which is nearer. */
+            /* Near the middle of the edge both are met, and the planes decide which is nearer. */
             const double d[3] = {r.x[i], r.y[i], r.z[i]};
             const double in_a = bvh_range_of(r.bvh, 0, r.station_m, d), in_b = bvh_range_of(r.bvh, 1, r.station_m, d);
             const double mid = d[1] / d[0];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A map of the directions that a head looks into knows all of them, also at the corners of what it looks at at once. */
+/* A map of the directions of a head's view knows all of them, including those at the corners of the view. */
 #include "tests/unit/cast_rig.h"
 
 #include "core/sight.h"
@@ -7,14 +7,14 @@
 static const double LO[3] = {-4.0, -6.0, -1.5}, HI[3] = {5.0, 7.0, 2.5}, STATION[3] = {0.31, -0.42, 0.17};
 enum { DIRECTIONS = 400 };
 
-/* The only ray there is. */
+/* There is only this ray. */
 static int sees(const void *ctx, const double dir[3], double radius_rad)
 {
     const double *ray = ctx;
     return acos(fmin(1.0, vec3_dot(ray, dir))) <= radius_rad;
 }
 
-/* How often the BVH is asked for that ray. */
+/* Returns how often the BVH is asked for that ray. */
 static uint64_t asked_for(const struct bvh *bvh, const double ray[3])
 {
     struct sight_spec spec = {.bvh = bvh, .rays = 1e5, .memory_bytes = 1 << 20, .sees = sees, .ctx = ray};
@@ -40,8 +40,8 @@ static uint64_t asked_for(const struct bvh *bvh, const double ray[3])
     return asked;
 }
 
-/* In a closed room, with rays on a spiral of the golden angle: none of them is in doubt, so none asks. The six axes are
- * where four corners meet, with the most to their middles. */
+/* In a closed room rays are on a spiral of the golden angle. None of them is in doubt, so none asks the BVH. The six
+ * axes are where four corners meet, with the most to their middles. */
 static void rays_that_are_there_are_known(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Maps of what stations see, as a site makes them: when, for which directions, and when not. */
+/* Visibility maps of stations, as a site makes them: when, for which directions, and when not. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -42,7 +42,7 @@ static struct site *need_site(const char *head, const char *stations, const char
 
 /* ---- directions */
 
-/* Unit vectors of a run's pulses, as core/cast aims them. */
+/* Writes unit vectors of a run's pulses, as core/cast aims them. */
 static void aim(const struct site *site, uint32_t station, const struct schedule_run *run, double d[3][64])
 {
     struct cast_setup setup;
@@ -50,7 +50,7 @@ static void aim(const struct site *site, uint32_t station, const struct schedule
     aimed_directions(run, setup.rotation, &(struct vec3_out){d[0], d[1], d[2]});
 }
 
-/* All pulses of the first lines and of the last ones go to where the view says that rays go. */
+/* All pulses of the first lines and of the last ones go in directions that the view includes. */
 static void expect_seen(const char *head, double least_share, double most_share)
 {
     struct site *site = need_site(head, ONE, "");
@@ -81,7 +81,7 @@ static void expect_seen(const char *head, double least_share, double most_share)
     site_free(site);
 }
 
-/* The share of a window: its width by the difference of its limits' sines; the margin adds a little. */
+/* The share of a window is its width by the difference of its limits' sines. The margin adds a little. */
 static void test_view(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void test_view(void **state)
     expect_seen("profile: velodyne-vlp16", 0.02, 0.2);
 }
 
-/* A cone is seen where any direction in it is: directions that are seen, turned by less than its width. */
+/* A cone is seen where any direction in it is. Seen directions are turned by less than its width. */
 static void test_cones(void **state)
 {
     (void)state;
@@ -167,7 +167,7 @@ static void test_stopped(void **state)
     site_free(site);
 }
 
-/* More stations than maps: a run has none, a recording has one at a time, and no hit depends on it. */
+/* There are more stations than maps. A run has none, a recording has one at a time, and no hit depends on it. */
 static void test_many_stations(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a site makes of a configuration's beams and mirrors: names of ghosts, profiles that have no footprint to use. */
+/* A site's beams and mirrors: names of ghosts, and profiles whose footprint can't be used. */
 #include "tests/unit/cast_rig.h"
 
 #include <unistd.h>
@@ -84,7 +84,7 @@ static void count_bounds(void *ctx, const char *text)
     n_bounds += strstr(text, "the plan drew 8388608 pulses") != NULL;
 }
 
-/* Of 300,000 pulses a second a hundred are cast: the search for them ends, and says so. */
+/* A hundred of 300,000 pulses a second are cast. The search for them ends, and reports that. */
 static void the_search_for_pulses_is_bounded(void **state)
 {
     (void)state;
@@ -101,7 +101,7 @@ static void the_search_for_pulses_is_bounded(void **state)
 
 #endif
 
-/* A profile like that of the VZ-400i, with another pulse width. */
+/* Writes a profile like that of the VZ-400i, with another pulse width. */
 static void write_head(const char *width)
 {
     static char text[8192];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Copies of meshes in a whole site: points as from the same triangles written out, lists from the configuration and from
- * a file, and what is wrong with them. */
+/* Copies of meshes in a whole site: points as from the same triangles written out, lists from the configuration and
+ * from a file, and their errors. */
 #include <math.h>
 
 #include <png.h>
@@ -22,7 +22,7 @@ static const char LIST[] = "[{offset_m: [4, 3, 0], turn_deg: 30}, {offset_m: [-5
                            " {offset_m: [1, -7, 0], scale: 0.7}, {offset_m: [2.5, 6, -0.1], turn_deg: 77, scale: 2}]";
 static const char *const files[] = {"tree.obj", "ground.obj", "trees.csv", "board.obj", "board.mtl", "board.png"};
 
-/* A board whose texture gets lighter and is a hole in every other square. */
+/* Writes a board whose texture gets lighter and is a hole in every other square. */
 static int write_board(void)
 {
     static uint8_t rgba[8 * 8][4];
@@ -115,7 +115,7 @@ static void cast_lines(const struct site *site, double t_s, struct lines *out)
     caster_free(caster);
 }
 
-/* A micrometre is a count: a rounding may tip from one count to the next. Where a ray passes an edge by less than
+/* A micrometre is a count, so a rounding may move from one count to the next. If a ray passes an edge by less than
  * rounding, it may meet either side. */
 static void compare(struct lines *a, struct lines *b, uint32_t least_on_trees)
 {
@@ -161,7 +161,7 @@ static void points_are_those_of_triangles(void **state)
     }
 }
 
-/* Holes of textures, and what textures reflect, are looked up in the mesh. */
+/* Holes of textures, and their reflectances, are looked up in the mesh. */
 static void textures_lie_on_copies(void **state)
 {
     (void)state;
@@ -219,7 +219,7 @@ static void a_list_is_as_good_as_a_file(void **state)
     assert_says("2 numbers instead of 3");
 }
 
-/* A fault in a file is said with its line, what is wrong, and what is allowed. */
+/* An error in a file is reported with its line, the wrong value, and the allowed ones. */
 static void faults_of_a_file_say_where(void **state)
 {
     (void)state;
@@ -247,7 +247,7 @@ static void faults_of_a_file_say_where(void **state)
     write_in("trees.csv", PLACES);
 }
 
-/* 40,000 times two surfaces. That many copies alone are too many before the mesh is read. */
+/* 40,000 times two surfaces: that many copies alone are too many before the mesh is read. */
 static void too_many_surfaces_are_refused(void **state)
 {
     (void)state;
@@ -275,7 +275,7 @@ static void too_many_surfaces_are_refused(void **state)
     write_in("trees.csv", PLACES);
 }
 
-/* Patterns choose among the copies' surfaces; what is left of them is scanned as it was. */
+/* Patterns choose among the copies' surfaces. The rest is scanned unchanged. */
 static void targets_are_chosen_among_copies(void **state)
 {
     (void)state;
@@ -298,7 +298,7 @@ static void targets_are_chosen_among_copies(void **state)
     assert_says("copy 2 of a mesh would keep other objects of it than one before");
 }
 
-/* A station on a copy: 0.3 m from the crown's axis of the second one, whose sides rise 3 m in 0.5 m there. */
+/* A station stands on a copy: 0.3 m from the crown's axis of the second one, whose sides rise 3 m in 0.5 m there. */
 static void stations_stand_on_copies(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Textures with holes in a configuration: single rays and footprints through a board that moves, and what
- * the plan makes of beams then. */
+/* Textures with holes in a configuration: single rays and footprints through a board that moves, and the plan's choice
+ * of beams then. */
 #include "tests/unit/scene_files.h"
 
 #include <math.h>
@@ -64,8 +64,8 @@ struct seen {
     uint32_t board, wall, both;
 };
 
-/* Casts over the board's upper half. Of pulses whose centre is further from a square's border than `near`
- * squares, what they meet is compared with the square. */
+/* Casts over the board's upper half. Pulses whose centre is further from a square's border than `near` squares are
+ * compared with the square. */
 static struct seen cast(const struct site *site, double near)
 {
     const struct schedule_spec spec = {.prr_uhz = 24000000000,
@@ -125,7 +125,7 @@ static void single_rays_and_rings_pass_holes(void **state)
     struct seen seen = cast(site, 1e-6);
     assert_true(seen.board > 500 && seen.wall > 500 && seen.both == 0);
     site_free(site);
-    /* The beam is 7 mm wide where it leaves and widens by 0.35 mrad; seen at 45 degrees at most: within 1
+    /* The beam is 7 mm wide where it leaves and widens by 0.35 mrad. Seen at 45 degrees at most it stays within 1
      * cm. */
     if (load_site("beam: {mode: rings, rings: 3, echoes: all}\n", "on", 1, &cfg, &site, &err) != SH_OK)
         fail_msg("%s", err.text);

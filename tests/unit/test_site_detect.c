@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A site follows a configuration's air and encoders, and has mirrors in scenes of many surfaces. */
+/* A site follows a configuration's air and encoders, and mirrors are limited in scenes of many surfaces. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -23,7 +23,7 @@ static int load(const char *more, struct site **site)
     return rc == SH_OK ? site_load(cfg, &report, site, &err) : rc;
 }
 
-/* Amplitude of a white target at 400 m. */
+/* Returns the amplitude of a white target at 400 m. */
 static double amplitude(const char *signal)
 {
     char text[128];
@@ -36,8 +36,8 @@ static double amplitude(const char *signal)
     return a;
 }
 
-/* An extinction is that of the air, all of it. The data sheet's reaches hold for air that lets 23 km be seen, whose
- * extinction at 1550 nm is, after Kruse, 3.912 / 23 km (550 / 1550)^1.3. So the signal changes by the difference of both,
+/* An extinction replaces that of the air. The data sheet's reaches hold for air with a visibility of 23 km. Its
+ * extinction at 1550 nm is, by Kruse, 3.912 / 23 km (550 / 1550)^1.3. So the signal changes by the difference of both,
  * on the way there and back. The exponentials are rounded to some 1e-16 each. */
 static void extinction_replaces_that_of_the_days_air(void **state)
 {
@@ -51,8 +51,8 @@ static void extinction_replaces_that_of_the_days_air(void **state)
     assert_true(fabs(amplitude(", extinction_1_km: 0.5") / as_quoted / ratio - 1.0) < 1e-13);
 }
 
-/* An encoder reads too much by eccentricity sin(angle - phase): nothing at its own phase, all of it a quarter of a turn
- * on. A rounding of a turn is 1e-16. */
+/* An encoder's error is eccentricity sin(angle - phase): zero at its own phase, and all of it a quarter of a turn on. A
+ * rounding of a turn is 1e-16. */
 static void each_encoder_has_a_phase_of_its_own(void **state)
 {
     (void)state;
@@ -69,7 +69,7 @@ static void each_encoder_has_a_phase_of_its_own(void **state)
     site_free(site);
 }
 
-/* n surfaces, the first of a mirror. */
+/* Writes n surfaces, the first of which is a mirror. */
 static void write_surfaces(uint32_t n)
 {
     char *text = malloc(100 * (size_t)n + 100), *p = text;
@@ -81,7 +81,7 @@ static void write_surfaces(uint32_t n)
     free(text);
 }
 
-/* Labels are 16 bits, and 65535 is none: 65534 are left, a half of them for ghosts. */
+/* Labels are 16 bits, and 65535 means none. 65534 are left, and half of them are for ghosts. */
 static void ghosts_need_labels(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What is allowed and hardly meant is said once, with figures; what is usual is not. Run from the top of the
- * source tree. */
+/* Settings that are allowed and hardly meant give one warning, with figures; usual ones give none. Run from the top of
+ * the source tree. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/site_rig.h"
 
@@ -18,7 +18,7 @@ static void write_box(double z0, double z1)
     write_in("mesh.obj", text);
 }
 
-/* Without what takes long and has nothing to do with this: the search for a beam, and IFC's other readers. */
+/* Two slow parts are left out, which do not matter here: the search for a beam, and IFC's other readers. */
 static void load_file(const char *path)
 {
     static const char *const sets[] = {"beam.mode=single", "scene.ifc_reader=assimp"};
@@ -80,7 +80,7 @@ static void under_the_floor(void **state)
     says("no surface below it, and one 2 m above it: is it under the floor?");
 }
 
-/* In a slab of 20 cm: whatever is not along it is nearer than the 1.5 m that this head sees. */
+/* The head is in a slab of 20 cm. Everything but along it is nearer than the 1.5 m that this head sees. */
 static void within_a_slab(void **state)
 {
     (void)state;
@@ -89,7 +89,7 @@ static void within_a_slab(void **state)
     says("meet something nearer than range_min_m, 1.5 m: does it stand within something?");
 }
 
-/* 300 m beside a slab of 20 cm: seen under 0.04 degrees. */
+/* The head is 300 m beside a slab of 20 cm, which it sees under 0.04 degrees. */
 static void a_scan_that_is_mostly_empty(void **state)
 {
     (void)state;
@@ -133,7 +133,7 @@ static void attributes_that_nothing_fills(void **state)
 }
 
 #ifndef SH_SANITIZE /* the house is large, and loading it has a test of its own */
-/* config/README.md: they are ready to run. */
+/* config/README.md calls them ready to run. */
 static void configurations_of_this_tree_are_silent(void **state)
 {
     (void)state;

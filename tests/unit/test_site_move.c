@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bodies that move: a wall that goes away, a door that turns. Ranges by hand at any time. */
+/* Bodies that move: a wall that goes away, and a door that turns. Ranges are worked out by hand at any time. */
 #include "tests/unit/cast_rig.h"
 
 #include <unistd.h>
@@ -38,7 +38,7 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-/* A back wall at y = 50, and before it a body with these keys. */
+/* A back wall is at y = 50, and before it a body with these keys. */
 static struct site *load(const char *body_obj, const char *motion, struct config *cfg)
 {
     char text[1024], path[128];
@@ -66,7 +66,7 @@ struct look {
     uint32_t movers;
 };
 
-/* The line's plane is level when the head is laid on its side: socs z (90 degrees of the mirror) is east. */
+/* The line's plane is level when the head lies on its side: socs z (90 degrees of the mirror) is east. */
 static void look(const struct site *site, double t_s, struct look *out)
 {
     struct cast_setup setup;
@@ -104,7 +104,7 @@ static void look(const struct site *site, double t_s, struct look *out)
     caster_free(caster);
 }
 
-/* A count is a micrometre: half of one is rounding, 1e-9 m arithmetic. */
+/* A count is a micrometre: half of one is rounding, and 1e-9 m is arithmetic. */
 static void assert_range(const struct look *l, int i, long double want_m, int label)
 {
     assert_int_equal(l->label[i], label);
@@ -129,7 +129,8 @@ static void test_wall_that_goes_away(void **state)
             assert_range(l, i, nearest_m / cosl(l->azimuth[i]), wall_m < 50.0);
     }
     site_free(site);
-    /* Back and forth within 4 s: at 3 s as at 1 s, at 10.5 s as at 2.5 s, which is 1.5 s on the way back. */
+    /* It goes back and forth within 4 s. At 3 s it is where it is at 1 s. At 10.5 s it is where it is at 2.5 s, 1.5 s
+     * on the way back. */
     site = load(WALL, ", move_m_s: [0, 1, 0], cycle_s: 4", cfg);
     static const double cycle[][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 1}, {4, 0}, {10.5, 1.5}};
     for (int n = 0; n < 6; n++) {
@@ -142,9 +143,9 @@ static void test_wall_that_goes_away(void **state)
     free(cfg);
 }
 
-/* A door of 2 m on a hinge at (0, 6), at rest along x; clockwise from above it swings towards the head: after an angle
- * a it points to (cos a, -sin a). A ray to azimuth b meets it at r with r (sin b, cos b) = (0, 6) + s (cos a, -sin a).
- */
+/* A door of 2 m is on a hinge at (0, 6), at rest along x. Clockwise from above it swings towards the head: after an
+ * angle a it points to (cos a, -sin a). A ray to azimuth b meets it at r with r (sin b, cos b) = (0, 6) + s (cos a,
+ * -sin a). */
 static void test_door(void **state)
 {
     (void)state;
@@ -173,7 +174,8 @@ static void test_door(void **state)
     free(cfg);
 }
 
-/* With all motions zero the body belongs to what stands still: no mover, and the numbers of one scene. */
+/* With all motions zero the body belongs to the fixed scene: there is no mover, and the numbers are those of one
+ * scene. */
 static void test_nothing_moves(void **state)
 {
     (void)state;

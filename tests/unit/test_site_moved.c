@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A station that a client moves: where it then stands, which way the head looks, and where that is on the Earth. */
+/* A station that a client moves: its new place, the head's direction, and its place on the Earth. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -10,7 +10,7 @@
 
 static const char ROOM[] = "o floor\nv -50 -50 0.25\nv 50 -50 0.25\nv 50 50 0.25\nv -50 50 0.25\nf 1 2 3 4\n";
 
-/* A station over a floor at z = 0.25 m, with these keys. */
+/* Makes a station over a floor at z = 0.25 m, with these keys. */
 static struct site *load(const char *station)
 {
     char text[512];
@@ -42,8 +42,8 @@ static void expect_attitude(const struct site *site, double heading_deg, double 
         assert_true(fabs(site->station[0].at.rotation[i] - want[i]) < 1e-15);
 }
 
-/* It stands where it is told to, no longer at a height above the floor; turned alone it is turned; back at its first
- * place it has its floor again. */
+/* It stands at the given place, no longer at a height above the floor. A turn alone turns it. Back at its first place
+ * it has its floor again. */
 static void a_place_is_taken_as_it_is(void **state)
 {
     (void)state;
@@ -76,8 +76,8 @@ static void a_place_is_taken_as_it_is(void **state)
     site_free(first);
 }
 
-/* Without an anchor the first place says where the scene lies: 100 m to the east, and up, are that on the Earth, too. At
- * 60 degrees of latitude a degree of longitude is 55.8 km, within half a percent of half of 111.3 km. */
+/* Without an anchor the first place fixes the scene on the Earth: 100 m to the east, and up, are that on the Earth,
+ * too. At 60 degrees of latitude a degree of longitude is 55.8 km, within half a percent of half of 111.3 km. */
 static void on_the_earth_it_moves_along(void **state)
 {
     (void)state;
@@ -89,7 +89,8 @@ static void on_the_earth_it_moves_along(void **state)
     struct site *moved = move(first, first, &to);
     const struct georef_place *at = &moved->station[0].at.place;
     assert_true(fabs((at->lon_deg - 11.0) * 55650.0 / 100.0 - 1.0) < 5e-3);
-    /* the parallel bends away from the tangent, 100^2 / 2 / 6378 km times tan 60: 1.4 mm; the height by half of that */
+    /* The parallel bends away from the tangent, 100^2 / 2 / 6378 km times tan 60: 1.4 mm; the height by half of
+     * that. */
     assert_true(fabs(at->lat_deg - 60.0) < 3e-8 && fabs(at->height_m - 203.0) < 1e-3);
     assert_memory_equal(moved->station[0].at.position_m, to.position_m, sizeof to.position_m);
     site_free(moved);

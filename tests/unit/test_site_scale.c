@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a count of the stream is, by the head's longest range. Run from the top of the source tree. */
+/* The size of a count of the stream, by the head's longest range. Run from the top of the source tree. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -34,7 +34,7 @@ static FILE *open_in(const char *name, const char *mode)
     return f;
 }
 
-/* The profile of full-sweep with another range. */
+/* Writes the profile of full-sweep with another range. */
 static void write_profile(double range_max_m)
 {
     char line[512];
@@ -49,7 +49,7 @@ static void write_profile(double range_max_m)
     assert_int_equal(fclose(to), 0);
 }
 
-/* Metres per count; 0: refused. */
+/* Returns metres per count; 0: refused. */
 static double scale_of(double range_max_m, const char *output, const char *noise, double range_scale_ppm)
 {
     char path[128];
@@ -89,7 +89,7 @@ static void test_counts(void **state)
         {4294.95, "layout: polar", "range: on", 1e-5, "ranges up to 429"}, /* ten sigma more do not fit */
         {4300, "layout: polar", "range: off", 1e-5, "4300 m have to fit into 32 bits, at 1e-06 m those up to 4295 m"},
         {1000, "layout: polar", "ball: {radius_m: 100, distance_1_m: 0.05}", 1e-5, "ranges up to 6100 m"},
-        /* what the instrument reads counts: 1.5 m more or less, or 0.1 % of it, each alone */
+        /* Errors of the instrument's readings count: 1.5 m more or less, or 0.1 % of it, each alone. */
         {4294, "layout: polar", "range: off}\ninstrument: {range_offset_m: 1.5", 1e-5, "ranges up to 4295.5 m"},
         {4294, "layout: polar", "range: off}\ninstrument: {range_offset_m: -1.5", 1e-5, "ranges up to 4295.5 m"},
         {4294, "layout: polar", "range: off}\ninstrument: {range_scale_ppm: 1000", 1e-5, "ranges up to 4298.29 m"},
@@ -114,7 +114,7 @@ static void test_counts(void **state)
     assert_non_null(strstr(err.text, "from 1.02e-06 m on"));
 }
 
-/* An instrument that reads ranges 100 ppm longer: 0.2 m of 2147.4 m, 0.4 m of 4294.9 m. Nothing else is set. */
+/* The instrument reads ranges 100 ppm longer: 0.2 m of 2147.4 m, 0.4 m of 4294.9 m. Nothing else is set. */
 static void test_range_scale(void **state)
 {
     (void)state;

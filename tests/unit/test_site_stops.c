@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Stops of a head along a trajectory: how many, when, where, and how it is turned there by its mount. */
+/* Stops of a head along a trajectory: their number, times and places, and the turn of the head by its mount. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 #include "core/pose.h"
 #include "firmware_sim/config/load.h"
 
-/* 2 m/s along x in 1.2 s from 5 s on, looking north. */
+/* The way is 2 m/s along x in 1.2 s from 5 s on, looking north. */
 static const char PATH[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n5,0,0,2,0,0,0\n6.2,2.4,0,2,0,0,0\n";
 
 static struct site *load(const char *platform)
@@ -27,8 +27,8 @@ static struct site *load(const char *platform)
     return site;
 }
 
-/* 0.1 s divides 1.2 s, 0.3 s and 0.9 s, but not to the last bit: the stop at the end is one. It lies at the end of the part
- * that is asked for, not beyond it. */
+/* 0.1 s divides 1.2 s, 0.3 s and 0.9 s, but not to the last bit. The stop at the end counts. It lies at the end of the
+ * requested part, not beyond it. */
 static void the_last_stop_is_at_the_end(void **state)
 {
     (void)state;

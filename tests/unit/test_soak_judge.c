@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The judge of a soak: what was done to a frame beside what its client saw. A client that is wrong must show. */
+/* The judge of a soak compares the faults of each frame with the client's view. A client that is wrong must show. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -45,7 +45,7 @@ static struct soak *make(void)
     link->fact = calloc(SOAK_RING, sizeof *link->fact);
     assert_true(soak->clean.ring != NULL && link->fact != NULL);
     soak_saw_open(link);
-    /* What the verdict needs beside the links. */
+    /* The verdict needs these beside the links. */
     strcpy(soak->clean.idn, "a,b,c,d");
     strcpy(soak->clean.state, "scanning");
     soak->stats.have_hash = 1;
@@ -59,7 +59,7 @@ static void end(struct soak *soak)
     free(soak);
 }
 
-/* A frame of the stream. damage: of its payload, with a checksum that is right. */
+/* Makes a frame of the stream. damage: changes its payload, with a right checksum. */
 static struct scanhead_frame frame_of(uint32_t seq, uint8_t damage, uint8_t raw[NATIVE_HEADER_LEN + PAYLOAD])
 {
     memset(raw, 0, NATIVE_HEADER_LEN + PAYLOAD);
@@ -96,7 +96,7 @@ static void notice(struct soak *soak, enum scanhead_notice_kind kind, uint32_t s
     soak_saw_notice(&soak->link[0], &it);
 }
 
-/* All frames but one, which is `hit`. */
+/* The client sees all frames but one, which is `hit`. */
 static void see_others(struct soak *soak, uint32_t from, uint32_t to)
 {
     for (uint32_t seq = from; seq < to; seq++)
@@ -126,7 +126,7 @@ static struct soak_row *inject(struct soak *soak, enum fault_kind kind, uint64_t
     return &soak->link[0].row[text[0] != '\0' ? SOAK_RESEALED : (int)kind];
 }
 
-/* Sees the rest, and gives how many reasons for a bad verdict there are. */
+/* Sees the rest. Returns how many reasons for a bad verdict there are. */
 static uint32_t finish(struct soak *soak)
 {
     see_others(soak, HIT + 1, FIRST + N_FRAMES);
@@ -267,7 +267,7 @@ static void test_bytes(void **state)
     }
 }
 
-/* Of a frame that was cut to 30 bytes, 30 are bad ones, and no more. */
+/* A frame that was cut to 30 bytes gives exactly 30 bad ones. */
 static void test_cut_bytes(void **state)
 {
     (void)state;
@@ -302,7 +302,7 @@ static void test_connections(void **state)
     assert_int_equal(row->missed, 1);
     end(soak);
 
-    soak = make(); /* nobody asked for that */
+    soak = make(); /* this fault was not asked for */
     send_clean(soak);
     see_others(soak, FIRST, HIT);
     soak_saw_end(&soak->link[0]);
@@ -311,7 +311,7 @@ static void test_connections(void **state)
     end(soak);
 }
 
-/* A boot that nobody saw is a miss in real time alone: else it may be over before a client is there. */
+/* A boot that no client saw is a miss in real time only: else it may be over before a client is there. */
 static void test_boots(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A sphere by its angle: rings within limits of elevation, a sector of azimuths, a circle. Each pulse's line, angles and
- * whether it is cast, by counting steps in whole numbers. Nothing of core/schedule is used for what is expected. */
+/* A sphere by its angle: rings within limits of elevation, a sector of azimuths, a circle. Each pulse's line, angles
+ * and whether it is cast follow from counting steps in whole numbers. Expected values use nothing of core/schedule. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -20,7 +20,7 @@ struct window {
     uint32_t steps, gaps;                                       /* 360 / step and 180 / step, rounded by hand */
 };
 
-/* a / b, and the rest, against c / d: whether a / b >= c / d - 1 micro-degree, in whole numbers. */
+/* Compares a / b with c / d: whether a / b >= c / d - 1 micro-degree, in whole numbers. */
 static int at_least(int64_t numerator, int64_t denominator, int64_t udeg)
 {
     return numerator >= (udeg - 1) * denominator;
@@ -49,7 +49,8 @@ static double deviation(double turn, double want)
     return fabs(remainder(turn - want, 1.0));
 }
 
-/* One ring: the steps within the window in the order of azimuths, from the window's begin on; the rest is blind. */
+/* Checks one ring: the steps within the window come in the order of azimuths, from the window's begin on; the rest is
+ * blind. */
 static void check_ring(const struct window *w, const struct schedule_segment *seg, uint64_t n, double elevation_turn,
                        int pole)
 {
@@ -170,7 +171,7 @@ static void limits_between_rings_are_refused(void **state)
     free(e);
 }
 
-/* A window that is changed within a ring keeps the pulse's place in it. */
+/* A window that changes within a ring keeps the pulse's place in it. */
 static void a_change_across_zero(void **state)
 {
     (void)state;
@@ -193,7 +194,7 @@ static void a_change_across_zero(void **state)
     free(e);
 }
 
-/* A change in the middle of a frame leaves the frame its rings: ring n is still ring n mod their number. */
+/* A change in the middle of a frame does not change the frame's rings: ring n is still ring n mod their number. */
 static void a_change_keeps_the_frame(void **state)
 {
     (void)state;
@@ -217,7 +218,7 @@ static void a_change_keeps_the_frame(void **state)
     free(e);
 }
 
-/* A planar head whose rotor turns either way: the steps of a run lie where those of its pulses do, one by one. */
+/* A planar head's rotor turns either way. The steps of a run are those of its pulses, one by one. */
 static void steps_of_a_planar_run(void **state)
 {
     (void)state;

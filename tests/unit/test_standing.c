@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How a head stands: attitude by vectors known by hand, and the floor below it. */
+/* A head's attitude, by vectors known by hand, and the floor below it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -30,7 +30,8 @@ static void turned(double heading_deg, double pitch_deg, double roll_deg, const 
     mat3_apply(r, p_socs, p);
 }
 
-/* Right, forward, up of the head after each turn alone, and all three by 90 degrees in their order. */
+/* Right, forward and up of the head are checked after each turn alone, and after all three by 90 degrees in their
+ * order. */
 static void attitudes_by_hand(void **state)
 {
     (void)state;
@@ -49,8 +50,8 @@ static void attitudes_by_hand(void **state)
     assert_vector(p, h, 0, -h);
     turned(0, 0, 45, up, p);
     assert_vector(p, h, 0, h);
-    /* Facing east, nose to the zenith, then rolled about that vertical: the right side, south before, sinks "down" as
-     * the head sees it, which is east. */
+    /* The head faces east, its nose to the zenith, then rolled about that vertical. The right side, south before, sinks
+     * in the head's sense of down, which is east. */
     turned(90, 90, 90, forward, p);
     assert_vector(p, 0, 0, 1);
     turned(90, 90, 90, right, p);
@@ -59,7 +60,7 @@ static void attitudes_by_hand(void **state)
     assert_vector(p, 0, -1, 0);
 }
 
-/* The product of the three turns, as the header has it. */
+/* The attitude is the product of the three turns, as the header defines it. */
 static void attitude_is_the_product(void **state)
 {
     (void)state;
@@ -77,7 +78,8 @@ static void attitude_is_the_product(void **state)
     assert_memory_equal(got, about_z, sizeof got);
 }
 
-/* A floor at z = 0 of 10 x 10 m with a hole at 4..6, a cellar at -3, a table at 0.75 over 1..2, a wall at x = 8. */
+/* The scene has a floor at z = 0 of 10 x 10 m with a hole at 4..6, and a cellar at -3. A table stands at 0.75 over
+ * 1..2, and a wall at x = 8. */
 static const double at_z[][5] = {
     /* x0 x1 y0 y1 z */
     {0, 4, 0, 10, 0}, {6, 10, 0, 10, 0}, {4, 6, 0, 4, 0}, {4, 6, 6, 10, 0}, {0, 10, 0, 10, -3}, {1, 2, 1, 2, 0.75},
@@ -168,7 +170,7 @@ static void down_is_any_direction(void **state)
     scene_free(scene);
 }
 
-/* Two floors 0.1 um apart, told apart from 40 m: whichever float would take, the upper one counts. */
+/* Two floors are 0.1 um apart, and seen from 40 m. Whichever float would take, the upper one counts. */
 static void floors_are_ordered_exactly(void **state)
 {
     (void)state;

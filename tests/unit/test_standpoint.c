@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Places to stand: in rooms, on land, before objects. */
+/* Viewpoints: in rooms, on land, before objects. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -98,7 +98,7 @@ static void a_room_is_entered(void **state)
     assert_near(at.pan_rad, 2 * M_PI, 1e-12);
 }
 
-/* 2 m high: three fifths of that, 40 cm below the ceiling and more. */
+/* The room is 2 m high. The head stands at three fifths of that, at least 40 cm below the ceiling. */
 static void under_a_low_ceiling_the_head_stands_lower(void **state)
 {
     (void)state;
@@ -120,7 +120,7 @@ static void of_two_storeys_the_lower_one(void **state)
     assert_near(at.position_m[2], 1.6, 1e-6);
 }
 
-/* All eight corners lie within what is scanned, and nothing is nearer than the head sees. */
+/* All eight corners are within the scanned view, and nothing is nearer than the head can see. */
 static void assert_all_in_view(const double lo[3], const double hi[3])
 {
     for (int i = 0; i < 8; i++) {
@@ -135,7 +135,7 @@ static void assert_all_in_view(const double lo[3], const double hi[3])
     }
 }
 
-/* From 1 cm to 200 m: the same picture, as far as the head's shortest range allows. */
+/* From 1 cm to 200 m the picture is the same, as far as the head's shortest range allows. */
 static void an_object_is_looked_at_from_the_front(void **state)
 {
     (void)state;
@@ -154,7 +154,7 @@ static void an_object_is_looked_at_from_the_front(void **state)
     assert_true(at.faces_out); /* 200 m wide and high: room for a head, but it would see backs */
 }
 
-/* A plate across x shows nothing to who stands before it in y. */
+/* A plate across x is not visible from a place before it in y. */
 static void a_plate_is_looked_at_from_its_side(void **state)
 {
     (void)state;
@@ -170,7 +170,7 @@ static void a_plate_is_looked_at_from_its_side(void **state)
     assert_true(at.seen > 0.5);
 }
 
-/* 2 km of hills: a two-hundredth of that above the ground, 10 m. */
+/* The land has 2 km of hills. The head is a two-hundredth of that above the ground, 10 m. */
 static void land_is_stood_on(void **state)
 {
     (void)state;
@@ -182,7 +182,7 @@ static void land_is_stood_on(void **state)
     assert_true(at.position_m[0] > 100 && at.position_m[0] < 1900);
 }
 
-/* On the ground between the houses, not on a roof and not within a house, whose walls face outward. */
+/* The head is on the ground between the houses, not on a roof and not within a house, whose walls face outward. */
 static void between_houses(void **state)
 {
     (void)state;

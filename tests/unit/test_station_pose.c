@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The head's pose in a recording's frame, against GeographicLib; the CRS texts; the place of a shot in its line. */
+/* The head's pose in a recording's frame, compared with GeographicLib; the CRS texts; the place of a shot in its
+ * line. */
 #include "drivers/record/station_pose.h"
 
 #include "core/georef.h"
@@ -25,8 +26,8 @@ static struct scanhead_info info_of(const struct georef_spec *spec, const struct
     return info;
 }
 
-/* A step of a metre along each axis of the head goes where the pose says, but for the grid's scale: compared are
- * directions. Beyond the pose's own 1e-6 rad, the grid bends by less than 1e-6 rad over a metre, even at the pole. */
+/* A step of a metre along each axis of the head goes where the pose says, but for the grid's scale, so directions are
+ * compared. Beyond the pose's own 1e-6 rad, the grid bends by less than 1e-6 rad over a metre, even at the pole. */
 static void check_directions(const struct georef_spec *spec, double tolerance)
 {
     struct georef *georef;
@@ -69,7 +70,7 @@ static void test_directions(void **state)
     }
 }
 
-/* Random rotations, and the half turns where one term alone is left: the quaternion turns as the matrix does. */
+/* Random rotations, and the half turns where only one term is left: the quaternion turns as the matrix does. */
 static void test_quaternion(void **state)
 {
     (void)state;
@@ -107,7 +108,7 @@ static void test_there_and_back(void **state)
     assert_true(fabs(p[0]) < 1e-9 && fabs(p[1] - 10) < 1e-9 && fabs(p[2] - 3) < 1e-9); /* steps of a double at 5e6 */
 }
 
-/* Every CRS a stream can be in has a text that fits, with balanced brackets, and no other code has one. */
+/* Every CRS of a stream has a text that fits, with balanced brackets, and no other code has one. */
 static void test_wkt(void **state)
 {
     (void)state;
@@ -152,7 +153,7 @@ static void put_line_end(uint32_t line, uint64_t pulse0, uint32_t n_fired)
     rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
 }
 
-/* The line's end is believed before the times; where it is missing, times at the descriptor's 1 kHz are. */
+/* The line's end counts before the times. If it is missing, times at the descriptor's 1 kHz count. */
 static void test_rows(void **state)
 {
     (void)state;

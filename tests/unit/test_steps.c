@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Schedules of heads that fire in steps, rings and lists: counted by hand. */
+/* Schedules of heads that fire in steps, rings and lists, counted by hand. */
 #include "tests/common/cases.h"
 
 #include <math.h>
@@ -57,7 +57,7 @@ static void a_turn_has_its_steps(void **state)
     }
 }
 
-/* The window may be narrowed to steps; line angles count from the front on, along the steps. */
+/* The window may be narrowed to steps. Line angles count from the front on, along the steps. */
 static void a_window_is_whole_steps(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void take_lines(const struct schedule_segment *seg, uint64_t *next, uint6
     }
 }
 
-/* Another rate in the middle of a turn: the steps go on. */
+/* The rate changes in the middle of a turn, and the steps go on. */
 static void a_planar_head_keeps_its_steps(void **state)
 {
     (void)state;
@@ -119,7 +119,7 @@ static void a_planar_head_keeps_its_steps(void **state)
 
 /* ---- spheres and lists */
 
-/* A line is a turn of 360 degrees; pulses: of a line. */
+/* A line is a turn of 360 degrees. pulses: those of a line. */
 static struct schedule_spec turning(const struct emitter *e, int64_t lines_uhz, uint32_t pulses)
 {
     return (struct schedule_spec){.prr_uhz = lines_uhz * pulses,

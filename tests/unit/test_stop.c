@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Long work asks whether to stop, and ends; and what Embree's errors mean. */
+/* Long work asks whether to stop, and ends. And the meaning of Embree's errors. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -52,7 +52,7 @@ static int free_terrain(void **state)
     return 0;
 }
 
-/* Stops at a call; from any thread. */
+/* Stops at one call, from any thread. */
 struct asked {
     unsigned calls, stop_at; /* 0: never */
 };
@@ -111,7 +111,7 @@ static int follow_way(const struct sh_report *report, struct sh_err *err)
     return rc;
 }
 
-/* One polygon of very many corners, zigzag: its ears are looked for all over it. */
+/* One polygon has very many corners in a zigzag, and its ears are looked for all over it. */
 static int cut_polygon(const struct sh_report *report, struct sh_err *err)
 {
     enum { CORNERS = 4096 };
@@ -129,7 +129,8 @@ static int cut_polygon(const struct sh_report *report, struct sh_err *err)
     return rc;
 }
 
-/* How often each asks when nobody stops it is counted first; then it is stopped at its first call and at one halfway. */
+/* The test first counts how often each asks when it is not stopped. Then it is stopped at its first call, and at one
+ * halfway. */
 static void work_is_ended(void **state)
 {
     (void)state;
@@ -163,7 +164,7 @@ static void errors_of_embree(void **state)
     assert_non_null(strstr(err.text, "RTCError 3"));
 }
 
-/* Enough for the planes and for Embree's buffers (80 bytes a triangle), not for its BVH. */
+/* The memory is enough for the planes and for Embree's buffers (80 bytes a triangle), but not for its BVH. */
 static void no_memory_is_said(void **state)
 {
     (void)state;

@@ -28,7 +28,8 @@ static int close_stream(void **state)
     return 0;
 }
 
-/* A tick of n_events events, then, unless before < 0, a line end with so many echoes before it, then so many after. */
+/* Makes a tick of n_events events, then, unless before < 0, a line end with so many echoes before it, then so many
+ * after. */
 static struct ring_slot *make_tick(uint64_t tick, int n_events, int before, uint32_t tail)
 {
     static const struct native_event event = {.code = NATIVE_EV_PPS, .text = "text"};
@@ -56,7 +57,7 @@ static void release(struct ring_slot *slot, uint64_t tick)
     stream_release(&stream, slot, tick, 5);
 }
 
-/* Echoes that the only line end of a tick says; its frames carry the numbers from first_seq on. */
+/* Returns the echoes of the only line end of a tick. Its frames have the numbers from first_seq on. */
 static uint32_t read_echoes(uint64_t tick, uint32_t first_seq, uint32_t n_frames)
 {
     uint8_t bytes[512];
@@ -90,7 +91,7 @@ static void a_line_has_the_echoes_of_all_its_ticks(void **state)
     assert_int_equal(counters.lines, 2);
 }
 
-/* Whether the pacing thread gave it up or there was no memory for it. */
+/* The pacing thread gave it up, or there was no memory for it. */
 static void a_line_that_lacks_a_tick_has_no_count(void **state)
 {
     (void)state;
@@ -113,8 +114,8 @@ static void a_line_that_lacks_a_tick_has_no_count(void **state)
     }
 }
 
-/* A tick of a scan with n_cast pulses, then telemetry and the scan's end where `cast` is not 0: so many pulses were to
- * be cast up to it. */
+/* Makes a tick of a scan with n_cast pulses, then telemetry and the scan's end where `cast` is not 0: so many pulses
+ * were to be cast up to it. */
 static struct ring_slot *make_pulses(uint64_t tick, uint32_t scan, uint64_t n_cast, uint64_t cast)
 {
     uint8_t bytes[512];
@@ -145,7 +146,7 @@ static void read_end(uint64_t tick, struct native_telemetry *t, struct native_ev
     assert_int_equal(native_decode_event(parser.payload, parser.header.length, end), SH_OK);
 }
 
-/* A scan of 10 + 20 + 30 + 40 pulses, of which a tick before the last one is lost after the last one was made. */
+/* A scan has 10 + 20 + 30 + 40 pulses. A tick before the last one is lost after the last one was made. */
 static void a_scan_end_counts_what_was_lost_after_it_was_made(void **state)
 {
     (void)state;
@@ -165,7 +166,7 @@ static void a_scan_end_counts_what_was_lost_after_it_was_made(void **state)
     assert_true(copy.pulses_before == 1030 && copy.n_cast == 40);
 }
 
-/* Its tick was lost, too: it is said in a tick of the next scan, whose pulses are not taken for its own. */
+/* Its tick was lost, too. The end comes in a tick of the next scan, whose pulses do not count for it. */
 static void a_scan_end_that_comes_late_counts_its_own_scan(void **state)
 {
     (void)state;

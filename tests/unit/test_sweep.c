@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* core/cast/kernels_sweep.c: directions of runs whose axes turn evenly, against long double, against angles taken one
- * by one, and cut in all ways. And the runs' times. */
+/* core/cast/kernels_sweep.c: directions of runs whose axes turn evenly, compared with long double, with angles taken
+ * one by one, and cut in all ways. And the runs' times. */
 #include "tests/common/cases.h"
 
 #include <float.h>
@@ -31,7 +31,8 @@ static double below(uint64_t *seed, double most)
     return most * case_unit(seed);
 }
 
-/* A line head's run within a few turns; steps up to most_deg, the pan's mostly far smaller, as pans are. */
+/* A line head's run within a few turns. Steps are up to most_deg, and the pan's are mostly far smaller, as real
+ * ones. */
 static struct schedule_run a_run(uint64_t *seed, double most_deg)
 {
     const double pan_deg = case_between(seed, 0, 3) == 0 ? most_deg : most_deg * 1e-3;
@@ -65,8 +66,8 @@ static double distance(const long double d[3], double x, double y, double z)
     return (double)sqrtl((d[0] - x) * (d[0] - x) + (d[1] - y) * (d[1] - y) + (d[2] - z) * (d[2] - z));
 }
 
-/* Each of the two sines and cosines has half its last bit and 4e-17 of the block's middle, then come two products: 4e-16
- * together. Taken one by one, angles are rounded before, to 1e-16 of a turn. */
+/* Each of the two sines and cosines has half its last bit and 4e-17 of the block's middle, and two products follow:
+ * 4e-16 together. Taken one by one, angles are rounded before, to 1e-16 of a turn. */
 static void they_are_closer_to_the_schedule_than_one_by_one(void **state)
 {
     (void)state;
@@ -96,8 +97,8 @@ static void they_are_closer_to_the_schedule_than_one_by_one(void **state)
     assert_true(worst < 4e-16 && worst < worst_one && longest < 4e-16);
 }
 
-/* The directions of whole counts, where half a count's third power over 6 is far below the last bit: the error is
- * that of an angle that was rounded, as the counts are those of rounded angles. */
+/* Directions of whole counts, where half a count's third power over 6 is far below the last bit. The error is that of a
+ * rounded angle, as the counts are those of rounded angles. */
 static void encoders_read_whole_counts(void **state)
 {
     (void)state;
@@ -174,7 +175,7 @@ static void cuts_change_nothing(void **state)
     }
 }
 
-/* The table is that of the run at hand, whatever came before. */
+/* The table is that of the current run, whatever came before. */
 static void runs_take_turns(void **state)
 {
     (void)state;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What of a scene is scanned: surfaces that are left out of it, and surfaces that give no echo. */
+/* The scanned part of a scene: surfaces that are left out of it, and surfaces that give no echo. */
 #include "firmware_sim/site/site.h"
 #include "tests/unit/cast_rig.h"
 #include "tests/unit/config_rig.h"
 
-/* Two triangles of each of three surfaces, side by side along x; they share vertices 4 and 5. */
+/* Two triangles of each of three surfaces are side by side along x; they share vertices 4 and 5. */
 static struct scene *strip(void)
 {
     static const double v[8][3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0},
@@ -39,7 +39,8 @@ static void what_is_left_has_its_own_numbers(void **state)
     scene_free(scene);
 }
 
-/* A line in a box: pulses that meet a silent wall are shots without echo, and counted; all others are as before. */
+/* A line is scanned in a box. Pulses that meet a silent wall are shots without echo, and counted; all others are
+ * unchanged. */
 static void silent_surfaces_give_no_echo(void **state)
 {
     (void)state;

@@ -57,7 +57,8 @@ static double light_of(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-/* A square board upright across the y axis, twice the image a side; as one polygon, so that it is cut up here. */
+/* A square board is upright across the y axis, twice the image a side. It is one polygon, so that the loader cuts
+ * it. */
 static const char BOARD[] = "mtllib board.mtl\no board\n"
                             "v -2 10 -2\nv 2 10 -2\nv 2 10 2\nv -2 10 2\n"
                             "vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\n"
@@ -97,7 +98,7 @@ struct seen {
     uint32_t n, light, dark;
 };
 
-/* Half of 0.01 dB, and of a texel's 65534th of a reflectance of 0.02 or more. */
+/* The bound is half of 0.01 dB, and of a texel's 65534th of a reflectance of 0.02 or more. */
 static const double TOLD_DB = 0.005 + 4.343 * 0.5 / 65534.0 / 0.02;
 
 /* Casts over the board and compares the reflectance of each pulse with its square's. Pulses within `near` squares of
@@ -189,14 +190,14 @@ static void fill_table(struct surface_table *table, const struct scene *scene, c
         fail_msg("%s", err.text);
 }
 
-/* Luminance of the material's colour times the texel's, of Kd 1 0.8 0.5. */
+/* Returns the luminance of the material's colour times the texel's, for Kd 1 0.8 0.5. */
 static double reflectance(int srgb)
 {
     double texel = light_of(srgb / 255.0);
     return texel * (0.2126 + 0.7152 * light_of(0.8) + 0.0722 * light_of(0.5));
 }
 
-/* A texel's share of 65534 steps: none, all, half. A label without one has its surface's. */
+/* A texel's share of 65534 steps may be none, all, or half. A label without one has its surface's. */
 static void texels_in_labels(void **state)
 {
     (void)state;
@@ -224,7 +225,7 @@ static void squares_are_where_the_image_has_them(void **state)
     scene_free(scene);
 }
 
-/* Moved to the right, and a wall far behind it stands still. */
+/* The board moves to the right, and a wall far behind it stands still. */
 static void squares_move_with_the_mesh(void **state)
 {
     (void)state;
@@ -253,7 +254,8 @@ static void squares_move_with_the_mesh(void **state)
     scene_free(still);
 }
 
-/* With a footprint of 8 mm: where it lies within a square; adaptively, one ray tells the square in its centre. */
+/* A footprint of 8 mm is compared where it lies within a square. With the adaptive beam one ray decides by the square
+ * in its centre. */
 static void squares_under_a_footprint(void **state)
 {
     (void)state;
@@ -275,7 +277,7 @@ static void squares_under_a_footprint(void **state)
     scene_free(scene);
 }
 
-/* glTF counts v from the top, and Assimp turns that round. */
+/* glTF counts v from the top, and Assimp reverses that. */
 static void squares_of_gltf(void **state)
 {
     (void)state;

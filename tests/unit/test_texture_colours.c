@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours of points by texture: a chart with a colour of its own in each texel, on a board whose coordinates are known.
- * Each point has exactly the texel that lies there by hand: for each image format, each way to wrap, images beside the
- * mesh and within it, seen plainly, under a footprint, in a mirror and on a mesh that moves. */
+/* Colours of points by texture: a chart with a colour of its own in each texel is on a board whose coordinates are
+ * known. Each point has exactly the texel that lies there, worked out by hand. The test has each image format, each way
+ * to wrap, and images beside the mesh and within it. The board is seen directly, under a footprint, in a mirror and on
+ * a mesh that moves. */
 #include "tests/common/chart.h"
 
 #include <math.h>
@@ -18,7 +19,7 @@ static const double AWAY_M = 10.0;
 /* ---- scans of the board */
 
 struct view {
-    const struct scene *scene; /* what stands still; has the board unless mover is there */
+    const struct scene *scene; /* the scene that stands still; has the board unless mover is there */
     const struct surface_colours *colours;
     enum texture_wrap wrap[2];
     const chart_texels *texels;
@@ -59,7 +60,7 @@ static void check_point(const struct view *view, const double d[3], const uint8_
                  want[0], want[1], want[2]);
 }
 
-/* Lines a quarter of a degree apart, over more than the board. */
+/* Lines are a quarter of a degree apart, over more than the board. */
 static void begin(struct schedule_segment *segment)
 {
     static const struct schedule_spec spec = {.prr_uhz = 48000000000,
@@ -181,7 +182,7 @@ static void each_format_and_each_way_to_wrap(void **state)
     }
 }
 
-/* As the mesh's own file says it: repeat unless -clamp is on. */
+/* The mesh's own file decides: repeat unless -clamp is on. */
 static void an_obj_says_how_to_wrap(void **state)
 {
     (void)state;
@@ -201,7 +202,7 @@ static void an_obj_says_how_to_wrap(void **state)
     }
 }
 
-/* The image lies within the mesh's file; glTF counts v from the top. */
+/* The image is within the mesh's file; glTF counts v from the top. */
 static void load_gltf(const char *image, const char *type, int wrap_s, int wrap_t, struct scene **scene)
 {
     static const float p[4][3] = {{-2, -2, -10}, {2, -2, -10}, {2, 2, -10}, {-2, 2, -10}}; /* y up: 10 m along y */
@@ -296,7 +297,8 @@ static void a_mesh_takes_its_image_along(void **state)
     scene_free(still);
 }
 
-/* A footprint of 8 mm within a texel of 98 x 150 mm; adaptively one ray says the texel in its centre. */
+/* A footprint of 8 mm is within a texel of 98 x 150 mm. With the adaptive beam one ray decides by the texel in its
+ * centre. */
 static void under_a_footprint(void **state)
 {
     (void)state;
@@ -322,8 +324,8 @@ static void under_a_footprint(void **state)
     scene_free(scene);
 }
 
-/* Through a pane that is red itself, and in a mirror: with the board 2 m behind the head and the mirror 4 m before it,
- * its image stands 10 m before it. */
+/* The board is seen through a pane that is red itself, and in a mirror. With the board 2 m behind the head and the
+ * mirror 4 m before it, its image is 10 m before it. */
 static void through_glass_and_in_a_mirror(void **state)
 {
     (void)state;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* When a head released the frames of a recording, from the frames alone. The times that are wanted come from the rules of
- * the schedule, written out here once more: a packet is 16 pulses from the line's first, and leaves with its last. */
+/* The times at which a head released the frames of a recording, from the frames alone. Expected times follow from the
+ * rules of the schedule, written out here once more: a packet is 16 pulses from the line's first, and is sent with its
+ * last. */
 #include "tests/unit/native_rig.h"
 
 #include "firmware_sim/replay/timing.h"
@@ -46,7 +47,7 @@ static struct timing_moment event(uint32_t code, uint64_t a, int64_t t_ns)
     return take();
 }
 
-/* n pulses from pulse0 on, of a line from line_t0 on; the last fires dt after the first. Two points each. */
+/* n pulses from pulse0 on, in a line from line_t0 on. The last fires dt after the first. There are two points each. */
 static struct timing_moment points(uint32_t line, uint64_t pulse0, uint32_t n, int64_t t0_ns, int64_t line_t0_ns,
                                    uint32_t dt_ns)
 {
@@ -97,7 +98,7 @@ static void packets_of_a_line(void **state)
 {
     (void)state;
     begin();
-    /* 1003 pulses, of which 100..699 are cast: frames of whole packets, and both ends within one. */
+    /* 100..699 of 1003 pulses are cast: frames of whole packets, with both ends within one. */
     is(shot(0, 0, 100, 111), TIMING_KNOWN, T0_NS + fired(111));
     is(shot(0, 0, 112, 367), TIMING_KNOWN, T0_NS + fired(367));
     is(shot(0, 0, 368, 699), TIMING_AT_MOST, T0_NS + fired(703));
@@ -105,7 +106,7 @@ static void packets_of_a_line(void **state)
     /* Packets of the next line count from its own first pulse. */
     is(shot(1, 1003, 1003, 1018), TIMING_KNOWN, T0_NS + fired(1018));
     is(shot(1, 1003, 1019, 1023), TIMING_AT_MOST, T0_NS + fired(1003 + 2 * PACKET - 1));
-    /* Where a line begins with what is not cast, its first pulse is still known by the line before. */
+    /* If a line begins with blind pulses, its first pulse is still known from the line before. */
     is(line_end(1, 1003, 1000, fired(2003), 0), TIMING_KNOWN, T0_NS + fired(2002));
     is(shot(2, 2003, 2103, 2104), TIMING_AT_MOST, T0_NS + fired(2003 + 7 * PACKET - 1));
 }
@@ -122,7 +123,7 @@ static void frames_beside_points(void **state)
     is(take(), TIMING_KNOWN, 78);
     assert_true(native_encode_anchor(frame, sizeof frame, &a, 78, NATIVE_LOCAL) > 0);
     assert_int_equal(take().kind, TIMING_FOLLOWS);
-    /* A descriptor for one reader changes nothing: it may be of other rates than the stream by then. */
+    /* A descriptor for one reader changes nothing: by then it may have other rates than the stream. */
     assert_int_equal(descriptor(1000000, NATIVE_LOCAL).kind, TIMING_FOLLOWS);
     is(shot(0, 0, 0, 17), TIMING_AT_MOST, T0_NS + fired(2 * PACKET - 1));
 }
@@ -156,7 +157,7 @@ static void a_stop_within_a_line(void **state)
     (void)state;
     begin();
     is(shot(0, 0, 0, 15), TIMING_KNOWN, T0_NS + fired(15));
-    /* The scan was stopped after 20 pulses: they left with the tick of the stop, before their packet was full. */
+    /* The scan was stopped after 20 pulses. They were sent with the tick of the stop, before their packet was full. */
     is(shot(0, 0, 16, 19), TIMING_AT_MOST, T0_NS + fired(31));
     assert_int_equal(line_end(0, 0, 20, fired(20), LINE_PARTIAL).kind, TIMING_STOPS);
     is(event(NATIVE_EV_SCAN_END, 1, T0_NS + 70000), TIMING_KNOWN, T0_NS + 70000);
@@ -165,7 +166,7 @@ static void a_stop_within_a_line(void **state)
     is(shot(0, 0, 0, 15), TIMING_KNOWN, T0_NS + fired(15));
 }
 
-/* The rates change with pulse 40 of a line: it keeps its time, and packets count from it. */
+/* The rates change with pulse 40 of a line. It keeps its time, and packets count from it. */
 static void rates_change_within_a_line(void **state)
 {
     (void)state;
@@ -182,7 +183,7 @@ static void rates_change_within_a_line(void **state)
     is(points(1, 60, 16, at + 200000, at + 200000, 150000), TIMING_KNOWN, T0_NS + at + 350000);
 }
 
-/* Where the end of the line before is missing, the line's first time says which pulse was its first. */
+/* If the end of the line before is missing, the line's first time gives its first pulse. */
 static void frames_are_missing(void **state)
 {
     (void)state;
@@ -191,13 +192,13 @@ static void frames_are_missing(void **state)
     is(shot(7, 7021, 7133, 7135), TIMING_AT_MOST, T0_NS + fired(7021 + 8 * PACKET - 1));
     is(line_end(7, 7021, 1003, fired(8024), 0), TIMING_KNOWN, T0_NS + fired(8023));
     is(shot(8, 8024, 8024, 8025), TIMING_AT_MOST, T0_NS + fired(8024 + PACKET - 1));
-    /* Before any descriptor: the last pulse of the points, and nothing is known of packets. */
+    /* Before any descriptor only the last pulse of the points counts, as nothing is known of packets. */
     memset(&timing, 0, sizeof timing);
     is(shot(7, 7021, 7133, 7135), TIMING_KNOWN, T0_NS + fired(7135));
     is(line_end(7, 7021, 1003, fired(8024), 0), TIMING_KNOWN, T0_NS + fired(8024));
 }
 
-/* Sequences of 3 beams, 20 us apart, that fire 0, 2 and 7 us after the first. */
+/* Sequences of 3 beams are 20 us apart, and fire 0, 2 and 7 us after the first. */
 static void beams(void **state)
 {
     (void)state;
@@ -211,12 +212,12 @@ static void beams(void **state)
     is(points(0, 0, 32, 0, 0, (uint32_t)BEAM(31)), TIMING_KNOWN, T0_NS + BEAM(31));
     is(points(0, 32, 5, BEAM(32), 0, (uint32_t)(BEAM(36) - BEAM(32))), TIMING_AT_MOST, T0_NS + BEAM(47));
     is(line_end(0, 0, 37, BEAM(37), 0), TIMING_KNOWN, T0_NS + BEAM(36));
-    /* A line's first pulse by its time alone: not where beams fire together. */
+    /* The time alone does not give a line's first pulse where beams fire together. */
     assert_int_equal(points(5, 500, 5, BEAM(500), BEAM(490), 1000).kind, TIMING_KNOWN);
 #undef BEAM
 }
 
-/* A planar head and a sphere say a pulse's time as a ratio, which the descriptor has rounded. */
+/* A planar head and a sphere give a pulse's time as a ratio, which the descriptor has rounded. */
 static void steps(void **state)
 {
     (void)state;
@@ -235,7 +236,7 @@ static void steps(void **state)
     }
 }
 
-/* Whatever numbers stand in frames whose checksums are right: an answer, and (with sanitizers) no overflow. */
+/* Frames with right checksums have any numbers. There is an answer, and (with sanitizers) no overflow. */
 static void hostile_numbers(void **state)
 {
     (void)state;
@@ -307,7 +308,7 @@ static void hostile_numbers(void **state)
     assert_true(timing.n_beams <= NATIVE_MAX_BEAMS);
 }
 
-/* Payloads of any bytes, of each type: more beams than there may be, too. */
+/* Payloads have any bytes, for each type, including more beams than allowed. */
 static void hostile_bytes(void **state)
 {
     (void)state;

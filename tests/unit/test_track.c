@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A moving head in all formats of points: the same points in each, those without a pose in none. */
+/* A moving head in all formats of points. Each has the same points, without those that have no pose. */
 #include "tests/unit/recorder_rig.h"
 
 enum { LINES = 3, SHOTS = 10 };
@@ -19,7 +19,7 @@ static void put_poses(int64_t from_ms, int64_t to_ms)
     rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
 }
 
-/* Where shot i of line l, at t ms, hit: 5 m + i mm straight ahead. Lines of 10 shots, at 0, 150 and 200 ms. */
+/* Shot i of line l, at t ms, hit at 5 m + i mm straight ahead. Lines have 10 shots, at 0, 150 and 200 ms. */
 static const int START_MS[LINES] = {0, 150, 200};
 
 static void hit(int line, int i, double p[3], double *t_s)
@@ -31,7 +31,7 @@ static void hit(int line, int i, double p[3], double *t_s)
     p[2] = 30;
 }
 
-/* Of the poses, those of 100 to 200 ms are lost: the second line has none. The last shot of a line is empty. */
+/* The poses of 100 to 200 ms are lost, so the second line has none. The last shot of a line is empty. */
 static void put_stream(void)
 {
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
@@ -62,7 +62,7 @@ static uint8_t *record(const char *name, struct recorder_options options, size_t
     return file;
 }
 
-/* tolerance_m: half a step of the format, the steps of a sine left out (1e-15). Without frame: NULL. */
+/* tolerance_m is half a step of the format; the steps of a sine (1e-15) are neglected. Without frame: NULL. */
 static void expect(int n, const double p[3], const double *t_s, const double *frame, double tolerance_m)
 {
     double want[3], want_s;
@@ -140,8 +140,8 @@ static double number_of(const char *xml, const char *tag)
     return strtod(strchr(at, '>') + 1, NULL);
 }
 
-/* Count, bounds and pose; pages' checksums do not fall into the first kilobyte of the XML. The points themselves are
- * read by others (tests/wire/test_moving_readers.c). */
+/* Checks count, bounds and pose. Pages' checksums are not in the first kilobyte of the XML. Other readers check the
+ * points (tests/wire/test_moving_readers.c). */
 static void test_e57(void **state)
 {
     (void)state;
@@ -170,7 +170,7 @@ static void test_e57(void **state)
     free(e57);
 }
 
-/* In the geo layout a point needs no pose; its frame scalar does. */
+/* In the geo layout a point needs no pose, but its frame scalar does. */
 static void test_geo(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Recordings of a stream with attributes: points wait for them, and come out with their own or with none. */
+/* Recordings of a stream with attributes. Points wait for them, and are written with their own or with none. */
 #include "tests/unit/recorder_rig.h"
 
 enum { SHOTS = 10 };
@@ -7,7 +7,7 @@ enum { SHOTS = 10 };
 static uint8_t out[1 << 16];
 static uint32_t seq;
 
-/* The frames at `out`, numbered; the one numbered `lost` (from 0 in each call) is only counted. */
+/* Numbers the frames at `out`. The one numbered `lost` (from 0 in each call) is only counted. */
 static void put(size_t len, int lost)
 {
     int n = 0;
@@ -48,7 +48,7 @@ static void put_event(uint32_t code, uint64_t a, uint64_t b, uint64_t c, int fla
         put(len, -1);
 }
 
-/* From there to 100 ms later the head stands still. */
+/* The head stands still from then to 100 ms later. */
 static void put_poses(int64_t from_ms)
 {
     struct native_pose pose[2];
@@ -57,8 +57,8 @@ static void put_poses(int64_t from_ms)
     put(native_encode_poses(out, sizeof out, pose, 2, 0, 0), -1);
 }
 
-/* Shots a millisecond apart; the fourth one is empty. Shot i at pulse0 + i has pulse0 + i as amplitude (0.01 dB) and
- * 400 more as width. local: a frame of this reader's own comes between. */
+/* Shots are a millisecond apart, and the fourth one is empty. Shot i at pulse0 + i has pulse0 + i as amplitude (0.01
+ * dB) and 400 more as width. local: a frame for this reader alone comes between. */
 static void put_points(uint32_t line, uint64_t pulse0, int with, int lost, int local)
 {
     uint32_t a[SHOTS], zero[SHOTS] = {0}, dt[SHOTS];
@@ -116,7 +116,7 @@ static uint8_t *record(const char *name, struct recorder_options options, size_t
     return file;
 }
 
-/* The next vertex of a PLY as text; number -1: its attributes are lost. */
+/* Checks the next vertex of a PLY as text; number -1: its attributes are lost. */
 static char *expect(char *at, int number)
 {
     char amplitude[32], width[32], want[32];
@@ -129,8 +129,8 @@ static char *expect(char *at, int number)
     return at + used;
 }
 
-/* Points of a head that moves whose poses were lost are left out: the others keep their own attributes; with a frame in
- * between that is not of the sequence; and where attributes, or points, were lost. */
+/* The head moves, and points whose poses were lost are left out. The others keep their own attributes, even with a
+ * frame in between that is not of the sequence, and where attributes, or points, were lost. */
 static void test_moving(void **state)
 {
     (void)state;
@@ -164,7 +164,7 @@ static void test_moving(void **state)
     free(text);
 }
 
-/* Binary, with the empty shot: two floats behind each vertex. */
+/* The file is binary, with the empty shot: two floats after each vertex. */
 static void test_binary(void **state)
 {
     (void)state;
@@ -186,7 +186,7 @@ static void test_binary(void **state)
     free(file);
 }
 
-/* Points that wait keep the time that the head's clock told with them: behind them another scan began. */
+/* Points that wait keep the time that the head's clock gave with them. After them another scan began. */
 static void test_time(void **state)
 {
     (void)state;
@@ -214,7 +214,7 @@ static void test_time(void **state)
     free(las);
 }
 
-/* A file holds one kind; formats that hold no attributes take both. */
+/* A file holds one kind. Formats that hold no attributes take both. */
 static void test_kinds(void **state)
 {
     (void)state;
@@ -240,7 +240,7 @@ static void test_kinds(void **state)
     }
 }
 
-/* The library: attributes are of the frame before and of no other, and says which call is wrong. */
+/* The library: attributes belong to the frame before and to no other. A wrong call is reported. */
 static void test_library(void **state)
 {
     (void)state;

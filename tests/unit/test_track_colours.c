@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Recordings with colours: as the head sends them, where points wait for them, and as they are made of the points. */
+/* Recordings with colours: as the head sends them, where points wait for them, and as computed from the points. */
 #include "tests/unit/recorder_rig.h"
 
 #include "core/colour.h"
@@ -9,7 +9,7 @@ enum { SHOTS = 10, ATTRIBUTES = NATIVE_HAS_ATTRIBUTES, COLOURS = NATIVE_HAS_COLO
 static uint8_t out[1 << 16];
 static uint32_t seq;
 
-/* The frames at `out`, numbered; those whose bit (1 << number) is in `lost` are only counted. */
+/* Numbers the frames at `out`. Those whose bit (1 << number) is in `lost` are only counted. */
 static void put(size_t len, unsigned lost)
 {
     int n = 0;
@@ -36,8 +36,8 @@ static void put_head(uint32_t scan, uint32_t content, const struct native_anchor
     put(native_encode_anchor(out, sizeof out, anchor != NULL ? anchor : &a, 0, 0), 0);
 }
 
-/* Shot k of a line has the range 1 + k metres, 9 degrees of line angle a shot, and the colour pulse0 + k, k, 7. The fourth
- * one is empty, and grey. */
+/* Shot k of a line has the range 1 + k metres, 9 degrees of line angle a shot, and the colour pulse0 + k, k, 7. The
+ * fourth one is empty, and grey. */
 static void put_points(uint32_t line, uint64_t pulse0, uint32_t content, unsigned lost)
 {
     uint32_t a[SHOTS], b[SHOTS], zero[SHOTS] = {0}, dt[SHOTS];
@@ -85,7 +85,7 @@ static char *record(const char *name, struct recorder_options options, size_t *l
     return file;
 }
 
-/* The colour at the end of a line of text; returns what follows it. */
+/* Reads the colour at the end of a line of text. Returns the text after it. */
 static char *expect(char *at, const uint8_t want[3])
 {
     int rgb[3];
@@ -107,7 +107,8 @@ static char *body_of(char *ply)
     return at + 11;
 }
 
-/* With attributes between and without; where colours, attributes or points are lost, each point has its own or grey. */
+/* Attributes come between or not. If colours, attributes or points are lost, each point has its own colour or
+ * grey. */
 static void test_as_sent(void **state)
 {
     (void)state;
@@ -139,7 +140,7 @@ static void test_as_sent(void **state)
     }
 }
 
-/* What is asked for comes before what is sent; `none` leaves it out. */
+/* The requested colours replace the sent ones; `none` leaves them out. */
 static void test_another_choice(void **state)
 {
     (void)state;
@@ -190,7 +191,8 @@ static void test_formats(void **state)
     free(ptx);
 }
 
-/* Blue, green, yellow, red over the limits: at 1 m blue, at 4 m a third is green, at 10 m red; beyond them as at them. */
+/* The ramp is blue, green, yellow, red over the limits. At 1 m it is blue, at 4 m a third towards green, at 10 m red.
+ * Beyond the limits it is as at them. */
 static void test_range(void **state)
 {
     (void)state;
@@ -214,7 +216,7 @@ static void test_range(void **state)
     free(text);
 }
 
-/* Where the scan's anchor stands at z = 5 m: the z of the points, worked out by hand; and as far along the ramp. */
+/* The scan's anchor is at z = 5 m. The z of the points is worked out by hand, and as far along the ramp. */
 static void test_height(void **state)
 {
     (void)state;
@@ -234,7 +236,7 @@ static void test_height(void **state)
     free(text);
 }
 
-/* Of a stop of a trajectory: its scalar. Without a trajectory there is none, and that is an error. */
+/* A stop of a trajectory has its scalar. Without a trajectory there is none, and that is an error. */
 static void test_frame(void **state)
 {
     (void)state;
@@ -261,7 +263,7 @@ static void test_frame(void **state)
     unlink(path);
 }
 
-/* A file holds one kind, unless its colours are made here. */
+/* A file holds one kind, unless its colours are computed here. */
 static void test_kinds(void **state)
 {
     (void)state;
@@ -280,7 +282,7 @@ static void test_kinds(void **state)
     }
 }
 
-/* The library: colours are of the last points and of no others. */
+/* The library: colours belong to the last points and to no others. */
 static void test_library(void **state)
 {
     (void)state;

@@ -4,8 +4,8 @@
 
 #include "tests/unit/scene_files.h"
 
-/* Area by the shoelace formula; the triangles' own areas add up to it only when none overlaps or sticks out.
- */
+/* Computes the area by the shoelace formula. The triangles' own areas only add up to it when none overlaps or sticks
+ * out. */
 static void check_polygon(const double (*uv)[2], int n, bool at_utm)
 {
     char *text = malloc((size_t)n * 128 + 64), *p = text;
@@ -23,7 +23,7 @@ static void check_polygon(const double (*uv)[2], int n, bool at_utm)
     free(text);
     assert_int_equal(scene->n_triangles + scene->counts.zero_area, n - 2);
     assert_null(strstr(warnings, "cross"));
-    /* coordinates are rounded to ulp(5.8e6) / 2 = 4.7e-10, along a boundary shorter than 200 */
+    /* Coordinates are rounded to ulp(5.8e6) / 2 = 4.7e-10, along a boundary shorter than 200. */
     double tolerance = at_utm ? 200 * 4.7e-10 * 2 : 1e-12 * fabs(area);
     if (fabs(total_area(scene) - fabs(area)) > tolerance)
         fail_msg("%d corners: area %.15g, not %.15g", n, total_area(scene), area);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a tripod hides, by geometry alone: the cone on level and sloping ground, at heights up to where it hovers; legs
- * as prisms; and nothing else of a scan changes. */
+/* The part that a tripod hides, by geometry alone: the cone on level and sloping ground, at heights up to where it
+ * hovers, and legs as prisms. Nothing else of a scan changes. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -88,15 +88,15 @@ static void scan(const struct site *site, uint32_t station)
 static const char SLOPE[] = "o slope\nv -20 -20 -4\nv 20 -20 4\nv 20 20 4\nv -20 20 -4\nf 1 2 3 4\n"; /* z = x / 5 */
 static const char LEVEL[] = "o level\nv -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nf 1 2 3 4\n";
 
-/* Ground z = slope x, 40 m wide, from (0, 0, h). 0: beyond it. */
+/* Returns the range from (0, 0, h) to the ground z = slope x, 40 m wide. 0: beyond it. */
 static double ground_range(const double d[3], double h, double slope)
 {
     const double t = h / (slope * d[0] - d[2]);
     return t > 0 && fabs(t * d[0]) < 20 && fabs(t * d[1]) < 20 ? t : 0;
 }
 
-/* Each shot: hidden where its cosine with straight down is above the opening's, else at the ground's range. Of those
- * within 1e-12 of the border nothing is known: arithmetic is in double. */
+/* Each shot is hidden where its cosine with straight down is above the opening's, else at the ground's range. Those
+ * within 1e-12 of the border may be either, as arithmetic is in double. */
 static void check_holes(double h, double slope, double cos_opening)
 {
     int hidden = 0, seen = 0;
@@ -170,8 +170,8 @@ static void no_ground_is_said(void **state)
 
 /* ---- legs */
 
-/* A prism of six sides between a and b, as the head of tripod.c says it: where a ray from o enters it; 0: not. *deep:
- * the way within. */
+/* A prism of six sides between a and b, as the head of tripod.c describes it. Returns where a ray from o enters it; 0:
+ * not. *deep: the way within. */
 static double prism_range(const double o[3], const double d[3], const double a[3], const double axis[3],
                           const double across[3], double length, double radius, double *deep)
 {
@@ -241,7 +241,7 @@ static void legs_hide_what_is_behind_them(void **state)
     site_free(site);
 }
 
-/* ---- with all else that a scan may have */
+/* ---- with all other parts of a scan */
 
 static const char GLASS[] = "surfaces:\n  - {material: glass, glass: 0.9, reflectance: 0.02, specular: 0.05}\n"
                             "  - {material: mirror, mirror: 0.9, reflectance: 0.02}\n";
@@ -256,7 +256,7 @@ static void write_room(void)
     write_in("room.obj", text);
 }
 
-/* The cone takes pulses away, and leaves all others bit by bit as they are without it. */
+/* The cone takes pulses away. All others stay bit by bit as without it. */
 static void nothing_else_changes(void **state)
 {
     (void)state;
@@ -286,7 +286,7 @@ static void nothing_else_changes(void **state)
             site_free(site);
         }
         for (int k = 0; k < n_shots; k++) {
-            /* With angle noise a beam is off by up to 7 sigma of 0.0005 deg twice: 0.01 deg is 2e-4. */
+            /* With angle noise a beam strays by up to 7 sigma of 0.0005 deg twice: 0.01 deg is 2e-4. */
             const double margin = strstr(more[i], "angle") != NULL ? 2e-4 : 1e-12;
             const int is_hidden = -shot[k].d[2] > 0.4;
             if (fabs(-shot[k].d[2] - 0.4) < margin) continue;

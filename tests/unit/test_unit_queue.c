@@ -13,7 +13,7 @@
 #include "firmware_sim/loop/kept.h"
 #include "firmware_sim/loop/unit_queue.h"
 
-enum { CAP = 1000, HEAD = 32 }; /* what a unit costs beside its bytes: two ticks, a kind and a length, aligned */
+enum { CAP = 1000, HEAD = 32 }; /* a unit's cost beside its bytes: two ticks, a kind and a length, aligned */
 
 static void units_come_out_as_they_went_in(void **state)
 {
@@ -34,7 +34,7 @@ static void units_come_out_as_they_went_in(void **state)
         assert_int_equal(lost, room < len + HEAD); /* whole, or not at all */
         put += !lost;
         if (!lost && (random & 3) != 0) continue;
-        /* the oldest, in pieces */
+        /* The oldest is read in pieces. */
         const struct unit_kind oldest = unit_queue_kind(&queue);
         assert_true(oldest.tick == got && oldest.made_tick == 2 * got && oldest.is_reply == (int)(got & 1));
         size_t n = 0;
@@ -128,7 +128,7 @@ static void *keep(void *arg)
     return arg;
 }
 
-/* A reader beside the one that keeps never gets a frame that is half of one and half of another. */
+/* A reader beside the one that stores them never gets a frame that is half of one and half of another. */
 static void copies_are_whole(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Heads with a fault, cast: a slipped pan is a head whose pan began elsewhere, but for what it reads; a soiled window
+/* Casts of heads with a fault. A slipped pan is a head whose pan began elsewhere, but for its readings. A soiled window
  * is a weaker signal. */
 #include "tests/unit/cast_rig.h"
 
@@ -9,7 +9,7 @@
 static const double LO[3] = {-4.0, -6.0, -1.5}, HI[3] = {5.0, 7.0, 2.5}, CENTRE[3] = {0.0, 0.0, 0.0};
 enum { SLIP_UDEG = 2500000, LINE = 3 };
 
-/* A line of three heads: the one at hand, the same with a slipped pan, the same whose pan began so much further. */
+/* A line of three heads: the tested one, the same with a slipped pan, and the same whose pan began so much further. */
 struct three {
     struct line_block clean, slipped, turned;
 };
@@ -45,7 +45,7 @@ static void free_three(struct three *t)
     line_block_free(&t->turned);
 }
 
-/* Ranges are counts of 1e-5 m: directions that differ in their last bit may round to the next one. */
+/* Ranges are counts of 1e-5 m. Directions that differ in their last bit may round to the next one. */
 static void slip_is_what_nobody_reads(struct cast_rig *rig)
 {
     struct three t;
@@ -58,7 +58,7 @@ static void slip_is_what_nobody_reads(struct cast_rig *rig)
         assert_true(abs((int)(t.slipped.a[i] - t.turned.a[i])) <= 1);
         moved += abs((int)(t.slipped.a[i] - t.clean.a[i])) > 100; /* 1 mm */
     }
-    /* Floor and ceiling are as far away in any pan; walls fill a tenth of a line. */
+    /* Floor and ceiling are as far away in any pan. Walls fill a tenth of a line. */
     assert_true(moved > t.clean.n_points / 20);
     free_three(&t);
     cast_rig_close(rig);
@@ -79,7 +79,7 @@ enum { LEVEL, TILTED, MOVING };
 static void a_slipped_pan_of_any_head(void **state)
 {
     (void)state;
-    /* Its encoders err alike, whatever way the beam goes. */
+    /* The encoders' errors are the same, wherever the beam goes. */
     const struct instrument bent = {.collimation_rad = 0.02,
                                     .trunnion_rad = -0.01,
                                     .transit_offset_m = 0.05,
@@ -98,8 +98,8 @@ static void a_slipped_pan_of_any_head(void **state)
         }
 }
 
-/* Positions are where the encoders say: range times direction, to a count of 1e-5 m and half a one of the range; 2^-32
- * of a turn moves 9 m by 7e-9 m. */
+/* Positions follow the encoders: range times direction, to a count of 1e-5 m and half a one of the range. 2^-32 of a
+ * turn moves 9 m by 7e-9 m. */
 static void positions_follow_the_encoders(void **state)
 {
     (void)state;
@@ -126,8 +126,8 @@ static void positions_follow_the_encoders(void **state)
     cast_rig_close(rig);
 }
 
-/* A = (6 m / R)^2 through a clean window, of a white wall that is seen to 6 m. Through one that lets half of it through
- * walls are seen to 6 m / sqrt 2, and the jitter of what is seen is twice as large: the same numbers are drawn. */
+/* A = (6 m / R)^2 through a clean window, for a white wall that is seen to 6 m. Through one that transmits half, walls
+ * are seen to 6 m / sqrt 2, and the jitter of the seen ones is twice as large: the same numbers are drawn. */
 static void a_soiled_window_is_a_weaker_signal(void **state)
 {
     (void)state;
@@ -174,8 +174,8 @@ static void a_soiled_window_is_a_weaker_signal(void **state)
     cast_rig_close(rig);
 }
 
-/* Without a model of the signal the fixed part of the noise grows by 1 / share: the same numbers are drawn, four times as
- * large through a window that lets a quarter through. Counts of 1e-5 m are rounded five times. */
+/* Without a model of the signal the fixed part of the noise grows by 1 / share. The same numbers are drawn, four times
+ * as large through a window that transmits a quarter. Counts of 1e-5 m are rounded five times. */
 static void a_soiled_window_makes_ranges_noisy(void **state)
 {
     (void)state;
@@ -202,7 +202,7 @@ static void a_soiled_window_makes_ranges_noisy(void **state)
     cast_rig_close(rig);
 }
 
-/* A wobble is a sine from its begin on: 0 there, the whole after a quarter of a period, minus that after three. */
+/* A wobble is a sine from its begin on: 0 there, full after a quarter of a period, and minus that after three. */
 static void a_wobble_begins_at_rest(void **state)
 {
     (void)state;
@@ -219,7 +219,7 @@ static void a_wobble_begins_at_rest(void **state)
     }
 }
 
-/* A laser that is dark: all shots are empty, and the encoders read on. */
+/* The laser is dark: all shots are empty, and the encoders still read. */
 static void a_dark_laser_has_no_echo(void **state)
 {
     (void)state;

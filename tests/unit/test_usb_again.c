@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Clients of a USB link that attach again without having let go: the session before ends, and one of their own begins.
- * What was meant for the one, or sent in it, is not the other's. */
+/* Clients of a USB link attach again without a detach. The session before ends, and one of their own begins. Bytes for
+ * the one session, or sent in it, do not reach the other. */
 #include "tests/unit/usbip_client.h"
 
 enum { STREAM = 1, STREAM_IN = 3, STREAM_OUT = 3 };
@@ -36,7 +36,7 @@ static void expect_text(struct client *c, const char *text)
     assert_memory_equal(r.data, text, r.actual);
 }
 
-/* Begun while it is open: the link tells the end of the one and then the begin of the other, each time. */
+/* It is begun while it is open. The link reports the end of the one and then the begin of the other, each time. */
 static void test_stream_begun_again(void **state)
 {
     (void)state;
@@ -56,7 +56,7 @@ static void test_stream_begun_again(void **state)
         expect(&bench, LINK_OPENED);
         bench_read_all(&bench, STREAM, heard, 4);
         assert_memory_equal(heard, "new\n", 4);
-        for (int k = 0; k < 2; k++) { /* what was sent was taken */
+        for (int k = 0; k < 2; k++) { /* all sent bytes were taken */
             assert_true(client_reply(&c, &r, 0));
             assert_int_equal(r.status, 0);
         }

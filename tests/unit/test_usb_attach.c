@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A device that plugs itself in (`attach: on`) and whose host lets go of it: it comes back by itself, and says so. */
+/* A device plugs itself in (`attach: on`), and its host lets go of it. It comes back by itself, and reports that. */
 #include "tests/unit/usbip_client.h"
 
 #include <poll.h>
 
 #include "drivers/usb/vhci.h"
 
-/* In place of the kernel's virtual host controller, and of the module that talks to it: takes the other end of the
+/* It replaces the kernel's virtual host controller, and the module that talks to it: it takes the other end of the
  * socket pair, as the kernel does. */
 static struct {
     int fd, attempts, refuses;
@@ -83,7 +83,7 @@ static void test_usbip(void **state)
     bench_close(&bench);
 }
 
-/* One that can't be plugged in at all is an error at once, and nothing is tried again. */
+/* A device that can't be plugged in at all gives an error at once, and nothing is tried again. */
 static void test_usbip_refused(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void test_usbip_refused(void **state)
     assert_non_null(strstr(err.text, "no such module"));
 }
 
-/* Between attempts nothing goes round: who runs the head may stop it, and the processor rests. */
+/* Between attempts nothing spins: the head's owner may stop it, and the processor rests. */
 static void test_pace(void **state)
 {
     (void)state;

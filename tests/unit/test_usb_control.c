@@ -137,7 +137,7 @@ static void test_requests(void **state)
             }
 }
 
-/* What the requests do, not only whether they are taken. */
+/* The effects of the requests are checked, not only whether they are accepted. */
 static void test_effects(void **state)
 {
     (void)state;
@@ -161,7 +161,7 @@ static void test_effects(void **state)
     assert_int_equal(le_get16(host_in), 1);
     host_control(host, 0x82, 0, 0, 0x82, 2, NULL);
     assert_int_equal(le_get16(host_in), 0); /* the other one is not halted */
-    /* configuring anew brings everything back to how it begins */
+    /* A new configuration resets everything. */
     host_control(host, 0x00, 9, 1, 0, 0, NULL);
     host_control(host, 0x81, 10, 0, 0, 1, NULL);
     assert_int_equal(host_in[0], 0);
@@ -185,8 +185,8 @@ static void test_effects(void **state)
     host_free(host);
 }
 
-/* All types and requests with few and odd parameters: nothing is overrun (host_control looks), nothing answered that
- * is not in the table of chapter 9. */
+/* All types and requests are tried with few and odd parameters. Nothing is overrun (host_control checks), and nothing
+ * is answered that is not in the table of chapter 9. */
 static void test_all(void **state)
 {
     (void)state;
@@ -217,7 +217,7 @@ static void test_all(void **state)
     host_free(host);
 }
 
-/* An OUT request whose data stage is not as long as it said. */
+/* The data stage of an OUT request is not as long as its setup says. */
 static void test_data_stage(void **state)
 {
     (void)state;

@@ -12,7 +12,7 @@ static void check(struct host *host, unsigned value, unsigned index, const uint8
 {
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, value, index, 4096, NULL), (int)n);
     assert_memory_equal(host_in, bytes, n);
-    /* and any shorter wish is met with the first bytes */
+    /* Any shorter request gets the first bytes. */
     for (unsigned wish = 0; wish < n; wish++) {
         assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, value, index, wish, NULL), (int)wish);
         assert_memory_equal(host_in, bytes, wish);
@@ -84,7 +84,7 @@ static void test_strings(void **state)
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0301, 0x0407, 255, NULL), USB_STALL);
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0301, 0, 255, NULL), USB_STALL);
     host_free(host);
-    /* a malformed serial number neither overruns nor vanishes */
+    /* A malformed serial number neither overruns nor vanishes. */
     struct usb_identity id = {.serial = "\xc3"};
     uint8_t out[16];
     static const uint8_t replaced[] = {4, 3, 0xfd, 0xff};
@@ -109,7 +109,7 @@ static void test_bos(void **state)
         check(host, 0x0f00, 0, bytes, sizeof bytes);
         host_free(host);
     }
-    /* one that can't do super speed claims nothing of it: its USB 2.0 extension would be empty */
+    /* A device without super speed does not claim it: its USB 2.0 extension would be empty. */
     uint8_t high[33] = {5, 15, 33, 0, 1};
     memcpy(high + 5, bytes + 22, 28);
     struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
@@ -117,7 +117,7 @@ static void test_bos(void **state)
     host_free(host);
 }
 
-/* Below super speed and without compatible ids a BOS has nothing to say: the device is one of USB 2.00. */
+/* Below super speed and without compatible ids a BOS would be empty: the device is one of USB 2.00. */
 static void test_no_bos(void **state)
 {
     (void)state;
@@ -160,7 +160,7 @@ static void test_ms_os(void **state)
     host_free(host);
 }
 
-/* The head: walked through as a host does, every length and number checked against its neighbours. */
+/* The head's descriptors are walked as by a host, and every length and number is checked against its neighbours. */
 static void test_head(void **state)
 {
     (void)state;
@@ -211,7 +211,7 @@ static void test_head(void **state)
         assert_int_equal(associations, 1);
         assert_int_equal(companions, rates[i] == USB_RATE_SUPER ? 5 : 0);
         assert_int_equal(cdc, 1 << 0 | 1 << 1 | 1 << 2 | 1 << 6); /* header, call management, ACM, union */
-        /* WinUSB for the stream alone: one function subset, from interface 2 on */
+        /* WinUSB is for the stream alone: one function subset, from interface 2 on. */
         uint8_t set[512];
         assert_in_range(usb_describe_ms_os(&scanhead_usb_model, set, sizeof set), 46, sizeof set);
         assert_int_equal(le_get16(set + 16) - 8, le_get16(set + 24));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* USB faults on request, in the device core and over USB/IP: what a host sees of each, and that no byte is lost. */
+/* USB faults on request, in the device core and over USB/IP, as a host sees them. No byte is lost. */
 #include <netinet/tcp.h>
 
 #include "tests/unit/usb_host.h"
@@ -121,7 +121,7 @@ static void expect_urb(struct client *c, uint32_t seqnum, int status, uint32_t a
     assert_int_equal(r.actual, actual);
 }
 
-/* Halted until the host clears it; what could not be written goes out then. */
+/* The endpoint is halted until the host clears it. The waiting bytes are sent then. */
 static void test_stall(void **state)
 {
     (void)state;
@@ -149,7 +149,7 @@ static void test_stall(void **state)
     bench_close(&bench);
 }
 
-/* Sessions end, and the device is configured all the same: another session can begin at once. */
+/* Sessions end, and the device stays configured: another session can begin at once. */
 static void test_reset(void **state)
 {
     (void)state;
@@ -174,7 +174,7 @@ static void test_reset(void **state)
     bench_close(&bench);
 }
 
-/* A reader that had no transfer pending learns of it by its next one, and the reader after it by none. */
+/* A reader that had no transfer pending learns of it by its next one, and a later reader by none. */
 static void test_reset_of_idle(void **state)
 {
     (void)state;
@@ -200,7 +200,7 @@ static void test_reset_of_idle(void **state)
     bench_close(&bench);
 }
 
-/* The device goes, and nobody can attach it; then it is at the same port again. */
+/* The device goes, and can't be attached; then it is at the same port again. */
 static void test_unplug(void **state)
 {
     (void)state;
@@ -235,7 +235,7 @@ static void test_unplug(void **state)
     bench_close(&bench);
 }
 
-/* The owner hears of a host before the host hears anything of the device. */
+/* The owner learns of a host before the host gets anything of the device. */
 static void expect_plugged(struct bench *bench, int times)
 {
     for (const int64_t end_ms = now_ms() + DEADLINE_MS; bench->n_plugged < times; bench_poll(bench, 0, 1))
@@ -243,7 +243,7 @@ static void expect_plugged(struct bench *bench, int times)
     assert_int_equal(bench->n_plugged, times);
 }
 
-/* Each request takes its time; one that the host gives up meanwhile is gone. */
+/* Each request takes its time. One that the host gives up meanwhile is gone. */
 static void test_enumeration(void **state)
 {
     (void)state;

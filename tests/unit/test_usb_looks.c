@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The looks of a head on USB: their descriptors, byte by byte, and what begins and ends their sessions.
+/* The identities of a head on USB: their descriptors, byte by byte, and the begin and end of their sessions.
  *
  * The bytes are written out by hand from the layouts of USB 2.0 (tables 9-8, 9-10, 9-12, 9-13) and CDC 1.20 (tables 15
- * to 18 and PSTN 1.20, tables 3 and 4), with the figures that real devices report: a TiM571 as its `lsusb -v` in
- * uos/sick_tim issue 29 shows it, an URG's device descriptor as in UrgNetwork/urg_library issue 29. */
+ * to 18 and PSTN 1.20, tables 3 and 4). The figures are those of real devices: a TiM571 by its `lsusb -v` in
+ * uos/sick_tim issue 29, an URG's device descriptor by UrgNetwork/urg_library issue 29. */
 #include "tests/unit/usb_host.h"
 
 #include "drivers/usb/head_device.h"
@@ -17,7 +17,7 @@ struct shape {
     size_t config_len;
 };
 
-/* ---- native: as it was before there were others */
+/* ---- native: unchanged since before there were others */
 
 static const uint8_t native_device[18] = {18, 1, 0x10, 0x02, 0xef, 2, 1, 64, 0x09, 0x12, 0x01, 0, 0, 1, 1, 2, 5, 1};
 
@@ -50,7 +50,7 @@ static const uint8_t hokuyo_device[18] = {18, 1, 0, 2, 2, 0, 0, 64, 0xd1, 0x15, 
 
 static const uint8_t hokuyo_full[] = {HOKUYO_BYTES(16, 64, 0)}, hokuyo_high[] = {HOKUYO_BYTES(8, 0, 2)};
 
-/* ---- sick: as the TiM571's listing, whose 32 bytes are a configuration, an interface and two endpoints */
+/* ---- sick: as in the TiM571's listing, whose 32 bytes are a configuration, an interface and two endpoints */
 
 static const uint8_t sick_device[18] = {18, 1, 0, 2, 0, 0, 0, 64, 0xa2, 0x19, 0x01, 0x50, 0x09, 0x01, 0, 2, 3, 1};
 
@@ -126,7 +126,7 @@ static void test_descriptors(void **state)
             rig_open(&rig, s->look, s->serial, high ? USB_RATE_HIGH : USB_RATE_FULL);
             expect_bytes(&rig, 0x0100, s->device, 18);
             expect_bytes(&rig, 0x0200, high ? s->high : s->full, s->config_len);
-            /* a BOS only where the native look has something to say in it */
+            /* There is a BOS only where the native identity has content for it. */
             const int bos = control(&rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0f00, 0, 255);
             assert_true((bos == USB_STALL) == (s->look != USB_LOOK_NATIVE));
             usb_device_free(rig.head.device);
@@ -167,7 +167,7 @@ static void test_strings(void **state)
     }
 }
 
-/* Configured, the status of a device says that it is self-powered: USB 2.0, figure 9-4, bit 0. */
+/* The status of a configured device says that it is self-powered: USB 2.0, figure 9-4, bit 0. */
 static void test_status(void **state)
 {
     (void)state;
@@ -181,7 +181,7 @@ static void test_status(void **state)
     }
 }
 
-/* An OUT transfer of the host; the transfer stays the test's. */
+/* Submits an OUT transfer of the host; the transfer stays the test's. */
 static void send(struct rig *rig, struct usb_transfer *transfer, uint8_t endpoint, const char *text)
 {
     static uint8_t bytes[256];
@@ -191,7 +191,7 @@ static void send(struct rig *rig, struct usb_transfer *transfer, uint8_t endpoin
     scanhead_usb_update(&rig->head);
 }
 
-/* The port of the URG: opened by DTR, or by data where a host leaves DTR alone; closed by DTR. */
+/* The port of the URG is opened by DTR, or by data where a host does not use DTR, and closed by DTR. */
 static void test_port(void **state)
 {
     (void)state;
@@ -215,7 +215,7 @@ static void test_port(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* Any bit rate, 8N1: set as drivers do (PSTN 1.20, table 17), and read back. */
+/* Any bit rate, 8N1, is set as drivers do (PSTN 1.20, table 17), and read back. */
 static void test_line_coding(void **state)
 {
     (void)state;
@@ -239,7 +239,7 @@ static void test_line_coding(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* Requests of other looks are refused: a stream request has no place on a TiM, nor a port's. */
+/* Requests of other identities are refused: a TiM has no stream request, and no port's. */
 static void test_foreign_requests(void **state)
 {
     (void)state;

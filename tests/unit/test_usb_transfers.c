@@ -14,8 +14,9 @@ static struct host *configured(enum usb_rate rate)
     return host;
 }
 
-/* What one write leaves, by its length L, into transfers of 1024 bytes at each packet size: as many as it fills, and
- * one that ends short; with a zero-length packet exactly where L is a whole number of packets and fills nothing up. */
+/* The result of one write, by its length L, into transfers of 1024 bytes at each packet size. It fills as many as fit,
+ * and one ends short. There is a zero-length packet exactly where L is a whole number of packets and fills no
+ * transfer. */
 static void test_fill(void **state)
 {
     (void)state;
@@ -41,7 +42,7 @@ static void test_fill(void **state)
                 assert_int_equal(host->done[0]->zero_packet, rest % packets[rate] == 0);
                 host_expect(host, full, USB_OK, (uint32_t)rest);
             }
-            /* the next one submitted goes behind those that wait, and ends nothing */
+            /* The next submitted one goes behind those that wait, and ends nothing. */
             host_submit(host, 99, 0x81, NULL, 1024);
             assert_int_equal(host->n_done, 0);
             usb_device_detach(host->device);
@@ -52,7 +53,7 @@ static void test_fill(void **state)
         }
 }
 
-/* Where the last transfer is full to the brim, the zero-length packet that ends the unit comes in the next one. */
+/* If the last transfer is exactly full, the zero-length packet that ends the unit comes in the next one. */
 static void test_zero_packet(void **state)
 {
     (void)state;
@@ -64,20 +65,20 @@ static void test_zero_packet(void **state)
     host_expect(host, 2, USB_OK, 0);
     host_submit(host, 3, 0x81, NULL, 1024); /* only once */
     assert_int_equal(host->n_done, 0);
-    /* full, but more was to come: no end yet */
+    /* It is full, but more was to come: no end yet. */
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 1500), 1024);
     host_expect(host, 3, USB_OK, 1024);
     host_submit(host, 4, 0x81, NULL, 1024);
     assert_int_equal(host->n_done, 0);
     assert_int_equal(usb_device_write(host->device, 0x81, pattern + 1024, 476), 476);
     host_expect(host, 4, USB_OK, 476);
-    /* full with a short packet at its end: that is the end */
+    /* It is full, with a short packet at its end: that is the end. */
     host_submit(host, 5, 0x81, NULL, 700);
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 700), 700);
     host_expect(host, 5, USB_OK, 700);
     host_submit(host, 6, 0x81, NULL, 1024);
     assert_int_equal(host->n_done, 0);
-    /* due, and then the host clears the endpoint: what it asks for next is another transfer */
+    /* It is due, and then the host clears the endpoint. Its next request is another transfer. */
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 1024), 1024);
     host_expect(host, 6, USB_OK, 1024);
     assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x81, 0, NULL), 0);
@@ -88,7 +89,7 @@ static void test_zero_packet(void **state)
     host_free(host);
 }
 
-/* A rest smaller than the packet that comes: babble, and the packet is still there for the next. */
+/* The rest is smaller than the packet: that is babble, and the packet is still there for the next. */
 static void test_overflow(void **state)
 {
     (void)state;
@@ -126,7 +127,7 @@ static void test_out(void **state)
     host_submit(host, 4, 0x02, NULL, 0); /* and alone it is over at once */
     host_expect(host, 4, USB_OK, 0);
     assert_int_equal(usb_device_read(host->device, 0x02, back, 10), 0);
-    /* directions are kept apart */
+    /* Directions are kept apart. */
     host_submit(host, 5, 0x81, NULL, 512);
     assert_int_equal(usb_device_read(host->device, 0x81, back, 10), 0);
     assert_int_equal(usb_device_write(host->device, 0x02, pattern, 10), 0);
@@ -135,7 +136,7 @@ static void test_out(void **state)
     host_free(host);
 }
 
-/* Before, in the middle of, and after; first, middle and last of the queue; unknown; twice. */
+/* Transfers are cancelled before, in the middle, and after; first, middle and last of the queue; unknown; twice. */
 static void test_cancel(void **state)
 {
     (void)state;
@@ -153,7 +154,7 @@ static void test_cancel(void **state)
         assert_int_equal(usb_device_cancel(host->device, 4), 0); /* too late */
         assert_int_equal(host->n_done, 0);
     }
-    /* OUT: what was read of it counts, the next one begins at its start */
+    /* OUT: the part that was read counts, and the next one begins at its start. */
     host_submit(host, 7, 0x02, pattern, 100);
     host_submit(host, 8, 0x02, pattern + 200, 50);
     host_submit(host, 9, 0x02, NULL, 0);
@@ -194,7 +195,7 @@ static void test_halt(void **state)
     host_expect(host, 3, USB_STALLED, 0);
     assert_int_equal(host_control(host, 0x82, USB_REQ_GET_STATUS, 0, 0x02, 2, NULL), 2);
     assert_int_equal(host_in[0], 1);
-    /* clear on one that is not halted is allowed; pending ones stay */
+    /* A clear on one that is not halted is allowed, and pending ones stay. */
     host_submit(host, 6, 0x81, NULL, 512);
     assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x81, 0, NULL), 0);
     assert_int_equal(host->n_done, 0);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Telegrams on USB: each one is a transfer, over the device core, USB/IP and usbredir.
  *
- * A unit ends with a packet shorter than wMaxPacketSize (USB 2.0, 5.8.3). One whose length is a multiple of it needs
- * a packet of no bytes after it. A host's transfer that has room left ends there by itself; where the unit fills the
+ * A unit ends with a packet shorter than wMaxPacketSize (USB 2.0, 5.8.3). One whose length is a multiple of it needs a
+ * packet of no bytes after it. A host's transfer that has room left ends there by itself. If the unit fills the
  * transfer to its last byte, that packet is the next transfer. */
 #include "tests/unit/usbip_client.h"
 #ifdef HAVE_USBREDIR
@@ -66,7 +66,7 @@ static void expect_in(struct client *c, uint32_t seqnum, const uint8_t *bytes, u
     assert_memory_equal(r.data, bytes, n);
 }
 
-/* Reads as long as libusb's clients ask for: one telegram each, two of them in a row. */
+/* Reads are as long as those of libusb's clients: one telegram each, two of them in a row. */
 static void test_usbip_long_reads(void **state)
 {
     (void)state;
@@ -91,7 +91,7 @@ static void test_usbip_long_reads(void **state)
     }
 }
 
-/* Reads that the telegram fills exactly: its end is the next read, whether that waits already or comes later. And a
+/* The telegram fills these reads exactly: its end is the next read, whether that waits already or comes later. A
  * telegram longer than the read goes on in the next one. */
 static void test_usbip_exact_reads(void **state)
 {
@@ -124,7 +124,7 @@ static void test_usbip_exact_reads(void **state)
     }
 }
 
-/* Nothing comes by itself. A read that its client gives up (its timeout) takes nothing with it. */
+/* Nothing comes by itself. A read that its client gives up (its timeout) takes no bytes with it. */
 static void test_usbip_cancel(void **state)
 {
     (void)state;
@@ -139,7 +139,7 @@ static void test_usbip_cancel(void **state)
         assert_int_equal(r.command, 4);
         assert_int_equal(r.seqnum, unlink);
         assert_int_equal(r.status, ECONNRESET_WIRE);
-        assert_int_equal(bench.ops->write(bench.link, 0, telegram, 1024), 0); /* nobody reads: it stays here */
+        assert_int_equal(bench.ops->write(bench.link, 0, telegram, 1024), 0); /* no host reads, so it stays here */
         const uint32_t next = client_submit(&c, 1, 1, NULL, NULL, MOST);
         bench_expect(&bench, LINK_WRITABLE, 1);
         assert_int_equal(bench.ops->write(bench.link, 0, telegram, 1024), 1024);
@@ -149,7 +149,7 @@ static void test_usbip_cancel(void **state)
     bench_close(&bench);
 }
 
-/* A telegram to the device in pieces of any size, a read of them in others. */
+/* A telegram goes to the device in pieces of any size, and is read in others. */
 static void test_usbip_out_pieces(void **state)
 {
     (void)state;

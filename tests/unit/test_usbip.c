@@ -58,7 +58,7 @@ static void test_import(void **state)
     assert_int_equal(client_control(&c, &r, 0x80, 6, 0x0305, 0x0409, 255, NULL), 0);
     assert_int_equal(r.actual, sizeof serial);
     assert_memory_equal(r.data, serial, sizeof serial);
-    /* a second host is told that it is busy, one that wants another device that there is none */
+    /* A second host gets busy, and one that wants another device gets that there is none. */
     uint8_t request[40] = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'}, back[8];
     other.fd = client_connect(&bench);
     client_write(&other, request, sizeof request);
@@ -68,7 +68,7 @@ static void test_import(void **state)
     client_write(&other, request, sizeof request);
     assert_true(client_read(&other, back, 8));
     assert_int_equal(back[7], 1);
-    /* and has it when the first one is gone: closing is unplugging */
+    /* It has the device when the first one is gone: closing is unplugging. */
     close(c.fd);
     request[10] = '1';
     for (const int64_t end_ms = now_ms() + DEADLINE_MS;;) {
@@ -82,7 +82,7 @@ static void test_import(void **state)
     bench_close(&bench);
 }
 
-/* Commands in and a stream out, in URBs of different lengths, each in its order and none of it lost. */
+/* Commands go in and a stream comes out, in URBs of different lengths, each in its order and without loss. */
 static void test_stream(void **state)
 {
     (void)state;
@@ -128,7 +128,7 @@ static void test_commands(void **state)
     char text[64] = "";
     client_import(&c, &bench);
     configure(&c);
-    /* the stream opens with its first bytes */
+    /* The stream opens with its first bytes. */
     uint32_t seqnum = client_submit(&c, 0, 3, NULL, "*IDN?\n", 6);
     assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 1);
     assert_int_equal(bench_expect(&bench, LINK_READABLE, 0).session, 1);
@@ -137,7 +137,7 @@ static void test_commands(void **state)
     assert_true(client_reply(&c, &r, 0));
     assert_int_equal(r.seqnum, seqnum);
     assert_int_equal(r.actual, 6);
-    /* the console with DTR; what comes before waits, as it does with a port that is not open */
+    /* The console opens with DTR. Earlier bytes wait, as on a port that is not open. */
     seqnum = client_submit(&c, 0, 1, NULL, "*RST\n", 5);
     bench_poll(&bench, 0, 20);
     assert_int_equal(bench.n_queue, 0);
@@ -149,7 +149,7 @@ static void test_commands(void **state)
     assert_memory_equal(text, "*RST\n", 5);
     assert_true(client_reply(&c, &r, 0));
     assert_int_equal(r.seqnum, seqnum);
-    /* and ends without it, after what came before is read */
+    /* It ends without DTR, after earlier bytes were read. */
     bench.n_queue = 0;
     client_submit(&c, 0, 1, NULL, "BYE\n", 4);
     setup[2] = 2;
@@ -167,7 +167,7 @@ static void test_commands(void **state)
     assert_memory_equal(text, "next", 4);
     for (int i = 0; i < 4; i++)
         assert_true(client_reply(&c, &r, 0));
-    /* unplugging ends both */
+    /* Unplugging ends both. */
     close(c.fd);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 0);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
@@ -211,7 +211,7 @@ static void expect_ready(struct client *c)
     assert_memory_equal(r.data, ready, sizeof ready);
 }
 
-/* It waits: were it answered, its answer would come before that to the unlink. */
+/* The request waits: an answer would come before that to the unlink. */
 static void expect_no_notice(struct client *c)
 {
     client_unlink(c, client_submit(c, 1, 2, NULL, NULL, 16));
@@ -220,8 +220,8 @@ static void expect_no_notice(struct client *c)
     assert_int_equal(r.status, ECONNRESET_WIRE);
 }
 
-/* The interrupt endpoint says that the line is ready: when the interface comes to life, and to each program that opens
- * the port, which is where DTR rises; not while it stays up, and not when it falls. */
+/* The interrupt endpoint reports that the line is ready: when the interface comes to life, and to each program that
+ * opens the port, where DTR rises. It does not while DTR stays up, nor when it falls. */
 static void test_serial_state(void **state)
 {
     (void)state;
@@ -262,7 +262,7 @@ static void test_unlink(void **state)
     assert_true(client_reply(&c, &r, 1));
     assert_int_equal(r.seqnum, second);
     assert_int_equal(r.actual, 3);
-    /* too late, unknown, and its own number: all are "not pending" */
+    /* These are too late, unknown, and its own number: all are "not pending". */
     const uint32_t victims[] = {second, 0x7fffffff, c.seqnum + 3};
     for (int i = 0; i < 3; i++) {
         client_unlink(&c, victims[i]);
@@ -270,7 +270,7 @@ static void test_unlink(void **state)
         assert_int_equal(r.command, 4);
         assert_int_equal(r.status, 0);
     }
-    /* a halted endpoint, and one that is not there */
+    /* One endpoint is halted, and one is missing. */
     assert_int_equal(client_control(&c, &r, 0x02, 3, 0, 0x83, 0, NULL), 0);
     client_submit(&c, 1, 3, NULL, NULL, 512);
     assert_true(client_reply(&c, &r, 1));
@@ -278,7 +278,7 @@ static void test_unlink(void **state)
     client_submit(&c, 1, 9, NULL, NULL, 512);
     assert_true(client_reply(&c, &r, 1));
     assert_int_equal(r.status, ESHUTDOWN_WIRE);
-    /* a control URB that contradicts its setup */
+    /* This control URB contradicts its setup. */
     uint8_t setup[8] = {0x80, 6, 0, 1, 0, 0, 18, 0};
     client_submit(&c, 1, 0, setup, NULL, 8);
     assert_true(client_reply(&c, &r, 1));
@@ -287,7 +287,7 @@ static void test_unlink(void **state)
     bench_close(&bench);
 }
 
-/* The link hangs up on who breaks the protocol, and serves the next one. */
+/* The link hangs up on a client that breaks the protocol, and serves the next one. */
 static void expect_hang_up(const void *bytes, size_t len, int imported)
 {
     struct bench bench = usbip_bench("N");
@@ -330,7 +330,7 @@ static void test_broken(void **state)
     }
 }
 
-/* Bytes at random, and sound messages with bytes changed: no crash, no endless loop, and the next client is served. */
+/* Random bytes, and sound messages with bytes changed: no crash, no endless loop, and the next client is served. */
 static void test_garbage(void **state)
 {
     (void)state;
@@ -381,7 +381,7 @@ static void test_garbage(void **state)
     bench_close(&bench);
 }
 
-/* At the end of a run: what was written is there, whatever requests are still on their way. */
+/* At the end of a run the written bytes are there, whatever requests are still on their way. */
 static void test_close(void **state)
 {
     (void)state;

@@ -4,7 +4,7 @@
 
 #include <poll.h>
 
-/* MANY requests have 48 MB, replies not counted: more than the sockets' buffers and the back end together. */
+/* MANY requests have 48 MB without the replies: more than the sockets' buffers and the back end together. */
 enum { EREMOTEIO_WIRE = -121, GET_STATUS = 0, MANY = 1000000 };
 
 static struct reply r;
@@ -25,7 +25,7 @@ static int connect_silent(struct bench *bench)
     return fd;
 }
 
-/* More of them than the back end has places for. */
+/* There are more of them than the back end has places for. */
 static void test_silent(void **state)
 {
     (void)state;
@@ -40,7 +40,7 @@ static void test_silent(void **state)
         silent[i] = connect_silent(&bench);
     other.fd = client_connect(&bench);
     list_devices(&other);
-    assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* who has the device keeps it */
+    assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* the owner keeps the device */
     list_devices(&other);
     for (int i = 0; i < 2 * SILENT; i++)
         close(silent[i]);
@@ -49,14 +49,14 @@ static void test_silent(void **state)
     bench_close(&bench);
 }
 
-/* 1: the link has hung up. */
+/* Returns 1 when the link has hung up. */
 static int is_put_out(int fd)
 {
     char byte;
     return recv(fd, &byte, 1, MSG_DONTWAIT) == 0;
 }
 
-/* There are four places. The one that has been here longest without importing makes room, wherever its place is. */
+/* There are four places. The client that has been here longest without importing makes room, wherever its place is. */
 static void test_oldest(void **state)
 {
     (void)state;
@@ -68,7 +68,7 @@ static void test_oldest(void **state)
         client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
     close(client[1].fd); /* its place is free, and goes to one that is younger than its neighbours */
     bench_poll(&bench, 0, DEADLINE_MS);
-    static const int out[] = {-1, 0, 2, 3}; /* who goes as 3, 4, 5 and 6 come */
+    static const int out[] = {-1, 0, 2, 3}; /* the hosts that go as 3, 4, 5 and 6 come */
     for (int i = 3; i < 7; i++) {
         client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
         for (int k = 0; k <= i; k++)
@@ -100,7 +100,7 @@ static void put_submit(uint8_t *at, uint32_t seqnum, int in, uint32_t ep, uint32
     if (setup != NULL) memcpy(at + 40, setup, 8);
 }
 
-/* Sends as long as the way takes it and the link moves; returns the requests begun. */
+/* Sends as long as there is room and the link moves. Returns the requests begun. */
 static uint32_t send_requests(struct client *c)
 {
     static const uint8_t get_status[8] = {0x80, GET_STATUS, 0, 0, 0, 0, 2, 0};
@@ -108,7 +108,7 @@ static uint32_t send_requests(struct client *c)
     uint32_t n = 0;
     for (size_t pos = HEADER, stuck = 0; stuck < 3;) {
         if (pos == HEADER) {
-            assert_true(n < MANY); /* nobody holds so much */
+            assert_true(n < MANY); /* no buffer holds so much */
             put_submit(head, ++n, 1, 0, 2, get_status);
             pos = 0;
         }
@@ -119,7 +119,7 @@ static uint32_t send_requests(struct client *c)
             continue;
         }
         assert_int_equal(errno, EAGAIN); /* and not cut off */
-        /* A link that can't go on waits; one whose host can't read yet moves what the kernel takes. */
+        /* A link that can't go on waits. One whose host can't read yet moves as much as the kernel takes. */
         const int64_t start_ms = now_ms();
         bench_poll(c->bench, 0, 50);
         if (now_ms() - start_ms >= 49) stuck++;
@@ -127,7 +127,7 @@ static uint32_t send_requests(struct client *c)
     return n;
 }
 
-/* A host that sends and sends before it reads: it is held back, not cut off, and gets every reply in its order. */
+/* A host sends and sends before it reads. It is held back, not cut off, and gets every reply in its order. */
 static void test_pipelining(void **state)
 {
     (void)state;
@@ -176,7 +176,7 @@ static void test_turns(void **state)
     bench_close(&bench);
 }
 
-/* Everything a host says in one session, and what it gets: the same however the bytes are cut. */
+/* Runs one whole session of a host. Its answers are the same however the bytes are cut. */
 static size_t session(size_t piece, uint8_t *got, size_t room)
 {
     static const uint8_t import[40] = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'};
@@ -227,7 +227,7 @@ static void test_segments(void **state)
     }
 }
 
-/* URB_SHORT_NOT_OK is the server's to judge, as it is a host controller's (include/linux/usb.h). */
+/* The server judges URB_SHORT_NOT_OK, as a host controller does (include/linux/usb.h). */
 static void test_short_not_ok(void **state)
 {
     (void)state;
@@ -258,8 +258,8 @@ static void test_short_not_ok(void **state)
     bench_close(&bench);
 }
 
-/* Bytes asked for and not got count up to 64 MiB (drivers/usb/usbip_private.h), the last one as well: one more
- * cuts it off. */
+/* Requested bytes that were not received count up to 64 MiB (drivers/usb/usbip_private.h), the last one as well. One
+ * more cuts the client off. */
 static void test_bytes_pending(void **state)
 {
     (void)state;

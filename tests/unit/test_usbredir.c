@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The usbredir back end and the usb link over it, with the library's own guest-side parser at the other end of a Unix
- * socket, and no virtual machine. */
+/* These are tests of the usbredir back end and of the usb link over it. The library's own guest-side parser is at the
+ * other end of a Unix socket, so there is no virtual machine. */
 #ifdef HAVE_USBREDIR
 
 #include "tests/unit/usbredir_guest.h"
@@ -112,7 +112,7 @@ static void test_stream(void **state)
         g->n_seen = 0;
     }
     assert_memory_equal(sent, got, sizeof sent);
-    /* commands the other way */
+    /* Commands go the other way. */
     bench.n_queue = 0;
     guest_bulk(g, 5000, 0x03, 6, (uint8_t *)"*IDN?\n");
     while (usbredirparser_has_data_to_write(g->parser) > 0)
@@ -166,7 +166,7 @@ static void test_cancel_and_halt(void **state)
     s = guest_await(g, 6);
     assert_int_equal(s->id, 4);
     assert_memory_equal(s->data, "def", 3);
-    /* reset: what waits is gone, and so is the session */
+    /* After a reset waiting bytes are gone, and so is the session. */
     guest_bulk(g, 5, 0x83, 512, NULL);
     usbredirparser_send_reset(g->parser);
     s = guest_await(g, 7);
@@ -186,7 +186,8 @@ static void expect_notice(struct bench *bench, const char *part)
     if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
 }
 
-/* Who runs the head reads why a session was cut off. A guest that enumerates resets the bus, too: no news. */
+/* The head's owner reads why a session was cut off. A guest that enumerates also resets the bus, which is not
+ * reported. */
 static void test_reset_is_no_unplugging(void **state)
 {
     (void)state;
@@ -203,7 +204,7 @@ static void test_reset_is_no_unplugging(void **state)
     guest_configure(g);
     guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
     bench_expect(&bench, LINK_OPENED, 0);
-    guest_configure(g); /* what a host with a reset of its own does here */
+    guest_configure(g); /* a host with a reset of its own does this here */
     bench_expect(&bench, LINK_CLOSED, 0);
     expect_notice(&bench, "configured the device anew");
     guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
@@ -266,7 +267,7 @@ static void test_close(void **state)
     guest_free(g);
 }
 
-/* The socket of a head that was killed is taken over; that of one that lives is not. */
+/* The socket of a killed head is taken over; that of a living one is not. */
 static void test_path(void **state)
 {
     (void)state;
@@ -337,8 +338,9 @@ static void test_garbage(void **state)
     bench_close(&bench);
 }
 
-/* Packets before the hello, and of streams, which no endpoint has: the peer is cut off or told, and the next one
- * served. Headers as in usbredirproto.h: type, length and id, of 32 bits before the hello and 64 after it. */
+/* Packets come before the hello, or for streams, which no endpoint has. The peer is cut off or gets an error, and the
+ * next one is served. Headers are those of usbredirproto.h: type, length and id, of 32 bits before the hello and 64
+ * after it. */
 static void test_early_and_streams(void **state)
 {
     (void)state;

@@ -20,7 +20,7 @@ static void test_silent(void **state)
         bench_poll(&bench, 0, 0);
     }
     struct guest *g = guest_new(&bench);
-    int late = guest_socket(); /* who has said hello keeps the device */
+    int late = guest_socket(); /* the guest that has said hello keeps the device */
     bench_poll(&bench, 0, 0);
     assert_int_equal(guest_control(g, 0x80, 6, 0x0100, 0, 18, NULL)->status, usb_redir_success);
     const int64_t start_ms = now_ms();
@@ -33,9 +33,9 @@ static void test_silent(void **state)
     bench_close(&bench);
 }
 
-/* Headers as in usbredirproto.h: type, length, id (64 bits); endpoint, request, type, status, value, index, length.
- * MANY: the kernel counts 768 bytes or more for each small piece in a Unix socket's buffers, which have 2 MiB at most
- * each way (SO_SNDBUF, doubled): some 5,500 pieces, and the back end's 64. */
+/* Headers are those of usbredirproto.h: type, length, id (64 bits); endpoint, request, type, status, value, index,
+ * length. MANY: the kernel counts 768 bytes or more for each small piece in a Unix socket's buffers, which have 2 MiB
+ * at most each way (SO_SNDBUF, doubled). That is some 5,500 pieces, and the back end's 64. */
 enum { CONTROL_HEAD = 16 + 10, MANY = 20000 };
 
 static void put_get_config(uint8_t *at, uint32_t id)
@@ -48,7 +48,7 @@ static void put_get_config(uint8_t *at, uint32_t id)
     memcpy(at + 16, rest, sizeof rest);
 }
 
-/* As long as the way takes it and the link moves; returns the packets begun. */
+/* Sends as long as there is room and the link moves. Returns the packets begun. */
 static uint32_t send_requests(struct guest *g)
 {
     uint8_t head[CONTROL_HEAD];
@@ -84,7 +84,7 @@ static void read_raw(struct guest *g, uint8_t *at, size_t len)
     }
 }
 
-/* A guest that asks and asks and does not read is held back; then it gets every answer in its order. */
+/* A guest asks and asks and does not read. It is held back, and then gets every answer in its order. */
 static void test_flood(void **state)
 {
     (void)state;
@@ -143,7 +143,7 @@ static struct seen *control_on(struct guest *g, uint64_t id, uint8_t endpoint, u
     return s;
 }
 
-/* As usbredirhost does it: a packet for an endpoint of another kind is invalid, and nothing happens. */
+/* A packet for an endpoint of another kind is invalid, as in usbredirhost, and nothing happens. */
 static void test_wrong_endpoint(void **state)
 {
     (void)state;
@@ -204,7 +204,7 @@ static void check_reconnects(const struct link_spec *spec, int listener, const s
     g = accept_device(&bench, listener); /* it comes by itself */
     guest_configure(g);
     expect_notice(&bench, "plugged in again");
-    close(listener); /* nobody there: it says so once, and tries again */
+    close(listener); /* nobody answers: it says so once, and tries again */
     if (at->sa_family == AF_UNIX) unlink(((const struct sockaddr_un *)at)->sun_path);
     guest_free(g);
     expect_notice(&bench, "detached");
@@ -244,7 +244,7 @@ static void test_reconnect(void **state)
     check_reconnects(&spec, listener, (struct sockaddr *)&named, sizeof named);
 }
 
-/* A path whose owner lives and is busy, its queue full: refused at once, and left alone. */
+/* The owner of the path lives and is busy, with its queue full. The path is refused at once, and left alone. */
 static void test_busy_path(void **state)
 {
     (void)state;
@@ -271,7 +271,7 @@ static void test_busy_path(void **state)
     unlink(guest_path);
 }
 
-/* A path that somebody removed and another head listens on by now stays that one's. */
+/* A path was removed, and another head listens on it by now. It stays that head's. */
 static void test_path_of_another(void **state)
 {
     (void)state;

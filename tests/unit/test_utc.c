@@ -31,8 +31,8 @@ static const char *text_of(const struct utc_table *table, int64_t tai_ns, int de
     return buf;
 }
 
-/* IS-GPS-200 (epoch), IERS Bulletin C 52 (the leap second of 2016), the GPS week rollovers of 1999 and 2019 as the US
- * Coast Guard announced them, and LIGO's tconvert. */
+/* The dates are those of IS-GPS-200 (epoch), IERS Bulletin C 52 (the leap second of 2016) and LIGO's tconvert. The GPS
+ * week rollovers of 1999 and 2019 are those that the US Coast Guard announced. */
 static void published_dates(void **state)
 {
     (void)state;
@@ -61,7 +61,7 @@ static void published_dates(void **state)
     }
 }
 
-/* gmtime_r of the C library, which knows no leap seconds in the default zone, over all days of 228 years. */
+/* gmtime_r of the C library has no leap seconds in the default zone. It is compared over all days of 228 years. */
 static void calendar_as_the_library_has_it(void **state)
 {
     (void)state;
@@ -81,7 +81,7 @@ static void calendar_as_the_library_has_it(void **state)
     }
 }
 
-/* Each second around each leap second: one after the other, and there and back. */
+/* Each second around each leap second comes one after the other, and converts back and forth. */
 static void leap_seconds_count(void **state)
 {
     (void)state;
@@ -104,7 +104,7 @@ static void leap_seconds_count(void **state)
     }
 }
 
-/* Never happened, but allowed for: the second 23:59:59 left out. */
+/* A negative leap second never happened, but is allowed: the second 23:59:59 is left out. */
 static void a_negative_leap_second(void **state)
 {
     (void)state;
@@ -197,7 +197,7 @@ static void the_systems_table_is_the_same(void **state)
     for (uint32_t i = 0; i < common; i++)
         assert_true(table.leap[i].posix_s == ours->leap[i].posix_s &&
                     table.leap[i].tai_minus_utc == ours->leap[i].tai_minus_utc);
-    for (uint32_t i = common; i < table.n; i++) /* what is new to us came after ours ended */
+    for (uint32_t i = common; i < table.n; i++) /* seconds that are new to us came after ours ended */
         assert_true(table.leap[i].posix_s > ours->expires_s);
 }
 

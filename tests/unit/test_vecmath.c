@@ -19,7 +19,7 @@ static int need_long_double(void **state)
     return LDBL_MANT_DIG >= 64 ? 0 : -1;
 }
 
-/* fmodl is exact; what is left is below a turn, where the rounding of 2 pi costs less than 4e-19. */
+/* fmodl is exact. The remainder is below a turn, where the rounding of 2 pi costs less than 4e-19. */
 static double sincos_error(double turn)
 {
     const long double two_pi = 6.283185307179586476925286766559L;
@@ -47,7 +47,7 @@ static void sine_and_cosine_of_a_million_turns(void **state)
     if (!(worst < SINCOS_ERROR)) fail_msg("error %.3g at %.17g turns", worst, at);
 }
 
-/* Where the reduction changes its mind: eighths of a turn, and the doubles beside them. */
+/* The reduction changes its branch at eighths of a turn, so these and the doubles beside them are tried. */
 static void sine_and_cosine_beside_every_eighth(void **state)
 {
     (void)state;
@@ -104,7 +104,7 @@ static void they_lie_on_the_unit_circle(void **state)
     assert_true(worst <= 2.0 * sqrt(2.0) * SINCOS_ERROR);
 }
 
-/* Beyond the last bit: a part of a turn, with what its double leaves out. */
+/* A part of a turn is given beyond the last bit, with the remainder of its double. */
 static void fine_sine_and_cosine(void **state)
 {
     (void)state;
@@ -172,8 +172,7 @@ static void logarithm_of_a_million_numbers(void **state)
     if (!(worst < LOG_ERROR)) fail_msg("relative error %.3g at %.17g", worst, at);
 }
 
-/* The ends of the range, the joints of the reduction, and the neighbourhood of 1, where the result goes
- * through 0. */
+/* The ends of the range, the joints of the reduction, and the neighbourhood of 1, where the result goes through 0. */
 static void logarithm_at_its_edges(void **state)
 {
     (void)state;

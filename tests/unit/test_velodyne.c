@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* VLP-16 data packets against their published layout: what a client computes is what the head measured. */
+/* VLP-16 data packets against their published layout: a client computes the head's measurements. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,7 +14,7 @@
 
 static struct protocol_rig rig;
 
-/* 0..1, of a fixed seed. */
+/* Returns a number in 0..1, of a fixed seed. */
 static double uniform(uint64_t stream, uint64_t i)
 {
     return (double)(rng_mix(rng_mix(stream) + i) >> 11) * 0x1p-53;
@@ -51,7 +51,7 @@ static uint32_t u32(const uint8_t *p)
     return u16(p) | u16(p + 2) << 16;
 }
 
-/* Every byte of a packet whose ranges and reflectances are all different. */
+/* Checks every byte of a packet whose ranges and reflectances all differ. */
 static void test_bytes_of_a_packet(void **state)
 {
     (void)state;
@@ -85,8 +85,8 @@ static void test_bytes_of_a_packet(void **state)
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST] + rig.count[PROTOCOL_POINTS_LOST], 0);
 }
 
-/* A client, from the published layout alone: all blocks of all packets in a row; an entry's azimuth lies
- * between its block's and the next one's by its time. Up to the block before the last. */
+/* A client, from the published layout alone. It takes all blocks of all packets in a row. An entry's azimuth lies
+ * between its block's and the next one's by its time. It reads up to the block before the last. */
 struct seen {
     double range_m, elevation_deg, azimuth_deg;
     int reflectivity;
@@ -111,8 +111,8 @@ static uint32_t parse(struct seen *seen)
     return n;
 }
 
-/* A turn and some more, in frames of all sizes, through 0 degrees: half a unit of range, half a hundredth of
- * a degree. */
+/* A turn and some more, in frames of all sizes, through 0 degrees: half a unit of range, half a hundredth of a
+ * degree. */
 static void test_client_gets_what_was_measured(void **state)
 {
     (void)state;
@@ -143,7 +143,7 @@ static void test_client_gets_what_was_measured(void **state)
     }
 }
 
-/* The azimuth is rounded, and 360 degrees read 0. */
+/* The azimuth is rounded, and 360 degrees become 0. */
 static void test_azimuth_wraps(void **state)
 {
     (void)state;
@@ -160,8 +160,8 @@ static void test_azimuth_wraps(void **state)
     }
 }
 
-/* t(block, entry) = 55.296 (2 block + entry div 16) + 2.304 (entry mod 16) us after the packet's time stamp,
- * which counts from the top of the hour: exactly, over an hour and beyond its end. */
+/* t(block, entry) = 55.296 (2 block + entry div 16) + 2.304 (entry mod 16) us after the packet's time stamp, which
+ * counts from the top of the hour. This is exact, over an hour and beyond its end. */
 static void test_times_over_an_hour(void **state)
 {
     (void)state;
@@ -185,7 +185,7 @@ static void test_times_over_an_hour(void **state)
     }
 }
 
-/* The time stamp is that of the first firing also where a packet begins in the middle of a frame. */
+/* The time stamp is that of the first firing, even where a packet begins in the middle of a frame. */
 static void test_time_of_the_first_firing(void **state)
 {
     (void)state;
@@ -198,7 +198,8 @@ static void test_time_of_the_first_firing(void **state)
         assert_int_equal(u32(packet(i) + 1200), (uint32_t)((10 + i) * 1327104ull / 1000));
 }
 
-/* 753.5 packets in a second, 1507.04 in two of them; with both returns 1507.04 in one: what is full is sent. */
+/* There are 753.5 packets in a second, 1507.04 in two of them, and with both returns 1507.04 in one. Full ones are
+ * sent. */
 static void test_packet_rate(void **state)
 {
     (void)state;

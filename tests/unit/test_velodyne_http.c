@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The settings of a VLP-16 over HTTP, from bytes to bytes: what known clients send, and what they read. */
+/* The settings of a VLP-16 over HTTP, from bytes to bytes: requests of known clients, and their answers. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -12,7 +12,7 @@
 static const char done[] = DONE("keep-alive");
 static const char done_close[] = DONE("close");
 
-/* Byte for byte what clients send, and get. */
+/* Requests and answers are those of real clients, byte for byte. */
 static void test_curl(void **state)
 {
     (void)state;
@@ -23,7 +23,7 @@ static void test_curl(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
-/* CVelodyneScanner of MRPT 2.5.8, captured: an Origin that is the device's own address. */
+/* CVelodyneScanner of MRPT 2.5.8, captured. Its Origin is the device's own address. */
 static void test_mrpt(void **state)
 {
     (void)state;
@@ -49,7 +49,7 @@ static void test_urllib(void **state)
     assert_string_equal(http_rig.line[1], "SCAN:ECHOES STRONGEST");
 }
 
-/* Each key: what the head is told, or that nothing is. */
+/* Each key gives its command to the head, or none. */
 static void test_settings(void **state)
 {
     (void)state;
@@ -117,7 +117,7 @@ static void test_settings(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
-/* Who sends nothing, or half a request, is sent away 30 s after the last whole request: others want to come in. */
+/* A client that sends nothing, or half a request, is cut off 30 s after the last whole request, as others wait. */
 static void test_idle_clients(void **state)
 {
     (void)state;
@@ -142,7 +142,7 @@ static void test_idle_clients(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
-/* laser and rpm of a head that stands. A rate alone does not set it going. */
+/* A client posts laser and rpm to a head that stands. A rate alone does not start it. */
 static void test_head_at_rest(void **state)
 {
     (void)state;
@@ -174,7 +174,7 @@ static void test_reset(void **state)
     assert_string_equal(http_rig.line[3], "SCAN:START");
 }
 
-/* What the head refuses, with its words; the rest of the form is left alone. */
+/* The head's refusal is passed on with its words, and the rest of the form is not carried out. */
 static void test_refused_by_the_head(void **state)
 {
     (void)state;
@@ -196,7 +196,7 @@ static void test_refused_by_the_head(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
-/* Documents: the fields that clients read. */
+/* The documents have the fields that clients read. */
 static void test_documents(void **state)
 {
     (void)state;

@@ -53,7 +53,7 @@ static const uint8_t *packet(uint32_t i)
     return rig.bytes + (size_t)512 * i;
 }
 
-/* Another session, opened at a device time. */
+/* Opens another session, at a device time. */
 static int note_time(void *ctx, int64_t t_ns, struct nmea_fix *fix)
 {
     const struct protocol_rig *r = ctx;
@@ -72,7 +72,7 @@ static void open_again(int64_t t_ns)
     rig.ops->open(rig.protocol, t_ns);
 }
 
-/* The fields that VELODYNE.md names, by their offsets; all else is 0. */
+/* Checks the fields that VELODYNE.md names, by their offsets; all else is 0. */
 static void test_fields(void **state)
 {
     (void)state;
@@ -107,7 +107,7 @@ static void test_fields(void **state)
     assert_string_equal(text + sizeof rmc - 1, end);
 }
 
-/* The states of the pulses, and the time: UTC once it was set, before it the time since power-up. */
+/* Checks the states of the pulses, and the time: UTC once it was set, before it the time since power-up. */
 static void test_pulses_per_second(void **state)
 {
     (void)state;
@@ -124,7 +124,7 @@ static void test_pulses_per_second(void **state)
     }
 }
 
-/* One for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was
+/* There is one for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was
  * opened. */
 static void test_rate(void **state)
 {
@@ -142,7 +142,7 @@ static void test_rate(void **state)
     assert_int_equal(u32(packet(0) + 198), 1003290);
 }
 
-/* Without UTC: since power-up, PPS absent, no sentence. It wraps with the hour. */
+/* Without UTC the time counts from power-up, PPS is absent, and there is no sentence. The time wraps with the hour. */
 static void test_without_utc(void **state)
 {
     (void)state;
@@ -171,7 +171,7 @@ static void test_without_fix(void **state)
     assert_int_equal(packet(0)[206], 0);
 }
 
-/* The sentence is the one that the receiver sent last before the packet's own time. */
+/* The sentence is the receiver's last before the packet's own time. */
 static void test_fix_of_the_packet(void **state)
 {
     (void)state;
@@ -183,7 +183,7 @@ static void test_fix_of_the_packet(void **state)
     assert_int_equal(n_asked, 1);
 }
 
-/* The longest sentence that there is stays within the 128 bytes that clients read. */
+/* The longest sentence stays within the 128 bytes that clients read. */
 static void test_longest_sentence(void **state)
 {
     (void)state;
@@ -198,7 +198,7 @@ static void test_longest_sentence(void **state)
     assert_string_equal(text + strlen(text) - 2, "\r\n");
 }
 
-/* Time that passed without a call: at most 64 packets at once, the newest; the others are counted. */
+/* Time passes without a call. At most 64 packets, the newest, are sent at once, and the others are counted. */
 static void test_after_a_long_silence(void **state)
 {
     (void)state;

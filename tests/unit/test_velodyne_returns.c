@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* VLP-16 data packets: return modes, what is lost, and what a device of this kind would never send. */
+/* VLP-16 data packets: return modes, losses, and streams that a device of this kind would never send. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -27,7 +27,7 @@ static int teardown(void **state)
     return 0;
 }
 
-/* Of packet i, block 0..11, entry 0..31: at the published places. */
+/* Returns the range of packet i, block 0..11, entry 0..31, at the published places. */
 static uint32_t range_units(uint32_t i, int block, int entry)
 {
     assert_true(i < rig.n_units);
@@ -68,8 +68,8 @@ static uint64_t unsent(void)
     return rig.count[PROTOCOL_PULSES_UNSENT];
 }
 
-/* The even block of a pair has the last return, the odd one the strongest, or where that is the last the
- * second strongest; a single return stands in both (user manual, 9.3.2). */
+/* The even block of a pair has the last return, and the odd one the strongest, or the second strongest where that is
+ * the last. A single return is in both (user manual, 9.3.2). */
 static void test_dual_returns(void **state)
 {
     (void)state;
@@ -80,19 +80,19 @@ static void test_dual_returns(void **state)
     } cases[] = {
         {{0, {0}, {0}, {0}}, 0, 0, 0, 0},
         {{1, {10.0}, {-300}, {0}}, 5000, 5000, 50, 50},
-        /* the first the stronger one, by reflectance and by range */
+        /* The first is the stronger one, by reflectance and by range. */
         {{2, {10.0, 20.0}, {-300, -1000}, {0}}, 10000, 5000, 10, 50},
-        /* the last the stronger one: 7 dB more reflectance against 6 dB of range */
+        /* The last is the stronger one: 7 dB more reflectance against 6 dB of range. */
         {{2, {10.0, 20.0}, {-1000, -300}, {0}}, 10000, 5000, 50, 10},
-        /* 5 dB of reflectance don't make up for 6 dB of range, but three do where the range is the same
-         * within a metre */
+        /* 5 dB of reflectance don't make up for 6 dB of range, but three do where the range is the same within a
+         * metre. */
         {{3, {10.0, 20.0, 21.0}, {-1000, -700, -1000}, {0}}, 10500, 5000, 10, 10},
         {{3, {10.0, 20.0, 21.0}, {-1000, -550, -2000}, {0}}, 10500, 5000, 1, 10}, /* nor do 4.5 dB */
         {{3, {10.0, 20.0, 21.0}, {-2000, -700, -1000}, {0}}, 10500, 10000, 10, 20},
         {{3, {10.0, 11.0, 21.0}, {-1000, -700, 0}, {0}}, 10500, 5500, 100, 20},
-        /* the last is the strongest of three; then the first, of the two before it */
+        /* The last is the strongest of three; then the first, of the two before it. */
         {{3, {10.0, 11.0, 12.0}, {-700, -1000, 0}, {0}}, 6000, 5000, 100, 20},
-        /* not modelled: the nearest is the strongest */
+        /* They are not modelled, so the nearest is the strongest. */
         {{2, {10.0, 20.0}, {INT16_MIN, INT16_MIN}, {0}}, 10000, 5000, 0, 0},
     };
     enum { N = sizeof cases / sizeof cases[0] };
@@ -114,8 +114,7 @@ static void test_dual_returns(void **state)
     }
 }
 
-/* Ranges are 2 mm a unit, rounded. Where there is no number for one, the entry says no return, and it is
- * counted. */
+/* Ranges are 2 mm a unit, rounded. If no number fits, the entry has no return, and it is counted. */
 static void test_range_units(void **state)
 {
     (void)state;
@@ -152,7 +151,7 @@ static void test_reflectivities(void **state)
         assert_int_equal(velodyne_reflectivity(cdb) == 255, cdb >= 3080);
     }
     assert_int_equal(velodyne_reflectivity(INT16_MIN), 0);
-    /* in a packet: the same ones */
+    /* A packet has the same ones. */
     struct protocol_rig_shot shot[384];
     for (int i = 0; i < 384; i++)
         shot[i] = (struct protocol_rig_shot){.n = 1, .range_m = {5.0}, .refl_cdb = {(int16_t)(-3000 + 17 * i)}};
@@ -162,7 +161,7 @@ static void test_reflectivities(void **state)
         assert_int_equal(reflectivity(0, i / 32, i % 32), velodyne_reflectivity(-3000 + 17 * i));
 }
 
-/* After pulses that the head did not send the next packet begins with the next firing sequence. What was begun is not
+/* After pulses that the head did not send the next packet begins with the next firing sequence. The begun packet is not
  * sent, and its pulses are counted: no reader was too slow. */
 static void test_lost_pulses(void **state)
 {
@@ -182,7 +181,7 @@ static void test_lost_pulses(void **state)
     }
 }
 
-/* gap() alone: the pulses may go on where they were, but something was lost between them. */
+/* gap() alone: the pulses may go on where they were, but frames were lost between them. */
 static void test_gap(void **state)
 {
     (void)state;
@@ -193,7 +192,7 @@ static void test_gap(void **state)
     assert_int_equal(lost(), 1);
     assert_int_equal(rig.n_units, 1);
     assert_int_equal(range_units(0, 0, 0), 10000);
-    /* a gap between two packets costs nothing */
+    /* A gap between two packets costs nothing. */
     rig.ops->gap(rig.protocol, 1);
     velodyne_head_fire_alike(&rig, 432, 384, 20.0);
     assert_int_equal(lost(), 1);
@@ -201,7 +200,7 @@ static void test_gap(void **state)
     assert_int_equal(rig.n_units, 2);
 }
 
-/* The end of a scan: what is left of a packet is not padded, and is no loss of a reader. The next scan begins with its
+/* At the end of a scan the rest of a packet is not padded, and is no loss of a reader. The next scan begins with its
  * pulse 0. */
 static void test_end_of_scan(void **state)
 {
@@ -220,7 +219,7 @@ static void test_end_of_scan(void **state)
     assert_int_equal(range_units(2, 0, 0), 10000);
 }
 
-/* A client that joins in the middle of a scan and of a sequence. */
+/* A client joins in the middle of a scan and of a sequence. */
 static void test_joined_late(void **state)
 {
     (void)state;
@@ -230,7 +229,7 @@ static void test_joined_late(void **state)
     assert_int_equal(lost(), 0);
 }
 
-/* Another return mode between two blocks: no packet has both, and the byte says which. */
+/* The return mode changes between two blocks. No packet has both, and the byte says which. */
 static void test_mode_changes(void **state)
 {
     (void)state;
@@ -255,7 +254,7 @@ static void test_mode_changes(void **state)
         left += (pulse - from) % per_packet;
     }
     assert_int_equal(lost(), 0);
-    /* the repeated frames of each second change nothing */
+    /* The repeated frames of each second change nothing. */
     protocol_rig_clear(&rig);
     velodyne_head_fire_alike(&rig, pulse, 92, 5.0);
     protocol_rig_describe(&rig, 0);
@@ -264,7 +263,7 @@ static void test_mode_changes(void **state)
     assert_int_equal(unsent(), before);
 }
 
-/* Another rate of turns: the packet at hand goes on, and so does the azimuth. */
+/* The rate of turns changes. The current packet goes on, and so does the azimuth. */
 static void test_rpm_changes(void **state)
 {
     (void)state;
@@ -283,8 +282,7 @@ static void test_rpm_changes(void **state)
     }
 }
 
-/* A head that this device can't be: other beams, a line head, first echoes. Nothing is sent; pulses are
- * counted. */
+/* This device can't be such a head: other beams, a line head, first echoes. Nothing is sent, and pulses are counted. */
 static void test_other_heads(void **state)
 {
     (void)state;
@@ -311,8 +309,7 @@ static void test_line_head(void **state)
     assert_int_equal(unsent(), 400);
 }
 
-/* The model byte by the elevations: those of the Puck Hi-Res in the order of its table; what is neither
- * reads VLP-16. */
+/* The elevations decide the model byte: those of the Puck Hi-Res in the order of its table. Any others give VLP-16. */
 static void test_models(void **state)
 {
     (void)state;
@@ -330,7 +327,7 @@ static void test_models(void **state)
     assert_int_equal(lost(), 0);
 }
 
-/* Without room a packet is lost, whole, and the next one is as it would have been. */
+/* Without room a packet is lost, whole, and the next one is unchanged. */
 static void test_no_room(void **state)
 {
     (void)state;
@@ -345,7 +342,7 @@ static void test_no_room(void **state)
     assert_int_equal(lost(), 0); /* the session's owner counts that one */
 }
 
-/* Frames of any content, as a client that speaks to us: no packet of another length, and the module goes on. */
+/* Frames have any content. No packet has another length, and the module goes on. */
 static void test_any_frames(void **state)
 {
     (void)state;
@@ -373,7 +370,7 @@ static void test_any_frames(void **state)
     assert_int_equal(range_units(0, 11, 31), 5000);
 }
 
-/* A UDP link brings nothing in; elsewhere it is counted. */
+/* A UDP link has no input; elsewhere it is counted. */
 static void test_input_is_counted(void **state)
 {
     (void)state;

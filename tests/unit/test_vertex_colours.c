@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours of vertices: as PLY, OBJ and what Assimp reads have them; between the corners at a hit; after a texture, before
- * the material's colour; and nothing of it where a mesh has none, or nobody wants them. */
+/* Colours of vertices in PLY, OBJ and the formats that Assimp reads. They are interpolated between the corners at a
+ * hit. They count after a texture and before the material's colour. A mesh without any is unchanged, as is a load that
+ * does not want them. */
 #include <math.h>
 
 #include "core/cast.h"
@@ -20,7 +21,7 @@ static struct scene *take(const char *name, const char *text, int textures)
     return s;
 }
 
-/* The colour of corner c of triangle i. */
+/* Checks the colour of corner c of triangle i. */
 static void check(const struct scene *s, uint32_t i, int c, int r, int g, int b)
 {
     const uint8_t *at = s->rgb[i][c];
@@ -88,7 +89,7 @@ static void ply_by_face(void **state)
     scene_free(s);
 }
 
-/* As photogrammetry writes them; a weight is no colour. */
+/* The forms are those of photogrammetry; a weight is no colour. */
 static void obj_of_two_ranges(void **state)
 {
     (void)state;
@@ -113,7 +114,8 @@ static void obj_of_two_ranges(void **state)
     scene_free(s);
 }
 
-/* Numbers that rounding left above 1, or a few that shine, make no file one of 0 to 255. They are cut to 1, and counted. */
+/* Numbers that rounding left above 1, or a few that shine, do not make a file one of 0 to 255. They are cut to 1, and
+ * counted. */
 static void a_little_above_one(void **state)
 {
     (void)state;
@@ -177,7 +179,7 @@ static void nothing_is_spent_without(void **state)
     scene_free(s);
 }
 
-/* Kept with their triangles: where surfaces go, where copies are written out. */
+/* Colours stay with their triangles where surfaces are left out, and where copies are written out. */
 static void colours_stay_with_triangles(void **state)
 {
     (void)state;
@@ -206,7 +208,8 @@ static void colours_stay_with_triangles(void **state)
 
 /* ---- at hits */
 
-/* By hand: the board's lower right half is between red, green and blue, its upper left one between red, blue and white. */
+/* Worked out by hand: the board's lower right half is between red, green and blue, its upper left one between red, blue
+ * and white. */
 static void expected(double x_m, double z_m, double rgb[3])
 {
     const double u = (x_m + 2.0) / 4.0, v = (z_m + 2.0) / 4.0;
@@ -216,7 +219,7 @@ static void expected(double x_m, double z_m, double rgb[3])
     rgb[2] = 255.0 * (w[2] + (v > u ? w[1] : 0.0));
 }
 
-/* One line of 200 pulses through the board, upwards; its points, with colours, and labels with reflectances. */
+/* Casts one line of 200 pulses through the board, upwards: its points, with colours, and labels with reflectances. */
 static void cast_line(const struct scene *scene, const struct cast_setup *setup, struct line_block *block)
 {
     static const struct schedule_spec spec = {.prr_uhz = 20000000000,
@@ -285,7 +288,7 @@ static void hits_have_the_colour_between(void **state)
     scene_free(s);
 }
 
-/* A rule says nothing of the reflectance: it is the colour's luminance, 0.2126 of red and so on, in linear light. */
+/* If a rule has no reflectance it is the colour's luminance, 0.2126 of red and so on, in linear light. */
 static void hits_reflect_as_their_colour(void **state)
 {
     (void)state;
@@ -314,7 +317,7 @@ static void hits_reflect_as_their_colour(void **state)
     surface_table_free(&table);
 }
 
-/* One rule: texture, else the colour between the vertices, else the material's, else grey. */
+/* There is one rule: texture, else the colour between the vertices, else the material's, else grey. */
 static void the_order_of_colours(void **state)
 {
     (void)state;

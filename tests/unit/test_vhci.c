@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Plugging into vhci_hcd, with files in place of the kernel's. The lines of `status` are as Linux 6.1 prints them. */
+/* Plugging into vhci_hcd, with files in place of the kernel's. The lines of `status` are those that Linux 6.1
+ * prints. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

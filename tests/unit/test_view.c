@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points in perspective: where they are, which are seen, how they are lit, and from where all is seen. */
+/* Points in perspective: their places, which are visible, their shading, and an eye that sees all. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -45,7 +45,7 @@ static const uint8_t *at(const struct picture *p, uint32_t column, uint32_t row)
 }
 
 /* A field of 90 degrees across 200 pixels: f = 100 / tan 45 = 100 pixels. A point that is r to the right and u above
- * the axis at depth d is at column 100 + 100 r / d, row 75 - 100 u / d. All figures here by hand. */
+ * the axis at depth d is at column 100 + 100 r / d, row 75 - 100 u / d. All figures here are worked out by hand. */
 static void test_pinhole(void **state)
 {
     (void)state;
@@ -69,7 +69,7 @@ static void test_pinhole(void **state)
         assert_int_equal(view_project(view, cases[i].p, place, &depth_m), 1);
         assert_true(fabs(place[0] - cases[i].column) < 1e-9 && fabs(place[1] - cases[i].row) < 1e-9);
         assert_true(fabs(depth_m - cases[i].depth) < 1e-12);
-        /* A point a pixel wide colours the pixel that has it, and those it reaches over to: no farther than one. */
+        /* A point a pixel wide colours its own pixel, and those that it reaches over to, no farther than one. */
         add(view, cases[i].p[0], cases[i].p[1], cases[i].p[2], red);
         struct picture picture = draw(view, 0);
         double sum[2] = {0, 0}, weight = 0;
@@ -89,7 +89,7 @@ static void test_pinhole(void **state)
     }
 }
 
-/* Nearer points hide farther ones, whichever comes first; and discs of a wall hide what is behind them. */
+/* Nearer points hide farther ones, in any order. Discs of a wall hide what is behind them. */
 static void test_hidden(void **state)
 {
     (void)state;
@@ -129,8 +129,8 @@ static void test_counts(void **state)
     view_free(view);
 }
 
-/* A wall 10 m away and a sheet of 4 x 4 m 2 m before it. Without shading all have their colour. With it the wall is
- * even away from the edges, and dark beside the sheet, which is not dark there. */
+/* A wall is 10 m away, and a sheet of 4 x 4 m 2 m before it. Without shading all have their colour. With it the wall is
+ * even away from the edges, and dark beside the sheet. The sheet is not dark there. */
 static void test_shade(void **state)
 {
     (void)state;
@@ -148,8 +148,8 @@ static void test_shade(void **state)
     for (uint32_t row = 20; row < 40; row++) /* seen straight on: the light is the same everywhere; steps are 3 */
         for (uint32_t column = 20; column < 60; column++)
             assert_true(abs(at(&lit, column, row)[0] - wall) <= 3);
-    /* the sheet's last point is at 100 + 100 * 1.95 / 8 = 124.4, and half a pixel wide; dark is what is beside it, by
-     * half and more: all four distances reach over the edge there */
+    /* The sheet's last point is at 100 + 100 * 1.95 / 8 = 124.4, and half a pixel wide. The part beside it is dark, by
+     * half and more: all four distances reach over the edge there. */
     const uint8_t beyond = at(&lit, 125, 75)[0], within = at(&lit, 122, 75)[0];
     assert_true(beyond < wall - 60);
     assert_true(abs(within - wall) <= 9);
@@ -178,7 +178,7 @@ static void test_range(void **state)
     view_free(view);
 }
 
-/* All corners of the box are in the image, and one of them is near a border, from whichever side. */
+/* All corners of the box are in the image, and one of them is near a border, from any side. */
 static void test_frame(void **state)
 {
     (void)state;
@@ -200,7 +200,7 @@ static void test_frame(void **state)
             assert_int_equal(view_project(view, p, place, &depth_m), 1);
             share = fmax(share, fmax(fabs(place[0] / 150 - 1), fabs(place[1] / 100 - 1)));
         }
-        /* a box that is a line is not looked at from within, however small it looks along its length */
+        /* A box that is a line is not seen from within, however small it looks along its length. */
         if (!(share <= 1 && share > (k % 4 == 2 ? 0.1 : 0.85)))
             fail_msg("case %d: %g of the way to the border", k, share);
         view_free(view);
@@ -256,7 +256,7 @@ static void ramp(const void *ctx, double value, uint8_t rgb[3])
     view_ramp(value, rgb);
 }
 
-/* A legend and stations change the picture within its borders, whatever they are given. */
+/* A legend and stations change the picture within its borders, for any values. */
 static void test_marks(void **state)
 {
     (void)state;
@@ -265,8 +265,8 @@ static void test_marks(void **state)
     struct sh_err err;
     struct view_entry entry[VIEW_MAX_NAMES] = {{{255, 0, 0}, "a"}};
     assert_int_equal(picture_make(&picture, 200, 150, white, &err), SH_OK);
-    /* one before the eye, one behind it, one beside the image; two more at nearly the same place: one name fits on the
-     * left of its mark, none is left for the other */
+    /* One is before the eye, one behind it, one beside the image. Two more are at nearly the same place: one name fits
+     * on the left of its mark, and there is no room for the other. */
     const struct view_station stations[] = {{{1, 10, 0}, "here"},
                                             {{0, -10, 0}, "behind"},
                                             {{30, 10, 0}, "beside"},
@@ -275,11 +275,12 @@ static void test_marks(void **state)
     assert_int_equal(view_draw_stations(view, &picture, stations, 3), 0);
     assert_int_equal(view_draw_stations(view, &picture, stations, 5), 1);
     assert_memory_equal(at(&picture, 110, 74), ((const uint8_t[3]){214, 39, 40}), 3);
-    /* steps of the legend that no double is apart, and a span that no double holds: both end */
+    /* Steps of the legend that no double can represent, and a span that no double can hold, both end. */
     const struct view_colours colours = {ramp, NULL, 0, {255, 255, 255}, NULL};
     view_draw_scale(&picture, "Range", 1e15, 1e15 + 0.125, &colours);
     view_draw_scale(&picture, "Range", -1e308, 1e308, &colours);
-    /* two marks where the name of a third could be, to its right and to its left: both stay, the name is left out */
+    /* Two marks are where the name of a third could be, to its right and to its left. Both stay, and the name is left
+     * out. */
     const struct view_station row[] = {{{-3, 10, -3}, "name"}, {{-1, 10, -3}, ""}, {{-5, 10, -3}, ""}};
     assert_int_equal(view_draw_stations(view, &picture, row, 3), 1);
     for (uint32_t column = 50; column <= 90; column += 20)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead view` makes of a recording: files into points, points and triangles into bytes, queries into answers.
+/* `scanhead view` and a recording: files become points, points and triangles become bytes, queries become answers.
  * Expected values are worked out by hand. */
 #include <math.h>
 #include <setjmp.h>
@@ -20,7 +20,7 @@
 static struct sh_err err;
 static char path[64];
 
-/* A PLY file of the test's own, as text; its name is good until the next one. */
+/* Writes a PLY file of the test's own, as text. Its name is good until the next one. */
 static const char *write_ply(const char *comments, const char *properties, int n, const char *rows)
 {
     snprintf(path, sizeof path, "/tmp/test_viewed.XXXXXX.ply");
@@ -141,7 +141,7 @@ static void wrong_files_are_refused(void **state)
 
 enum { N = 5 };
 
-/* Five points on a line, of stations 1 to 5; the clock begins at 100 s. */
+/* Five points are on a line, of stations 1 to 5; the clock begins at 100 s. */
 static void fill(struct viewed_points *p)
 {
     memset(p, 0, sizeof *p);
@@ -280,7 +280,7 @@ static void requests(void **state)
     viewed_free(&v);
 }
 
-/* Latitudes beyond a pole, and coordinates of which squares are no numbers any more: left out, counted. */
+/* Latitudes beyond a pole, and coordinates whose squares are no numbers any more, are left out and counted. */
 static void places_beyond_any_are_left_out(void **state)
 {
     static const char geodetic[] = "52.5 13.4 35\n95 13.4 35\n-91 0 0\n52.5 13.4 1e300\n52.5001 13.4 35\n",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Nobody sleeps for ever: bells, and the whole loop with queues of a few ticks, where each thread waits for each other
- * one again and again. A lost wake-up shows as a time-out. */
+/* No thread sleeps for ever. The tests have wake-ups alone, and the whole loop with queues of a few ticks, where each
+ * thread waits for each other one again and again. A lost wake-up shows as a time-out. */
 #include "tests/unit/device_rig.h"
 
 #include <poll.h>
@@ -131,7 +131,7 @@ struct loop_case {
     uint64_t leaves;
 };
 
-/* Runs it to its end in time; the stream's hash. */
+/* Runs it to its end in time, and writes the stream's hash. */
 static void run_case(const struct loop_case *c, uint64_t seed, char sha256[65])
 {
     int fd[2], n_sets = 0;
@@ -169,7 +169,7 @@ static void run_case(const struct loop_case *c, uint64_t seed, char sha256[65])
 
 enum { EVERY = SANITIZED ? 5 : 1, STEPS = SANITIZED ? 250 : 600 };
 
-/* The same ticks in all of them, so the same bytes. */
+/* All of them have the same ticks, so the same bytes. */
 static void a_fast_loop_never_stands_still(void **state)
 {
     (void)state;

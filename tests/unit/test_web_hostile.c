@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What comes to a web link's port and is no request of a browser: each gets an answer and an end at once, and nobody
+/* Bytes at a web link's port that are no request of a browser. Each client gets an answer and an end at once, and none
  * keeps others out. Clients are bytes on a socket. */
 #include <sys/socket.h>
 #include <errno.h>
@@ -10,7 +10,7 @@
 
 enum { PLACES = 48, OF_ONE = 40 };
 
-/* text with @ as the link's place. */
+/* Writes the text with the link's place for @. */
 static size_t fill_in(char *to, size_t room, const char *text, size_t len, const char *place)
 {
     size_t n = 0;
@@ -24,7 +24,7 @@ static size_t fill_in(char *to, size_t room, const char *text, size_t len, const
     return n;
 }
 
-/* Sends it, and reads to the connection's end. The status; 0: it ended without a byte. */
+/* Sends it, and reads to the connection's end. Returns the status; 0: it ended without a byte. */
 static int send_raw(struct bench *bench, const char *place, const char *text, size_t len, char *answer, size_t room)
 {
     static char bytes[30000];
@@ -58,7 +58,7 @@ static const struct {
     CASE("GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\nHost: localhost:99999\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\nHost: local host\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400), /* what follows is not waited for */
+    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400), /* the link does not wait for more */
     CASE("GET / HTTP/1.1\r\n" HOST "X: a\0b", 400),
     CASE("GET / HTTP/1.1\r\n" HOST "X: a\rb\r\n", 400),
     CASE("GET / HTTP/1.1\r\n" HOST " folded\r\n\r\n", 400),
@@ -107,7 +107,7 @@ static void test_requests(void **state)
     bench_close(&bench);
 }
 
-/* As many arguments and fields as fit into a request. */
+/* There are as many arguments and fields as fit into a request. */
 static void test_many(void **state)
 {
     (void)state;
@@ -146,7 +146,7 @@ static int is_open(int fd)
     return recv(fd, &byte, 1, MSG_PEEK | MSG_DONTWAIT) < 0 && errno == EAGAIN;
 }
 
-/* Whoever fills the places, with what he likes, and comes again: a browser is answered each time. */
+/* Clients fill the places, with any bytes, and come again. A browser is answered each time. */
 static void test_nobody_is_shut_out(void **state)
 {
     (void)state;
@@ -166,7 +166,7 @@ static void test_nobody_is_shut_out(void **state)
     bench_close(&bench);
 }
 
-/* One address has some of the places, its newest ones; the clients of another one stay. */
+/* One address keeps some of the places, those of its newest clients. The client of another one stays. */
 static void test_one_address(void **state)
 {
     (void)state;
@@ -189,7 +189,7 @@ static void test_one_address(void **state)
     bench_close(&bench);
 }
 
-/* Half a request that has to go is told so. A client that reads is not cut off by its own crowd. */
+/* Half a request that has to go gets an answer. A client that reads is not cut off by others of its address. */
 static void test_who_makes_room(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Who makes room at a web link. */
+/* These are tests of the choice of the client that makes room at a web link. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <string.h>
@@ -49,7 +49,7 @@ static void test_who_goes(void **state)
     assert_int_equal(take(3, 100), WEB_PLACES_OF_ONE);
 }
 
-/* An answer that is taken stays; one that nobody takes is silent. */
+/* A client that takes its answer stays. One that does not is silent. */
 static void test_answers(void **state)
 {
     (void)state;

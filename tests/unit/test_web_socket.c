@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of a client that break RFC 6455, and those that keep it: with which code its session ends. */
+/* Frames of a client that break RFC 6455, and those that keep it, and the code with which its session ends. */
 #include <sys/socket.h>
 #include <stdio.h>
 #include <string.h>
@@ -47,7 +47,7 @@ static const struct {
     CASE("\x88\x83" MASK "\x03\xe8\xff", 0), /* the reason is no UTF-8 */
 };
 
-/* The code of the close frame that comes next: -1: it has none; 0: the connection ends without one. */
+/* Returns the code of the next close frame: -1: it has none; 0: the connection ends without one. */
 static int take_code(struct bench *bench, int fd)
 {
     uint8_t payload[200], head[2];
@@ -58,7 +58,7 @@ static int take_code(struct bench *bench, int fd)
     return head[1] == 0 ? -1 : payload[0] << 8 | payload[1];
 }
 
-/* From its first byte, and byte by byte. The close frame is the last one, whatever the owner has to say. */
+/* Bytes come at once, and byte by byte. The close frame is the last one, even when the owner has more to write. */
 static void test_ends(void **state)
 {
     (void)state;
@@ -86,8 +86,8 @@ static void test_ends(void **state)
     bench_close(&bench);
 }
 
-/* Pings are answered, between the pieces of a message, too; pongs that nobody asked for are not. A frame without a mask is
- * taken: libwebsockets does not say that it has none. */
+/* Pings are answered, even between the pieces of a message; unsolicited pongs are not. A frame without a mask is
+ * accepted, as libwebsockets does not report that. */
 static void test_pings(void **state)
 {
     (void)state;
@@ -112,7 +112,7 @@ static void test_pings(void **state)
     bench_close(&bench);
 }
 
-/* A frame behind the request, in the same piece. */
+/* A frame comes after the request, in the same piece. */
 static void test_early_frames(void **state)
 {
     (void)state;

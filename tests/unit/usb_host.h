@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the USB tests share: a host's side of the device core. */
+/* Shared by the USB tests: a host's side of the device core. */
 #ifndef TESTS_UNIT_USB_HOST_H
 #define TESTS_UNIT_USB_HOST_H
 
@@ -28,26 +28,26 @@ struct host {
     int n_requests;
 };
 
-/* Vendor request 0x55: reads four bytes, 0x66: writes. Others are refused. */
+/* Vendor request 0x55 reads four bytes, and 0x66 writes. Others are refused. */
 int host_request(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
 
 struct host *host_new(const struct usb_model *model, enum usb_rate highest, enum usb_rate rate);
 
 void host_free(struct host *host);
 
-/* A control transfer. out: wLength bytes for OUT. What comes in is left in host_in, whose bytes behind wLength must
- * stay as they were. */
+/* Makes a control transfer. out: wLength bytes for OUT. Received bytes are in host_in, whose further bytes must not
+ * change. */
 extern uint8_t host_in[70000];
 
 int host_control(struct host *host, unsigned type, unsigned request, unsigned value, unsigned index, unsigned length,
                  const void *out);
 
-/* Default -> addressed -> configured. */
+/* The device goes from default to addressed to configured. */
 void host_configure(struct host *host);
 
 struct usb_transfer *host_submit(struct host *host, uint64_t id, uint8_t endpoint, const void *out, uint32_t length);
 
-/* The next completed one must be this, so; frees it. */
+/* The next completed transfer must be this one, with these values. Frees it. */
 void host_expect(struct host *host, uint64_t id, enum usb_status status, uint32_t actual);
 
 #endif

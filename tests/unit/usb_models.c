@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/usb_models.h"
 
-/* A vendor class with one bulk pair, that is all. */
+/* This is a vendor class with only one bulk pair. */
 static const struct usb_endpoint_row pair_endpoints[] = {
     {.address = 0x81, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}, .burst = 3},
     {.address = 0x02, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}}};
@@ -26,7 +26,7 @@ const struct usb_model pair_model = {.bcd_device = 0x0234,
                                      .n_rows = 1,
                                      .ms_vendor_code = 0x42};
 
-/* Two interfaces; the first has nothing in its alternate setting 0, and a bulk pair and an interrupt in 1. */
+/* Two interfaces. The first has nothing in its alternate setting 0, and a bulk pair and an interrupt in 1. */
 static const struct usb_endpoint_row alt_endpoints[] = {
     {.address = 0x81, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}},
     {.address = 0x01, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}},

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Devices as tables, for tests: other devices than the scanner head need no code. */
+/* Devices as tables, for tests. Other devices than the scanner head need no code. */
 #ifndef TESTS_UNIT_USB_MODELS_H
 #define TESTS_UNIT_USB_MODELS_H
 

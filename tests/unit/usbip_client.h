@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A USB/IP client without a kernel, against a usb link: the test polls the link itself, so one thread plays both
+/* This is a USB/IP client without a kernel, for a usb link. The test polls the link itself, so one thread plays both
  * ends. Numbers are written out from the kernel's Documentation/usb/usbip_protocol.rst. */
 #ifndef TESTS_UNIT_USBIP_CLIENT_H
 #define TESTS_UNIT_USBIP_CLIENT_H
@@ -32,7 +32,7 @@ struct bench usbip_bench(const char *serial);
 
 int client_connect(struct bench *bench);
 
-/* All len bytes, while the link does its part. 0: the link hung up instead. */
+/* Reads all len bytes, while the link does its part. Returns 0 when the link hung up instead. */
 int client_read(struct client *c, void *data, size_t len);
 
 void client_write(struct client *c, const void *data, size_t len);
@@ -45,12 +45,12 @@ uint32_t client_submit(struct client *c, int in, uint32_t ep, const void *setup,
 
 uint32_t client_unlink(struct client *c, uint32_t victim);
 
-/* in: the URB that is expected back carries data. */
+/* Reads a reply. in: the expected URB carries data. */
 int client_reply(struct client *c, struct reply *r, int in);
 
 void client_import(struct client *c, struct bench *bench);
 
-/* A control transfer; returns its status. What it reads is in r. */
+/* Makes a control transfer and returns its status. The received bytes are in r. */
 int client_control(struct client *c, struct reply *r, unsigned type, unsigned request, unsigned value, unsigned index,
                    unsigned length, const void *out);
 

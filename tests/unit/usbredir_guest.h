@@ -15,7 +15,7 @@
 
 enum { MAX_SEEN = 64 };
 
-/* What came from the device, in order. */
+/* The packets from the device, in order. */
 struct seen {
     int type;
     uint64_t id;
@@ -47,13 +47,13 @@ int guest_socket(void);
 
 void guest_turn(struct guest *g, uint32_t want_write);
 
-/* Until n packets have been seen. */
+/* Waits until n packets have been seen. */
 struct seen *guest_await(struct guest *g, int n);
 
-/* On a connected socket, which it takes over; it says hello with the next turns. */
+/* Begins on a connected socket, which it takes over. It says hello with the next turns. */
 struct guest *guest_begin(struct bench *bench, int fd);
 
-/* The same. It has the device when it returns. */
+/* The same, but it has the device when it returns. */
 struct guest *guest_on(struct bench *bench, int fd);
 
 struct guest *guest_new(struct bench *bench);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* In place of the tests of usbredir where its parser is missing: they are skipped, and say why. */
+/* Replaces the tests of usbredir where its parser is missing: they are skipped, with the reason. */
 #ifndef TESTS_UNIT_USBREDIR_MISSING_H
 #define TESTS_UNIT_USBREDIR_MISSING_H
 

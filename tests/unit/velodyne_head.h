@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Firings of a VLP-16 for a protocol under test: pulse k of the scan is beam k mod 16 of sequence k div 16,
- * at the times of the data sheet, at the azimuth that the turn has then. */
+/* Firings of a VLP-16 for a protocol under test. Pulse k of the scan is beam k mod 16 of sequence k div 16, at the
+ * times of the data sheet, at the turn's azimuth of that time. */
 #ifndef TESTS_UNIT_VELODYNE_HEAD_H
 #define TESTS_UNIT_VELODYNE_HEAD_H
 
@@ -8,20 +8,20 @@
 
 enum { SEQUENCE_NS = 55296, FIRING_NS = 2304 };
 
-/* The protocol for a VLP-16 at 10 turns a second that sends the strongest echo. */
+/* Opens the protocol for a VLP-16 at 10 turns a second that sends the strongest echo. */
 void velodyne_head_open(struct protocol_rig *rig);
 
-/* Since the scan's start, of pulse k: 55.296 us a sequence, 2.304 us a firing. */
+/* Returns the time of pulse k since the scan's start: 55.296 us a sequence, 2.304 us a firing. */
 int64_t velodyne_head_ns(uint64_t pulse);
-/* Turns of the head at pulse k. rpm: 600. */
+/* Returns the turns of the head at pulse k. rpm: 600. */
 double velodyne_head_turns(uint64_t pulse, double rpm);
-/* Elevation of a beam, degrees. */
+/* Returns the elevation of a beam in degrees. */
 int velodyne_head_elevation_deg(uint32_t beam);
 
-/* One points frame of n pulses from pulse0 on, n <= 4096. turn0: where pulse 0 of the scan looked. */
+/* Fires one points frame of n pulses from pulse0 on, n <= 4096. turn0: the azimuth of pulse 0 of the scan. */
 void velodyne_head_fire(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, const struct protocol_rig_shot *shot,
                         double rpm, double turn0);
-/* The same with one range for all. */
+/* Does the same with one range for all. */
 void velodyne_head_fire_alike(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, double range_m);
 void velodyne_head_event(struct protocol_rig *rig, uint32_t code);
 

@@ -51,7 +51,7 @@ int web_dial(const char *place)
     return web_dial_from(place, 1);
 }
 
-/* Lets the link work until the client has something, or its end. Bytes read, or 0 at the end. */
+/* Lets the link work until the client has bytes, or its end. Returns the bytes read, or 0 at the end. */
 size_t web_listen_to(struct bench *bench, int fd, void *buf, size_t len)
 {
     int64_t end = now_ms() + DEADLINE_MS;
@@ -66,7 +66,8 @@ size_t web_listen_to(struct bench *bench, int fd, void *buf, size_t len)
     }
 }
 
-/* The whole answer to a request with these fields: its status, or 0 where the connection ended without a byte. */
+/* Reads the whole answer to a request with these fields. Returns its status, or 0 where the connection ended without a
+ * byte. */
 int web_ask(struct bench *bench, const char *place, const char *line, const char *fields, char **body, size_t *len)
 {
     enum { ROOM = 4 << 20 };
@@ -102,7 +103,7 @@ int web_status_of(struct bench *bench, const char *place, const char *line, cons
     return web_ask(bench, place, line, host, &body, &len);
 }
 
-/* A WebSocket; 0: it was turned down. */
+/* Opens a WebSocket. Returns 0 where it was turned down. */
 int web_upgrade(struct bench *bench, const char *place, const char *path, const char *fields)
 {
     char text[1000], answer[1000];
@@ -113,7 +114,7 @@ int web_upgrade(struct bench *bench, const char *place, const char *path, const 
              path, place, fields);
     assert_int_equal(send(fd, text, strlen(text), MSG_NOSIGNAL), strlen(text));
     size_t n = 0, got;
-    do { /* no further than the head: messages may follow at once */
+    do { /* not beyond the head, as messages may follow at once */
         got = web_listen_to(bench, fd, answer + n, 1);
         n += got;
         answer[n] = '\0';
@@ -123,7 +124,7 @@ int web_upgrade(struct bench *bench, const char *place, const char *path, const 
     return 0;
 }
 
-/* A frame from the client, masked with zeros. */
+/* Sends a frame from the client, masked with zeros. */
 void web_send_frame(int fd, uint8_t first, const void *data, size_t len)
 {
     uint8_t frame[20000] = {first};
@@ -147,7 +148,7 @@ void web_take(struct bench *bench, int fd, uint8_t *to, size_t len)
     }
 }
 
-/* A frame from the link: its first byte; the payload, and its length. */
+/* Takes a frame from the link. Returns its first byte; writes the payload and its length. */
 uint8_t web_take_frame(struct bench *bench, int fd, uint8_t *payload, size_t *len)
 {
     uint8_t head[10];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A web link, and its clients: bytes on a socket, as RFC 9112 and RFC 6455 write them. */
+/* A web link, and its clients: bytes on a socket, in the form of RFC 9112 and RFC 6455. */
 #ifndef TESTS_UNIT_WEB_RIG_H
 #define TESTS_UNIT_WEB_RIG_H
 
@@ -8,24 +8,25 @@
 
 enum { WEB_SESSIONS = 2 };
 
-/* place: "127.0.0.1:40123". /scene is its owner's: 5 bytes, or 3 million with ?n=big. */
+/* place: "127.0.0.1:40123". Its owner answers /scene: 5 bytes, or 3 million with ?n=big. */
 struct bench web_open(char place[64]);
 int web_dial(const char *place);
-/* The same from 127.0.0.LAST. */
+/* Does the same from 127.0.0.LAST. */
 int web_dial_from(const char *place, uint8_t last);
-/* Lets the link work until the client has something, or its end. Bytes read, or 0 at the end. */
+/* Lets the link work until the client has bytes, or its end. Returns the bytes read, or 0 at the end. */
 size_t web_listen_to(struct bench *bench, int fd, void *buf, size_t len);
-/* The whole answer to a request with these fields: its status, or 0 where the connection ended without a byte. */
+/* Reads the whole answer to a request with these fields. Returns its status, or 0 where the connection ended without a
+ * byte. */
 int web_ask(struct bench *bench, const char *place, const char *line, const char *fields, char **body, size_t *len);
-/* The same with a right Host. */
+/* Does the same with a right Host. */
 int web_status_of(struct bench *bench, const char *place, const char *line, const char *fields);
 
-/* A WebSocket; 0: it was turned down. */
+/* Opens a WebSocket. Returns 0 where it was turned down. */
 int web_upgrade(struct bench *bench, const char *place, const char *path, const char *fields);
-/* A frame from the client, masked with zeros. */
+/* Sends a frame from the client, masked with zeros. */
 void web_send_frame(int fd, uint8_t first, const void *data, size_t len);
 void web_take(struct bench *bench, int fd, uint8_t *to, size_t len);
-/* A frame from the link: its first byte; the payload, and its length. */
+/* Takes a frame from the link. Returns its first byte; writes the payload and its length. */
 uint8_t web_take_frame(struct bench *bench, int fd, uint8_t *payload, size_t *len);
 
 #endif

@@ -40,7 +40,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native)
     rig.list.n = n;
     rig.native = native;
     rig.now_ns = 1000 * MS;
-    rig.seq = UINT32_MAX - 5; /* and soon over its end */
+    rig.seq = UINT32_MAX - 5; /* its numbers soon wrap */
     if (n != 0) memcpy(rig.list.fault, fault, n * sizeof *fault);
     assert_int_equal(fault_board_create(&rig.list, NULL, NULL, &rig.board, &err), SH_OK);
     fault_board_listen(rig.board, keep_note, NULL);
@@ -153,7 +153,7 @@ void rig_drain(void)
         rig_take(1);
         if (wire_is_empty(rig.wire)) return;
         const int64_t next_ns = wire_next_ns(rig.wire);
-        assert_true(next_ns > rig.now_ns && next_ns != INT64_MAX); /* or nobody would ever wake it */
+        assert_true(next_ns > rig.now_ns && next_ns != INT64_MAX); /* else the wire would never be woken */
         rig.now_ns = next_ns;
     }
     fail_msg("it does not end");
@@ -171,12 +171,12 @@ void rig_expect(const int *items)
     assert_int_equal(at, rig.n_out);
 }
 
-/* ---- what should have come out, by the notes: each item has its place in the input, and what was held has the place
- * of the frame that it comes after. Sorted by that, it is the output. */
+/* ---- the expected output, by the notes: each item has its place in the input, and a held one has the place of the
+ * frame that it comes after. Sorted by that, it is the output. */
 
 struct chunk {
     uint64_t place; /* of an item, from 0; after the last ones: those in the order of their countings */
-    uint32_t rank;  /* at that place: what stands before the item, the item, what was held until it */
+    uint32_t rank;  /* its order at that place: pieces before the item, the item, pieces that were held until it */
     uint32_t order;
     int is_garbage;
     size_t len;
@@ -194,7 +194,7 @@ static int compare(const void *a, const void *b)
     return x->order < y->order ? -1 : x->order > y->order;
 }
 
-/* The place of frame `number` of a counting. */
+/* Returns the place of frame `number` of a counting. */
 static uint64_t place_of(int of, uint64_t number)
 {
     for (uint32_t i = 0; i < rig.n_items; i++)
@@ -256,7 +256,7 @@ static void apply(struct chunk *c, const struct rig_item *item, const struct fau
     }
 }
 
-/* Returns how many whole and right ones it gives. */
+/* Adds an item. Returns how many whole and right ones it gives. */
 static uint32_t add_item(uint32_t i)
 {
     const struct rig_item *item = &rig.item[i];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of faults on the wire: frames and replies go in, with a clock of the test's own, and what comes out is kept
- * with its times; and beside it what should have come out, by the notes of the faults alone. */
+/* For tests of faults on the wire. Frames and replies go in, with a clock of the test's own, and the output is kept
+ * with its times. The expected output, by the notes of the faults alone, is beside it. */
 #ifndef TESTS_UNIT_WIRE_RIG_H
 #define TESTS_UNIT_WIRE_RIG_H
 
@@ -28,7 +28,7 @@ struct rig_item {
     uint64_t number; /* in its counting, from 1 */
     size_t len;
     uint8_t bytes[RIG_UNIT];
-    uint32_t notes_from; /* what was noted while it was put begins here */
+    uint32_t notes_from; /* the notes of the last put begin here */
 };
 
 struct rig_write {
@@ -57,34 +57,34 @@ struct rig {
 };
 extern struct rig rig;
 
-/* A fault that strikes at each frame. */
+/* Returns a fault that strikes at each frame. */
 struct fault fault_of_kind(enum fault_kind kind);
-/* A session of link 1; native, or of a protocol whose units have a byte that is their sum at the end. */
+/* Opens a session of link 1. It is native, or of a protocol whose units have a byte that is their sum at the end. */
 void rig_open(const struct fault *fault, uint32_t n, int native);
 void rig_close(void);
-/* The same, for a test that failed before it did. */
+/* Closes the session of a test that failed before it did so. */
 int rig_teardown(void **state);
-/* A session with one fault, and so many frames of the stream; and its end: `whole` of them came whole and right. */
+/* Runs a session with one fault, so many frames of the stream, and its end: `whole` of them came whole and right. */
 void rig_run(const struct fault *fault, uint32_t n_frames);
 void rig_end(uint32_t whole);
 
-/* Puts one at now_ns; the clock goes on by 1 us. Bytes are random and different each time. */
+/* Puts a frame at now_ns; the clock goes on by 1 us. Bytes are random and different each time. */
 enum rig_frame { RIG_STREAM, RIG_POINTS, RIG_NOTICE, RIG_LOCAL };
-/* t_ns: device time in its header. pulse0: of points, which have 100 pulses. */
+/* t_ns: device time in its header. pulse0: for points, which have 100 pulses. */
 struct rig_item *rig_frame_at(enum rig_frame kind, size_t payload_len, int64_t t_ns, uint64_t pulse0);
 struct rig_item *rig_frame(enum rig_frame kind);
 struct rig_item *rig_reply(const char *line); /* without CR LF */
 struct rig_item *rig_unit(size_t len, int is_reply);
 
-/* Takes what may go out now; returns how many writes. last: nothing more comes. */
+/* Takes the pieces that may go out now. Returns how many writes there were. last: there is no more input. */
 uint32_t rig_take(int last);
-/* The same, with the clock going to each time at which something may. Fails when it does not end. */
+/* The same, with the clock going to each time at which something may. It fails when that does not end. */
 void rig_drain(void);
 
-/* What went out as bytes is that of the items of these numbers (from 0), one after the other; ends with -1. */
+/* The sent bytes are those of the items of these numbers (from 0), one after the other; ends with -1. */
 void rig_expect(const int *items);
-/* It is what the notes say, item by item; bytes of garbage are any. Returns how many frames or units came whole and
- * right. */
+/* The output is that of the notes, item by item; bytes of garbage are any. Returns how many frames or units came whole
+ * and right. */
 uint32_t rig_check_notes(void);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "tests/wire/room.h"
 
-/* Two stations, three pulse rates: six jobs of some ten thousand pulses. */
+/* Two stations and three pulse rates make six jobs of some ten thousand pulses. */
 static const char CONFIG[] =
     "head: {profile: any-rate, prr_hz: 100000, lines_hz: 50, pan_deg_s: 60, pan_stop_deg: 6}\n"
     "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
@@ -22,7 +22,7 @@ int batch_setup(void **state)
     return 0;
 }
 
-/* Folders of campaigns and what is in them. */
+/* Removes the folders of campaigns and their files. */
 int batch_teardown(void **state)
 {
     struct wire *wire = *state;

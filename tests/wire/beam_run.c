@@ -18,7 +18,7 @@ static struct beam_shot *shot_at(struct beam_run *run, uint64_t pulse)
     return &run->shot[pulse];
 }
 
-/* One echo at most: an entry is a pulse. */
+/* A pulse has one echo at most, so an entry is a pulse. */
 static void take_points(struct beam_run *run, struct scanhead *sh, const struct scanhead_frame *frame)
 {
     struct scanhead_point point[256];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A scan of the room with faults, made off line, as a native client has it: its shots by pulse number, its line ends,
- * and the truth about the faults. */
+/* This makes a scan of the room with faults, off line, as a native client receives it. It has its shots by pulse
+ * number, its line ends, and the truth about the faults. */
 #ifndef TESTS_WIRE_BEAM_RUN_H
 #define TESTS_WIRE_BEAM_RUN_H
 
@@ -23,7 +23,7 @@ struct beam_note {
 
 struct beam_run {
     struct beam_shot shot[BEAM_MAX_PULSES];
-    uint64_t pulses; /* after the last one that is there */
+    uint64_t pulses; /* one after the last pulse that is there */
     struct scanhead_line_end line[BEAM_MAX_LINES];
     uint32_t lines;
     struct scanhead_info info;
@@ -38,12 +38,12 @@ extern const struct room_config BEAM_ROOM;
 /* Records the room with these faults (YAML of the list's items; NULL: none) and settings (KEY=VALUE, ends with NULL; or
  * NULL). The run is the callee's, one for each `slot` of 0 and 1, until the next call. */
 const struct beam_run *beam_record(struct wire *wire, int slot, const char *faults, const char *const *sets);
-/* Of another room. */
+/* Does the same for another room. */
 const struct beam_run *beam_record_room(struct wire *wire, int slot, const struct room_config *room, const char *faults,
                                         const char *const *sets);
-/* The same of a stream and a truth that are there already. */
+/* The same for a stream and a truth that are there already. */
 const struct beam_run *beam_read(const struct wire *wire, int slot, const char *stream, const char *truth);
-/* The n-th note of a kind, from 0, that begins or ends it; it must be there. */
+/* Returns the n-th note of a kind, from 0, that begins or ends it. It fails where there is none. */
 const struct beam_note *beam_note(const struct beam_run *run, const char *kind, uint32_t n, int ended);
 
 #endif

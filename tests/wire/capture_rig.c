@@ -48,7 +48,7 @@ static void put_be32(uint8_t *to, uint32_t v)
     put_be16(to + 2, v);
 }
 
-/* RFC 791, 9293. Checksums are 0: tshark does not look at them unless asked to. */
+/* The layouts are those of RFC 791 and 9293. Checksums are 0: tshark does not look at them unless asked to. */
 void capture_segment(struct capture *c, uint32_t interface, struct capture_tcp *tcp, int from_head, const void *data,
                      size_t len)
 {
@@ -72,7 +72,7 @@ void capture_segment(struct capture *c, uint32_t interface, struct capture_tcp *
     capture_packet(c, interface, packet, ETHERNET_LEN + IP_LEN + TCP_LEN + len);
 }
 
-/* struct mon_bin_hdr of Linux, Documentation/usb/usbmon.rst. */
+/* The layout is struct mon_bin_hdr of Linux, Documentation/usb/usbmon.rst. */
 void capture_transfer(struct capture *c, uint32_t interface, uint8_t device, uint8_t endpoint, const void *data,
                       size_t len)
 {
@@ -91,7 +91,7 @@ void capture_transfer(struct capture *c, uint32_t interface, uint8_t device, uin
     capture_packet(c, interface, packet, USBMON_LEN + len);
 }
 
-/* Knuth's linear congruential generator; the upper bits. */
+/* Knuth's linear congruential generator, of which the upper bits are used. */
 uint32_t capture_random(uint64_t *state, uint32_t below)
 {
     *state = *state * 6364136223846793005u + 1442695040888963407u;

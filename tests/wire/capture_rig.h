@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Captures of the native protocol made by hand: TCP on Ethernet, USB bulk as usbmon has it, and frames in packets of
- * their own (link type 147), all in one pcapng. */
+/* Captures of the native protocol made by hand, all in one pcapng: TCP on Ethernet, USB bulk as usbmon has it, and
+ * frames in packets of their own (link type 147). */
 #ifndef TESTS_WIRE_CAPTURE_RIG_H
 #define TESTS_WIRE_CAPTURE_RIG_H
 
@@ -9,7 +9,7 @@
 
 enum capture_link { CAPTURE_ETHERNET = 1, CAPTURE_USER0 = 147, CAPTURE_USBMON = 220 };
 
-/* Begins as zeros; free() its bytes. */
+/* A capture begins as zeros; free() its bytes. */
 struct capture {
     uint8_t *bytes;
     size_t len, room;
@@ -23,18 +23,19 @@ struct capture_tcp {
 };
 
 void capture_begin(struct capture *capture);
-/* Returns its number. */
+/* Adds an interface and returns its number. */
 uint32_t capture_interface(struct capture *capture, enum capture_link link);
-/* One packet, whatever is in it. */
+/* Adds one packet with any bytes. */
 void capture_packet(struct capture *capture, uint32_t interface, const void *data, size_t len);
-/* One segment of at most 1460 bytes. */
+/* Adds one segment of at most 1460 bytes. */
 void capture_segment(struct capture *capture, uint32_t interface, struct capture_tcp *tcp, int from_head,
                      const void *data, size_t len);
-/* One bulk transfer of at most 64 KiB; of an IN endpoint its completion, of an OUT endpoint its submission. */
+/* Adds one bulk transfer of at most 64 KiB. For an IN endpoint that is its completion, for an OUT endpoint its
+ * submission. */
 void capture_transfer(struct capture *capture, uint32_t interface, uint8_t device, uint8_t endpoint, const void *data,
                       size_t len);
 
-/* Random lengths and places; *state is any number. */
+/* Draws lengths and places at random; *state is any number. */
 uint32_t capture_random(uint64_t *state, uint32_t below);
 
 #endif

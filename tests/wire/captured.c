@@ -167,7 +167,7 @@ void captured_check_talk(const struct captured *captured, uint16_t client_port, 
         const int side = p->from_port == server_port && p->to_port == client_port;
         if (p->is_udp || (!side && (p->from_port != client_port || p->to_port != server_port))) continue;
         assert_int_equal((p->flags & ACK) != 0, n > 0);
-        assert_int_equal(p->flags & SYN, n < 2 ? SYN : 0); /* a SYN, one with an ACK, and no further */
+        assert_int_equal(p->flags & SYN, n < 2 ? SYN : 0); /* a SYN, one with an ACK, and no more */
         if (n < 2) assert_int_equal(side, n);
         if (syns[side]) assert_int_equal(p->seq, next[side]);
         if (n > 0) assert_int_equal(p->ack, next[!side]);

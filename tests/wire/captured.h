@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What `record --raw` is to be tried with: the recorder, started and ended, and its captures read back into packets;
- * and what tshark says of them. */
+/* The recorder of `record --raw`, started and ended. Its captures are read back into packets, and tshark checks
+ * them. */
 #ifndef TESTS_WIRE_CAPTURED_H
 #define TESTS_WIRE_CAPTURED_H
 
@@ -12,16 +12,16 @@ struct raw_recorder {
     char endpoint[128];
 };
 
-/* `scanhead record SOURCE --raw -o DIR/cap.pcapng --stats DIR/stats.json ...`; more ends with NULL. Waits until it
- * listens, or is connected. */
+/* Starts `scanhead record SOURCE --raw -o DIR/cap.pcapng --stats DIR/stats.json ...`; more ends with NULL. It waits
+ * until the recorder listens, or is connected. */
 struct raw_recorder raw_recorder_start(struct wire *wire, const char *source, const char *const *more);
-/* The same with the size of its files limited (ulimit -f, blocks of 512 bytes). */
+/* The same, with the size of its files limited (ulimit -f, blocks of 512 bytes). */
 struct raw_recorder raw_recorder_start_limited(struct wire *wire, const char *source, const char *blocks);
-/* Ends it with a signal (0: it ends by itself); its exit status must be `status`, and its messages must have `says`
+/* Ends it with a signal (0: it ends by itself). Its exit status must be `status`, and its messages must have `says`
  * (NULL: any). */
 void raw_recorder_end(struct raw_recorder *recorder, int signal_number, int status, const char *says);
 
-/* The recorder stands still until raw_recorder_go_on, which returns the time of UTC at which it was still standing. */
+/* Stops the recorder until raw_recorder_go_on. That returns a time of UTC at which it was still stopped. */
 void raw_recorder_stop(const struct raw_recorder *recorder);
 int64_t raw_recorder_go_on(const struct raw_recorder *recorder);
 
@@ -41,17 +41,17 @@ struct captured {
     uint32_t n;
 };
 
-/* DIR/cap.pcapng. Each packet is in it whole, and is UDP or TCP over IPv4. */
+/* Reads DIR/cap.pcapng. Each packet must be in it whole, and be UDP or TCP over IPv4. */
 void captured_read(const struct wire *wire, struct captured *captured);
 void captured_free(struct captured *captured);
-/* The payloads of the packets from a port, one after the other; free() it. */
+/* Returns the payloads of the packets from a port, one after the other; free() it. */
 uint8_t *captured_stream(const struct captured *captured, uint16_t from_port, size_t *len);
-/* Times in the order of the file. */
+/* The times rise in the order of the file. */
 void captured_check_order(const struct captured *captured);
-/* Begin and end of a TCP connection of two ports, and that all sequence numbers fit; resets: an RST ends it. */
+/* A TCP connection of two ports begins and ends, and all sequence numbers fit. With `resets` an RST ends it. */
 void captured_check_talk(const struct captured *captured, uint16_t client_port, uint16_t server_port, int resets);
-/* tshark, where it is installed, finds no wrong checksum or length, and nothing to say of TCP. Returns 0 where it is
- * not. */
+/* tshark, where it is installed, finds no wrong checksum or length, and has no remark about TCP. Returns 0 where it is
+ * not installed. */
 int captured_check_tshark(const struct wire *wire);
 
 #endif

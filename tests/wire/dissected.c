@@ -30,7 +30,7 @@ static void add_value(struct column *c, char *value)
     c->value[c->n++] = value;
 }
 
-/* A line a packet, a column a field; values of one packet have `|` between them. */
+/* Each line is a packet, and each column a field. Several values of one packet have `|` between them. */
 static void split(char *all)
 {
     for (char *line; (line = strsep(&all, "\n")) != NULL && *line != 0;)
@@ -84,7 +84,7 @@ void dissect(const char *file, int passes, const char *const *fields)
         argv[n++] = "-e";
         argv[n++] = *fields;
     }
-    /* Whatever is installed or preferred here: neither another copy of the script nor a port. */
+    /* This makes other copies of the script, and the user's preferences of ports, have no effect. */
     setenv("HOME", wire->dir, 1);
     setenv("WIRESHARK_CONFIG_DIR", wire->dir, 1);
     run_well(argv);

@@ -8,7 +8,7 @@ const char *write_room(const struct wire *wire, const char *links)
 {
     struct room_config config = ROOM;
     config.links = links;
-    config.more = "loop: {late_ms: 10000, queue_ms: 10000}\n" /* patient with a machine that stands still */
+    config.more = "loop: {late_ms: 10000, queue_ms: 10000}\n" /* a machine may stand still for so long */
                   "time: {epoch: 2026-01-01T00:00:00Z}\n";
     room_write(wire);
     return room_config_write(wire, &config); /* its station has no place on the earth yet: PLACE */

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A head with a GNSS receiver, for the wire tests. */
+/* This runs a head with a GNSS receiver, for the wire tests. */
 #ifndef TESTS_WIRE_GNSS_RIG_H
 #define TESTS_WIRE_GNSS_RIG_H
 
 #include "tests/wire/room.h"
 
-/* Neither at the pole nor near zero; seven decimals of a degree and no rounding that helps. */
+/* The place is neither at the pole nor near zero. It has seven decimals of a degree, so that no rounding hides an
+ * error. */
 #define LAT_DEG  (-33.8567844)
 #define LON_DEG  151.2152967
 #define HEIGHT_M 87.6543

@@ -32,7 +32,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
     char text[2048], file[64], path[352];
     *grabber = (struct grabber){.wire = wire};
     snprintf(grabber->name, sizeof grabber->name, "%s", name);
-    /* Sensors are asked 10,000 times a second, as one call reads one packet; what has come is saved every 10 ms. */
+    /* Sensors are asked 10,000 times a second, as one call reads one packet. New observations are saved every 10 ms. */
     snprintf(text, sizeof text,
              "[global]\nrawlog_prefix = %s/%s\ntime_between_launches = 10\nuse_sensoryframes = false\n"
              "GRABBER_PERIOD_MS = 10\n\n[%s]\nsensorLabel = %s\nprocess_rate = 10000\nmax_queue_len = 10000\n"
@@ -40,7 +40,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
              wire->dir, name, name, name, sensor);
     snprintf(file, sizeof file, "%s.ini", name);
     snprintf(path, sizeof path, "%s", wire_write_text(wire, file, text));
-    /* It writes to a terminal, and so line by line. */
+    /* It writes to a terminal, and therefore line by line. */
     int in[2], out[2];
     assert_int_equal(pipe2(in, O_CLOEXEC), 0);
     assert_int_equal(openpty(&out[0], &out[1], NULL, NULL, NULL), 0);
@@ -62,7 +62,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
     grabber->out_fd = out[0];
 }
 
-/* Takes what it says; 0: nothing more will come. */
+/* Reads its output. Returns 0 when no more will come. */
 static int listen_to(struct grabber *grabber)
 {
     struct pollfd slot = {.fd = grabber->out_fd, .events = POLLIN};
@@ -141,7 +141,7 @@ static const uint8_t *skip_text(const uint8_t *at)
     return at + 4 + len;
 }
 
-/* A nested object: 0x80 + length of its class's name, the name, a version, 12 doubles, an end mark. */
+/* A nested object is 0x80 + the length of its class's name, the name, a version, 12 doubles, and an end mark. */
 static const uint8_t *skip_pose(const uint8_t *at)
 {
     return at + 1 + (at[0] & 0x7f) + 1 + 12 * 8 + 1;

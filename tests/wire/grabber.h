@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* rawlog-grabber of Debian's mrpt-apps, unmodified: started with a configuration of the test's, ended as its user ends
- * it, and what it has recorded. A rawlog is a gzip stream of MRPT's serialised objects; of these the rig reads scans,
+/* rawlog-grabber of Debian's mrpt-apps, unmodified. It is started with a configuration of the test's, ended as its user
+ * ends it, and its recording is read. A rawlog is a gzip stream of MRPT's serialised objects. The rig reads scans,
  * turns and GPS observations. */
 #ifndef TESTS_WIRE_GRABBER_H
 #define TESTS_WIRE_GRABBER_H
@@ -19,30 +19,32 @@ struct grabber {
 /* Skips the test where the program is not installed. */
 void grabber_or_skip(void);
 
-/* name: of its section, its label and its files. sensor: the lines of its section, the driver's. */
+/* Starts it. `name` is that of its section, its label and its files. `sensor` has the lines of its section for the
+ * driver. */
 void grabber_start(struct wire *wire, const char *name, const char *sensor, struct grabber *grabber);
 
-/* Waits until it has saved so many observations. 0: it complained before. */
+/* Waits until it has saved so many observations. Returns 0 when it complained before. */
 int grabber_wait(struct grabber *grabber, int n_saved);
 
-/* All threads of a process go before others, where the kernel permits that (root, RLIMIT_RTPRIO). So does this client. It
- * waits 100 ms for the reply to a command and then does without it, so its head has to hurry, too. */
+/* Lets all threads of a process go before others, where the kernel permits that (root, RLIMIT_RTPRIO). This client has
+ * it, too. It waits 100 ms for the reply to a command and then does without it, so its head has to hurry, too. */
 void grabber_hurry(pid_t pid);
 
-/* Both; starts it anew where it complains. Beside eight busy processes, and where nothing may hurry, it has its replies in
- * one of three tries or so; so its user has fifteen. */
+/* Starts it and waits; where it complains, it is started anew. Beside eight busy processes, and without the right to
+ * hurry, it gets its replies in about one of three tries. So it has fifteen tries. */
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
                             struct grabber *grabber);
 
-/* Datagrams that the kernel threw away since a socket's owner did not read them in time: on a busy machine. */
+/* Returns how many datagrams the kernel threw away because a socket's owner did not read them in time. That happens on
+ * a busy machine. */
 uint32_t grabber_dropped_at(int port);
 
-/* A key is pressed; it must end with status 0. */
+/* Ends it by a key, as a user does. It must end with status 0. */
 void grabber_end(struct grabber *grabber);
 
 enum { RAWLOG_PACKET_LEN = 1206 };
 
-/* One observation. */
+/* This is one observation. */
 struct rawlog_item {
     enum { RAWLOG_SCAN, RAWLOG_TURN, RAWLOG_GPS } kind;
     int64_t t_100ns; /* since 1601 */
@@ -61,7 +63,7 @@ struct rawlog {
     uint32_t n_items;
 };
 
-/* What a grabber that has ended has written, in the order of the file. */
+/* Reads the file of a grabber that has ended, in its order. */
 void rawlog_read(const struct grabber *grabber, struct rawlog *log);
 void rawlog_free(struct rawlog *log);
 

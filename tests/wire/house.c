@@ -8,7 +8,7 @@
 
 const double HOUSE_HEADING_DEG = 25.0;
 
-/* As in config/hokuyo.yaml and the others. */
+/* This is the station of config/hokuyo.yaml and the other ready configurations. */
 static const double STATION_M[3] = {5.5, 2.2, 1.6};
 
 struct house {
@@ -17,7 +17,7 @@ struct house {
     uint32_t mark_triangle; /* the first one of the mark */
 };
 
-/* A post 1 m to the right of the head and 0.4 m before it, 20 cm wide, from the floor to the ceiling. */
+/* A post stands 1 m to the right of the head and 0.4 m before it. It is 20 cm wide, from the floor to the ceiling. */
 static void write_mark(const struct wire *wire)
 {
     const double heading = HOUSE_HEADING_DEG * M_PI / 180.0;
@@ -115,7 +115,7 @@ int house_is_mark(const struct house *house, double azimuth_rad, double elevatio
     return hit.triangle != REFERENCE_NONE && hit.triangle >= house->mark_triangle;
 }
 
-/* 0: none, or one that the device does not measure. */
+/* Returns the range, or 0 where there is none or the device does not measure it. */
 static double within(double range_m, double min_m, double max_m)
 {
     return range_m >= min_m && range_m <= max_m ? range_m : 0.0;
@@ -131,6 +131,7 @@ int house_agrees(const struct house *house, double azimuth_rad, double elevation
         least_m = fmin(least_m, at_m);
         most_m = fmax(most_m, at_m);
     }
-    /* a slanted wall: anything from one side to the other; an outline (10 cm or more): only the two sides */
+    /* a slanted wall may give any range from one side to the other, an outline (10 cm or more) only those of its two
+     * sides */
     return most_m - least_m < 0.1 && range_m >= least_m - tolerance_m && range_m <= most_m + tolerance_m;
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What test_python.c asks of the Python client. Its answers are binary rows or plain numbers.
+"""test_python.c and test_python_damage.c ask the Python client by this. Its answers are binary rows or plain numbers.
 
     python_client.py FOLDER_OF_THE_CLIENT numpy|plain WHAT ...
         dump SOURCE OUT     points, attributes, poses and times, frame by frame, as test_python.c reads them
@@ -10,8 +10,8 @@
         samples PAGE OUT    decodes the frames in hex of PAGE; what is said below each is what it holds
         tables FOLDER FILE  decodes FILE's frames by the tables of FOLDER's pages alone; the client must read the same
         hostile FILE SEED   frames of FILE with wrong contents and good checksums: only ScanheadError comes
-        older FILE OUT      FILE as heads wrote it whose telemetry had no counts of the scan
-        ends FILE           where scan_over is true, with SCAN_END and without; what says that pulses were lost
+        older FILE OUT      rewrites FILE for heads whose telemetry had no counts of the scan
+        ends FILE           the frames where scan_over is true, with SCAN_END and without; the pulses lost
         misuse FILE         wrong sources and calls: only ScanheadError comes; a late reply answers nothing else
 """
 import glob
@@ -132,7 +132,7 @@ def crs(polar, geo):
 
 
 def count(path):
-    """Counters, then a hash of all notices, a line each."""
+    """Prints counters, then a hash of all notices, a line each."""
     head, said = scanhead.open(path), hashlib.sha256()
     head.on_notice = lambda n: said.update(f"{n.kind} {n.at_byte} {n.seq} {n.n} {n.t_ns or 0}\n".encode())
     frames = sum(1 for _ in head.frames())
@@ -143,7 +143,7 @@ def count(path):
 
 
 def hostile(path, seed):
-    """Up to 8 places of each payload get other bytes, a tenth another length; checksums are made good."""
+    """Changes up to 8 places of each payload, and the length of a tenth of them. Checksums are made good."""
     resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
     dice = random.Random(int(seed))
     frames = [f for f in scanhead.open(path).frames()]
@@ -217,7 +217,7 @@ def telemetry(state, scan):
 
 
 def ends_of(path, *frames):
-    """The places where scan_over is true."""
+    """Returns the frames after which scan_over is true, and the number of lost pulses."""
     with open(path, "wb") as file:
         file.writelines(framed(f[1], 0, len(f) - 28, f[28:], i) for i, f in enumerate(frames))
     head = scanhead.open(path)
@@ -271,7 +271,7 @@ def misuse(path):
 
 
 def late_replies(lines):
-    """The replies to commands that were given up come when the next one has been sent."""
+    """Replies to commands that were given up come only after the next command."""
     head, theirs = pair()
     for line in lines:
         refused(head.query, line, 0.0)
@@ -287,7 +287,7 @@ def late_replies(lines):
 
 
 def notices():
-    """Of a live head: what was wrong, once each, at its byte, before the frame that follows it."""
+    """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])
@@ -331,8 +331,8 @@ def notices():
 
 
 def bombs(path):
-    """Good headers that promise 64 KiB, small good frames between: if each payload were summed anew this were
-    200 MB, a minute; it must take less than 10 s of processor time."""
+    """Good headers promise 64 KiB, with small good frames between. To sum each payload anew would be 200 MB and take a
+    minute. This must take less than 10 s of processor time."""
     resource.setrlimit(resource.RLIMIT_CPU, (10, 10))
     with open(path + ".bombs", "wb") as out:
         out.write((framed(3, 0, 65536, b"") + framed(200, scanhead.LOCAL, 0, b"") +
@@ -348,7 +348,7 @@ def words(value):
 
 
 def said_of(head, frame):
-    """The words below a sample: fields as `name value;`, then records, one a line."""
+    """Returns the words below a sample: fields as `name value;`, then records, one a line."""
     names = "? descriptor anchor points line-end telemetry event surfaces poses attributes emitter colours".split()
     flags = "".join(f" {name}" for bit, name in ((1, "REPEAT"), (2, "LOCAL")) if frame.flags & bit)
     text = [f"{names[frame.type]}{flags}; seq {frame.seq}; t_ns {frame.t_ns}"]
@@ -428,7 +428,7 @@ def tables(folder, path):
 
 
 def chatter(data):
-    """A head that sends without end and never what is waited for: calls end with their time all the same."""
+    """The head sends without end, but never the awaited answer. Calls end with their time all the same."""
     head, theirs = pair()
 
     def send():

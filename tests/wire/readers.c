@@ -14,7 +14,7 @@ void keep_truth(const struct scanhead_point *point, uint32_t station)
     if (station == 1) n_first = n_truth;
 }
 
-/* Debian 13's CloudCompare looks for its plugins, of which one reads PTX, in another folder than they are in. */
+/* Debian 13's CloudCompare looks for its plugins in a folder where they are not. One of them reads PTX. */
 static void say_where_plugins_are(void)
 {
     glob_t found;
@@ -22,7 +22,7 @@ static void say_where_plugins_are(void)
     globfree(&found);
 }
 
-/* Runs argv (ends with NULL) in the test's folder; its exit status, 127 where there is no such program. */
+/* Runs argv (ends with NULL) in the test's folder. Returns its exit status, or 127 where there is no such program. */
 static int run(const char *const *argv)
 {
     char out[352], err[352];
@@ -106,7 +106,8 @@ static void solve3(const double m[3][3], const double v[3], double out[3])
         out[i] = (c[0][i] * v[0] + c[1][i] * v[1] + c[2][i] * v[2]) / det;
 }
 
-/* Least squares for small motions: shift is the mean difference d, turn w solves sum(|r|^2 - r r^T) w = sum(r x d). */
+/* Least squares for small motions. The shift is the mean difference d, and the turn w solves sum(|r|^2 - r r^T) w =
+ * sum(r x d). */
 static struct misfit misfit(size_t first, size_t end)
 {
     struct misfit out = {0};

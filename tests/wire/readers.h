@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Recordings as readers see them that are not ours: the points that a stream holds, other people's programs, and how
- * what they read differs. */
+/* Recordings as other people's readers see them: the points of the stream, the programs, and the differences of the
+ * points that they read. */
 #ifndef TESTS_WIRE_READERS_H
 #define TESTS_WIRE_READERS_H
 
@@ -18,14 +18,14 @@ void keep_truth(const struct scanhead_point *point, uint32_t station);
 
 void run_well(const char *const *argv);
 
-/* One of tests/readers/, where make has put it beside what npm installed. */
+/* Runs one of tests/readers/, where make has put it beside npm's packages. */
 void run_reader(const char *script, const char *in, const char *out);
 
-/* The first three numbers of each line, against the stream's points from `first` on. tolerance_m is per axis, for a
- * point's station. */
+/* Compares the first three numbers of each line with the stream's points from `first` on. tolerance_m is per axis, for
+ * a point's station. */
 size_t compare(char *text, size_t first, const double tolerance_m[N_STATIONS]);
 
-/* ---- how a scan's points as read lie to what they should be */
+/* ---- the distance of a scan's points, as read, from their true places */
 
 struct misfit {
     double bounds_m, shift_m,
@@ -33,8 +33,8 @@ struct misfit {
     double radius_m; /* of the scan about its middle */
 };
 
-/* A row of the table. Single points were off by tolerance_m per axis at most: so is the box, and by far the pose, but
- * for a shift that all have in common. */
+/* Prints a row of the table. Single points are wrong by tolerance_m per axis at most. So is the box, and the pose by
+ * far less, but for a shift that all have in common. */
 void tell(const char *format, const char *reader, const double tolerance_m[N_STATIONS]);
 
 #endif

@@ -3,14 +3,14 @@
 
 #include "drivers/protocol/bytes.h"
 
-/* Behind this text; 0: it is not there. */
+/* Returns the place after this text; 0: it is not there. */
 static size_t behind(const struct bytes *b, const char *text)
 {
     const uint8_t *at = memmem(b->data, b->len, text, strlen(text));
     return at != NULL ? (size_t)(at - b->data) + strlen(text) : 0;
 }
 
-/* From `begin` on, the repaired file has the first `len` bytes of the whole one, and nothing else. */
+/* From `begin` on, the repaired file must have exactly the first `len` bytes of the whole one. */
 static void expect_begin(const struct bytes *whole, const struct bytes *repaired, size_t begin, size_t len)
 {
     assert_int_equal(repaired->len, begin + len);
@@ -26,7 +26,7 @@ static size_t count_lines(const uint8_t *from, size_t len)
     return n;
 }
 
-/* Behind the last newline. */
+/* Returns the place after the last newline. */
 static size_t end_of_lines(const struct bytes *b, size_t begin)
 {
     size_t end = b->len;
@@ -163,7 +163,8 @@ static uint64_t check_pcapng(const struct bytes *whole, const struct bytes *left
     }
     const struct bytes packets = {repaired->data, at};
     expect_begin(whole, &packets, 0, at);
-    const int is_full = left->len % 4096 == 0; /* a disk of whole pages: what is cut is all the room for a note */
+    /* A full disk has whole pages: the note has no more room than the part that is cut off. */
+    const int is_full = left->len % 4096 == 0;
     if (is_full && repaired->len == at && left->len - at < 120) return n;
     const struct bytes note = {repaired->data + at, repaired->len - at}; /* a block of statistics with a comment */
     assert_true(note.len > 0 && note.len % 4 == 0 && block_len(&note, 0) == note.len && le_get32(note.data) == 5);
@@ -171,7 +172,7 @@ static uint64_t check_pcapng(const struct bytes *whole, const struct bytes *left
     return n;
 }
 
-/* Without its second block, the interface. */
+/* The second block, the interface, is not there. */
 static int is_no_pcapng(const struct bytes *left)
 {
     const size_t first = block_len(left, 0);
@@ -205,7 +206,7 @@ static struct bytes e57_content(const struct bytes *b)
     return c;
 }
 
-/* The next scan in the XML: records, and where its section is. 0: there is none. */
+/* Finds the next scan in the XML: its records, and the place of its section. Returns 0 where there is none. */
 static int e57_scan(const char **xml, unsigned long long *n, size_t *section)
 {
     unsigned long long offset;
@@ -223,7 +224,7 @@ static const char *e57_xml(const struct bytes *file, const struct bytes *content
     return (const char *)content->data + at / 1024 * 1020 + at % 1024;
 }
 
-/* Packets of the whole file that end within what was left; the same bytes are in the repaired one. */
+/* The packets of the whole file that end within the left one must be in the repaired one with the same bytes. */
 static uint64_t check_e57(const struct bytes *whole, const struct bytes *left, const struct bytes *repaired)
 {
     struct bytes w = e57_content(whole), r = e57_content(repaired);
@@ -255,7 +256,7 @@ static uint64_t check_e57(const struct bytes *whole, const struct bytes *left, c
     return all;
 }
 
-/* Before its first note (288 bytes from 48 on) and header (32) are there, which is in the first page. */
+/* Its first note (288 bytes from 48 on) and header (32), which are in the first page, are not there. */
 static int is_no_e57(const struct bytes *left)
 {
     return left->len < 1024 || memcmp(left->data + 64, "scanhead e57 1", 15) != 0;
@@ -263,8 +264,8 @@ static int is_no_e57(const struct bytes *left)
 
 /* ---- .ptx, and the grid beside it: a head of 120 bytes, cells of 40 */
 
-/* The next point of a text, behind its newline; NULL: there is no other. Lines of four numbers are points and the last lines
- * of a header, which end in 0 or 1. */
+/* Returns the next point of a text, and moves on to after its newline; NULL: there is no other. Lines of four numbers
+ * are points, but also the last lines of a header, which end in 0 or 1. */
 static const char *ptx_point(const char *at, const char *end, size_t *len)
 {
     for (const char *stop; at < end && (stop = memchr(at, '\n', (size_t)(end - at))) != NULL; at = stop + 1) {
@@ -325,7 +326,7 @@ const char *repair_row_beside(const struct repair_row *row)
             "-SAVE_CLOUDS >/dev/null && cat *.asc && rm *.asc"                                                \
     }
 
-/* npm's; count and bounds come first. 127: it is not installed. */
+/* npm's reader. Count and bounds come first. Status 127: it is not installed. */
 #define LOADERS_GL                                                                                                                \
     {                                                                                                                             \
         "sh", "-c",                                                                                                               \
@@ -333,7 +334,7 @@ const char *repair_row_beside(const struct repair_row *row)
             "tail -n +3 las.xyz && rm las.xyz"                                                                                    \
     }
 
-/* READERS: an absolute path, which the harness sets. */
+/* READERS is an absolute path, which the harness sets. */
 #define WEB_E57 \
     "[ -e \"$READERS/installed\" ] || exit 127; node --experimental-wasm-modules \"$READERS\"/e57.mjs \"$F\" e57.xyz && cat e57.xyz && rm e57.xyz"
 

@@ -48,7 +48,7 @@ void tape_keep_common(struct tape *tape)
     const uint32_t n = tape->n;
     tape->len = tape->n = 0;
     for (uint32_t i = 0; i < n; i++) {
-        const struct tape_frame frame = tape->frame[i]; /* what was kept lies before it */
+        const struct tape_frame frame = tape->frame[i]; /* kept frames only overwrite places before it */
         if ((frame.flags & SCANHEAD_LOCAL) == 0) take(tape, tape->bytes + frame.at, &frame);
     }
 }

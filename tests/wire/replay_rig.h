@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What tests of a replay share: frames of a session, each with the tick in which it came, and files of them. */
+/* For tests of a replay: the frames of a session, each with the tick in which it came, and files of them. */
 #ifndef TESTS_WIRE_REPLAY_RIG_H
 #define TESTS_WIRE_REPLAY_RIG_H
 
@@ -20,7 +20,7 @@ struct tape {
     uint32_t n, n_room;
 };
 
-/* A command before the tick of this number is granted. */
+/* A command that is sent before the tick of this number is granted. */
 struct tape_line {
     int tick;
     const char *command;
@@ -28,35 +28,35 @@ struct tape_line {
 
 void tape_add(struct tape *tape, const struct scanhead_frame *frame, int tick);
 void tape_free(struct tape *tape);
-/* The file with its frames, those that were for this reader alone included. */
+/* Writes the file with its frames, including those that were for this reader alone. */
 const char *tape_write(const struct wire *wire, const char *name, const struct tape *tape);
-/* Of the same frames without those for this reader alone; tape may be the same. */
+/* Keeps the same frames without those for this reader alone; tape may be the same. */
 void tape_keep_common(struct tape *tape);
-/* The frames of a file, one like the other; they have no ticks. */
+/* Reads the frames of a file, one after the other; they have no ticks. */
 void tape_read(const char *path, struct tape *tape);
 
-/* `scanhead run` of a configuration, or of a recording, in the pace step: n ticks of a millisecond, granted one at a
- * time. lines end with a NULL. */
+/* Runs `scanhead run` with a configuration, or a recording, in the pace step: n ticks of a millisecond, granted one at
+ * a time. lines end with a NULL. */
 void tape_step(struct wire *wire, const char *what, const char *const *more, const struct tape_line *lines, int n,
                struct tape *tape);
 
-/* The same frames with the same bytes, and as many ticks between them as there were. */
+/* Both have the same frames with the same bytes, and as many ticks between them. */
 void tape_same_ticks(const struct tape *tape, const struct tape *want);
-/* The same bytes. */
+/* Both have the same bytes. */
 void tape_same_bytes(const struct tape *tape, const struct tape *want);
 
-/* `scanhead ...` up to its end: the exit status. Its messages are in "err". */
+/* Runs `scanhead ...` to its end and returns the exit status. Its messages are in "err". */
 int replay_call(struct wire *wire, const char *const *args);
-/* The text is in what the last call printed as its messages. */
+/* The messages of the last call have the text. */
 void replay_said(const struct wire *wire, const char *text);
-/* `scanhead run FILE --start --pace fast` into a file link. more may be NULL. */
+/* Runs `scanhead run FILE --start --pace fast` into a file link. more may be NULL. */
 void replay_to_file(struct wire *wire, const char *file, const char *const *more, const char *out);
 
 /* Two files of the folder have the same frames, more than 100. */
 void replay_same_file(const struct wire *wire, const char *out, const char *of);
 
-/* A recording of a scan of `lines` lines of 10 ms in the room, of 10 kHz: name.shs, from the head's power-up to its
- * being idle again. */
+/* Records a scan of `lines` lines of 10 ms in the room, at 10 kHz, into name.shs. The recording goes from the head's
+ * power-up until it is idle again. */
 const char *replay_room(struct wire *wire, const char *name, unsigned lines);
 
 #endif

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The scenes of the wire tests, their configurations, and what must come out of them: a closed room whose
- * walls are known planes, and a schedule in exact rational arithmetic that shares nothing with core/schedule.
- */
+/* The scenes of the wire tests, their configurations, and the results that they must have: a closed room whose walls
+ * are known planes, and a schedule in exact rational arithmetic that shares nothing with core/schedule. */
 #ifndef TESTS_WIRE_ROOM_H
 #define TESTS_WIRE_ROOM_H
 
@@ -11,14 +10,14 @@
 
 __extension__ typedef __int128 i128;
 
-/* ---- the room: scene frame, metres. No two walls at the same distance, no wall at a round one. */
+/* ---- the room: scene frame, metres. No two walls are at the same distance, and no wall is at a round one. */
 extern const double ROOM_MIN[3], ROOM_MAX[3];
 extern const char *const WALLS[6];
 
-/* One object per wall, each of its own material. */
+/* Writes one object per wall, each of its own material. */
 void room_write(const struct wire *wire);
 
-/* Open ground 1.7 m below the station: every shot above the horizon is empty. */
+/* Writes open ground 1.7 m below the station, so that every shot above the horizon is empty. */
 void ground_write(const struct wire *wire);
 
 struct room_config {
@@ -37,7 +36,7 @@ struct room_config {
 
 extern const double STATION[3], HEADING_DEG;
 
-/* config.yaml in the folder, for room.obj beside it. Its path is good as wire_path says. */
+/* Writes config.yaml in the folder, for room.obj beside it. Its path is good as long as those of wire_path. */
 const char *room_config_write(const struct wire *wire, const struct room_config *c);
 
 /* ---- the range along a direction given in the head's frame by mirror and pan angle */
@@ -50,7 +49,7 @@ struct room_ray {
 
 void room_cast(double mirror_rad, double pan_rad, struct room_ray *ray);
 
-/* ---- the schedule, exactly: everything from k * lines / prr and k / prr in integers */
+/* ---- the schedule, exactly: everything follows from k * lines / prr and k / prr in integers */
 
 struct oracle {
     int64_t prr_uhz, lines_uhz, pan_udeg_s, pan_stop_udeg; /* pan from 0 */
@@ -60,23 +59,23 @@ struct oracle {
 
 int64_t micro(double value);
 
-/* fov_min and sweep: the profile's, 240 deg for three facets of a polygon and 100 for full-sweep. */
+/* fov_min and sweep are the profile's: 240 deg for three facets of a polygon and 100 for full-sweep. */
 struct oracle oracle_of(const struct room_config *c, double fov_min_deg, double fov_max_deg, double sweep_deg);
 
 uint64_t oracle_line(const struct oracle *o, uint64_t k);
 
 uint64_t oracle_first_pulse(const struct oracle *o, uint64_t line);
 
-/* Lines until the pan has gone from 0 to its stop. */
+/* Returns the lines until the pan has gone from 0 to its stop. */
 uint64_t oracle_frame_lines(const struct oracle *o);
 
-/* First pulse after the scan's last frame. */
+/* Returns the first pulse after the scan's last frame. */
 uint64_t oracle_end(const struct oracle *o);
 
-/* floor(k / prr) in ns. */
+/* Returns floor(k / prr) in ns. */
 int64_t oracle_time_ns(const struct oracle *o, uint64_t k);
 
-/* Whether the mirror is within the cast window: angle * prr_uhz compared in integers. */
+/* Returns whether the mirror is within the cast window: angle * prr_uhz compared in integers. */
 int oracle_is_cast(const struct oracle *o, uint64_t k);
 
 double oracle_mirror_deg(const struct oracle *o, uint64_t k);

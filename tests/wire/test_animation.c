@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* An animation: stops at stations while meshes move, and at way-points, counted in frames. A file for each frame and one
- * of all; each point lies on its body where that stands in the frame. */
+/* An animation: stops at stations while meshes move, and at way-points, counted in frames. There is a file for each
+ * frame and one of all. Each point lies on its body where that stands in the frame. */
 #include <math.h>
 
 #include "tests/wire/wire.h"
 
-/* Wide ground, a plate at x = 5 m that goes east at 2 m/s, and one at x = -4 m that turns about the origin of its own
- * by 10 deg/s. Both are much larger than what is seen of them. */
+/* The scene has wide ground and two plates. The plate at x = 5 m goes east at 2 m/s, and the one at x = -4 m turns
+ * about its own origin by 10 deg/s. Both are much larger than their visible part. */
 #define SCENE                                                                              \
     "scene:\n  meshes:\n    - {file: ground.obj, up: z, scale: 1}\n"                       \
     "    - {file: plate.obj, up: z, scale: 1, offset_m: [5, 0, 0], move_m_s: [2, 0, 0]}\n" \
@@ -54,13 +54,13 @@ static void record(struct wire *wire, const char *config)
     assert_int_equal(status, 0);
 }
 
-/* What a file should hold: the time of its frame, and where the head of each point was. */
+/* The expected contents of a file: the time of its frame, and the place of the head for each point. */
 struct expected {
     double frame, t_s;
     unsigned station;
 };
 
-/* Checks each point of a file against its body; gives how many there are of each label. */
+/* Checks each point of a file against its body, and counts the points of each label. */
 static unsigned check_points(const char *text, const struct expected *e, unsigned of_label[3])
 {
     unsigned n = 0;
@@ -80,7 +80,8 @@ static unsigned check_points(const char *text, const struct expected *e, unsigne
     return n;
 }
 
-/* The files of all frames, in order; the combined one is their points one after the other. Returns how many there are. */
+/* Checks the files of all frames, in order. The combined one has their points one after the other. Returns how many
+ * there are. */
 static void check_files(struct wire *wire, const struct expected *e, unsigned n_files)
 {
     char *all = wire_read(wire_path(wire, "all.ply"), NULL), name[32];
@@ -102,7 +103,8 @@ static void check_files(struct wire *wire, const struct expected *e, unsigned n_
     assert_int_equal(access(wire_path(wire, name), F_OK), -1);
 }
 
-/* Two stations, the second with a scanner of its own: all stations at the first frame, then all at the next. */
+/* There are two stations, the second with a scanner of its own. All stations scan the first frame, then all the
+ * next. */
 static void test_standing(void **state)
 {
     struct wire *wire = *state;
@@ -111,7 +113,7 @@ static void test_standing(void **state)
     write_scene(wire);
     record(wire, HEAD SCENE OUTPUT "platform: {kind: stops, " FRAMES "}\n" TWO ", scanner: {head: {step_deg: 12}}}\n");
     check_files(wire, want, 6);
-    /* 36 x 19 directions, and 30 x 16: the scanners are different ones */
+    /* The scanners differ: 36 x 19 directions, and 30 x 16. */
     unsigned n[2], of_label[3] = {0};
     for (int i = 0; i < 2; i++) {
         char *text = wire_read(wire_path(wire, i == 0 ? "all-1.ply" : "all-2.ply"), NULL);
@@ -119,14 +121,14 @@ static void test_standing(void **state)
         free(text);
     }
     assert_true(n[0] <= 36 * 19 && n[1] <= 30 * 16 && n[0] > n[1]);
-    /* The same times in seconds; frames are numbered from 1 on then. */
+    /* The same times are given in seconds. Frames are then numbered from 1 on. */
     static const struct expected counted[6] = {{1, 0.5, 1}, {1, 0.5, 2}, {2, 1.5, 3},
                                                {2, 1.5, 4}, {3, 2.5, 5}, {3, 2.5, 6}};
     record(wire, HEAD SCENE OUTPUT "platform: {kind: stops, start_s: 0.5, end_s: 2.5, step_s: 1}\n" TWO "}\n");
     check_files(wire, counted, 6);
 }
 
-/* The head drives north at 1 m/s, a stop each second; it shows in its poses. */
+/* The head drives north at 1 m/s with a stop each second. The poses show it. */
 static void test_driving(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* output.attributes from the configuration to the files: what it leaves alone, what it adds, and what a reader makes of
- * it who has lost a part. */
+/* output.attributes from the configuration to the files: what stays the same, what is added, and the result of a reader
+ * that has lost a part. */
 #include "drivers/protocol/native.h"
 #include "tests/wire/room.h"
 
@@ -33,7 +33,7 @@ static const char *begin(struct wire *wire)
     return config;
 }
 
-/* Exit status; the statistics are in stats.json. */
+/* Returns the exit status. The statistics are in stats.json. */
 static int record(struct wire *wire, const char *source, const char *set, const char *const *files)
 {
     char stats[352], path[4][352];
@@ -59,7 +59,7 @@ static struct scanhead *open_stream(const struct wire *wire, const char *name)
     return client_open(wire_path(wire, name));
 }
 
-/* The next frame that the hash is of. 0 at the end. */
+/* Takes the next frame that the hash includes. Returns 0 at the end. */
 static int next_hashed(struct scanhead *sh, struct scanhead_frame *frame, int without_attributes)
 {
     do {
@@ -69,7 +69,7 @@ static int next_hashed(struct scanhead *sh, struct scanhead_frame *frame, int wi
     return 1;
 }
 
-/* Off, nothing is there that was not before: no frame, not a byte of the descriptor. On, all else is the same. */
+/* Off, the stream has nothing new: no frame, and not a byte of the descriptor. On, all else is the same. */
 static void test_off_and_on(void **state)
 {
     struct wire *wire = *state;
@@ -86,7 +86,7 @@ static void test_off_and_on(void **state)
     struct scanhead *off = open_stream(wire, "off.shs"), *on = open_stream(wire, "on.shs");
     struct scanhead_frame a, b;
     uint32_t points = 0;
-    int64_t later_ns = 0; /* by which the second scan was commanded later: a tick, perhaps */
+    int64_t later_ns = 0; /* the second scan may be commanded later, by a tick perhaps */
     for (int n = 0; next_hashed(off, &a, 0); n++) {
         assert_true(next_hashed(on, &b, 1));
         assert_true(a.type != SCANHEAD_ATTRIBUTES);
@@ -110,7 +110,7 @@ static void test_off_and_on(void **state)
     scanhead_close(on);
 }
 
-/* Each frame of points is followed by its attributes; keeps what they say of echoes. */
+/* Each frame of points is followed by its attributes, which are kept by echo. */
 static void keep_told(const struct wire *wire, const char *name)
 {
     static struct scanhead_point point[NATIVE_MAX_POINTS];
@@ -148,7 +148,7 @@ static void keep_told(const struct wire *wire, const char *name)
     scanhead_close(sh);
 }
 
-/* amplitude and width of each vertex of a PLY as text, against what was told; -1 in lost: from there on to `end` they
+/* Compares amplitude and width of each vertex of a PLY as text with the stream's. From `lost` (-1: none) to `end` they
  * are lost. */
 static void check_ply(const struct wire *wire, const char *name, size_t lost, size_t end)
 {
@@ -191,8 +191,8 @@ static double real(const uint8_t *p)
     return d;
 }
 
-/* By the LAS 1.4 specification: extra bytes described in a record of LASF_Spec, 4, with types 4 (int16) and 3 (uint16),
- * their scales, and the value that says that there is none. */
+/* Checks by the LAS 1.4 specification: extra bytes described in a record of LASF_Spec, 4, with types 4 (int16) and 3
+ * (uint16), their scales, and the value that stands for none. */
 static void check_las(const struct wire *wire, const char *name)
 {
     size_t len;
@@ -245,7 +245,7 @@ static void test_files(void **state)
     assert_true(least == 4.0 && most > 4.2); /* the profile's pulse; board and wall in one echo */
     check_ply(wire, "a.ply", 0, 0);
     check_las(wire, "a.las");
-    /* out of the stream the same */
+    /* The recording of the stream has the same. */
     snprintf(stream, sizeof stream, "%s", wire_path(wire, "a.shs"));
     assert_int_equal(record(wire, stream, NULL, (const char *const[]){"b.ply", "b.las", "b.shs", NULL}), 0);
     stats_hash(wire, again);
@@ -254,7 +254,7 @@ static void test_files(void **state)
     check_las(wire, "b.las");
 }
 
-/* A head in real time, over TCP: the hash of head, client and recording off line. */
+/* A head runs in real time, over TCP. The hash of the head, the client and the recording off line are the same. */
 static void test_live(void **state)
 {
     struct wire *wire = *state;
@@ -299,7 +299,7 @@ static void leave_out(const struct wire *wire, const char *from, const char *to,
     scanhead_close(sh);
 }
 
-/* Echoes before the points frame `which`, and in it. */
+/* Counts the echoes before the points frame `which`, and in it. */
 static void count_echoes(const struct wire *wire, const char *name, uint32_t which, size_t *before, size_t *within)
 {
     static struct scanhead_point point[NATIVE_MAX_POINTS];
@@ -318,8 +318,8 @@ static void count_echoes(const struct wire *wire, const char *name, uint32_t whi
     scanhead_close(sh);
 }
 
-/* Where attributes are lost the points stay, without any; where points are lost, theirs are not given to others. The
- * recording says that it is not complete. */
+/* If attributes are lost the points stay, without any. If points are lost, their attributes are not given to
+ * others. The recording says that it is not complete. */
 static void test_lost(void **state)
 {
     struct wire *wire = *state;
@@ -393,7 +393,7 @@ static void test_capacity(void **state)
     }
 }
 
-/* Sums of the lines, as the library passes them on, are what `record` says. */
+/* The sums of the lines, as the library passes them on, are those that `record` reports. */
 static void test_line_ends(void **state)
 {
     struct wire *wire = *state;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Campaigns: the same bytes in 1, 2 and 7 shards; by Slurm's variables and by GNU parallel; jobs that fail. */
+/* Campaigns have the same bytes in 1, 2 and 7 shards, by Slurm's variables and by GNU parallel. Jobs may fail. */
 #include "tests/wire/batch_rig.h"
 
-/* One job by `record`, one by one, is the same file; so is the whole in 2 and in 7 shards, which then run from the last to
- * the first: one of them has no job. */
+/* One job by `record` is the same file. So is the whole campaign in 2 and in 7 shards, which run from the last to the
+ * first. One of the seven has no job. */
 static void test_shards(void **state)
 {
     struct wire *wire = *state;
@@ -22,8 +22,9 @@ static void test_shards(void **state)
     batch_expect_same(ply, batch_file(wire, "ref", 3, ".ply"));
 }
 
-/* Meshes that one process shares among combinations, and BVHs among those of the same places, change no byte: two
- * scanners, two places of the second one, three rates of the first; in one process, and in one for each job. */
+/* Meshes that one process shares among combinations, and BVHs among those of the same places, change no byte. There are
+ * two scanners, two places of the second one, and three rates of the first. They run in one process, and in one for
+ * each job. */
 static void test_shared(void **state)
 {
     static const char sweep[] = "stations.1.position_m=[0.5,0.25,1.5],[-0.5,0,1.25]";
@@ -40,7 +41,7 @@ static void test_shared(void **state)
     batch_expect_same(batch_in(wire, "each", "manifest.json"), batch_in(wire, "one", "manifest.json"));
 }
 
-/* A mesh that can't be loaded fails its jobs, and no others; a value out of range stops all before the first one. */
+/* A mesh that can't be loaded fails its jobs, and no others. A value out of range stops all before the first one. */
 static void test_failing(void **state)
 {
     struct wire *wire = *state;
@@ -58,7 +59,7 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--sweep", "head.lines_hz=50,1e9"), 2, "head.lines_hz");
     batch_expect(wire, "none", WITH("--stations", "3"), 2, "allowed 1 to 2");
     batch_expect(wire, "none", WITH("--set", "time.epoch=utc"), 2, "time.epoch");
-    /* names of files would say what isn't so */
+    /* names of files would be wrong here */
     batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames sets it, too");
     batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs sets it, too");
     batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "that of --stations");
@@ -67,7 +68,8 @@ static void test_failing(void **state)
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
 }
 
-/* All that a mesh is written with is the job's: of two frames, two images. Without one of them it isn't whole. */
+/* All files that are written with a mesh are the job's: for two frames, two images. Without one of them the job isn't
+ * whole. */
 static void test_images(void **state)
 {
     struct wire *wire = *state;
@@ -96,7 +98,8 @@ static int points_of(struct wire *wire, const char *name)
     return n;
 }
 
-/* The faults of a scenario are in each job, whatever scanner its station has; what is in the file counts, not its name. */
+/* The faults of a scenario are in each job, whatever scanner its station has. The file's contents count, not its
+ * name. */
 static void test_scenario(void **state)
 {
     struct wire *wire = *state;
@@ -110,7 +113,7 @@ static void test_scenario(void **state)
     batch_change(config, "heading_deg: 30,", "heading_deg: 30, scanner: {noise: {seed: 7}},");
     wire_write_text(wire, "dark.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
-    /* The others are blind: all 10,000 pulses of a job have 3,900 points where none is dark. */
+    /* The other pulses are blind: all 10,000 pulses of a job have 3,900 points where none is dark. */
     assert_in_range(points_of(wire, "0001_station-1.ply"), 1000, 3000);
     assert_in_range(points_of(wire, "0002_station-2.ply"), 1000, 3000);
     wire_write_text(wire, "other.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
@@ -134,8 +137,8 @@ static void by_script(struct wire *wire, const char *shell, const char *script, 
     assert_int_equal(status, 0);
 }
 
-/* The script as Slurm runs it: by bash, once for each task, with Slurm's variables. Directives are comments. Tasks 4, 6 and
- * 8 of an array are shards 1 to 3. */
+/* Bash runs the script once for each task, with Slurm's variables, as Slurm does. Directives are comments. Tasks 4, 6
+ * and 8 of an array are shards 1 to 3. */
 static void test_slurm(void **state)
 {
     struct wire *wire = *state;
@@ -151,7 +154,7 @@ static void test_slurm(void **state)
     assert_int_equal(access(batch_in(wire, "slurm", "manifest-3-of-3.jsonl"), F_OK), 0);
     batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are whole");
     batch_expect_equal(wire, "slurm", "ref");
-    /* some tasks again, of an array of seven */
+    /* Some tasks of an array of seven run again. */
     setenv("SHARDS", "7", 1);
     setenv("SLURM_ARRAY_TASK_ID", "3", 1);
     by_script(wire, "/bin/bash", "config/campaign/slurm.sh", "again");

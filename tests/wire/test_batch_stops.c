@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Campaigns that are killed and gone on with: the same bytes in the end. What was changed since is found, and nothing is mixed. */
+/* Campaigns that are killed and continued have the same bytes in the end. Changes made meanwhile are found, and nothing
+ * is mixed. */
 #include <sys/file.h>
 #include <sys/inotify.h>
 
 #include "tests/wire/batch_rig.h"
 
-/* Waits until something whose name ends so has come, or changed, in the folder, `n` times; 0: the program ended before. */
+/* Waits until a file whose name ends so has come, or changed, in the folder, `n` times. Returns 0 when the program
+ * ended before. */
 static int wait_for(int notify, pid_t pid, const char *ending, int n)
 {
     char buf[8192] __attribute__((aligned(8)));
@@ -27,7 +29,7 @@ static int wait_for(int notify, pid_t pid, const char *ending, int n)
     return n == 0;
 }
 
-/* Killed once in each of these moments, one after the other, in one campaign; the cut is another one each time. */
+/* One campaign is killed once in each of these moments, one after the other. The shards differ each time. */
 static const struct moment {
     const char *shard;
     uint32_t events;
@@ -38,7 +40,7 @@ static const struct moment {
     {"2/2", IN_MOVED_TO, ".ply", 1, SIGKILL},    /* one of its files is whole, the other one isn't */
     {"1/1", IN_MODIFY, ".jsonl", 1, SIGKILL},    /* a line is there */
     {"1/3", IN_CREATE, ".las.part", 1, SIGTERM}, /* asked to end, within a job */
-    {"1/1", IN_CREATE, ".ply.part", 2, SIGKILL}, /* within the second of those that were left */
+    {"1/1", IN_CREATE, ".ply.part", 2, SIGKILL}, /* within the second of the jobs that were left */
 };
 
 static void test_killed(void **state)
@@ -54,9 +56,9 @@ static void test_killed(void **state)
         if (came) kill(pid, m->signal);
         const int status = wire_wait(wire, pid);
         close(notify);
-        /* 0, too: it may have come to its end before the signal did */
+        /* 0 is right, too: the program may have ended before the signal came */
         assert_true(status == 0 || (came && status == (m->signal == SIGKILL ? 256 + SIGKILL : 1)));
-        /* what bears its own name is whole, whether it is in a manifest or not */
+        /* a file that has its final name is whole, whether it is in a manifest or not */
         for (int job = 0; job < BATCH_JOBS; job++)
             for (int k = 0; k < 2; k++) {
                 const char *ending = k ? ".las" : ".ply";
@@ -70,7 +72,7 @@ static void test_killed(void **state)
     batch_expect_equal(wire, "killed", "ref");
 }
 
-/* A signal while points are being written: nothing of the job stays. */
+/* After a signal while points are being written, nothing of the job is left. */
 static void test_interrupted(void **state)
 {
     struct wire *wire = *state;
@@ -89,7 +91,7 @@ static void test_interrupted(void **state)
     assert_int_equal(rmdir(wire_path(wire, "long")), 0);
 }
 
-/* ---- what isn't whole any more */
+/* ---- files that are not whole any more */
 
 static void spoil(const struct wire *wire, int job, const char *ending, off_t cut, off_t flip)
 {
@@ -113,7 +115,7 @@ static void test_spoilt(void **state)
     spoil(wire, 0, ".ply", 1, 0);
     spoil(wire, 2, ".las", 0, 9);
     assert_int_equal(unlink(batch_file(wire, "one", 3, ".ply")), 0);
-    /* a line that was cut short, and a part of a file */
+    /* One line is cut short, and a part of a file is left. */
     struct stat st;
     assert_int_equal(stat(batch_in(wire, "one", "manifest-1-of-1.jsonl"), &st), 0);
     assert_int_equal(truncate(batch_in(wire, "one", "manifest-1-of-1.jsonl"), st.st_size - 2), 0);
@@ -135,7 +137,7 @@ static void test_spoilt(void **state)
     assert_int_equal(access(batch_in(wire, "one", "manifest.json"), F_OK), 0);
 }
 
-/* Each is refused until it is as it was; --force makes the jobs again. */
+/* Each change is refused until it is undone; --force makes the jobs again. */
 static void test_nothing_is_mixed(void **state)
 {
     struct wire *wire = *state;
@@ -148,7 +150,7 @@ static void test_nothing_is_mixed(void **state)
                         (size_t)(second - list));
     assert_memory_equal(second, "-    0002_", 10);
     free(list);
-    /* how fast it is computed is no part of a job */
+    /* settings of the computing's speed are no part of a job */
     batch_expect(wire, "one", WITH("--set", "loop.queue_ms=100", "--list"), 0, "");
     list = wire_read(wire_path(wire, "out"), NULL);
     assert_memory_equal(list, "done ", 5);
@@ -170,7 +172,7 @@ static void test_nothing_is_mixed(void **state)
     free(text);
     batch_change(manifest, engine, "Embree 3.0.0, packets of 2, abacus");
     batch_expect(wire, "one", WITH("--shard", "2/3"), 1, "processor");
-    /* of two kinds, which --merge finds, wherever it runs */
+    /* the shards are of two kinds, which --merge finds, wherever it runs */
     batch_expect(wire, "one", WITH("--force", "--shard", "2/3"), 0, "shard 2/3");
     batch_expect(wire, "one", WITH("--merge"), 1, "abacus");
     batch_change(manifest, "Embree 3.0.0, packets of 2, abacus", engine);
@@ -182,7 +184,7 @@ static void test_nothing_is_mixed(void **state)
     batch_expect(wire, "one", WITH("--merge"), 0, "1 files are of no job of this campaign, the first: 0001_before.ply");
 }
 
-/* ---- others at work, and jobs that fail */
+/* ---- other processes at work, and jobs that fail */
 
 static void test_locked(void **state)
 {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the beam: what a native client notices of each, by pulse number, is what the truth says. */
+/* Faults of the beam: the effects that a native client sees, by pulse number, are those of the truth. */
 #include "tests/wire/beam_run.h"
 
 static const double RAD = M_PI / 180.0;
 /* Encoders have 2^20 counts a turn. */
 static const double HALF_COUNT_RAD = M_PI / 1048576.0;
-/* Ranges by what the encoders read: half a count of each of two axes, 3e-6 rad, seen 7 m away at 65 deg at most: 0.1
- * mm; and half a step of 0.1 mm of the range on the wire. */
+/* Ranges follow from the encoders' angles. The bound is half a count of each of two axes, 3e-6 rad, seen 7 m away at 65
+ * deg at most: 0.1 mm; and half a step of 0.1 mm of the range on the wire. */
 static const double RANGE_M = 1.5e-4;
 
 static int is_within(double got, double want, double tolerance)
@@ -25,13 +25,13 @@ static double nominal_pan_rad(uint64_t k)
     return RAD * 60.0 * (double)k / 20000.0;
 }
 
-/* Of two angles of less than a turn. */
+/* Returns the difference of two angles of less than a turn. */
 static double angle_between(double a, double b)
 {
     return fabs(remainder(a - b, 2.0 * M_PI));
 }
 
-/* The range is what the room has where the head says that it looks. */
+/* The range is the room's in the direction that the head reports. */
 static void assert_right(const struct beam_shot *shot, uint64_t k)
 {
     struct room_ray ray;
@@ -46,7 +46,7 @@ static void assert_same(const struct beam_shot *a, const struct beam_shot *b, ui
         fail_msg("pulse %" PRIu64 " is not that of the clean run", k);
 }
 
-/* Begins and ends where the configuration says. */
+/* The fault begins and ends where the configuration says. */
 static void assert_window(const struct beam_run *run, const char *kind, uint64_t begin, uint64_t end)
 {
     assert_int_equal(beam_note(run, kind, 0, 0)->pulse, begin);
@@ -75,7 +75,7 @@ static void dark_shots_are_those_of_the_window(void **state)
     }
 }
 
-/* A window in device time: the first pulse that fires then, and the last one before its end. */
+/* A window in device time goes from the first pulse that fires in it to the last one before its end. */
 static void windows_in_time_are_exact_to_the_pulse(void **state)
 {
     const struct beam_run *first = beam_record(*state, 0, "  - {kind: laser_off}\n", NULL);
@@ -93,7 +93,7 @@ static void windows_in_time_are_exact_to_the_pulse(void **state)
     assert_int_equal(note->t_ns, zero_ns + run->shot[2001].t_ns);
 }
 
-/* Half the speed from pulse 1003 to 5008. Phases are whole 800ths of a line, and 400ths once it is over. */
+/* The speed is half from pulse 1003 to 5008. Phases are whole 800ths of a line, and 400ths once it is over. */
 static double slow_mirror_rad(uint64_t k)
 {
     const uint64_t before = k < 1003 ? k : 1003, after = k < 5009 ? 0 : k - 5009;
@@ -176,7 +176,7 @@ static void a_wobble_is_what_the_encoder_reads(void **state)
     }
 }
 
-/* Nobody can see it in the stream: only the walls are where they are not. */
+/* The stream does not show it; only the walls are in wrong places. */
 static void a_slipped_pan_moves_the_points_alone(void **state)
 {
     const struct beam_run *clean = beam_record(*state, 0, NULL, NULL);
@@ -202,8 +202,8 @@ static void a_slipped_pan_moves_the_points_alone(void **state)
 
 static const char SOILED[] = "  - {kind: window_soiled, loss_db: 4.25, from_pulse: 1003, until_pulse: 5008}\n";
 
-/* 0.01 dB on the wire: each of the two is rounded, so that they differ by a step at most. The profile's range on a dark
- * wall is 1 km: nothing vanishes. */
+/* Each of the two values is rounded to 0.01 dB on the wire, so they differ by a step at most. The profile's range on a
+ * dark wall is 1 km, so nothing vanishes. */
 static void a_soiled_window_takes_its_decibels(void **state)
 {
     static const char *const sets[] = {"signal.model=on", "signal.detection=sharp", "output.attributes=on", NULL};
@@ -219,8 +219,8 @@ static void a_soiled_window_takes_its_decibels(void **state)
     }
 }
 
-/* Without a signal model the noise is 10^(4.25 / 10) times as large, and else the same: counts of the range leave half
- * of one in each. */
+/* Without a signal model the noise is 10^(4.25 / 10) times as large, and otherwise the same. Counts of the range add
+ * half of one in each. */
 static void a_soiled_window_makes_ranges_noisy(void **state)
 {
     static const char *const off[] = {"noise.range=off", NULL}, *const on[] = {"noise.range=on", NULL};

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the beam with other heads, other ways to cast and other paces: the same pulses, and the same bytes. */
+/* Faults of the beam with other heads, other ways to cast and other paces. They hit the same pulses and give the same
+ * bytes. */
 #include "tests/wire/beam_run.h"
 #include "tests/wire/emitter_rig.h"
 
 static const double RAD = M_PI / 180.0;
 
-/* All kinds at once, one over the other, none of them at a whole packet or tick. */
+/* All kinds at once, overlapping. None of them begins at a whole packet or tick. */
 static const char ALL[] = "  - {kind: mirror_slow, factor: 0.37, from_pulse: 1003, until_pulse: 3008}\n"
                           "  - {kind: mirror_slow, factor: 1.7, from_pulse: 2500, until_pulse: 3500}\n"
                           "  - {kind: mirror_stuck, from_pulse: 2000, until_pulse: 2222}\n"
@@ -76,7 +77,7 @@ static void any_pace_and_threads_give_the_same_bytes(void **state)
     }
 }
 
-/* A fault whose pulses never come changes nothing, and is not told. */
+/* A fault whose pulses never come changes nothing, and the truth does not have it. */
 static void a_fault_that_is_not_due_changes_nothing(void **state)
 {
     char hash[65];
@@ -110,8 +111,8 @@ static void record_hash(struct wire *wire, const char *const *sets, const char *
     stats_hash(wire, hash);
 }
 
-/* With a map of what is seen the hits are those without; footprints and the geo layout cast the same with any number
- * of threads. */
+/* With a visibility map the hits are the same as without. Footprints and the geo layout are the same with any number of
+ * threads. */
 static void ways_to_cast_agree(void **state)
 {
     static const char *const noisy[] = {"noise.range=on", NULL};
@@ -141,7 +142,7 @@ static const struct room_config VLP = {.profile = "velodyne-vlp16",
                                        .links = "links: []\n",
                                        .more = "output: {scale_m: 1e-6}\n"};
 
-/* The rotor of a VLP-16 from pulse 10000 to 29999 (sequences 625 to 1874): slow, stuck, and with a wobble. Firings keep
+/* The rotor of a VLP-16 is slow, stuck, or wobbles from pulse 10000 to 29999 (sequences 625 to 1874). Firings keep
  * their times. Half a count of 2^-32 turns is 8e-10 rad; a change of speed keeps the phase to 2^-40. */
 static double rotor_rad(const char *kind, uint64_t k)
 {
@@ -179,7 +180,7 @@ static void check_rotor(struct wire *wire, const char *kind, const char *keys)
         room_cast(shot->mirror_rad, shot->pan_rad, &ray);
         assert_true(fabs(shot->range_m - ray.range_m) < 1e-5);
     }
-    for (uint32_t i = 0; i < run->lines; i++) { /* a turn's end reads what its last point does */
+    for (uint32_t i = 0; i < run->lines; i++) { /* a turn's end has the angle of its last point */
         const struct scanhead_line_end *line = &run->line[i];
         const struct beam_shot *last = &run->shot[line->pulse0 + line->n_fired - 1];
         assert_true(angle_between(last->pan_rad, 2.0 * M_PI * 0x1p-32 * line->pan_count) <= ANGLE_RAD);
@@ -194,7 +195,7 @@ static void a_rotor_may_be_slow_stuck_or_wobble(void **state)
     check_rotor(*state, "mirror_wobble", "deg: 1.5, hz: 12, ");
 }
 
-/* A planar head fires at steps of its mirror: a slow one fires slowly, and a turn has as many pulses. */
+/* A planar head fires at steps of its mirror. A slow mirror makes it fire slowly, and a turn has as many pulses. */
 static void a_planar_head_fires_as_slowly_as_it_turns(void **state)
 {
     static const struct room_config UTM = {.profile = "hokuyo-utm-30lx",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* build/bench: the JSON has the keys that scripts rely on, figures that can be, and stages that add up.
- * The program is $BENCH, or `bench` beside $SCANHEAD. */
+/* build/bench: the JSON has the keys that scripts rely on, plausible figures, and stages that add up. The program is
+ * $BENCH, or `bench` beside $SCANHEAD. */
 #include "tests/wire/wire.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@ static int bench(struct wire *wire, const char *const *args)
     return wire_wait(wire, wire_spawn_program(wire, program, args, "out", "err", -1));
 }
 
-/* The number behind "key": at or after `from`. */
+/* Returns the number after "key": at or after `from`. */
 static double number_of(const char *from, const char *key)
 {
     char quoted[64], *end;
@@ -44,8 +44,7 @@ static void test_keys(void **state)
     assert_true(number_of(scenes, "embree_mrays_s") > 0.0);
     double cast = number_of(scenes, "cast_ratio"), pipeline = number_of(scenes, "pipeline_ratio");
     assert_true(cast > 0.0 && pipeline > 0.0);
-    /* The pipeline does all that the cast does and more; a tenth is left for what else the machine does
-     * meanwhile. */
+    /* The pipeline does all of the cast and more. A tenth is left for other work of the machine. */
     assert_true(pipeline < 1.1 * cast);
     const char *ns = strstr(scenes, "\"ns_per_pulse\": {");
     assert_non_null(ns);
@@ -59,7 +58,7 @@ static void test_keys(void **state)
     free(text);
 }
 
-/* Whole scans: what building a sight costs is in the ratio, and it changes no hit. */
+/* For whole scans the ratio includes the time to build a sight. The sight changes no hit. */
 static void test_sight(void **state)
 {
     static const char *const args[] = {"--scenes", "10k", "--only-sight", "--pulses", "50k,100k", NULL};
@@ -76,7 +75,7 @@ static void test_sight(void **state)
         assert_true(number_of(at, "rounds") >= 9.0);
         const char *ns = strstr(at, "\"ns_per_pulse\": {");
         assert_non_null(ns);
-        /* A median of ratios lies near the ratio of medians: within half even where other programs run. */
+        /* A median of ratios lies near the ratio of medians, within half even where other programs run. */
         const double sum_ns = number_of(ns, "build") + number_of(ns, "cast");
         assert_true(fabs(number_of(at, "cast_ratio") * sum_ns / number_of(ns, "embree") - 1.0) < 0.5);
         for (size_t k = 0; k < sizeof parts / sizeof parts[0]; k++)
@@ -86,7 +85,7 @@ static void test_sight(void **state)
     free(text);
 }
 
-/* To a file, with a table for people beside it: to build the meshes takes longer than the rays. */
+/* The output goes to a file, with a table for people beside it. Building the meshes takes longer than the rays. */
 static void test_leaks(void **state)
 {
     struct wire *wire = *state;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* A personality's link leaves the native stream as it is: the same hash with it and without. And its ports outlive
- * clients that come, say half a word and go. */
+/* A personality's link does not change the native stream: its hash is the same with it and without. Its ports survive
+ * clients that come, send half a word and go. */
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
 
 #define CLIENTS thorough(10000, 2000)
 
 struct personality {
-    const char *config, *asks; /* asks: what makes it send all that it has; NULL: it sends by itself */
+    const char *config, *asks; /* asks: the request after which it sends all that it has; NULL: it sends by itself */
     const char *ptys[2];       /* keys of terminals' paths, or NULL */
     int native;                /* link */
     const char *without[8];    /* keys that take the personality away */
@@ -55,7 +55,7 @@ static struct head start(struct wire *wire, const struct personality *p, int wit
     return head_start(wire, p->config, args);
 }
 
-/* A child that asks, which starts the scan, and then takes all that comes until the head is gone. */
+/* Starts a child that asks, which starts the scan, and then takes all that comes until the head is gone. */
 static pid_t ask_and_drain(struct wire *wire, const char *endpoint, const char *asks)
 {
     static char bytes[1 << 16];
@@ -69,7 +69,7 @@ static pid_t ask_and_drain(struct wire *wire, const char *endpoint, const char *
     _exit(sum < 100000); /* scans came, not only replies */
 }
 
-/* Ten seconds of the device's time as fast as it computes, which waits for each client. */
+/* Scans ten seconds of device time as fast as the head computes. It waits for each client meanwhile. */
 static void scan(struct wire *wire, const struct personality *p, int with, const char *frames, char hex[65])
 {
     int udp[2];
@@ -90,7 +90,8 @@ static void scan(struct wire *wire, const struct personality *p, int with, const
     pid_t drain = 0;
     client_wait_state(sh, "idle");
     scanhead_hash_start(sh);
-    /* Who asks for scans asks before the scan begins: the head waits for a client, but not for one that is yet to come. */
+    /* A client that asks for scans asks before the scan begins: the head waits for a client, but not for one that is
+     * yet to come. */
     if (with && p->asks != NULL)
         drain = ask_and_drain(wire, head_link(&head, 0), p->asks);
     else
@@ -129,10 +130,10 @@ static void test_hash_velodyne(void **state)
 
 struct crowd {
     const struct personality *p;
-    const char *half, *ask, *answer; /* what each says before it goes; what is asked after all of them */
+    const char *half, *ask, *answer; /* half: sent by each client before it goes; ask: sent after all of them */
 };
 
-/* One after the other. */
+/* The clients come one after the other. */
 static pid_t crowd(struct wire *wire, const char *endpoint, const char *half)
 {
     char rest[256];
@@ -142,7 +143,7 @@ static pid_t crowd(struct wire *wire, const char *endpoint, const char *half)
         int fd = raw_connect(endpoint);
         raw_send(fd, half, strlen(half));
         shutdown(fd, SHUT_WR);
-        while (read(fd, rest, sizeof rest) > 0) /* until the head has closed it: so nobody stands in a queue */
+        while (read(fd, rest, sizeof rest) > 0) /* until the head has closed it, so that no client waits for it */
             continue;
         close(fd);
     }
@@ -164,7 +165,7 @@ static void expect_answer(const char *endpoint, const struct crowd *c)
     }
 }
 
-/* Ten thousand clients of each, and then the heads answer as if nobody had been there. */
+/* Ten thousand clients come to each head. Then the heads answer as if none had been there. */
 static void test_crowds(void **state)
 {
     (void)state;

@@ -1,18 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* The same scene, stations and step in Blender: tests/readers/blender_scan.py scans with geometry nodes, in single
- * precision and code of which nothing is ours. Here scanhead records the same, and each of its shots is compared with
- * Blender's ray of that direction: both meet something or neither does, and then at the same place.
+/* The same scene, stations and step in Blender. tests/readers/blender_scan.py scans with geometry nodes, in single
+ * precision and with no code of ours. scanhead records the same here, and each of its shots is compared with Blender's
+ * ray of that direction. Both meet something, at the same place, or neither does.
  *
- * How far they may lie apart, with e = 2^-23, at range r, where coordinates go up to C and the surface is met at an
- * incidence i. The directions come of float angles: an azimuth of up to 2 pi, rounded twice (12.6 e/2), an elevation
- * of up to pi (6.3 e/2), sines, cosines, their product and the turn by a matrix of floats (6 e/2): together less than
- * 13 e. Of what ends at the surface: vertices and the station, rounded (e/2 of C on each axis), and the intersection,
- * about ten roundings of differences of up to 2 C, together less than 8 e C. On a slanted surface what is across the
- * ray becomes 1 / cos i of it along the ray: e (13 r + 8 C) / cos i. What scanhead adds, half a count of 1e-6 m, is
- * added.
+ * The bound of their distance, with e = 2^-23, at range r, where coordinates go up to C and the surface is met at an
+ * incidence i: Directions come from float angles. An azimuth of up to 2 pi is rounded twice (12.6 e/2), an elevation of
+ * up to pi once (6.3 e/2). Sines, cosines, their product and the turn by a matrix of floats add 6 e/2. Together that is
+ * less than 13 e. At the surface vertices and the station are rounded (e/2 of C on each axis), and the intersection has
+ * about ten roundings of differences of up to 2 C. Together that is less than 8 e C. On a slanted surface an error
+ * across the ray is 1 / cos i of it along the ray: e (13 r + 8 C) / cos i. scanhead adds half a count of 1e-6 m.
  *
- * Where a ray passes an edge within that, Blender may take the surface beside or behind it. Such rays are counted; each
- * has to be that near to an edge of the mesh. */
+ * Where a ray passes an edge within that, Blender may take the surface beside or behind it. Such rays are counted, and
+ * each has to be that near to an edge of the mesh. */
 #include <math.h>
 
 #include "tests/wire/wire.h"
@@ -25,7 +24,7 @@ enum { STEP_DEG = 2, SEGMENTS = 360 / STEP_DEG, GAPS = 180 / STEP_DEG, RAYS = (G
 
 enum { CELLS = 40, POSTS = 3, N_VERTICES = (CELLS + 1) * (CELLS + 1) + 8 * POSTS, N_QUADS = CELLS * CELLS + 6 * POSTS };
 static const double CELL_M = 0.61, FIRST_M = -12.3; /* of the ground's first corner, x and y */
-static const double FAR_M = 25;                     /* no two points of it lie farther apart, seen from a station */
+static const double FAR_M = 25;                     /* no two points of it lie farther apart as seen from a station */
 static const double post_at[POSTS][2] = {{3.17, 1.93}, {-2.71, -4.39}, {-6.13, 5.57}};
 static const double post_lean[POSTS] = {-0.61, 0.0, 0.37};
 
@@ -62,7 +61,7 @@ static void make_post(int k)
         set_quad(q + i, v + face[i][0], v + face[i][1], v + face[i][2], v + face[i][3]);
 }
 
-/* The cells of the ground are not flat: they are written as two triangles each. */
+/* The cells of the ground are not flat, so they are written as two triangles each. */
 static void write_scene(const struct wire *wire)
 {
     static char text[64 * N_VERTICES + 64 * N_QUADS];
@@ -132,7 +131,7 @@ static void attitude(const struct station *s, double m[3][3])
     memcpy(m, rows, sizeof rows);
 }
 
-/* ---- what both have seen */
+/* ---- the hits of both */
 
 struct ray {
     float hit, hidden, position_m[3], normal[3];
@@ -173,7 +172,7 @@ static void run_blender(struct wire *wire)
     free(bytes);
 }
 
-/* Blender's sphere begins with the upper pole; of a ring the first vertex is one segment from x, counter-clockwise. */
+/* Blender's sphere begins with the upper pole. The first vertex of a ring is one segment from x, counter-clockwise. */
 static int ray_of(uint32_t ring, uint32_t step)
 {
     if (ring == GAPS) return 0;
@@ -186,7 +185,7 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Distance between a ray (unit direction) and the segment a..b, by Sunday's formulas for two lines. */
+/* Returns the distance between a ray (unit direction) and the segment a..b, by Sunday's formulas for two lines. */
 static double to_edge(const double from[3], const double d[3], const double a[3], const double b[3])
 {
     double v[3], w[3], gap[3];
@@ -219,7 +218,7 @@ static double allowed_m(double range_m)
     return 0x1p-23 * (13 * range_m + 8 * 12.3);
 }
 
-/* Height of the station above the ground: on the triangle of a cell that it stands above. */
+/* Returns the height of the station above the ground, on the triangle of a cell that it stands above. */
 static double above_ground_m(const struct station *s)
 {
     for (int i = 0; i < CELLS * CELLS; i++)
@@ -235,14 +234,14 @@ static double above_ground_m(const struct station *s)
     return NAN;
 }
 
-/* The cosine of the tripod's opening; 2 without one. */
+/* Returns the cosine of the tripod's opening, or 2 without one. */
 static double opening_of(const struct station *s)
 {
     if (!(s->leg_m > 0)) return 2;
     return fmin(above_ground_m(s) / s->leg_m, cos(s->opening_min_deg * M_PI / 180));
 }
 
-/* Neither direction nor height is better in Blender than 13 e; both go into the comparison. */
+/* Direction and height are no better in Blender than 13 e, and both go into the comparison. */
 static int at_border(double cosine, double opening)
 {
     return fabs(cosine - opening) < 26 * 0x1p-23;
@@ -271,7 +270,7 @@ static void compare_places(const struct station *s, double range_m, const double
     sums->most = fmax(sums->most, share);
 }
 
-/* A shot and Blender's ray of its direction d. */
+/* Compares a shot with Blender's ray of its direction d. */
 static void compare(const struct station *s, const struct scanhead_point *p, const double d[3], const struct ray *ray,
                     struct sums *sums)
 {
@@ -346,7 +345,8 @@ static void the_same_points_in_blender(void **state)
         sums[i].opening = opening_of(&stations[i]);
     compare_recording(wire, sums);
     for (int i = 0; i < STATIONS; i++) {
-        /* Of rays 35 mrad apart, those within 2e-5 m of an edge, or on the cone, are a matter of chance: none here. */
+        /* Rays are 35 mrad apart, and whether one is within 2e-5 m of an edge, or on the cone, is a matter of chance.
+         * There is none here. */
         assert_true(sums[i].both > 3000 && sums[i].neither > 1000 && sums[i].edges <= 4 && sums[i].border <= 4);
         print_message("# station %d: %d shots at the same place, up to %.2f of what is allowed; %d without echo, %d "
                       "hidden; %d at edges, %d at the border of the cone\n",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead check` prints: all faults of a configuration, the keys of a section, an example that
- * passes. And short options as getopt takes them. */
+/* These are tests of the output of `scanhead check`: all errors of a configuration, the keys of a section, an example
+ * that passes. And short options in getopt's forms. */
 #include "tests/wire/room.h"
 
 /* A value may follow its letter at once: -oFILE. */
@@ -20,7 +20,7 @@ static void test_short_forms(void **state)
     assert_int_equal(access(wire_path(wire, "x.ply"), R_OK), 0);
 }
 
-/* All faults of a configuration, a line each, at most 20. */
+/* All errors of a configuration are printed, a line each, at most 20. */
 static void test_all_faults(void **state)
 {
     struct wire *wire = *state;
@@ -45,9 +45,9 @@ static void test_all_faults(void **state)
     free(told);
 }
 
-/* `memory    1.3 MB for meshes and BVH, 205 bytes a triangle; 18 MB at the peak`: the figures fit together, up to the four
- * digits they have, and the peak has all of it. A triangle takes 58 bytes at the least: its plane, its corners' numbers
- * and label, and a leaf that it shares. */
+/* `memory 1.3 MB for meshes and BVH, 205 bytes a triangle; 18 MB at the peak`: the figures agree, up to their four
+ * digits, and the peak includes all. A triangle takes at least 58 bytes: its plane, its corners' numbers and label, and
+ * a leaf that it shares. */
 static void check_memory(char *told)
 {
     const char *memory = strstr(told, "\nmemory "), *scene = strstr(told, "\nscene ");
@@ -64,7 +64,7 @@ static void check_memory(char *told)
     free(told);
 }
 
-/* The example passes `check`, and each of its keys is the one that the help has. */
+/* The example passes `check`, and each of its keys has the help's name. */
 static void test_example(void **state)
 {
     struct wire *wire = *state;
@@ -80,7 +80,7 @@ static void test_example(void **state)
     check_memory(wire_read(wire_path(wire, "out"), NULL));
 }
 
-/* 60 boxes of 2 x 3 x 4 m, each a little higher than the one before; of the first the top is missing. */
+/* 60 boxes of 2 x 3 x 4 m, each a little higher than the one before. The first has no top. */
 static void write_boxes(struct wire *wire)
 {
     char *text = NULL;
@@ -105,7 +105,8 @@ static void write_boxes(struct wire *wire)
                     "scene: {meshes: [{file: boxes.obj, up: z, scale: 1}]}\nstations: [{position_m: [5, 1, 1]}]\n");
 }
 
-/* The 50 largest objects; sums over all 60; the open one by name, though it is the smallest; all in the file. */
+/* The table has the 50 largest objects, the sums over all 60, and the open one by name, though it is the smallest. The
+ * file has all. */
 static void test_objects(void **state)
 {
     struct wire *wire = *state;
@@ -123,7 +124,7 @@ static void test_objects(void **state)
     static const char *const has[] = {
         "\nobjects   60, the largest first\n", "\n  and 10 more; --scene-csv FILE has all\n",
         "\nopen      box 0, \"red\", 4 open edges\n", "sum: 59 closed, 1 open, 0 turned, 0 empty\n",
-        /* 5 * 2 + 59 * 12 triangles; 52 m2 + 10 i / 100 each, but for a top of 6; 24 m3 + 6 i / 100 each but one */
+        /* 5 * 2 + 59 * 12 triangles; 52 m2 + 10 i / 100 each, without the top of 6; 24 m3 + 6 i / 100 each but one */
         "\n         718          4         3291       1522.2  sum: "};
     for (size_t i = 0; i < sizeof has / sizeof has[0]; i++)
         if (strstr(out, has[i]) == NULL) fail_msg("%s is not in\n%s", has[i], out);
@@ -134,7 +135,7 @@ static void test_objects(void **state)
     free(all);
 }
 
-/* The table of a pipe is alone there, from its first line on. */
+/* On a pipe there is only the table, from its first line on. */
 static void test_objects_by_pipe(void **state)
 {
     struct wire *wire = *state;
@@ -154,7 +155,7 @@ static void test_objects_by_pipe(void **state)
     free(err);
 }
 
-/* Grey is what has no colour at all; of what has some, a part. */
+/* Grey is for meshes without any colour. The others give the share that has one. */
 static void test_colours_in_part(void **state)
 {
     struct wire *wire = *state;
@@ -174,7 +175,8 @@ static void test_colours_in_part(void **state)
     free(err);
 }
 
-/* Surfaces that a file calls transparent are solid until `surfaces` says something. The warning has the line to write. */
+/* Surfaces that a file calls transparent are solid until `surfaces` says otherwise. The warning has the line to
+ * write. */
 static void test_transparent(void **state)
 {
     struct wire *wire = *state;

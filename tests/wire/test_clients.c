@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Clients that die, babble, crowd or go quiet: the head carries on, tells what happened, and serves the next
- * one. */
+/* Clients die, send garbage, crowd or go quiet. The head carries on, reports what happened, and serves the next one. */
 #include "tests/wire/room.h"
 
 #include <termios.h>
@@ -27,7 +26,7 @@ static void start_scan(struct scanhead *sh)
     client_wait_state(sh, "scanning");
 }
 
-/* Points still come, in order and with nothing missing. */
+/* Points still come, in order and without gaps. */
 static void expect_points(struct scanhead *sh, int n)
 {
     struct scanhead_frame frame;
@@ -42,7 +41,8 @@ static void expect_points(struct scanhead *sh, int n)
     }
 }
 
-/* What a killed client did not read of a terminal may come first: it is from before the head answered us. */
+/* The frames that a killed client did not read from a terminal may come first. They are older than the head's answer to
+ * us. */
 static void pass_frames_before(struct scanhead *sh, int64_t t_ns)
 {
     struct scanhead_frame frame;
@@ -58,8 +58,8 @@ static int is_among(int number, const int *list)
     return *list != 0;
 }
 
-/* Takes errors off the queue until one of this number comes; those before it must be among the allowed ones
- * (0 ends the list). */
+/* Takes errors off the queue until one of this number comes. Those before it must be among the allowed ones (0 ends the
+ * list). */
 static void expect_error(struct scanhead *sh, int number, const int *allowed)
 {
     struct scanhead_frame frame;
@@ -74,7 +74,7 @@ static void expect_error(struct scanhead *sh, int number, const int *allowed)
 
 static const int NONE[] = {0};
 
-/* A child that connects, says how, and reads until it is killed. Returns once it has seen points. */
+/* Starts a child that connects, reports that, and reads until it is killed. Returns once it has received points. */
 static pid_t start_reader(struct wire *wire, const char *source)
 {
     char at[256];
@@ -104,7 +104,7 @@ static pid_t start_reader(struct wire *wire, const char *source)
     return pid;
 }
 
-/* It must have been alive, in the middle of reading. */
+/* The child must have been alive, in the middle of reading. */
 static void kill_hard(struct wire *wire, pid_t pid)
 {
     kill(pid, SIGKILL);
@@ -125,7 +125,7 @@ static void killed_client(struct wire *wire, const char *link)
         client_wait_state(sh, "idle");
         scanhead_close(sh);
         struct scanhead *other = client_open(head_endpoint(&head, strcmp(link, "tcp") == 0 ? "pty" : "tcp"));
-        expect_error(other, 101, NONE); /* who had control hung up: that, too */
+        expect_error(other, 101, NONE); /* also after the client in control has hung up */
         scanhead_close(other);
     }
     head_end(&head, SIGTERM);
@@ -143,7 +143,7 @@ static void test_killed_pty_client(void **state)
     killed_client(*state, "pty");
 }
 
-/* A descriptor to the link that takes any bytes. */
+/* Returns a descriptor to the link that takes any bytes. */
 static int raw_open(const struct head *head, const char *link)
 {
     if (strcmp(link, "tcp") == 0) return raw_connect(head_endpoint(head, "tcp"));
@@ -182,7 +182,7 @@ static void babbling_client(struct wire *wire, const char *link)
          *code != NULL; code++)
         assert_int_equal(atoi(client_ask(watch, "SYST:ERR?")), atoi(*code));
 
-    /* A line of 1000 characters is refused whole; what follows it is heard. */
+    /* A line of 1000 characters is refused whole. The line after it is accepted. */
     char line[1001];
     memset(line, 'A', 1000);
     line[1000] = '\0';
@@ -192,8 +192,7 @@ static void babbling_client(struct wire *wire, const char *link)
     scanhead_close(sh);
     expect_error(watch, 101, NONE);
 
-    /* Bytes of all values and away without a line's end. As many as give fewer errors than the queue holds.
-     */
+    /* Sends bytes of all values and leaves without a line's end. They give fewer errors than the queue holds. */
     int fd = raw_open(&head, link);
     unsigned char garbage[2500];
     uint32_t x = 12345;
@@ -218,7 +217,7 @@ static void babbling_client(struct wire *wire, const char *link)
     expect_error(watch, 101, NONE);
     expect_points(watch, 20);
 
-    /* Half a command is not carried out, not even by what the next client sends. */
+    /* Half a command is not carried out, even when the next client completes it. */
     fd = raw_open(&head, link);
     raw_send(fd, "SCAN:ST", 7);
     close(fd);
@@ -311,8 +310,7 @@ static void test_fifth_client_is_refused(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* 200 clients come and go while one watches; every fourth asks something, every eighth leaves with a reset.
- */
+/* 200 clients come and go while one watches. Every fourth asks something, and every eighth leaves with a reset. */
 static void test_many_short_clients(void **state)
 {
     struct wire *wire = *state;
@@ -346,7 +344,7 @@ static void test_many_short_clients(void **state)
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* At the pace `fast` a client that does not read holds the run back; when it dies the run goes on. */
+/* In the pace `fast` a client that does not read holds the run back. When it dies, the run goes on. */
 static void test_dead_weight_at_pace_fast(void **state)
 {
     struct wire *wire = *state;
@@ -362,8 +360,7 @@ static void test_dead_weight_at_pace_fast(void **state)
     int idle = raw_connect(head_endpoint(&head, "tcp")); /* never reads, never writes */
     start_scan(sh);
     uint64_t got = 0;
-    /* 1.5 s without a frame can be nothing but the run held back, since the next one would take milliseconds.
-     */
+    /* 1.5 s without a frame can only mean that the run is held back, since the next one would take milliseconds. */
     while (scanhead_next(sh, &frame, 1500) == SCANHEAD_OK) {
         got += frame.type == SCANHEAD_POINTS ? frame.n_pulses : 0;
         assert_false(is_event(&frame, SCANHEAD_EV_SCAN_END));

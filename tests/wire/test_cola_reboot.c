@@ -10,7 +10,7 @@ struct client {
     size_t len;
 };
 
-/* The next telegram without its marks; NULL: the connection has ended. */
+/* Returns the next telegram without its marks; NULL: the connection has ended. */
 static const char *next(struct client *c)
 {
     for (;;) {
@@ -30,7 +30,7 @@ static const char *next(struct client *c)
     }
 }
 
-/* The answer; NULL as of next(). What streams in between is passed over. */
+/* Returns the answer; NULL as next() does. Scans that come before it are passed over. */
 static const char *ask(struct client *c, const char *request)
 {
     char line[64];
@@ -49,7 +49,7 @@ static void expect(struct client *c, const char *request, const char *answer)
     assert_string_equal(said, answer);
 }
 
-/* Telegrams, scans and the scan's start in us of the next scan. */
+/* Reads the counts of telegrams and scans, and the scan's start in us, of the next scan. */
 static void read_scan(struct client *c, unsigned *telegrams, unsigned *scans, unsigned *start_us)
 {
     const char *scan = ask(c, "sRN LMDscandata");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Three SICK clients at once: CoLa-A and CoLa-B over TCP, CoLa-B over a pty; others between them send garbage. Each
- * client gets every scan; what all have of a scan is the same. */
+/* Three SICK clients at once: CoLa-A and CoLa-B over TCP, CoLa-B over a pty. Others between them send garbage. Each
+ * client gets every scan, and all get the same figures of a scan. */
 #include "tests/wire/house.h"
 #include "tests/wire/wire.h"
 
@@ -12,12 +12,12 @@ struct client {
     size_t len, used; /* used: by the telegram found last */
 };
 
-/* What is compared of a scan. */
+/* The compared figures of a scan. */
 struct scan {
     uint32_t telegram, count, start_us, range[BEAMS];
 };
 
-/* Length of the whole telegram at the buffer's begin; 0: there is none yet. */
+/* Returns the length of the whole telegram at the buffer's begin; 0: there is none yet. */
 static size_t whole(const struct client *c)
 {
     if (!c->is_b) {
@@ -50,7 +50,7 @@ static uint32_t big_endian(const uint8_t *at, int n)
     return v;
 }
 
-/* Field i of a telegram in CoLa-A. */
+/* Returns field i of a telegram in CoLa-A. */
 static uint32_t field(const uint8_t *telegram, int i)
 {
     const char *at = (const char *)telegram;
@@ -80,7 +80,7 @@ static void read_scan(struct client *c, struct scan *s)
     }
 }
 
-/* A pty as it is: nobody has made its terminal raw. */
+/* Opens a pty with its default settings: no program has made its terminal raw. */
 static int connect_to(const char *endpoint)
 {
     if (strncmp(endpoint, "tty:", 4) != 0) return raw_connect(endpoint);
@@ -98,7 +98,7 @@ static void start_client(struct client *c, const char *endpoint, int is_b)
     assert_memory_equal(next_telegram(c) + (is_b ? 8 : 1), "sEA LMDscandata ", 16);
 }
 
-/* What a port scan may bring: none of it is a request. */
+/* Sends bytes as a port scan may; none of them is a request. */
 static void send_garbage(const char *endpoint, int i)
 {
     static const char *const garbage[] = {"GET / HTTP/1.1\r\n\r\n", "\2\2\2\2\xff\xff\xff\xff", "\2sRN ", "\r\n\r\n"};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours from the configuration to the files, through the real program: texels to the texel, the smallest and the largest
- * figure at the ends of the ramp, the same in each format, the same points with colours and without. */
+/* Colours from the configuration to the files, through the real program. Texels are exact, and the smallest and the
+ * largest figure are at the ends of the ramp. Each format has the same colours, and the points are the same with
+ * colours and without. */
 #include "core/colour.h"
 #include "tests/common/chart.h"
 #include "tests/wire/readers.h"
@@ -29,7 +30,7 @@ static int tear_down(void **state)
     return wire_teardown(state);
 }
 
-/* The board 10 m before the head, with the chart of PNG, and a floor without texture and colour. */
+/* The board is 10 m before the head and has the chart as PNG. There is a floor without texture and colour. */
 static void write_config(const char *more)
 {
     char text[2048], mesh[256];
@@ -46,7 +47,8 @@ static void write_config(const char *more)
     wire_write_text(wire, "config.yaml", text);
 }
 
-/* Words of a command line, which ends with NULL; those of files are paths in the folder. Returns the status. */
+/* Records with these words of a command line, which end with NULL. Words of files are paths in the folder. Returns the
+ * status. */
 static int record(const char *source, const char *const *words, const char *const *files)
 {
     static char path[8][352];
@@ -68,7 +70,8 @@ static int record(const char *source, const char *const *words, const char *cons
 #define FILES(...) ((const char *const[]){__VA_ARGS__, NULL})
 #define WORDS(...) ((const char *const[]){__VA_ARGS__, NULL})
 
-/* x y z range reflectance time echo count label station red green blue. Returns the header's text of colours. */
+/* The columns are x y z range reflectance time echo count label station red green blue. Returns the header's text of
+ * colours. */
 static char *read_ply(const char *name, int coloured)
 {
     char *text = wire_read(wire_path(wire, name), NULL), *at = strstr(text, "end_header\n");
@@ -95,7 +98,7 @@ static int is_rgb(const struct vertex *v, const uint8_t want[3])
     return v->rgb[0] == want[0] && v->rgb[1] == want[1] && v->rgb[2] == want[2];
 }
 
-/* Recorded positions are good to a micrometre: a texel is 98 mm wide. */
+/* Recorded positions are good to a micrometre, and a texel is 98 mm wide. */
 static void check_texels(void)
 {
     static const enum texture_wrap wrap[2] = {TEXTURE_REPEAT, TEXTURE_REPEAT};
@@ -118,7 +121,7 @@ static void check_texels(void)
     assert_true(n > 1000 && floor > 100);
 }
 
-/* What web-e57 reads, and the grid: the same colours in the same order. */
+/* The colours that web-e57 reads, and those of the grid, are the same in the same order. */
 static void check_other_formats(void)
 {
     char *text = wire_read(wire_path(wire, "t.ptx"), NULL), *at = text;
@@ -177,7 +180,7 @@ static void test_texture(void **state)
         stats_hash(wire, hash);
         assert_string_equal(hash, with);
     }
-    /* A recorded stream has them; and what is asked for comes before them. */
+    /* A recorded stream has them, and options come before them. */
     assert_int_equal(record("t.shs", NULL, FILES("again.ply")), 0);
     char *again = wire_read(wire_path(wire, "again.ply"), NULL);
     assert_string_equal(strstr(again, "end_header"), strstr(text, "end_header"));
@@ -189,8 +192,8 @@ static void test_texture(void **state)
     check_other_formats();
 }
 
-/* The nearest point is red, the farthest blue, as the file says it; so by --colour, by the configuration, and again from the
- * stream. */
+/* The nearest point is red and the farthest blue, as the file says. That is so by --colour, by the configuration, and
+ * again from the stream. */
 static void test_own_limits(void **state)
 {
     wire = *state;
@@ -225,8 +228,8 @@ static void test_own_limits(void **state)
     free(a);
 }
 
-/* In a stream limits are fixed: the head's ranges, which reach so far that all is red here; the scene's bounds, from -2 to
- * 2 m; or those that are given, also in a recording. */
+/* In a stream limits are fixed. They are the head's ranges, which reach so far that all is red here; the scene's
+ * bounds, from -2 to 2 m; or given ones, also in a recording. */
 static void test_stated_limits(void **state)
 {
     wire = *state;
@@ -253,8 +256,8 @@ static void test_stated_limits(void **state)
     }
 }
 
-/* What the head sends is what a recording makes of the same points; of figures on the ramp within a step, for the stream
- * has micrometres and 0.01 dB. */
+/* The head sends the colours that a recording computes from the same points. On the ramp they may differ by a step, as
+ * the stream has micrometres and 0.01 dB. */
 static void test_sent_and_made(void **state)
 {
     static const struct {
@@ -287,11 +290,11 @@ static void test_sent_and_made(void **state)
                     fail_msg("case %zu, point %d: %d, not %d", k, i, sent[i].rgb[c], vertex[i].rgb[c]);
             differ += memcmp(sent[i].rgb, vertex[0].rgb, sizeof sent[i].rgb) != 0;
         }
-        assert_int_equal(differ > 100, k != 0); /* but for one colour, there are several */
+        assert_int_equal(differ > 100, k != 0); /* only the first case has one colour for all */
     }
 }
 
-/* Wrong words on the command line: status 2 and what is allowed. */
+/* Wrong words on the command line end with status 2 and the allowed ones. */
 static void test_refused(void **state)
 {
     static const struct {
@@ -324,8 +327,8 @@ static void test_refused(void **state)
     assert_int_equal(access(wire_path(wire, "x.ply"), F_OK), -1);
 }
 
-/* What can't be coloured is named as it would have been written. There is no room to keep frames of more than 512 or 1024
- * bytes, which depends on the shell. */
+/* A part that can't be coloured is named as it would have been written. There is no room to keep frames of more than
+ * 512 or 1024 bytes, which depends on the shell. */
 static void test_names_of_parts(void **state)
 {
     (void)state;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead coverage, through the real program: figures, the mesh of cells, the next station, and what it refuses. */
+/* These tests run scanhead coverage, through the real program: figures, the mesh of cells, the next station, and its
+ * refusals. */
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 
-/* The L of tests/unit/coverage_rig.h, faces inward: 88.8 m2. */
+/* The L of tests/unit/coverage_rig.h, with its faces inward: 88.8 m2. */
 static const char L_ROOM[] =
     "v 0 0 0\nv 6 0 0\nv 6 2 0\nv 2 2 0\nv 2 5 0\nv 0 5 0\nv 0 0 2.4\nv 6 0 2.4\nv 6 2 2.4\nv 2 2 2.4\nv 2 5 2.4\n"
     "v 0 5 2.4\n"
@@ -11,7 +12,7 @@ static const char L_ROOM[] =
     "o floor\nusemtl wood\nf 1 2 3 4\nf 1 4 5 6\no ceiling\nusemtl paint\nf 10 9 8 7\nf 12 11 10 7\n";
 static const double L_M2 = 36.0 + 22.0 * 2.4;
 
-/* A head of 100 by 360 degrees, from the right leg of the L; half a degree. */
+/* A head of 100 by 360 degrees with steps of half a degree, in the right leg of the L. */
 static const char *set_up(const struct wire *wire)
 {
     static char path[256];
@@ -66,8 +67,8 @@ static void test_figures(void **state)
     assert_near("area", number_of(json, "area_m2"), L_M2, 1e-9);
     assert_near("cell", number_of(json, "cell_m"), 0.25, 0.0);
     assert_near("sum", number_of(json, "none_m2") + number_of(json, "one_m2"), L_M2, 1e-9);
-    /* 28.27 m2 lie behind the corner (tests/unit/test_coverage.c), and as much as a cone of 40 degrees up and down of
-     * floor and ceiling is not looked at: pi (1.2 / tan 50)^2 each, of which 0.2 m and more lie beyond the walls. */
+    /* 28.27 m2 lie behind the corner (tests/unit/test_coverage.c). A cone of 40 degrees up and down is not scanned on
+     * floor and ceiling: pi (1.2 / tan 50)^2 each, of which 0.2 m and more lie beyond the walls. */
     assert_true(number_of(json, "none_m2") > 28.26 - 6.6 * 0.6 &&
                 number_of(json, "none_m2") < 28.27 + 2.0 * 3.2 + 6.6 * 0.6);
     assert_non_null(strstr(json, "\"name\": \"right\""));
@@ -144,7 +145,7 @@ static void test_mesh(void **state)
     }
 }
 
-/* ---- the next station: what it says holds once the station is there */
+/* ---- the next station: its estimate holds once the station is there */
 
 static void test_next(void **state)
 {
@@ -163,8 +164,8 @@ static void test_next(void **state)
     assert_true(p[0] < 2.0 && p[2] == 1.2); /* in the other leg */
     const double gain_m2 = number_of(next, "gain_m2"), left_m2 = number_of(next, "none_m2");
     assert_near("gain", gain_m2, none_m2 - left_m2, 1e-9);
-    /* Estimates are right but for the cells of 0.25 m at the outlines of what is gained: the shadow's line, some 7 m, and
-     * where the cones of 40 degrees end on floor and ceiling, 2 pi 1.2 m / tan 50 = 6.3 m each. */
+    /* Estimates are right but for the cells of 0.25 m at the outlines of the gain: the shadow's line, some 7 m, and the
+     * ends of the cones of 40 degrees on floor and ceiling, 2 pi 1.2 m / tan 50 = 6.3 m each. */
     assert_near("estimate", number_of(next, "estimate_m2"), gain_m2, 0.25 * (7.0 + 2.0 * 6.3));
     snprintf(line, sizeof line, "stations.1.position_m=[%.17g, %.17g, %.17g]", p[0], p[1], p[2]);
     const char *const with[] = {"coverage", config, "--json", "--set", line, NULL};
@@ -180,8 +181,8 @@ static void test_next(void **state)
     free(text);
 }
 
-/* A head whose beams lie in a plane: all its 682 pulses are tried, so the estimate is the gain; but for two cells of 0.25 m,
- * where a ray lies on the border of one. */
+/* A head whose beams lie in a plane. All its 682 pulses are tried, so the estimate is the gain. The exception is two
+ * cells of 0.25 m, because a ray lies on the border of one. */
 static void test_next_planar(void **state)
 {
     struct wire *wire = *state;
@@ -203,7 +204,7 @@ static void test_next_planar(void **state)
     free(json);
 }
 
-/* ---- what is refused, and a signal */
+/* ---- refusals, and a signal */
 
 static void test_refused(void **state)
 {
@@ -245,7 +246,7 @@ static void test_refused(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
-/* The table of the stations has come: then it compares places for hours. */
+/* The table of the stations is printed; then it compares places for hours. */
 static void test_interrupt(void **state)
 {
     struct wire *wire = *state;
@@ -261,7 +262,7 @@ static void test_interrupt(void **state)
         struct pollfd on = {.fd = fd, .events = POLLIN};
         assert_int_equal(poll(&on, 1, DEADLINE_MS), 1);
         const ssize_t some = read(fd, got + n, sizeof got - 1 - n);
-        if (some <= 0) continue; /* nobody has opened the other end yet */
+        if (some <= 0) continue; /* the other end is not open yet */
         n += (size_t)some;
         got[n] = '\0';
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* --duration: of `record` off line, and of `run --start`, or head.start. Both are device time. */
+/* --duration of `record` off line, and of `run --start` or head.start. Both are device time. */
 #include "tests/wire/room.h"
 
 /* A frame takes 0.4 s. */
@@ -18,7 +18,7 @@ static uint64_t pulses_before(const struct oracle *oracle, int64_t t_ns)
     return k;
 }
 
-/* Off line --duration is device time, to the pulse: the same pulses and the same hash each time. */
+/* Off line --duration is device time, to the pulse: there are the same pulses and the same hash each time. */
 static void test_duration_is_device_time(void **state)
 {
     static const char *const threads[] = {"1", "2", "3", "2"};
@@ -41,7 +41,7 @@ static void test_duration_is_device_time(void **state)
     }
 }
 
-/* The pulses of a run, and what it said. */
+/* Returns the pulses of a run, and its output. */
 static uint64_t run(struct wire *wire, const char *const *more, char *said, size_t len)
 {
     room_write(wire);
@@ -53,7 +53,7 @@ static uint64_t run(struct wire *wire, const char *const *more, char *said, size
     return stats_uint(wire, "fired_pulses");
 }
 
-/* A head that has one frame to scan scans on, frame after frame, until the time is over. */
+/* A head that has one frame to scan goes on, frame after frame, until the time is over. */
 static void test_run_scans_until_the_time_is_over(void **state)
 {
     static const char *const more[] = {"--start", "--pace", "fast", "--duration", "1", NULL};
@@ -64,7 +64,7 @@ static void test_run_scans_until_the_time_is_over(void **state)
     assert_null(strstr(said, "was over"));
 }
 
-/* Frames that the user asked for are scanned, no more, and the head says so. */
+/* Exactly the frames that the user asked for are scanned, and the head says so. */
 static void test_frames_end_it_before(void **state)
 {
     static const char *const frames[] = {"--start", "--pace", "fast", "--duration", "1", "--frames", "2", NULL};
@@ -79,7 +79,8 @@ static void test_frames_end_it_before(void **state)
     }
 }
 
-/* head.start: on is --start: the same pulses, with --duration and with --frames; a head without either scans nothing. */
+/* head.start: on is --start: the pulses are the same, with --duration and with --frames. A head without either scans
+ * nothing. */
 static void test_the_key_is_the_option(void **state)
 {
     static const char *const runs[][9] = {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What becomes of heads that are no line heads: files, plan, map and report. */
+/* Files, plan, map and report of heads that are no line heads. */
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"
 
@@ -39,7 +39,7 @@ static int record_as(struct wire *wire, const char *config, const char *name)
     return run(wire, args);
 }
 
-/* Columns and rows, the first two lines. */
+/* The first two lines are the columns and rows. */
 static void assert_grid(const struct wire *wire, const char *columns_rows)
 {
     char *text = wire_read(wire_path(wire, "a.ptx"), NULL);
@@ -48,7 +48,7 @@ static void assert_grid(const struct wire *wire, const char *columns_rows)
     unlink(wire_path(wire, "a.ptx"));
 }
 
-/* A column a turn, a row a step that is cast: nothing is filled up. */
+/* Each turn is a column and each cast step a row; nothing is filled up. */
 static void grids_of_planar_heads(void **state)
 {
     assert_int_equal(record_as(*state, write_config(*state, "hokuyo-ust-20lx", 57600, 40, 7), "a.ptx"), 0);
@@ -86,7 +86,7 @@ static void other_formats_take_them(void **state)
     assert_int_equal(run(wire, map), 0);
 }
 
-/* b.shs: a.shs without its line ends, as if they were lost. */
+/* b.shs is a.shs without its line ends, as if they were lost. */
 static void lose_line_ends(struct wire *wire)
 {
     size_t len, kept = 0;
@@ -143,7 +143,7 @@ static void plan_and_check_name_the_emitter(void **state)
     assert_said(wire, "out", "emitter   planar, steps 44..725 of 1024 a turn, 384 ahead, counter-clockwise\n");
 }
 
-/* What a link's protocol needs of the stream is for clients on the wire. */
+/* A protocol's demands on the stream are for clients on the wire. */
 static void links_forbid_no_map(void **state)
 {
     struct wire *wire = *state;

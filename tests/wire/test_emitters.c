@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Heads that are no line heads, through the real program: each shot's time, direction and range against the
+/* Heads that are no line heads, through the real program. Each shot's time, direction and range are compared with the
  * formulas of their data sheets (emitter_rig.c) and the known walls of a room. */
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"
@@ -42,8 +42,8 @@ static void check_emitter(const struct model *m, const struct scanhead *sh)
     }
 }
 
-/* The room is at most 11 m long, so that half a count of the angle moves the range by less than 11 m x 1e-9 rad over
- * the sine of the incidence; the range's own count is 1e-6 m. */
+/* The room is at most 11 m long. So half a count of the angle moves the range by less than 11 m x 1e-9 rad over the
+ * sine of the incidence. The range's own count is 1e-6 m. */
 static void check_range(const struct model *m, const struct scanhead_point *p, const struct shot *s, uint64_t k)
 {
     struct room_ray ray, near;
@@ -188,7 +188,7 @@ static void planar_heads(void **state)
 
 static void spinning_beams(void **state)
 {
-    /* Three turns of 100 ms: 5425 sequences of 55.296 us begin in 300 ms, of which the last has 6 firings. */
+    /* Three turns of 100 ms: 5425 sequences of 55.296 us begin in 300 ms, and the last of them has 6 firings. */
     struct model vlp = {.profile = "velodyne-vlp16",
                         .prr_hz = 289351.851852,
                         .lines_hz = 10,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Heads that are no line heads, while they scan: settings that change, and rates that follow from others. */
+/* Heads that are no line heads, while they scan. Settings change, and rates follow from others. */
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"
 
@@ -14,8 +14,8 @@ struct live {
     int n_changes, lines_to[8]; /* in tenths, as asked for */
 };
 
-/* Ten turns a second until the first change, then as asked for: turns up to a firing time, from the times of the
- * changes alone. */
+/* Returns the turns up to a firing time, from the times of the changes alone. There are ten turns a second until the
+ * first change, then as many as commanded. */
 static double turned(const struct live *live, int64_t t_ns)
 {
     double turns = 0, lines_hz = 10;
@@ -107,7 +107,7 @@ static void turns_change_within_a_scan(void **state)
     assert_int_equal(live.echoes, 0);
     assert_int_equal(live.n_changes, 5);
     assert_true(live.next > 100000);
-    /* What fires at its own times takes no other rate. */
+    /* A head that fires at its own times takes no other rate. */
     assert_string_equal(client_ask(live.sh, "HEAD:PRR?"), "289351.851852");
     assert_non_null(strstr(client_ask(live.sh, "HEAD:PRR 300000"), "allowed 289351.851852\""));
     client_tell(live.sh, "SCAN:STOP");

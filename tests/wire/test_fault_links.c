@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Links that are cut, refused and unplugged on request, by the program: the truth says where, the client sees it
- * there, comes back and goes on; the neighbour's stream is the clean one. */
+/* Links that are cut, refused and unplugged on request, by the program. The truth says where. The client sees it there,
+ * comes back and goes on, and its neighbour's stream is the clean one. */
 #include "drivers/protocol/bytes.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usbip_host.h"
 
-/* A scan of half a second: 500 ticks, each with a frame of points. */
+/* A scan of half a second has 500 ticks, each with a frame of points. */
 static const struct room_config SCAN = {
     .prr_hz = 20000, .lines_hz = 100, .pan_deg_s = 180, .pan_stop_deg = 90, .frames = 1};
 
-/* A head with a link to be hit and a clean one after it. more: as head_start has it. */
+/* Starts a head with a link to be hit and a clean one after it. more: as in head_start. */
 static struct head start(struct wire *wire, const char *link, const char *fault, const char *const *more)
 {
     char links[300], faults[300], told[352], path[352];
@@ -29,7 +29,7 @@ static struct head start(struct wire *wire, const char *link, const char *fault,
     return head_start(wire, path, args);
 }
 
-/* The number after the key in line i of the truth, from 0; the kind must be this. */
+/* Returns the number after the key in line i of the truth, from 0. The line's kind must be this. */
 static int64_t truth(const struct wire *wire, int i, const char *kind, const char *key)
 {
     char *text = wire_read(wire_path(wire, "truth.json"), NULL), *line = text, want[64];
@@ -58,8 +58,9 @@ static int truth_lines(const struct wire *wire)
     return n;
 }
 
-/* Frames of the scan without a gap until the connection ends. The number of the last; t_ns of it. most_gaps: 1 for a
- * terminal: when it is hung up, the kernel throws away what waits to be read, and what is still on its way comes after. */
+/* Takes frames of the scan without a gap until the connection ends. Returns the number of the last, and its t_ns.
+ * most_gaps is 1 for a terminal: when it is hung up, the kernel throws away what waits to be read, and frames on their
+ * way come after. */
 static uint32_t read_to_cut(struct scanhead *sh, int most_gaps, int64_t *t_ns)
 {
     struct scanhead_frame frame;
@@ -77,7 +78,7 @@ static uint32_t read_to_cut(struct scanhead *sh, int most_gaps, int64_t *t_ns)
     }
 }
 
-/* Until the scan is over. A client that comes back late may miss its end, and hears of it by telemetry. */
+/* Reads until the scan is over. A client that comes back late may miss its end, and learns of it by telemetry. */
 static void read_to_end(struct scanhead *sh, struct scanhead_frame *frame)
 {
     enum { IDLE = 2 };
@@ -86,7 +87,7 @@ static void read_to_end(struct scanhead *sh, struct scanhead_frame *frame)
         client_next(sh, frame);
 }
 
-/* The clean link's reader: the whole scan, and its hash, which is that of the head. */
+/* The clean link's reader gets the whole scan and its hash, which is the head's. */
 static void read_clean(struct scanhead *sh, char hash[65])
 {
     struct scanhead_frame frame;
@@ -106,8 +107,8 @@ static void begin(struct scanhead *hit, struct scanhead *clean)
     client_tell(clean, "SCAN:START");
 }
 
-/* A client is cut off at the frame that the truth names: it has all before and nothing after. It comes back and has
- * the rest, and the count of one holds for the link: the second session is not cut. */
+/* A client is cut off at the frame that the truth names: it has all before and nothing after. It comes back and gets
+ * the rest. The count of one holds for the link, so the second session is not cut. */
 static void cut_and_return(struct wire *wire, const char *link, const char *fault, const char *kind)
 {
     struct head head = start(wire, link, fault, NULL);
@@ -133,7 +134,7 @@ static void cut_and_return(struct wire *wire, const char *link, const char *faul
     assert_int_equal(truth_lines(wire), 1);
     const int64_t seq = truth(wire, 0, kind, "seq");
     assert_int_equal(truth(wire, 0, kind, "frame"), 60);
-    assert_true(last < seq); /* nothing from there on; what a late reader had left with the head is gone, too */
+    assert_true(last < seq); /* nothing from there on; frames that wait for a late reader are gone, too */
     assert_true(next >= seq);
 }
 
@@ -157,7 +158,7 @@ static void test_unplug_pty(void **state)
     cut_and_return(*state, "type: pty, path: port", "kind: unplug, at: 60, count: 1, for_ms: 100", "unplug");
 }
 
-/* Without a count each session is cut at its own frame 60: frames are counted from 1 in each. */
+/* Without a count each session is cut at its own frame 60: frames count from 1 in each. */
 static void test_each_session(void **state)
 {
     struct wire *wire = *state;
@@ -184,7 +185,7 @@ static void test_each_session(void **state)
     assert_true(whole > 0);
 }
 
-/* Two clients of the link come to the frame of an unplugging: it is carried out once, and told once. */
+/* Two clients of the link come to the frame of an unplugging. It is carried out and reported once. */
 static void test_two_clients(void **state)
 {
     struct wire *wire = *state;
@@ -204,7 +205,7 @@ static void test_two_clients(void **state)
     assert_true(last[0] < seq && last[1] < seq);
 }
 
-/* As fast as it computes, a head waits for its readers, and for none that is gone. */
+/* As fast as it computes, a head waits for its readers, but not for one that is gone. */
 static void test_fast(void **state)
 {
     struct wire *wire = *state;
@@ -216,7 +217,7 @@ static void test_fast(void **state)
     begin(hit, clean);
     read_to_cut(hit, 0, &t_ns);
     read_clean(clean, seen);
-    /* turned away until its time is over, of which the head says nothing: only that a client was lost */
+    /* It is turned away until the fault's time is over. The head only says that a client was lost. */
     int rc;
     char reply[100];
     do
@@ -269,7 +270,7 @@ static void test_step(void **state)
     assert_int_equal(truth_lines(wire), 1);
 }
 
-/* 1: the head answers on it; 0: it is over without a byte. */
+/* Returns 1 when the head answers on it, 0 when it ends without a byte. */
 static int is_answered(int fd)
 {
     char byte;
@@ -296,7 +297,7 @@ static void test_refuse(void **state)
         assert_int_equal(truth(wire, i, "refuse", "connection"), 2 * (i + 1));
 }
 
-/* The recorder waits for the head, and says how often it was away. */
+/* The recorder waits for the head, and reports how often it was away. */
 static void test_record(void **state)
 {
     struct wire *wire = *state;
@@ -314,7 +315,7 @@ static void test_record(void **state)
     assert_int_equal(truth(wire, 0, "unplug", "frame"), 100);
 }
 
-/* A fault of a link that can't have it is refused, and one for all links is for those that can. */
+/* A fault that a link can't have is refused. One for all links is for those that can have it. */
 static void test_wrong_link(void **state)
 {
     struct wire *wire = *state;
@@ -339,8 +340,8 @@ static void test_wrong_link(void **state)
 
 /* ---- USB */
 
-/* Device-side errors of an enumeration hold for that one; connections are enumerations. Unplugged, the device is gone
- * for a while, and the same again after it. */
+/* Device-side errors of an enumeration hold for that one; connections are enumerations. When unplugged, the device is
+ * gone for a while, and the same again after it. */
 static void test_usb(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request that cost a client time: replies that don't come, or come late; a stall, which makes a slow reader; and
- * what a run still sends at its end. */
+/* Faults on request that cost a client time: replies that don't come, or come late; a stall, which makes a slow reader.
+ * And the frames that a run still sends at its end. */
 #include "tests/wire/fault_head.h"
 
 /* ---- replies */
@@ -31,13 +31,13 @@ static void test_replies_that_go_wrong(void **state)
     assert_string_equal(client_ask(sh, "HEAD:STAT?"), "idle");
     fault_head_add(sh, "{kind: late_reply, at: 1, for_ms: 300}", "2");
     expect_no_reply(sh, "SYST:VERS?");
-    assert_string_equal(client_ask(sh, "HEAD:STAT?"), "idle"); /* not what came late */
+    assert_string_equal(client_ask(sh, "HEAD:STAT?"), "idle"); /* the answer, and not the late one */
     assert_int_equal(seen[SCANHEAD_NOTICE_LATE_REPLY], 1);
     fault_head_add(sh, "{kind: echo, at: 1}", "3");
     assert_string_equal(client_ask(sh, "SYST:VERS?"), "1999.0");
     assert_int_equal(seen[SCANHEAD_NOTICE_ECHO], 1);
     fault_head_add(sh, "{kind: wrong_reply, at: 1}", "4");
-    assert_string_equal(client_ask(sh, "SYST:VERS?"), "4"); /* the one before: nobody can know */
+    assert_string_equal(client_ask(sh, "SYST:VERS?"), "4"); /* the one before: a client can't know */
     assert_string_equal(client_ask(sh, "SYST:VERS?"), "1999.0");
     assert_string_equal(client_ask(sh, "FAUL:LIST?"), "1 no_reply, 2 late_reply, 3 echo, 4 wrong_reply");
     assert_string_equal(client_ask(sh, "FAUL:INJ?"), "4");
@@ -51,7 +51,7 @@ static void test_replies_that_go_wrong(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Of a client that goes on asking, whose replies are late, there is always one on its way. */
+/* A client that goes on asking, whose replies are late, always has one on its way. */
 static void test_late_replies_do_not_keep_a_head(void **state)
 {
     struct wire *wire = *state;
@@ -104,7 +104,7 @@ static void test_a_fault_strikes_at_once(void **state)
 
 /* ---- stalls, and the end of the run */
 
-/* The wire keeps about 140 kB, the queue 50 ms of 2 MB/s: a stall of 300 ms is too long. */
+/* The wire keeps about 140 kB, the queue 50 ms of 2 MB/s, so a stall of 300 ms is too long. */
 static void test_a_stall_makes_a_slow_reader(void **state)
 {
     struct wire *wire = *state;
@@ -131,8 +131,8 @@ static void test_a_stall_makes_a_slow_reader(void **state)
     assert_int_equal(stats_uint(wire, "pulses"), pulses + told);
 }
 
-/* What would come within two seconds is not cut; what would come later is, and counts as left out: also where one
- * stall after the other ends in time. */
+/* Frames that would come within two seconds are not cut. Later ones are, and count as left out. That is so, too, where
+ * one stall after the other ends in time. */
 static void test_the_end_waits_for_what_is_on_its_way(void **state)
 {
     static const struct {

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request, in the program as its users meet it: the same seed gives the same truth at any pace, with any
- * number of threads, over any link and however the client reads; a link without faults has the clean stream; a client
- * reports what was injected, by number and length; a journal brings faults back. */
+/* Faults on request, in the program as its users meet it. The same seed gives the same truth at any pace, with any
+ * number of threads, over any link and however the client reads. A link without faults has the clean stream. A client
+ * reports the injected faults, by number and length. A journal brings faults back. */
 #include "drivers/protocol/native.h"
 #include "tests/wire/fault_head.h"
 
-/* ---- the truth, as far as it is the same in each run; seq apart: notices have numbers of the same counting */
+/* ---- the truth, as far as it is the same in each run; seq is left out, as notices are numbered in the same
+ * sequence */
 
 enum { MAX_NOTES = 1000, NOTE_LEN = 160 };
 struct truth {
@@ -30,7 +31,7 @@ static void word_in(const char *text, const char *key, char *word, size_t len)
     snprintf(word, len, "%.*s", (int)strcspn(at, "\""), at);
 }
 
-/* Of link 1. */
+/* Reads the truth of link 1. */
 static void read_truth(const struct wire *wire, struct truth *truth)
 {
     char *text = wire_read(wire_path(wire, "truth.json"), NULL), *save = NULL, of[16];
@@ -71,7 +72,7 @@ static void expect_same(const struct truth *a, const struct truth *b, const char
 
 /* ---- the head */
 
-/* Reads by pieces of so many bytes, up to the end of the scan. */
+/* Reads in pieces of so many bytes, up to the end of the scan. */
 static void scan_raw(const struct head *head, size_t piece)
 {
     static struct native_parser parser;
@@ -124,7 +125,7 @@ static const char ALL_KINDS[] = "faults:\n"
                                 "  - {kind: garbage, from: 11, every: 37, n: 100}\n"
                                 "  - {kind: drop, from_pulse: 20000, until_pulse: 20500}\n";
 
-/* The links in both orders: link 1 is the one that is read. */
+/* The links come in both orders; link 1 is read. */
 static void test_the_same_truth(void **state)
 {
     static const struct {
@@ -156,7 +157,7 @@ static void test_the_same_truth(void **state)
         assert_true(count_kind(&first, kinds[i]) > 0);
 }
 
-/* ---- what the client library reports of it */
+/* ---- the client library's report of it */
 
 enum { SEQS = 4096, MAX_BROKEN = 500 };
 struct seen {
@@ -196,7 +197,7 @@ static void read_both(struct scanhead *a, struct scanhead *b)
     }
 }
 
-/* One frame in each ten is hit, each by one fault: so the notices can be told apart. */
+/* One frame in ten is hit, each by one fault, so that the notices can be told apart. */
 static const char APART[] = "faults:\n"
                             "  - {kind: drop, link: 1, from: 2, every: 60}\n"
                             "  - {kind: duplicate, link: 1, from: 12, every: 60, n: 2}\n"
@@ -214,13 +215,13 @@ static void expect_broken(const struct scanhead_notice *got, const struct truth 
     const long seq = truth->note[i].seq, byte = truth->note[i].byte;
     const char *kind = truth->note[i].kind;
     const int is_garbage = strcmp(kind, "garbage") == 0, cut = strcmp(kind, "truncate") == 0;
-    /* What hits the header leaves no frame; else its number is known. */
+    /* A fault in the header leaves no frame; else its number is known. */
     const int no_header = is_garbage || byte < NATIVE_HEADER_LEN;
     if (got->kind != (no_header ? SCANHEAD_NOTICE_BAD_BYTES : SCANHEAD_NOTICE_BAD_PAYLOAD))
         fail_msg("%s: %s", truth->note[i].same, scanhead_notice_name((int)got->kind));
     if (!no_header) assert_int_equal(got->seq, seq);
     if (is_garbage) assert_int_equal(got->n, 100);
-    if (cut) assert_int_equal(got->n, byte); /* what is left of it */
+    if (cut) assert_int_equal(got->n, byte); /* the rest of it */
     if (!is_garbage && !cut) assert_true((long)got->n > byte && got->n >= NATIVE_HEADER_LEN);
 }
 
@@ -281,7 +282,7 @@ static void test_a_client_reports_what_was_injected(void **state)
     read_truth(wire, &truth);
     assert_true(truth.n > 40);
     compare(&seen, &truth);
-    /* And off line it is that stream, too. */
+    /* Off line the stream is the same, too. */
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
     const char *const args[] = {"record", wire_path(wire, "config.yaml"), "--stats", stats, "--quiet", NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that the program makes, where others may have put a link or a device; and a standard output that takes nothing. */
+/* Files that the program makes, where others may have put a link or a device. And a standard output that takes
+ * nothing. */
 #include "tests/wire/room.h"
 
 static const struct room_config SCAN = {.prr_hz = 20000,
@@ -15,7 +16,7 @@ static void begin(struct wire *wire, char config[352])
     snprintf(config, 352, "%s", room_config_write(wire, &SCAN));
 }
 
-/* Ends with this status and one line on standard error that has both texts. */
+/* It ends with this status and one line on standard error that has both texts. */
 static void expect(struct wire *wire, pid_t pid, int want, const char *says, const char *more)
 {
     int status = wire_wait(wire, pid);
@@ -25,7 +26,7 @@ static void expect(struct wire *wire, pid_t pid, int want, const char *says, con
     free(text);
 }
 
-/* `name` leads to a file that must stay as it is. */
+/* `name` leads to a file that must not change. */
 static void plant(struct wire *wire, const char *name)
 {
     wire_write_text(wire, "precious", "keep me\n");
@@ -75,7 +76,7 @@ static void test_links(void **state)
     expect_unharmed(wire, "stream.shs");
 }
 
-/* A map takes nobody's place but a file's. */
+/* A map replaces only a regular file. */
 static void test_map_on_a_fifo(void **state)
 {
     struct wire *wire = *state;
@@ -90,7 +91,7 @@ static void test_map_on_a_fifo(void **state)
     assert_true(S_ISFIFO(st.st_mode));
 }
 
-/* What can't be written is a failure, by each way: all of it waits for the end, or some is out before. */
+/* Output that can't be written is a failure in both ways: all of it waits for the end, or some is written before. */
 static void test_full_output(void **state)
 {
     struct wire *wire = *state;

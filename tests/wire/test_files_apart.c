@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Every file that a command writes, beside every file that it reads and every other that it writes: one line that names
- * both, status 2, and nothing has changed. The tables of options and of keys say whether these tables are whole. */
+/* Every file that a command writes is tried as every file that it reads, and as every other that it writes. There is
+ * one line that names both, status 2, and nothing has changed. The tables of options and of keys show whether these
+ * tables are whole. */
 #include "firmware_sim/config/keys.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/table/row.h"
@@ -27,7 +28,7 @@ enum {
     ALL = 1023
 };
 
-/* In words, @ stands for the folder and a slash. */
+/* In the words @ stands for the folder and a slash. */
 static const struct {
     unsigned bit;
     const char *name, *operands;
@@ -40,8 +41,8 @@ static const struct {
 };
 enum { N_COMMANDS = sizeof COMMANDS / sizeof COMMANDS[0] };
 
-/* What is written: by which option or key, with these words, as this file. Where one command writes two, the words of both
- * are given. */
+/* The written files: the option or key, the words, and the file. If one command writes two, the words of both are
+ * given. */
 static const struct output {
     unsigned bit;
     const char *who, *words, *file;
@@ -73,7 +74,7 @@ static const struct output {
 };
 enum { N_OUTPUTS = sizeof OUTPUTS / sizeof OUTPUTS[0] };
 
-/* What is read: as which option or key, by which commands, with these words, and from which file. */
+/* The read files: the option or key, the commands, the words, and the file. */
 enum { WITH_CONFIG = RUN | RECORD | REPORT | MAP | COVERAGE | SOAK | CHECK };
 static const struct input {
     unsigned bits;
@@ -99,7 +100,8 @@ static const struct input {
 };
 enum { N_INPUTS = sizeof INPUTS / sizeof INPUTS[0] };
 
-/* Not in the pairs above: their command lines are of another kind. ALIAS is what stands at the file's other name. */
+/* Cases that are not in the pairs above, as their command lines are of another kind. ALIAS stands for the file's other
+ * name. */
 static const struct {
     const char *line, *file, *alias, *who, *other;
 } LINES[] = {
@@ -121,7 +123,7 @@ static const struct {
      "0001_station-1.obj", "--output", "job 1,"},
 };
 
-/* Two that are written, where their names say what they are. */
+/* Pairs of written files, whose names say what they are. */
 static const struct {
     const char *line, *who, *other;
 } DOUBLES[] = {
@@ -178,7 +180,7 @@ static void begin(struct wire *wire)
     emitter_write_profile(wire, "emitter: directions\ndirections: list.txt\n");
 }
 
-/* The file has another name, `alias`, which the command is to write. Its bytes stay. */
+/* The file has another name, `alias`, which the command is told to write. Its bytes stay. */
 static void expect_refusal(struct wire *wire, const char *line, const char *file, const char *alias, const char *who,
                            const char *other)
 {
@@ -251,7 +253,7 @@ static int is_option_in(unsigned bit, const char *command, const char *who)
     return 0;
 }
 
-/* Each option that has a file in the help. */
+/* Checks each option that has a file in the help. */
 static void check_options(struct wire *wire, unsigned bit, const char *command)
 {
     const pid_t pid = wire_spawn(wire, (const char *const[]){command, "--help", NULL}, "out", "err", -1);
@@ -295,8 +297,8 @@ static void test_the_tables_are_whole(void **state)
 
 /* ---- two processes */
 
-/* The second head of one file link ends before it empties the file, and names the process that has it. So does whatever
- * else would write there. */
+/* The second head of one file link ends before it empties the file, and names the process that has it. So does every
+ * other command that would write there. */
 static void test_two_heads_one_file(void **state)
 {
     struct wire *wire = *state;

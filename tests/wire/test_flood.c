@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A client that is wrong as fast as it can be, beside one that reads a scan: the reader is told a bounded number of
- * errors and exactly how many there were, and neither the stream nor the loop's beat is disturbed. */
+/* A client that sends errors as fast as it can, beside one that reads a scan. The reader gets a bounded number of
+ * errors and the exact count of all. Neither the stream nor the loop's beat is disturbed. */
 #include "tests/wire/room.h"
 
 #include <pthread.h>
@@ -27,7 +27,7 @@ struct flood {
     _Atomic int over;
 };
 
-/* Frames lie between reply lines; they are skipped by the length in their header. */
+/* Frames lie between reply lines. They are skipped by the length in their header. */
 static void take_bytes(struct flood *f, const unsigned char *bytes, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
@@ -74,7 +74,7 @@ static void *flood(void *arg)
     return NULL;
 }
 
-/* What the reader is told of errors. */
+/* The errors that the reader gets. */
 struct told {
     uint64_t events, single, held, session;
     int64_t first_ns, last_ns;
@@ -118,9 +118,10 @@ static void test_a_flood_of_errors(void **state)
         take(&told, &frame);
     }
     pthread_join(thread, NULL);
-    /* The head rests while it comes, so that it costs no processor: no faster than this, less a clock's step. */
+    /* The head rests while it comes, so that it costs no processor time: it is no faster than this, less a clock's
+     * step. */
     assert_true(wire_now_ms() - start_ms >= (LINES / WRONG_AT_ONCE - 1) * REST_MS - 1);
-    assert_int_equal(f.replies, LINES); /* whoever errs gets each of its replies */
+    assert_int_equal(f.replies, LINES); /* a client with errors gets each of its replies */
     assert_int_equal(f.wrong, 0);
     client_tell(sh, "SCAN:STOP");
     do {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes on a disk that gets full: why is said, and what to do; and no file of theirs is left, neither under its name nor
- * under that of a part. */
+/* Meshes on a disk that gets full. The reason is printed, and what to do. No file of theirs is left, neither under its
+ * name nor under that of a part. */
 #include <sched.h>
 #include <sys/mount.h>
 
@@ -27,7 +27,7 @@ static int count_files(const char *folder, char last[64])
     return n;
 }
 
-/* `record` to a file of that ending, with so many KiB for all files or for each. Its status. */
+/* Runs `record` to a file of that ending, with so many KiB for all files or for each. Returns its status. */
 static int record(struct wire *wire, const char *ending, unsigned kib)
 {
     char line[512], config[96], folder[96], last[64];
@@ -61,7 +61,7 @@ static int record(struct wire *wire, const char *ending, unsigned kib)
     return status;
 }
 
-/* From the smallest disk on, each a third larger than the one before, until all has room. */
+/* Disks go from the smallest on, each a third larger than the one before, until all has room. */
 static void nothing_is_left(void **state)
 {
     static const char *const endings[] = {".obj", ".gltf", ".glb", ".fbx", ".ply"};

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The GNSS receiver on its links: whole sentences in their order, all of them or what is lost counted; and the PPS of
- * the native stream beside them. */
+/* The GNSS receiver on its links. Sentences are whole and in order, and all come or are counted as lost. The PPS of the
+ * native stream comes beside them. */
 #include "tests/wire/gnss_rig.h"
 
 #include "tests/common/nmea_reader.h"
 
 static const char *const ORDER[5] = {"GNRMC", "GNGGA", "GNGSA", "GNGST", "GNZDA"};
 
-/* What a reader has of the receiver's sentences: whole ones only, five to a moment, in their order. */
+/* A reader's sentences of the receiver: whole ones only, five to a moment, in their order. */
 struct tally {
     char rest[256];
     size_t rest_len;
@@ -38,7 +38,7 @@ static void take_bytes(struct tally *t, const char *bytes, size_t len)
     }
 }
 
-/* Reads once; 0: the head is gone. */
+/* Reads once. Returns 0 when the head is gone. */
 static int tally_read(struct tally *t, int fd)
 {
     char buf[4096];
@@ -50,11 +50,11 @@ static int tally_read(struct tally *t, int fd)
     return 1;
 }
 
-/* 2026-01-01 is 16797 days after 1980-01-06 (46 years, 12 leap days, less 5); 18 leap seconds since (IERS Bulletin C).
- */
+/* 2026-01-01 is 16797 days after 1980-01-06 (46 years, 12 leap days, less 5). There were 18 leap seconds since (IERS
+ * Bulletin C). */
 static const int64_t GPS0_S = INT64_C(16797) * 86400 + 18;
 
-/* The recording of the native stream: each full second, and the GPS time of each pulse by them. */
+/* Checks the recording of the native stream: each full second, and the GPS time of each pulse by them. */
 static void check_recording(const char *path, int seconds)
 {
     struct scanhead *sh = client_open(path);
@@ -89,7 +89,8 @@ static void check_recording(const char *path, int seconds)
     scanhead_close(sh);
 }
 
-/* Off the clock, into files: all of it, twice the same, and the stream's hash is that of a head without. */
+/* Off the clock, into files, all of it comes, twice the same. The stream's hash is that of a head without a
+ * receiver. */
 static void test_files(void **state)
 {
     struct wire *wire = *state;
@@ -127,7 +128,7 @@ static void test_files(void **state)
     free(text[1]);
 }
 
-/* What a client sends a receiver is no command; the receiver goes on. */
+/* Bytes that a client sends a receiver are no command, and the receiver goes on. */
 static void test_receiver_takes_no_commands(void **state)
 {
     struct wire *wire = *state;
@@ -149,8 +150,8 @@ static void test_receiver_takes_no_commands(void **state)
     client_tell(sh, "SCAN:START");
     memset(&t, 0, sizeof t);
     fd = open(wire_path(wire, "gnss"), O_RDWR | O_NOCTTY | O_CLOEXEC);
-    /* The first ones may be some that the kernel still held for the reader before; a receiver that leaves some out
-     * has no three in a row. */
+    /* The first ones may be some that the kernel still held for the reader before. A receiver that leaves some out
+     * never has three in a row. */
     for (int tries = 0; tries == 0 || (t.last - t.first != 2 && tries < 10); tries++) {
         t.moments = 0;
         while (t.moments < 3)
@@ -164,8 +165,8 @@ static void test_receiver_takes_no_commands(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A port that is open but not read: what the system can't hold is lost, whole moments, counted and said; what comes
- * after the reader is back is whole again. */
+/* A port is open but not read. Sentences that the system can't hold are lost, in whole moments, counted and reported.
+ * After the reader is back they are whole again. */
 static void test_slow_reader(void **state)
 {
     struct wire *wire = *state;
@@ -175,7 +176,7 @@ static void test_slow_reader(void **state)
     struct scanhead_frame frame;
     struct tally t = {.rest_len = 0};
     int fd = open(wire_path(wire, "gnss"), O_RDWR | O_NOCTTY | O_CLOEXEC);
-    /* 6.7 kB/s: what a pty holds, 14 kB or so, and the queue of a second are full within half of the six seconds. */
+    /* 6.7 kB/s fill a pty, 14 kB or so, and the queue of a second within half of the six seconds. */
     for (int pps = 0; pps < 6; pps++)
         client_until(sh, SCANHEAD_EV_PPS, &frame);
     int back = (int)(frame.event_value[0] - 1767225600) * 20;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The GNSS receiver read by gpsd, the client that everybody has, and gpspipe. */
+/* The GNSS receiver is read by gpsd, the most common client, and gpspipe. */
 #include "tests/wire/gnss_rig.h"
 #include "tests/wire/unit_faults.h"
 
@@ -14,7 +14,7 @@ static int in_path(const char *program)
     return 0;
 }
 
-/* A port that nobody has just now. */
+/* Returns a port that is free now. */
 static int free_port(void)
 {
     struct sockaddr_in at = {.sin_family = AF_INET};
@@ -43,7 +43,7 @@ static pid_t spawn(struct wire *wire, const char *const *args, int out_fd)
     _exit(127);
 }
 
-/* Until somebody listens there: the program that is to (pid) says nothing of it, so it is asked again and again. */
+/* Waits until the program (pid) listens there. It does not announce that, so it is asked again and again. */
 static void wait_listening(pid_t pid, int port)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
@@ -68,7 +68,7 @@ static void end_child(struct wire *wire, pid_t pid)
     wire_wait(wire, pid);
 }
 
-/* The number behind "key": in a line of JSON; 0: there is none. */
+/* Returns the number after "key": in a line of JSON; 0: there is none. */
 static int json_number(const char *json, const char *key, double *value)
 {
     char name[64], *end;
@@ -106,7 +106,7 @@ static void gpsd_start(struct gpsd *g, struct wire *wire)
     g->fd = out[0];
 }
 
-/* The next line of gpspipe; good until the next call. */
+/* Returns the next line of gpspipe, which is good until the next call. */
 static const char *gpsd_line(struct gpsd *g)
 {
     static char line[4096];
@@ -126,7 +126,7 @@ static const char *gpsd_line(struct gpsd *g)
     return line;
 }
 
-/* The next TPV with a position in three dimensions. */
+/* Returns the next TPV with a position in three dimensions. */
 static const char *gpsd_fix(struct gpsd *g)
 {
     double mode;
@@ -145,7 +145,7 @@ static void gpsd_stop(struct gpsd *g)
     end_child(g->wire, g->daemon);
 }
 
-/* "time":"2026-01-01T00:00:07.200Z" -> tenths of a second since midnight. */
+/* Returns "time":"2026-01-01T00:00:07.200Z" as tenths of a second since midnight. */
 static int tpv_tenths(const char *line)
 {
     const char *at = strstr(line, "\"time\":\"2026-01-01T");
@@ -162,11 +162,11 @@ static double number(const char *line, const char *key)
     return value;
 }
 
-/* Half a step of the sentence, 0.5e-7', and half of gpsd's nine decimals: 0.15 mm on the ground; of the heights, two of
- * four decimals in and one out. All of it together is 0.26 mm, and to be within 1 mm was promised. */
+/* The bound is half a step of the sentence, 0.5e-7', and half of gpsd's nine decimals: 0.15 mm on the ground. Two
+ * heights of four decimals go in, and one comes out. Together that is 0.26 mm, and the promise is 1 mm. */
 static const double ANGLE_TOLERANCE_DEG = 0.5e-7 / 60 + 0.5e-9 + 1e-12, HEIGHT_TOLERANCE_M = 3 * 0.5e-4 + 1e-9;
 
-/* Status as gpsd_json(5) of 3.2x has it: 1 a fix (left out), 2 DGPS, 3 RTK fixed, 4 RTK float. */
+/* Status as gpsd_json(5) of 3.2x defines it: 1 a fix (left out), 2 DGPS, 3 RTK fixed, 4 RTK float. */
 static void check_gpsd(struct wire *wire, int quality, int status)
 {
     char set[64];
@@ -189,11 +189,11 @@ static void check_gpsd(struct wire *wire, int quality, int status)
         assert_true(fabs(number(line, "altHAE") - HEIGHT_M) <= HEIGHT_TOLERANCE_M);
         assert_true(fabs(number(line, "geoidSep") - 22.4321) <= 0.5e-3); /* gpsd gives three decimals */
         assert_true(number(line, "speed") == 0);
-        /* gpsd may say the same moment twice, as sentences come; but misses none. */
+        /* gpsd may report the same moment twice, as sentences come, but misses none. */
         if (before >= 0 && tenths != before) assert_int_equal(tenths, before + 2);
         n += tenths != before;
         before = tenths;
-        /* What it says is past: the head's own clock, asked now, is not before it. */
+        /* Its time is in the past: the head's own clock, asked now, is not before it. */
         int h, m;
         double s;
         assert_int_equal(sscanf(client_ask(sh, "TIME:UTC?"), "2026-01-01T%d:%d:%lfZ", &h, &m, &s), 3);
@@ -217,8 +217,8 @@ static void test_gpsd(void **state)
     check_gpsd(*state, 1, 1);
 }
 
-/* ---- sentences that go wrong on request: 2 s as a bad cable makes them, then 1 s with wrong positions whose checksums
- * are right. 20 fixes a second. */
+/* ---- sentences that go wrong on request: for 2 s as a bad cable makes them, then for 1 s with wrong positions whose
+ * checksums are right. There are 20 fixes a second. */
 
 enum { HURT_UNITS = 40, SEALED_UNITS = 20 };
 static const char HURT[] = "faults:\n"
@@ -239,13 +239,13 @@ static int is_right(const char *line)
            fabs(height_m - HEIGHT_M) <= HEIGHT_TOLERANCE_M;
 }
 
-/* Longer than it was. */
+/* The text has become longer. */
 static int has_grown(const char *text, const void *len)
 {
     return strlen(text) > *(const size_t *)len && text[strlen(text) - 1] == '\n';
 }
 
-/* The number of the last note of the faulty link. */
+/* Returns the number of the last note of the faulty link. */
 static uint32_t last_note(const struct wire *wire, struct truth_note **note, uint32_t *n_notes)
 {
     free(*note);
@@ -253,7 +253,8 @@ static uint32_t last_note(const struct wire *wire, struct truth_note **note, uin
     return *n_notes != 0 ? (uint32_t)(*note)[*n_notes - 1].number : 0;
 }
 
-/* The truth is written by a thread of its own: what gpsd has may come before its note, which is then the next one. */
+/* The truth is written by a thread of its own, so gpsd may have a sentence before its note. Its note is then the next
+ * one. */
 static uint32_t next_note(const struct wire *wire, struct truth_note **note, uint32_t *n_notes)
 {
     size_t len;
@@ -264,7 +265,8 @@ static uint32_t next_note(const struct wire *wire, struct truth_note **note, uin
     return last_note(wire, note, n_notes);
 }
 
-/* What gpsd says until all faults have struck and a second of right positions has followed. Returns the wrong ones. */
+/* Reads gpsd's output until all faults have struck and a second of right positions has followed. Returns the wrong
+ * ones. */
 static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_note **note, uint32_t *n_notes)
 {
     uint32_t n_wrong = 0;
@@ -280,8 +282,8 @@ static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_
     return n_wrong;
 }
 
-/* No position comes of a sentence with a wrong checksum. One whose checksum was made right is taken. gpsd speaks after
- * a sentence at most, and a fix has five; those of the next one end the last. */
+/* A sentence with a wrong checksum gives no position. One whose checksum was made right is taken. gpsd reports after a
+ * sentence at most, and a fix has five; those of the next one end the last. */
 static void test_gpsd_hurt(void **state)
 {
     struct wire *wire = *state;
@@ -313,7 +315,7 @@ static void test_gpsd_hurt(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* ---- a head that moves: along a straight line at constant speed, so that half-way poses are a closed form */
+/* ---- a head that moves along a straight line at constant speed, so that half-way poses are a closed form */
 
 static const double VELOCITY_M_S[3] = {1.1, 0.7, 0.15}, DRIVE_S = 60.0;
 
@@ -328,7 +330,7 @@ static void write_drive(const struct wire *wire)
     assert_int_equal(fclose(f), 0);
 }
 
-/* WGS 84, NIMA TR8350.2. */
+/* The ellipsoid is WGS 84, NIMA TR8350.2. */
 static void to_ecef(double lat_deg, double lon_deg, double height_m, double p[3])
 {
     const double a = 6378137, f = 1 / 298.257223563, e2 = f * (2 - f), deg = M_PI / 180;
@@ -338,7 +340,7 @@ static void to_ecef(double lat_deg, double lon_deg, double height_m, double p[3]
     p[2] = (n * (1 - e2) + height_m) * s;
 }
 
-/* East, north, up from the station. */
+/* Gives east, north and up from the station. */
 static void from_station(const char *line, double d[3])
 {
     double p[3], q[3], lat = LAT_DEG * M_PI / 180, lon = LON_DEG * M_PI / 180;
@@ -350,8 +352,8 @@ static void from_station(const char *line, double d[3])
     d[2] = cos(lat) * cos(lon) * x + cos(lat) * sin(lon) * y + sin(lat) * z;
 }
 
-/* Where the trajectory is that long after the scan's start, to the sentences' rounding, as above; speed and course to
- * theirs, 0.0005 knots and 0.01 degrees, and gpsd's three and four decimals. */
+/* Compares with the trajectory that long after the scan's start, to the sentences' rounding, as above. Speed and course
+ * are good to 0.0005 knots and 0.01 degrees, and gpsd's three and four decimals. */
 static void check_drive(const char *line, double since_s)
 {
     double d[3], t = since_s < 0.0 ? 0.0 : since_s;
@@ -394,7 +396,7 @@ static void test_gpsd_moves(void **state)
         const char *line = gpsd_fix(&gpsd);
         int tenths = tpv_tenths(line);
         since_s = 0.1 * tenths - start_s;
-        /* before the start was known to the receiver, it stood */
+        /* before the receiver knew the start, the head stood */
         check_drive(line, since_s);
         n += tenths != before;
         before = tenths;

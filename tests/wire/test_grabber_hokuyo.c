@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* rawlog-grabber reads the ready configuration of a Hokuyo, over TCP and over a pty at once: rates and times by the
- * device's own clock, nothing lost, ranges where they are. And a URG-04LX, which is slower, over its pty. */
+/* rawlog-grabber reads the ready configuration of a Hokuyo, over TCP and over a pty at once. Rates and times are those
+ * of the device's own clock, nothing is lost, and ranges are right. It also reads a URG-04LX, which is slower, over its
+ * pty. */
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
 
@@ -12,7 +13,7 @@ struct model {
 static const struct model UTM = {0, 1080, 540, 1440, 0.1, 30.0, 250000};
 static const struct model URG = {44, 725, 384, 1024, 0.02, 5.6, 1000000};
 
-/* Times: the first ten scans have the host's; from the eleventh on they are the device's, counted from that one. */
+/* The first ten scans have the host's times. From the eleventh on times are the device's, counted from that one. */
 enum { BY_HOST = 10, SCANS = 30 };
 
 static void check_scan(const struct house *house, const struct model *model, const struct rawlog_item *scan)
@@ -24,8 +25,8 @@ static void check_scan(const struct house *house, const struct model *model, con
         /* counter-clockwise from the front step */
         const double azimuth = -2.0 * M_PI * (model->first + (int)i - model->front) / model->steps;
         double range_m = scan->valid[i] ? rawlog_range_m(scan, i) : 0.0;
-        /* half a millimetre is the rounding of the protocol, the rest that of float; 1e-7 rad is more than the
-         * rounding of angles on both sides */
+        /* half a millimetre is the rounding of the protocol, the rest that of float; 1e-7 rad is more than the rounding
+         * of angles on both sides */
         if (!house_agrees(house, azimuth, 0.0, 1e-7, range_m, 0.000505, model->min_m, model->max_m))
             fail_msg("step %u: %.3f m instead of %.4f", i, range_m, house_range_m(house, azimuth, 0.0));
     }
@@ -52,7 +53,7 @@ static void check_log(const struct house *house, const struct model *model, cons
     rawlog_free(&log);
 }
 
-/* At a place where the mark is, seen from its mirror image there is something else. */
+/* The mark is on one side: its mirror images have other ranges. */
 static void check_mark(const struct house *house)
 {
     const double azimuth = atan2(1.1, 0.5);
@@ -61,7 +62,7 @@ static void check_mark(const struct house *house)
     assert_true(fabs(house_range_m(house, azimuth, 0.0) - house_range_m(house, -azimuth, 0.0)) > 0.1);
 }
 
-/* How the client reaches link i: its driver's lines. */
+/* Returns the driver's lines for link i. */
 static const char *sensor_of(const struct head *head, int i)
 {
     static char text[2][400];
@@ -74,7 +75,7 @@ static const char *sensor_of(const struct head *head, int i)
     return text[i];
 }
 
-/* While it boots a head refuses to measure, and this client asks once. */
+/* A head refuses to measure while it boots, and this client asks only once. */
 static void let_it_scan(const struct head *head)
 {
     struct scanhead *sh = client_open(head_link(head, 2));

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* PCL's VLPGrabber, where PCL is installed: turns are whole, and each point lies on the house. It takes all lasers of
- * a firing sequence as fired at once; the test knows better, as it knows the laser by its elevation. */
+/* PCL's VLPGrabber, where PCL is installed. Turns are whole, and each point lies on the house. It treats all lasers of
+ * a firing sequence as fired at once. The test knows the laser by its elevation, and so its true time. */
 #include "tests/wire/house.h"
 
-/* On a busy machine the kernel drops packets that the client does not fetch in time: one of RUNS has to be whole. */
+/* On a busy machine the kernel drops packets that the client does not fetch in time. One of RUNS has to be whole. */
 enum { SWEEPS = 3, RUNS = 5 };
 
-/* In the order of firing, 2.304 us apart, at 3,600 degrees a second. */
+/* The lasers in the order of firing, 2.304 us apart, at 3,600 degrees a second. */
 static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
 static const double LASER_DEG = 2.304 * 3600e-6;
 
@@ -16,8 +16,8 @@ static int run_shell(struct wire *wire, const char *command)
     return wire_wait(wire, wire_spawn_program(wire, "/bin/sh", args, "shell.out", "shell.err", -1));
 }
 
-/* The client's program; skips the test where it can't be had. To compile PCL's headers takes most of this test's time,
- * so the program is kept beside the other readers while its source is the same. */
+/* Returns the client's program, or skips the test where it can't be had. Compiling PCL's headers takes most of this
+ * test's time. So the program is kept beside the other readers while its source is the same. */
 static const char *build_or_skip(struct wire *wire)
 {
     static char program[512];
@@ -50,7 +50,7 @@ static int free_port(void)
     return ntohs(at.sin_port);
 }
 
-/* 1: the point is on the house. */
+/* Returns 1 when the point is on the house. */
 static int is_right(const struct house *house, double x, double y, double z)
 {
     const double range_m = sqrt(x * x + y * y + z * z), elevation = asin(z / range_m);
@@ -59,12 +59,13 @@ static int is_right(const struct house *house, double x, double y, double z)
         if (fabs(elevation * 180.0 / M_PI - ELEVATION_DEG[i]) < 0.01) laser = i;
     if (laser < 0) fail_msg("no laser at %.4f degrees", elevation * 180.0 / M_PI);
     const double azimuth = atan2(x, y) + laser * LASER_DEG * M_PI / 180.0;
-    /* Half of 2 mm, and the printed digits; azimuths are rounded to 0.01 degrees on the wire and once more there. */
+    /* The bound is half of 2 mm, and the printed digits. Azimuths are rounded to 0.01 degrees on the wire and once more
+     * there. */
     return house_agrees(house, azimuth, ELEVATION_DEG[laser] * M_PI / 180.0, 0.02 * M_PI / 180.0, range_m, 0.00102, 0.1,
                         100.0);
 }
 
-/* 1: the turns are whole. */
+/* Returns 1 when the turns are whole. */
 static int check_sweeps(const struct house *house, const char *text)
 {
     char *at = strstr(text, "sweep ");
@@ -72,8 +73,8 @@ static int check_sweeps(const struct house *house, const char *text)
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
         assert_non_null(at);
         const long n = strtol(at + strlen("sweep "), &at, 10);
-        /* A turn has 0.1 s / 55.296 us = 1808.4 sequences; a sweep begins with a block, of two. All of them see
-         * something. The first sweep begins anywhere. */
+        /* A turn has 0.1 s / 55.296 us = 1808.4 sequences, and a sweep begins with a block, which has two. All of them
+         * meet something. The first sweep begins anywhere. */
         if (sweep > 0) {
             assert_true(n <= 16 * 1811);
             whole &= n >= 16 * 1806;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* rawlog-grabber's CLMS100Eth reads a SICK LMS111 over TCP. It polls, and logs times of the host, so the device's own
- * times and counts are those of the telegrams: a relay between the two keeps them. The client itself waits 15 s
- * while it turns the scanner on. */
+ * times and counts are in the telegrams alone. A relay between the two keeps them. The client itself waits 15 s while
+ * it turns the scanner on. */
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
 
@@ -11,7 +11,7 @@ static const double STEP_DEG = 0.25, FIRST_DEG = -45.0; /* 90 is forward, counte
 static const double MIN_M = 0.5, MAX_M = 20.0;
 static const uint32_t PERIOD_US = 40000; /* 25 Hz */
 
-/* A listening socket of this machine. */
+/* Returns a listening socket of this machine. */
 static int listen_anywhere(int *port)
 {
     struct sockaddr_in at = {.sin_family = AF_INET};
@@ -35,7 +35,7 @@ static int pass_on(int from, int to, FILE *keep)
     return 1;
 }
 
-/* A child between a client and the head; what the head says is kept in the file "telegrams". */
+/* Starts a child between a client and the head. Telegrams of the head are kept in the file "telegrams". */
 static pid_t relay_start(struct wire *wire, int listener, const char *endpoint)
 {
     pid_t pid = wire_fork(wire);
@@ -51,13 +51,13 @@ static pid_t relay_start(struct wire *wire, int listener, const char *endpoint)
     _exit(fclose(keep) != 0);
 }
 
-/* One telegram in CoLa-A, its fields as text. */
+/* This is one telegram in CoLa-A, with its fields as text. */
 struct telegram {
     char *field[FIELDS];
     int n;
 };
 
-/* Cuts the next polled scan out of *at; 0: there is none. */
+/* Cuts the next polled scan out of *at. Returns 0 where there is none. */
 static int next_telegram(char **at, struct telegram *t)
 {
     static const char begin[] = "\2sRA LMDscandata ";
@@ -98,7 +98,7 @@ static void check_ranges(const struct house *house, const struct telegram *t)
     }
 }
 
-/* The log has what the telegrams say, in the same order. */
+/* The log has the figures of the telegrams, in the same order. */
 static void check_log(const struct telegram *t, const struct rawlog_item *scan)
 {
     assert_int_equal(scan->kind, RAWLOG_SCAN);
@@ -106,15 +106,15 @@ static void check_log(const struct telegram *t, const struct rawlog_item *scan)
         assert_true(fabs(rawlog_range_m(scan, i) - 1e-3 * hex(t, 26 + (int)i)) < 1e-5); /* float */
 }
 
-/* Lets the client poll, and reads what it logs. Returns 0 where it complains, or took a part of a telegram for a scan: it
- * waits 40 ms for the rest, and on a busy machine that may come later. */
+/* Lets the client poll, and reads its log. Returns 0 where it complains, or took a part of a telegram for a scan: it
+ * waits 40 ms for the rest, which on a busy machine may come later. */
 static int poll_scans(struct wire *wire, const char *endpoint, int number, struct rawlog *log)
 {
     static struct grabber grabber;
     char sensor[256], name[16];
     int port, listener = listen_anywhere(&port), is_whole = 1;
     pid_t relay = relay_start(wire, listener, endpoint);
-    grabber_hurry(relay); /* else the client, which polls all the time, goes before it */
+    grabber_hurry(relay); /* else the client, which polls all the time, would go before it */
     close(listener);
     snprintf(name, sizeof name, "SICK%d", number);
     snprintf(sensor, sizeof sensor, "driver = CLMS100Eth\nip_address = 127.0.0.1\nTCP_port = %d\n", port);

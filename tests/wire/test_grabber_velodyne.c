@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* rawlog-grabber reads the ready configuration of a VLP-16, which needs no other key: each packet of some turns comes,
- * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. Then a head that
- * loses packets on request. The grabber takes two fixed ports of this machine. */
+/* rawlog-grabber reads the ready configuration of a VLP-16, which needs no other key. Each packet of some turns comes,
+ * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. Then a head loses
+ * packets on request. The grabber takes two fixed ports of this machine. */
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
 #include "tests/wire/room.h"
@@ -9,7 +9,7 @@
 
 enum { TURNS = 25, BLOCKS = 12, SHOTS = 32, PACKET = RAWLOG_PACKET_LEN };
 
-/* As the layout's facts have it: elevation of each laser of a firing sequence, in its order; times in us. */
+/* This is the elevation of each laser of a firing sequence, in the layout's order; times in us. */
 static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
 static const double LASER_US = 2.304, SEQUENCE_US = 55.296, PACKET_US = 24 * 55.296, DEG_PER_US = 3600e-6; /* 600 rpm */
 static const double MIN_M = 0.1, MAX_M = 100.0; /* the room has nothing outside of that */
@@ -32,13 +32,13 @@ struct packets {
     uint32_t n_turns;
     struct {
         const uint8_t *bytes;
-        uint32_t number; /* of those that the head sent since the first, by their time */
+        uint32_t number; /* of this packet among those that the head sent since the first, by their time */
     } * packet;
     uint32_t n;
     double azimuth0_deg; /* of the first packet's first firing, finer than the packets say it */
 };
 
-/* Microseconds from one packet to another, by their own time, which begins anew with each hour. */
+/* Returns the microseconds from one packet to another, by their own time, which begins anew with each hour. */
 static int64_t later_us(const uint8_t *packet, const uint8_t *first)
 {
     const int64_t us = (int64_t)get32(packet + 1200) - get32(first + 1200);
@@ -52,8 +52,8 @@ static int by_device_time(const void *a, const void *b)
     return (us > 0) - (us < 0);
 }
 
-/* The log is in the order of its own dates. Those of turns before the first fix are the host's, which is late on a busy
- * machine: such turns stand behind younger ones. order: by_device_time, or NULL: as in the log. */
+/* The log is in the order of its own dates. Turns before the first fix have the host's date, which is late on a busy
+ * machine, so they may stand behind younger ones. order: by_device_time, or NULL: as in the log. */
 static void collect(const struct rawlog *log, int (*order)(const void *, const void *), struct packets *all)
 {
     *all = (struct packets){0};
@@ -71,8 +71,8 @@ static void collect(const struct rawlog *log, int (*order)(const void *, const v
     assert_true(all->n > 0);
 }
 
-/* At the device's rate: packet n comes n * 1327.104 us after the first, by its own time. None is missing but those that
- * the client did not read. */
+/* Packets come at the device's rate: packet n comes n * 1327.104 us after the first, by its own time. None is missing
+ * but those that the client did not read. */
 static void check_times(struct packets *all, uint32_t dropped)
 {
     for (uint32_t i = 0; i < all->n; i++) {
@@ -93,7 +93,8 @@ static double turned_deg(uint32_t n, int sequence, int laser)
     return DEG_PER_US * (n * PACKET_US + sequence * SEQUENCE_US + laser * LASER_US);
 }
 
-/* Each block's azimuth, rounded to 0.01 degrees, less where it must be then: the mean is the first one's. */
+/* The difference of each block's azimuth, rounded to 0.01 degrees, from the expected one. Its mean is the first block's
+ * azimuth. */
 static void check_azimuths(struct packets *all)
 {
     const double begin_deg = 0.01 * get16(all->packet[0].bytes + 2);
@@ -122,15 +123,15 @@ static void check_ranges(const struct house *house, const struct packets *all, u
             const double azimuth =
                 (all->azimuth0_deg + turned_deg(all->packet[n].number, 2 * b + shot / 16, shot % 16)) * M_PI / 180.0;
             const double elevation = ELEVATION_DEG[shot % 16] * M_PI / 180.0, range_m = 0.002 * get16(at);
-            /* Half of 2 mm. The mean of azimuths that are rounded in a regular pattern is good to a tenth of 0.01
-             * degrees: 2e-5 rad. */
+            /* The bound is half of 2 mm. The mean of azimuths that are rounded in a regular pattern is good to a tenth
+             * of 0.01 degrees: 2e-5 rad. */
             if (!house_agrees(house, azimuth, elevation, 2e-5, range_m, 0.00101, MIN_M, MAX_M))
                 fail_msg("packet %u block %d shot %d: %.3f m instead of %.4f", n, b, shot, range_m,
                          house_range_m(house, azimuth, elevation));
         }
 }
 
-/* From the first fix on, turns are dated by the device: hour and day of the receiver, the rest of the packet. */
+/* From the first fix on, turns have the device's date: hour and day of the receiver, the rest of the packet. */
 static void check_dates(const struct rawlog *log, const struct packets *all)
 {
     int fixes = 0, dated = 0;
@@ -206,7 +207,7 @@ static const char LOSSY_CONFIG[] =
     "links: [{type: udp, protocol: velodyne, port: 2368}, {type: file, protocol: velodyne, path: clean}]\n"
     "loop: {late_ms: 10000, queue_ms: 10000}\n";
 
-/* The scenario with each fault on link 1. */
+/* Writes the scenario with each fault on link 1. */
 static const char *lossy_scenario(const struct wire *wire)
 {
     char *text = wire_read("config/faults/lossy-udp.yaml", NULL);
@@ -238,7 +239,7 @@ static struct head start_lossy(struct wire *wire)
     return head_start(wire, wire_write_text(wire, "config.yaml", LOSSY_CONFIG), args);
 }
 
-/* What the truth makes of the clean packets. */
+/* Applies the truth to the clean packets. */
 static void read_truth(struct wire *wire, struct unit_list *sent)
 {
     static const char *const kinds[] = {"drop", "duplicate", "reorder", "jitter"};
@@ -257,8 +258,8 @@ static void read_truth(struct wire *wire, struct unit_list *sent)
     units_free(&clean);
 }
 
-/* The packets of the log from that one of those that were sent on. Shorter ones are left out by the client, and so many
- * may be missing that it did not read. Returns how many packets fit. */
+/* Follows the packets of the log from one of the sent ones on. The client leaves out shorter ones, and as many may be
+ * missing as it did not read. Returns how many packets fit. */
 static uint32_t follow(const struct packets *all, const struct unit_list *sent, uint32_t from, uint32_t dropped)
 {
     uint32_t n = 0, missing = 0;
@@ -274,7 +275,7 @@ static uint32_t follow(const struct packets *all, const struct unit_list *sent, 
     return n;
 }
 
-/* Each whole packet that was sent is read, in the order in which it came, twice where it came twice. */
+/* Each whole packet that was sent is read in the order in which it came, and twice where it came twice. */
 static void check_lossy(const struct packets *all, const struct unit_list *sent, uint32_t dropped)
 {
     uint32_t best = 0;
@@ -288,7 +289,8 @@ static void check_lossy(const struct packets *all, const struct unit_list *sent,
     if (best < all->n) fail_msg("%u of %u packets fit; %u were not read", best, all->n, dropped);
 }
 
-/* The client ends a turn where the azimuth falls: with each turn of the head, and at each packet that comes too late. */
+/* The client ends a turn where the azimuth falls: with each turn of the head, and at each packet that comes too
+ * late. */
 static void check_cuts(const struct rawlog *log)
 {
     int before = -1;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Clients of tcp that shut down their sending side, as `nc -N` does: each gets what is due to it, and then its session
- * ends. Clients that never read what they get, or what the head throws away, hold up nobody. Of many that ask at once each is answered. */
+/* Clients of tcp that shut down their sending side, as `nc -N` does. Each gets all that is due to it, and then its
+ * session ends. Clients that read nothing hold up nobody. Many that ask at once are each answered. */
 #include <errno.h>
 
 #include "drivers/protocol/native.h"
@@ -23,7 +23,7 @@ static void wait_idle(const char *endpoint)
     scanhead_close(sh);
 }
 
-/* Says it and nothing more. */
+/* Sends the text and nothing more. */
 static int say_all(const char *endpoint, const char *text)
 {
     const int fd = raw_connect(endpoint);
@@ -41,7 +41,7 @@ static ssize_t read_some(int fd, void *to, size_t room)
     return n;
 }
 
-/* All that comes until the head ends the session: lines and frames. */
+/* All lines and frames that come until the head ends the session. */
 struct got {
     char lines[4000];
     int n_frames, has_ended; /* the scan */
@@ -84,7 +84,7 @@ static void a_question_and_no_more(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Its client takes the whole scan, though control went back to others; at any pace. */
+/* Its client takes the whole scan, though control went back to others. This is so at any pace. */
 static void a_scan_and_no_more(void **state)
 {
     static const char *const paces[] = {"realtime", "fast"};
@@ -101,7 +101,7 @@ static void a_scan_and_no_more(void **state)
     }
 }
 
-/* Two units of a stream with an end, and no more: the session ends after them. */
+/* Exactly two units of a stream with an end come, and the session ends after them. */
 static void two_scans_of_scip(void **state)
 {
     static char got[1 << 16];
@@ -125,8 +125,8 @@ static void two_scans_of_scip(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* One asks for a scan and reads nothing; one has sent all and reads nothing; one sends and sends. Another one has its
- * answers, its scan to the end, and the head its end. */
+/* One client asks for a scan and reads nothing. One has sent all and reads nothing. One goes on sending. Another one
+ * has its answers and its whole scan, and the head ends. */
 static void nobody_waits_for_who_does_not_read(void **state)
 {
     struct wire *wire = *state;
@@ -154,7 +154,8 @@ static void nobody_waits_for_who_does_not_read(void **state)
     close(flood);
 }
 
-/* The page of settings has four places. Eight clients at a time that ask at once are all answered, whoever comes fifth. */
+/* The page of settings has four places. Eight clients that ask at once are all answered, and the fifth waits for a
+ * place. */
 static void a_crowd_that_asks(void **state)
 {
     enum { CLIENTS = 8, ROUNDS = 20 };

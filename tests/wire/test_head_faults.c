@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the head's states, power, time and counters, as a client of the program sees them; and that they are what
- * --truth says, by number and by time. Most run in the pace step: then nothing depends on when a client connects. */
+/* Faults of the head's states, power, time and counters, as a client of the program sees them. They are those of
+ * --truth, by number and by time. Most tests run in the pace step, where nothing depends on when a client connects. */
 #include "tests/wire/room.h"
 
 #define SECOND_NS INT64_C(1000000000)
@@ -58,7 +58,7 @@ static int has_value(const char *text, const void *sought)
     return value_in(text, sought) >= 0;
 }
 
-/* The value of a key in the line of the truth about this kind; ended: in that of its end. */
+/* Returns the value of a key in the line of the truth about this kind. With `ended` it is the line about its end. */
 static int64_t truth_of(const struct wire *wire, const char *kind, int ended, const char *key)
 {
     const struct sought sought = {kind, key, ended};
@@ -75,7 +75,7 @@ static void step(struct scanhead *sh, int ms)
     client_tell(sh, line);
 }
 
-/* Of the frames that have come, device time of the STATE event with this text; -1: there is none. */
+/* Returns the device time of the STATE event with this text among the frames so far; -1: there is none. */
 static int64_t state_at(struct scanhead *sh, const char *name)
 {
     struct scanhead_frame frame;
@@ -115,7 +115,7 @@ static void test_self_test(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* What PPS events said. */
+/* The times of PPS events. */
 struct edges {
     int n;
     int64_t utc_s[32], t_ns[32], gps_s[32];
@@ -137,7 +137,7 @@ static void take_edges(struct scanhead *sh, struct edges *e)
     }
 }
 
-/* Steps over `seconds` with these faults, and gives what PPS events came. */
+/* Steps over `seconds` with these faults, and keeps the PPS events. */
 static void run_clock(struct wire *wire, const char *faults, int seconds, struct edges *e)
 {
     char more[512];
@@ -169,7 +169,7 @@ static void test_pps_lost(void **state)
     assert_int_equal(truth_of(wire, "pps_lost", 1, "n"), missing);
 }
 
-/* By how much the head's clock differs from what it showed at first, at each edge. */
+/* Returns the change of the head's clock error since the first edge, at each edge. */
 static int64_t error_ns(const struct edges *e, int i)
 {
     return (e->gps_s[i] - e->gps_s[0]) * SECOND_NS - (e->t_ns[i] - e->t_ns[0]);
@@ -179,7 +179,7 @@ static void test_clock(void **state)
 {
     struct wire *wire = *state;
     struct edges e;
-    /* On by 2.25 s. */
+    /* The clock jumps ahead by 2.25 s. */
     run_clock(wire, "[{kind: clock_jump, from_s: 3.1, jump_s: 2.25}]", 6, &e);
     const int64_t jump_ns = truth_of(wire, "clock_jump", 0, "t_ns");
     assert_true(jump_ns == 3100000000 && e.n == 6);
@@ -195,7 +195,7 @@ static void test_clock(void **state)
         assert_true(llabs(error_ns(&e, i) - gained_ns) <= 1);
     }
     assert_true(e.n == 6 && until_ns - from_ns == 2 * SECOND_NS);
-    /* Stands for 1.75 s. */
+    /* The clock stands for 1.75 s. */
     run_clock(wire, "[{kind: clock_stop, from_s: 1.9, until_s: 3.65}]", 7, &e);
     for (int i = 0; i < e.n; i++)
         assert_int_equal(error_ns(&e, i), e.t_ns[i] < 1900000000 ? 0 : -1750000000);
@@ -203,7 +203,7 @@ static void test_clock(void **state)
                 truth_of(wire, "clock_stop", 1, "t_ns") - truth_of(wire, "clock_stop", 0, "t_ns") == 1750000000);
 }
 
-/* The minute ends at 5.5 s. GPS time goes on; UTC has a second more. */
+/* The minute ends at 5.5 s. GPS time goes on, and UTC has one more second. */
 static void test_leap_second(void **state)
 {
     struct wire *wire = *state;
@@ -246,7 +246,7 @@ static void test_wrap(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Takes what comes until the head hangs up. Device time of the last points, and the pulse after them. */
+/* Takes frames until the head hangs up. Returns the device time of the last points, and writes the pulse after them. */
 static int64_t until_hung_up(struct scanhead *sh, uint64_t *pulse_end, int *ends)
 {
     struct scanhead_frame frame;
@@ -263,7 +263,8 @@ static int64_t until_hung_up(struct scanhead *sh, uint64_t *pulse_end, int *ends
     return t_ns;
 }
 
-/* In steps: to the tick. A step that goes on over it is not answered, and its time passes all the same. */
+/* In steps the time is exact to the tick. A step that goes beyond it is not answered, and its time passes all the
+ * same. */
 static void test_power_cycle_in_steps(void **state)
 {
     struct wire *wire = *state;
@@ -283,7 +284,7 @@ static void test_power_cycle_in_steps(void **state)
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);
     assert_true(ends == 0 && last_ns < 2000000000);
     assert_int_equal(scanhead_reattach(sh, DEADLINE_MS), SCANHEAD_OK);
-    while (atoll(client_ask(sh, "TIME?")) < 2500000000) /* what was granted passes */
+    while (atoll(client_ask(sh, "TIME?")) < 2500000000) /* the granted time passes */
         continue;
     assert_string_equal(client_ask(sh, "HEAD:STATE?"), "off");
     assert_non_null(strstr(client_ask(sh, "SCAN:START"), "ERR -221"));
@@ -294,7 +295,7 @@ static void test_power_cycle_in_steps(void **state)
     assert_int_equal(truth_of(wire, "power_cycle", 0, "t_ns"), 2000000000);
     assert_int_equal(truth_of(wire, "power_cycle", 1, "t_ns"), 3500000000);
     /* The scan began at 330 ms: 50,100 pulses at 30 kHz, 600 a line, which are cut at packets of 16 from each line's
-     * start. What was on its way is lost with the connection. */
+     * start. Frames on their way are lost with the connection. */
     const uint64_t pulse = (uint64_t)truth_of(wire, "power_cycle", 0, "pulse");
     assert_true(pulse == 83 * 600 + 300 / 16 * 16 && pulse_end <= pulse);
     assert_string_equal(client_ask(sh, "HEAD:PRR?"), "20000");
@@ -306,7 +307,8 @@ static void test_power_cycle_in_steps(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* By the clock, and as fast as it goes: the client is hung up, comes back, and finds the head idle with an empty queue. */
+/* In real time, and as fast as it computes, the client is hung up. It comes back and finds the head idle with an empty
+ * queue. */
 static void power_cycle_at(struct wire *wire, const char *pace, const char *link)
 {
     struct head head = start(wire,
@@ -321,7 +323,7 @@ static void power_cycle_at(struct wire *wire, const char *pace, const char *link
     client_tell(sh, "SCAN:START");
     while ((rc = scanhead_next(sh, &frame, DEADLINE_MS)) == SCANHEAD_OK && !is_event(&frame, SCANHEAD_EV_SCAN_START))
         continue;
-    /* A client that is late is hung up before it has read that, and what it has not read is lost. */
+    /* A client that is late is hung up before it has read that. It loses all that it has not read. */
     if (rc != SCANHEAD_OK && rc != SCANHEAD_ECLOSED) fail_msg("%s", scanhead_error(sh));
     ends = -1; /* for the state `scanning` */
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);
@@ -347,7 +349,7 @@ static void test_power_cycle(void **state)
     power_cycle_at(*state, "realtime", "pty");
 }
 
-/* The same faults: the same stream, at any pace, with any number of threads, off line and on. */
+/* The same faults give the same stream at any pace, with any number of threads, off line and on. */
 static void test_same_stream(void **state)
 {
     struct wire *wire = *state;
@@ -380,7 +382,7 @@ static void test_same_stream(void **state)
     }
 }
 
-/* A file goes on over a power cycle that is longer than the queue, and has all of it. */
+/* A file goes on over a power cycle that is longer than the queue, and loses nothing. */
 static void test_file_goes_on(void **state)
 {
     struct wire *wire = *state;
@@ -407,7 +409,7 @@ static void test_file_goes_on(void **state)
     assert_string_equal(states, "boot idle spin-up scanning off boot idle spin-up scanning spin-down ");
 }
 
-/* Nothing to tell the time: refused. */
+/* Nothing reports the time, so it is refused. */
 static void test_needs_time(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Two VLP-16 and two LMS111 behind one interface, at the same ports: one client tells them apart by their addresses, and
- * gets from each what that one measures. Each head stands in a square room of its own. */
+/* Two VLP-16 and two LMS111 behind one interface, at the same ports. One client tells them apart by their addresses,
+ * and gets each one's own ranges. Each head stands in a square room of its own. */
 #include <arpa/inet.h>
 #include <math.h>
 
@@ -16,7 +16,7 @@ static struct sockaddr_in place(int host, int port)
     return at;
 }
 
-/* A socket at 127.0.0.1 and a port of the system's choice, which stays free on the addresses after it. */
+/* Returns a socket at 127.0.0.1 and a port of the system's choice, which is free on the addresses after it, too. */
 static int open_at(int type, int *port)
 {
     struct sockaddr_in at = place(0, 0);
@@ -28,7 +28,7 @@ static int open_at(int type, int *port)
     return fd;
 }
 
-/* Walls alone, so that the nearest point is half a side away. */
+/* The room has only walls, so the nearest point is half a side away. */
 static struct head start(struct wire *wire, int i, const char *profile, const char *link)
 {
     char name[16], text[1024];
@@ -49,8 +49,8 @@ static struct head start(struct wire *wire, int i, const char *profile, const ch
     return head_start(wire, wire_write_text(wire, name, text), NULL);
 }
 
-/* The nearest wall in m, of the head with that source in a stream of both. Every azimuth is met to 0.1 degrees, and two
- * beams are 1 degree from the horizon: cos(1 deg) cos(0.1 deg) is 1 - 1.6e-4. The wire has steps of 2 mm. */
+/* Returns the nearest wall in m of the head with that source, in a stream of both. Every azimuth occurs to 0.1 degrees,
+ * and two beams are 1 degree from the horizon: cos(1 deg) cos(0.1 deg) is 1 - 1.6e-4. The wire has steps of 2 mm. */
 static void expect_velodynes(int fd, int port)
 {
     double nearest_m[N] = {INFINITY, INFINITY};
@@ -77,8 +77,8 @@ static void expect_velodynes(int fd, int port)
             fail_msg("VLP-16 %d: %.3f m to a wall that is %d m away", i, nearest_m[i], HALF_M[i]);
 }
 
-/* All that comes until the head ends the session. The request is all that the client sends: its sending side is shut
- * down before the answer can be there. */
+/* Reads all until the head ends the session. The request is all that the client sends: its sending side is shut down
+ * before the answer can be there. */
 static void ask_last_scan(int i, int port, char *got, size_t cap)
 {
     static const char request[] = "\2sRN LMDscandata\3";
@@ -99,8 +99,8 @@ static void ask_last_scan(int i, int port, char *got, size_t cap)
     close(fd);
 }
 
-/* The nearest distance in mm, to a count of the wire: a beam every 0.25 or 0.5 degrees has one within 0.25 degrees of the
- * wall's foot, 1e-5 farther. */
+/* The nearest distance in mm, to a count of the wire. A beam every 0.25 or 0.5 degrees has one within 0.25 degrees of
+ * the wall's foot, 1e-5 farther. */
 static void expect_sick(int i, int port)
 {
     static char got[65536];

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The first ten minutes with a mesh of one's own: `scanhead init`, and what is said where a scan would show
- * little. */
+/* The first ten minutes with a mesh of one's own: `scanhead init`, and its advice where a scan would show little. */
 #include "tests/wire/room.h"
 
 static char *out, *text; /* of the last command: standard output and error */
@@ -39,7 +38,7 @@ static void contains(const char *in, const char *what)
     if (strstr(in, what) == NULL) fail_msg("\"%s\" is missing in:\n%s", what, in);
 }
 
-/* Points in a binary PLY, by its header. */
+/* Returns the points of a binary PLY, by its header. */
 static long points_of(const struct wire *wire, const char *name)
 {
     char *ply = wire_read(wire_path(wire, name), NULL);
@@ -50,7 +49,7 @@ static long points_of(const struct wire *wire, const char *name)
     return points;
 }
 
-/* A room of 8 x 6 x 3 units whose walls face inward; y is up in it where that is asked for. */
+/* A room of 8 x 6 x 3 units whose walls face inward. y is up in it where that is asked for. */
 static void write_room(const struct wire *wire, const char *name, double unit, int y_up)
 {
     static const char *const faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
@@ -65,7 +64,7 @@ static void write_room(const struct wire *wire, const char *name, double unit, i
     wire_write_text(wire, name, obj);
 }
 
-/* Nothing but init, check and record; all in a few lines, with comments. */
+/* Only init, check and record are needed. The configuration has a few lines, with comments. */
 static void a_mesh_becomes_a_scan(void **state)
 {
     struct wire *wire = *state;
@@ -93,7 +92,7 @@ static void a_mesh_becomes_a_scan(void **state)
     forget();
 }
 
-/* A model of Debian's as FBX text, with other axes: pairs of a name and a number. */
+/* Writes a model of Debian's as FBX text, with other axes: pairs of a name and a number. */
 static void write_fbx(struct wire *wire, const char *const *axes)
 {
     char *all = wire_read("/usr/share/assimp/models/FBX/cubes_with_names.fbx", NULL), from[64];
@@ -110,7 +109,7 @@ static void write_fbx(struct wire *wire, const char *const *axes)
     free(all);
 }
 
-/* With axes that up: y and up: z are not, the mesh lies on its side, stands on its head, or is mirrored. No key helps. */
+/* With these axes, up: y and up: z leave the mesh on its side, on its head, or mirrored. No key helps. */
 static void axes_that_no_key_can_say(void **state)
 {
     struct wire *wire = *state;
@@ -148,7 +147,7 @@ static void axes_that_no_key_can_say(void **state)
     forget();
 }
 
-/* Millimetres, y up: as the options say, or as the size makes it likely. */
+/* The mesh is in millimetres with y up. Options say so, or its size makes it likely. */
 static void unit_and_axes_can_be_given(void **state)
 {
     struct wire *wire = *state;
@@ -171,7 +170,7 @@ static void unit_and_axes_can_be_given(void **state)
     forget();
 }
 
-/* Boxes of 10 m, a kilometre from each other, in units of a metre from an origin. */
+/* Boxes of 10 m stand a kilometre from each other, in units of a metre from an origin. */
 static void write_city(const struct wire *wire, const char *name, double x, double y, double z)
 {
     static const char *const faces[] = {"1 2 3 4", "5 8 7 6", "1 5 6 2", "2 6 7 3", "3 7 8 4", "4 8 5 1"};
@@ -193,8 +192,8 @@ static void write_city(const struct wire *wire, const char *name, double x, doub
     free(obj);
 }
 
-/* Larger than 2 km without a unit: what else there is to see decides. A plate of 2 m by 1 cm nobody scans, and nobody puts
- * an origin 2.7 km beside it. */
+/* A mesh is larger than 2 km without a unit, so its contents decide. Nobody scans a plate of 2 m by 1 cm, and nobody
+ * puts an origin 2.7 km beside it. */
 static void the_unit_follows_from_what_there_is(void **state)
 {
     struct wire *wire = *state;
@@ -214,7 +213,7 @@ static void the_unit_follows_from_what_there_is(void **state)
     forget();
 }
 
-/* Nothing of nine boxes on two kilometres is to be seen from outside of all: the station stands near one of them. */
+/* From outside of all, nothing of nine boxes on two kilometres is seen. So the station stands near one of them. */
 static void a_sparse_city_is_looked_at(void **state)
 {
     struct wire *wire = *state;
@@ -232,7 +231,7 @@ static void a_sparse_city_is_looked_at(void **state)
     forget();
 }
 
-/* The command that comes next can be pasted into a shell; an error is one line. */
+/* The next command can be pasted into a shell, and an error is one line. */
 static void names_may_have_any_bytes(void **state)
 {
     struct wire *wire = *state;
@@ -249,7 +248,7 @@ static void names_may_have_any_bytes(void **state)
     forget();
 }
 
-/* A closed body is scanned from outside, and no more than what holds it; so the station has to look at it. */
+/* A closed body is scanned from outside, with a field of view that just holds it. So the station has to look at it. */
 static void a_body_is_looked_at(void **state)
 {
     struct wire *wire = *state;
@@ -264,12 +263,12 @@ static void a_body_is_looked_at(void **state)
     assert_int_equal(RUN(wire, "record", "box.yaml", "-o", "box.ply", "--empty-shots", "--quiet"), 0);
     const double shots = (double)points_of(wire, "box.ply");
     assert_int_equal(RUN(wire, "record", "box.yaml", "-o", "box.ply", "--quiet"), 0);
-    /* What init says of the view is of 1,024 directions or more: within 5 %, three standard errors of a share. */
+    /* init estimates the view from 1,024 directions or more: within 5 %, three standard errors of a share. */
     assert_true(seen > 0.3 && fabs((double)points_of(wire, "box.ply") / shots - seen) < 0.05);
     forget();
 }
 
-/* From another folder, by a path that leads out of that of the configuration. */
+/* The call comes from another folder, by a path that leads out of the configuration's folder. */
 static void the_path_of_the_mesh_starts_at_the_configuration(void **state)
 {
     struct wire *wire = *state;
@@ -332,7 +331,7 @@ static void wrong_use_says_what_is_allowed(void **state)
     forget();
 }
 
-/* The station is 500 m beside a room of 8 m: at check, run and record. */
+/* The station is 500 m beside a room of 8 m. check, run and record report it. */
 static void a_scan_of_nothing_is_told(void **state)
 {
     static const char moved[] = "stations.0.position_m=[0, 500, 1]";

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead init` takes more from a mesh's file than its shape: a raster's place, glass, and what its reader says. */
+/* `scanhead init` takes more from a mesh's file than its shape: a raster's place, glass, and the warnings of its
+ * reader. */
 #include "tests/common/tif.h"
 #include "tests/wire/wire.h"
 
@@ -34,7 +35,7 @@ static void has(const char *in, const char *what)
     if (in == NULL || strstr(in, what) == NULL) fail_msg("\"%s\" is missing in:\n%s", what, in);
 }
 
-/* A hill of 60 m; the scene is anchored where the file's system is one of the registry, in metres. */
+/* The raster is a hill of 60 m. The scene is anchored where the file's system is one of the registry, in metres. */
 static void a_raster_gives_the_place(void **state)
 {
     struct wire *wire = *state;
@@ -56,7 +57,7 @@ static void a_raster_gives_the_place(void **state)
     assert_null(strstr(made, "anchor"));
 }
 
-/* Names so long that a warning has no room for one of them: the configuration has the whole rule. */
+/* Names are too long for a warning. The configuration has the whole rule. */
 static void long_names_of_glass_stay_whole(void **state)
 {
     struct wire *wire = *state;
@@ -78,7 +79,7 @@ static void long_names_of_glass_stay_whole(void **state)
     has(err_text, "surfaces: [...]; check --scene-csv FILE has all");
 }
 
-/* Degenerate faces alone: why there is nothing left, in the words of the reader. */
+/* The mesh has only degenerate faces. The reader's words give the reason why nothing is left. */
 static void warnings_of_a_mesh_that_fails_are_said(void **state)
 {
     struct wire *wire = *state;

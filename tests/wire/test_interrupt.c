@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SIGTERM while the head loads: it is heeded within half a second, in one line, whatever the load is at. */
+/* SIGTERM while the head loads ends it within half a second, in one line, at any step of loading. */
 #include <sys/inotify.h>
 #include <sys/resource.h>
 
@@ -9,7 +9,7 @@
 /* Above a million triangles the building of the BVH is announced. */
 enum { TRIANGLES = 1010000 };
 
-/* 0.5 s is what is asked for, and 0.02 to 0.12 s is measured on two idle processors. Here processor time is looked at, so that a
+/* 0.5 s is promised, and 0.02 to 0.12 s was measured on two idle processors. The test takes processor time, so that a
  * busy machine changes nothing: both processors for half a second. */
 enum { MOST_MS = 1000 };
 
@@ -75,7 +75,7 @@ static const char *write_mesh(struct wire *wire, const char *name, void (*write)
     return wire_write_text(wire, "config.yaml", text);
 }
 
-/* Waits for a text on the program's standard error, a FIFO; what has come stays in `got`. */
+/* Waits for a text on the program's standard error, a FIFO. All text so far stays in `got`. */
 static void wait_for(int fd, const char *text, char *got, size_t room)
 {
     size_t n = 0;
@@ -90,7 +90,7 @@ static void wait_for(int fd, const char *text, char *got, size_t room)
     }
 }
 
-/* The program's standard error. Open at both ends, so that neither open waits. */
+/* The program's standard error is open at both ends, so that neither open waits. */
 static int make_err(struct wire *wire)
 {
     assert_int_equal(mkfifo(wire_path(wire, "err"), 0600), 0);
@@ -99,7 +99,7 @@ static int make_err(struct wire *wire)
     return fd;
 }
 
-/* A process has taken so much processor time so far, with its children that have ended. */
+/* Returns the processor time of a process so far, with its children that have ended. */
 static int64_t taken_ms(const char *pid)
 {
     char name[64], text[1024];
@@ -129,7 +129,7 @@ static int64_t all_taken_ms(pid_t pid)
     return sum_ms + taken_ms(number);
 }
 
-/* All processes that were waited for have taken this, with their children. */
+/* Returns the processor time of all processes that were waited for, with their children. */
 static int64_t past_ms(void)
 {
     struct rusage past;
@@ -182,7 +182,7 @@ static void test_while_the_bvh_is_built(void **state)
     interrupted_when_it_says(*state, config, "building the BVH");
 }
 
-/* Our own readers say nothing before a second is over: the signal comes when the file is opened. */
+/* Our own readers print nothing in the first second, so the signal comes when the file is opened. */
 static void test_while_a_ply_is_read(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Readers that come late and streams that lost bytes: what is needed comes again, and only what was hit is
- * missing. */
+/* Readers that come late and streams that lost bytes. All that a reader needs comes again, and only the damaged frames
+ * are missing. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
@@ -13,8 +13,8 @@ static const struct room_config ENDLESS = {.prr_hz = 200000,
                                            .links = LINK_YAML_BOTH,
                                            .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
-/* From the first frame on: nothing missing, and descriptor, anchor and names within a second of device time
- * (and the tick that the repetition falls in); points can be had from then on. */
+/* From the first frame on nothing is missing. Descriptor, anchor and names come within a second of device time (and the
+ * tick that the repetition falls in). Points can be had from then on. */
 static void follow(struct scanhead *sh)
 {
     struct scanhead_frame frame;
@@ -73,7 +73,7 @@ struct recording {
     size_t at[MAX_FRAMES + 1]; /* of each frame; the last entry is the end */
 };
 
-/* Where each frame of the file link's recording begins. */
+/* Finds where each frame of the file link's recording begins. */
 static void read_frames(const struct wire *wire, struct recording *r)
 {
     r->bytes = (uint8_t *)wire_read(wire_path(wire, "stream.shs"), &r->len);
@@ -104,9 +104,9 @@ static void record(struct wire *wire, struct recording *r)
     read_frames(wire, r);
 }
 
-/* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must
- * come, as it was. The one exception: a frame whose last byte looks like a sync byte is whole again with the
- * next one's, which then is what is missing. */
+/* Parses the frames first .. last - 1 without the byte at `lost`. Every other frame must come unchanged. There is one
+ * exception: a frame whose last byte looks like a sync byte is whole again with the next one's, and then the next one
+ * is missing. */
 static void check_without(const struct recording *r, int first, int last, size_t lost)
 {
     static struct native_parser parser;
@@ -156,8 +156,7 @@ static void test_lost_byte(void **state)
     free(r.bytes);
 }
 
-/* The same file through the library, whole: the recording of the file link is what was sent, and hashes to
- * it. */
+/* The same file goes through the library. The recording of the file link is the sent stream, and has its hash. */
 static void test_recording_is_whole(void **state)
 {
     struct wire *wire = *state;
@@ -182,8 +181,8 @@ static void test_recording_is_whole(void **state)
 
 /* ---- the time of day, for a reader that joins in the middle of a scan */
 
-/* The stream from frame `first` on: with the first points that can be placed the time is known, too. Returns how many
- * points frames came. */
+/* Reads the stream from frame `first` on. With the first points that can be placed the time is known, too. Returns how
+ * many points frames came. */
 static int check_time(const struct wire *wire, const struct recording *r, int first, int64_t gps_of_t0_ns)
 {
     size_t at = r->at[first];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What clients set between scans, over TCP: the scan is the one that record makes with the same keys; the journal
- * brings it back; and what HELP? says of a setting is what it takes. */
+/* Settings that clients make between scans, over TCP. The scan is the one that record makes with the same keys. The
+ * journal brings it back. HELP? gives the values that a setting accepts. */
 #include "tests/wire/room.h"
 
 static const struct room_config SHORT = {.prr_hz = 100000,
@@ -11,7 +11,7 @@ static const struct room_config SHORT = {.prr_hz = 100000,
                                          .links = LINK_YAML_TCP,
                                          .more = "loop: {pace: fast}\n"};
 
-/* Of full-sweep: a sweep of 100 deg, so that 0.25 deg at 100 kHz are 250 lines/s and 62.5 deg/s. */
+/* full-sweep has a sweep of 100 deg, so 0.25 deg at 100 kHz are 250 lines/s and 62.5 deg/s. */
 static const char *const commands[] = {"SCAN:STEP 0.25", "HEAD:RANG:MIN 1.25",  "HEAD:RANG:MAX 3.5",
                                        "HEAD:NOIS ON",   "HEAD:NOIS:SIGM 7 MM", "HEAD:NOIS:BALL 0.03"};
 static const char *const keys[] = {"head.lines_hz=250",       "head.pan_deg_s=62.5", "head.range_min_m=1.25",
@@ -67,7 +67,7 @@ static void test_scans_are_those_of_the_keys(void **state)
     assert_string_equal(again, kept);
 }
 
-/* A panel of knobs: each setting by its name, its limits from HELP?, and each end of them taken. */
+/* A panel of knobs is made from HELP?: each setting's name and limits. Each end of them is accepted. */
 static void test_knobs_draw_themselves(void **state)
 {
     struct wire *wire = *state;

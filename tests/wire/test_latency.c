@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From command to beam: a start, a change and a stop take effect within 100 ms of device time, with the
- * settings a head has by default. Device time is a property of the program; wall time would be one of the
- * machine. */
+/* From command to beam: a start, a change and a stop take effect within 100 ms of device time, with a head's default
+ * settings. Device time is a property of the program; wall time would be one of the machine. */
 #include "tests/wire/room.h"
 
 enum { EFFECT_NS = 100000000 };
@@ -40,7 +39,7 @@ static void close_session(struct session *s)
     head_end(&s->head, SIGTERM);
 }
 
-/* The line behind so many commands; NULL: it is not there yet. */
+/* Returns the line after so many commands; NULL: it is not there yet. */
 static const char *line_behind(const char *text, int commands)
 {
     while (text != NULL && (text[0] == '#' || commands-- > 0)) { /* notes, and the commands before */
@@ -55,8 +54,8 @@ static int has_command(const char *text, const void *commands)
     return line_behind(text, *(const int *)commands) != NULL;
 }
 
-/* Sends a command that has an effect and returns the device time of its arrival as the journal has it, which
- * must lie between what the head said before and what it says after. */
+/* Sends a command that has an effect, and returns the device time of its arrival by the journal. It must lie between
+ * the head's times before and after. */
 static int64_t command(struct session *s, const char *line)
 {
     int64_t before_ns = atoll(client_ask(s->sh, "TIME?"));
@@ -118,7 +117,7 @@ static void test_start_and_stop(void **state)
     close_session(&s);
 }
 
-/* Since the change before: a sum of exact periods. A long double holds a second of nanoseconds to 1e-10. */
+/* A rate since the last change: a sum of exact periods. A long double holds a second of nanoseconds to 1e-10. */
 struct rate {
     int64_t prr_uhz;
     uint64_t pulse0;
@@ -130,8 +129,8 @@ static long double time_of(const struct rate *rate, uint64_t pulse)
     return rate->t0_ns + (long double)(pulse - rate->pulse0) * 1e15L / (long double)rate->prr_uhz;
 }
 
-/* A time on the wire is the exact one, rounded down; the head carries fractions of a nanosecond from one rate
- * to the next to 1/prr, hence the 1e-6. */
+/* A time on the wire is the exact one, rounded down. The head carries fractions of a nanosecond from one rate to the
+ * next to 1/prr, hence the 1e-6. */
 static void check_time(int64_t t_ns, long double exact_ns)
 {
     long double rest = exact_ns - (long double)t_ns;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Personalities read twice at once: by a parser written from the published layout alone, and by libscanhead from the
- * native link beside it. Both get the same points, to half a unit of the protocol's last digit. Range noise is on,
- * so that no two scans are alike, and scans are matched by what is in them. */
+/* Personalities are read twice at once: by a parser written from the published layout alone, and by libscanhead from
+ * the native link beside it. Both get the same points, to half a unit of the protocol's last digit. Range noise makes
+ * all scans differ, so they are matched by their contents. */
 #include "tests/wire/wire.h"
 
 #include <math.h>
 
 enum { MAX_POINTS = 1081, MAX_LINES = 16, SCANS = 6, PACKETS = 40, PER_PACKET = 384, MAX_SHOTS = 300000 };
 
-/* One scan of a planar head, in the order of its steps. */
+/* This is one scan of a planar head, in the order of its steps. */
 struct scan {
     int n;
     double range_m[MAX_POINTS]; /* 0: none */
@@ -18,7 +18,7 @@ struct scan {
 
 static struct scan native[MAX_LINES], spoken[SCANS];
 
-/* The native stream's scans; the first may have been joined in its middle, and is then like no other. */
+/* Reads the native stream's scans. The first may have been joined in its middle, and then equals no other. */
 static void read_native(struct scanhead *sh, int n_lines)
 {
     static struct scanhead_point point[4096];
@@ -41,7 +41,7 @@ static void read_native(struct scanhead *sh, int n_lines)
     }
 }
 
-/* Whether two scans are one, as far as half a unit of 1 mm goes (and the native unit of a micrometre). */
+/* Returns whether two scans are one, to half a unit of 1 mm (and the native unit of a micrometre). */
 static int is_same(const struct scan *a, const struct scan *b)
 {
     for (int i = 0; i < a->n; i++)
@@ -49,8 +49,8 @@ static int is_same(const struct scan *a, const struct scan *b)
     return a->n == b->n;
 }
 
-/* Each spoken scan is one of the native ones, they follow each other, their angles and times agree. The two clocks
- * begin at different times; unit_ms: a time is rounded down to it. */
+/* Each scan of the protocol is one of the native ones. They follow each other, and their angles and times agree. The
+ * two clocks begin at different times; unit_ms: a time is rounded down to it. */
 static void compare(int lines, int scans, double unit_ms)
 {
     int first = -1;
@@ -68,7 +68,7 @@ static void compare(int lines, int scans, double unit_ms)
     }
 }
 
-/* The ready configuration with noise; its terminals are moved to the test's folder. Lists end with NULL. */
+/* Starts the ready configuration with noise. Its terminals are moved to the test's folder. Lists end with NULL. */
 static struct head start(struct wire *wire, const char *config, const char *const *ptys, const char *const *sets)
 {
     static char path[4][400];
@@ -88,7 +88,7 @@ static struct head start(struct wire *wire, const char *config, const char *cons
     return head_start(wire, config, more);
 }
 
-/* A client's socket, and what came of it. */
+/* A client's socket, and the bytes that came from it. */
 struct reader {
     int fd;
     size_t n, used;
@@ -103,7 +103,7 @@ static void reader_open(const char *endpoint)
     reader.n = reader.used = 0;
 }
 
-/* Up to and with `end`, NUL-terminated; good until the next call. */
+/* Returns the text up to and with `end`, NUL-terminated and good until the next call. */
 static char *read_until(const char *end)
 {
     static char piece[sizeof reader.bytes];
@@ -126,7 +126,7 @@ static char *read_until(const char *end)
     }
 }
 
-/* ---- SCIP: lines that end in a sum; values of characters with six bits each */
+/* ---- SCIP: lines that end in a sum; values are characters with six bits each */
 
 static long scip_value(const char *at, int chars)
 {
@@ -136,7 +136,7 @@ static long scip_value(const char *at, int chars)
     return value;
 }
 
-/* A line without its sum, which must be right. */
+/* Returns the length of a line without its sum, which must be right. */
 static size_t scip_line(const char *line, size_t len)
 {
     unsigned sum = 0;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What is hit and is no echo is counted, in every line end and in the statistics: of head and of recorder. */
+/* Hits that give no echo are counted, in every line end and in the statistics of head and recorder. */
 #include <inttypes.h>
 
 #include "drivers/protocol/native.h"
 #include "tests/wire/room.h"
 
-/* As full-sweep, but that it tells two echoes of a pulse and sees half a white target at REACH_M. */
+/* This is a profile like full-sweep, but with two echoes a pulse, which sees half a white target at REACH_M. */
 static const double REACH_M = 4.0;
 static const char PROFILE[] = "maker: scanhead\n"
                               "model: two echoes\n"
@@ -43,8 +43,8 @@ static const struct room_config SCAN = {.profile = "two-echoes.yaml",
                                         .frames = 1,
                                         .links = LINK_YAML_TCP};
 
-/* The room, and two closed boxes of glass around the station: from there each ray meets both, then a wall, each 0.5 m
- * and more behind the one before. */
+/* The room, and two closed boxes of glass around the station. Each ray from there meets both, then a wall, each 0.5 m
+ * or more behind the one before. */
 static void panes_write(const struct wire *wire)
 {
     static const int quad[6][4] = {{1, 3, 7, 5}, {2, 6, 8, 4}, {1, 5, 6, 2}, {3, 4, 8, 7}, {1, 2, 4, 3}, {5, 7, 8, 6}};
@@ -97,7 +97,7 @@ static void expect_stats(const struct wire *wire, const struct sums *sums)
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* A scan by a head with several threads, whose blocks end within lines; then the same as `record` takes it. */
+/* Scans by a head with several threads, whose blocks end within lines. Then `record` does the same. */
 static void scan(struct wire *wire, const char *noise, const char *more, check_fn *check, struct sums *sums)
 {
     struct room_config config = SCAN;
@@ -124,7 +124,7 @@ static void scan(struct wire *wire, const char *noise, const char *more, check_f
     expect_stats(wire, sums);
 }
 
-/* Three returns of every pulse, two of which are told. */
+/* Every pulse has three returns, and two of them are sent. */
 static void three_for_two(const struct line_end *end, const struct oracle *oracle)
 {
     (void)oracle;
@@ -144,7 +144,7 @@ static void test_echoes_left_out(void **state)
 }
 
 /* The range equation: a wall of the reflectance that is just seen at REACH_M is seen where cos i / R^2 >= 1 /
- * REACH_M^2. A part in 1e9 of that may go either way; and each hit is an echo or faint. */
+ * REACH_M^2. Within a part in 1e9 of that either result is right. Each hit is an echo or faint. */
 static void as_the_range_equation_says(const struct line_end *end, const struct oracle *oracle)
 {
     uint32_t faint = 0, unsure = 0;
@@ -187,19 +187,18 @@ static void test_a_plain_scan(void **state)
     scan(*state, NULL, "beam: {mode: single}\n", nothing_else, &sums);
 }
 
-/* A ball that is flattened to a rod along the scene's x axis, so big that points leave the reach of the stream's
- * integers,
- * +-(2^31 - 1) counts of the automatic 1e-6 m from the station. */
+/* A ball that is flattened to a rod along the scene's x axis. It is so large that points leave the range of the
+ * stream's integers, +-(2^31 - 1) counts of the automatic 1e-6 m from the station. */
 static const double BALL_M = 100.0, GROWTH_1_M = 5.0, FARTHEST_M = 2147.483647;
 
-/* Of a place in a ball of radius 1, uniform over its volume: that its x is beyond q. The disc at x has the share
- * 3/4 (1 - x^2) of the volume; that from q to 1. */
+/* Returns the probability that the x of a point in a ball of radius 1, uniform over its volume, is beyond q. The disc
+ * at x has the share 3/4 (1 - x^2) of the volume, summed from q to 1. */
 static double beyond(double q)
 {
     return q >= 1.0 ? 0.0 : 0.5 - 0.75 * q + 0.25 * q * q * q;
 }
 
-/* How many a scan should have lost, and the variance of that. */
+/* The expected number of lost echoes of a scan, and its variance. */
 static double unfit_mean, unfit_variance;
 
 static void as_the_ball_says(const struct line_end *end, const struct oracle *oracle)

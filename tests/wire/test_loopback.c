@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where no address is given, a head listens at 127.0.0.1 alone. A listener at all addresses of the machine would take
- * a connection to 127.0.0.2, which is loopback, too; one at 127.0.0.1 refuses it. So no other machine is needed to see. */
+/* If no address is given, a head listens at 127.0.0.1 alone. 127.0.0.2 is loopback, too. A listener at all addresses
+ * of the machine would accept a connection to it; one at 127.0.0.1 refuses it. So the test needs no other machine. */
 #include <arpa/inet.h>
 
 #include "tests/wire/room.h"
@@ -19,7 +19,7 @@ static struct sockaddr_in place(const char *address, int port)
     return at;
 }
 
-/* 0, or the errno of a connection. On loopback both answers come at once. */
+/* Returns 0, or the errno of a connection. On loopback both answers come at once. */
 static int try_tcp(const char *address, int port)
 {
     struct sockaddr_in at = place(address, port);
@@ -30,7 +30,7 @@ static int try_tcp(const char *address, int port)
     return error;
 }
 
-/* Whether the system says that nobody takes a datagram there. */
+/* Returns whether the system reports that nobody takes a datagram there. */
 static int udp_is_refused(const char *address, int port)
 {
     struct sockaddr_in at = place(address, port);
@@ -69,8 +69,8 @@ static void every_service_is_for_this_machine_alone(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* An address that others may reach is said with a warning, once for the link; loopback and a link that takes no commands
- * are not. */
+/* There is a warning for an address that others may reach, once for the link. Loopback and a link that takes no
+ * commands have none. */
 static void what_others_reach_is_said(void **state)
 {
     struct wire *wire = *state;
@@ -87,7 +87,7 @@ static void what_others_reach_is_said(void **state)
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
     const int port = endpoint_port(head_link(&head, 2));
-    assert_int_equal(try_tcp("127.0.0.2", port), 0); /* what the other test would see of such a link */
+    assert_int_equal(try_tcp("127.0.0.2", port), 0); /* the other test would see such a link */
     head_end(&head, SIGTERM);
     char *said = wire_read(wire_path(wire, "head.err"), &len), want[64];
     snprintf(want, sizeof want, "link tcp:0.0.0.0:%d: other machines may reach it", port);

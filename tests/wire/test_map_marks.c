@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead map, from above: stations stand where they are and look where they look, one beside the scene among them; of
- * a picture in perspective, what --above and --below leave out is left out. */
+/* These tests run scanhead map, from above. Stations stand and look where the configuration says, and one is beside the
+ * scene. A picture in perspective leaves out the same by --above and --below. */
 #include "tests/wire/room.h"
 
-/* Pixels of a centimetre; a station east of the room, which then belongs to the area. */
+/* Pixels of a centimetre. A station is east of the room, and the area then includes it. */
 static const char CONFIG[] = "head: {profile: full-sweep, prr_hz: 5000, lines_hz: 100, pan_deg_s: 240, frames: 1}\n"
                              "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
                              "stations:\n  - {name: first, position_m: [0.5, -1, 1], heading_deg: 90}\n"
@@ -40,7 +40,7 @@ static struct mark mark_of(const char *svg, const char *name)
     return m;
 }
 
-/* Places are written in hundredths of a pixel: a hundredth for each of the two that are compared. */
+/* Places are written in hundredths of a pixel, so the two that are compared may differ by one hundredth each. */
 static void expect(const char *what, double got, double want)
 {
     if (!(fabs(got - want) <= 0.02)) fail_msg("%s: %g, and it should be %g", what, got, want);
@@ -67,7 +67,8 @@ static void test_marks(void **state)
     free(svg);
 }
 
-/* A tripod stands on the room's floor, whichever scanner its station has; the plan says nothing of another scanner's. */
+/* A tripod stands on the room's floor, whichever scanner its station has. The plan does not mention another station's
+ * scanner. */
 static void test_heights(void **state)
 {
     struct wire *wire = *state;
@@ -98,7 +99,7 @@ static void test_heights(void **state)
     }
 }
 
-/* The room ends between z = ROOM_MIN[2] and ROOM_MAX[2]: above or below all of it no point is left. */
+/* The room ends between z = ROOM_MIN[2] and ROOM_MAX[2]. Above or below all of it no point is left. */
 static void test_cuts(void **state)
 {
     struct wire *wire = *state;
@@ -114,7 +115,7 @@ static void test_cuts(void **state)
     }
 }
 
-/* Each wall of the room is an object of its own, with four open edges; without the option none is drawn. */
+/* Each wall of the room is an object of its own, with four open edges. Without the option none is drawn. */
 static void test_open_edges(void **state)
 {
     struct wire *wire = *state;

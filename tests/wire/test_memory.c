@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The head's memory fits what is set: slots have room for usual ticks of the settings at power-up, and grow when a
- * command sets more. What goes out is the same as from a head that was set to more from the start. */
+/* The head's memory follows its settings. Slots have room for usual ticks of the settings at power-up, and grow when a
+ * command sets more. The stream is the same as from a head that was set to more from the start. */
 #include "tests/wire/room.h"
 
-/* A second of scanning at slow rates, at the profile's fastest, at slow ones, and at the fastest again. The start is
- * at slow rates whatever is configured. */
+/* The head scans for a second at slow rates, at the profile's fastest, at slow ones, and at the fastest again. The
+ * start is at slow rates in any configuration. */
 static const char JOURNAL[] = "# scanhead journal 1\n"
                               "300 300000000 1 HEAD:PRR 20000\n"
                               "300 300000000 1 HEAD:LINES 20\n"
@@ -80,15 +80,15 @@ static void test_slots_grow_in_real_time(void **state)
     check_grows(*state, "realtime", "loop: {queue_ms: 5000, late_ms: 10000}\n");
 }
 
-/* A queue of 4 s at 20 kHz and 1 kHz ticks is 4,251 slots of 1.1 KB at most, 5 MB; with libraries (Embree's alone are
- * 40 MB, locked as a whole), scene and casters' memory a head needs 105 MB. Slots for 2.2 MHz would need 190 MB more;
- * 4,251 of them at 15 echoes a pulse far more. */
+/* A queue of 4 s at 20 kHz and 1 kHz ticks is 4,251 slots of 1.1 KB at most, 5 MB. A head needs 105 MB, with libraries
+ * (Embree's alone are 40 MB, locked as a whole), the scene and casters' memory. Slots for 2.2 MHz would need 190 MB
+ * more, and 4,251 of them at 15 echoes a pulse far more. */
 static void test_a_slow_head_is_small(void **state)
 {
     struct wire *wire = *state;
     struct room_config slow = at_rates(20000, 20, "loop: {queue_ms: 4000}\n");
     room_write(wire);
-    /* The map of what the station sees has a limit of its own, cast.sight_mib. */
+    /* The station's visibility map has a limit of its own, cast.sight_mib. */
     const char *const more[] = {"--start", "--duration", "0.5", "--set", "cast.sight=off", NULL};
     struct head head = head_start(wire, room_config_write(wire, &slow), more);
     head_end(&head, 0);

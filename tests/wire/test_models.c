@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Every model of Debian's assimp-testmodels whose ending the scene reader takes: `scanhead init` and `scanhead
- * record` with no further key scan it, or refuse it with a reason that says what to do. Nothing dies, nothing
- * hangs. The counts are printed. One in six is scanned; all with THOROUGH=1. */
+/* Every model of Debian's assimp-testmodels whose ending the scene reader takes. `scanhead init` and `scanhead record`
+ * with no further key scan it, or refuse it with a reason that names the remedy. Nothing crashes or hangs. The counts
+ * are printed. One in six is scanned; all with THOROUGH=1. */
 #define _XOPEN_SOURCE 700
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
@@ -36,7 +36,7 @@ static const char *name_of(const struct wire *wire, int i, const char *ending)
     return wire_path(wire, name);
 }
 
-/* An error is the last line, and begins with the program's name; warnings are before it. */
+/* An error is the last line, and begins with the program's name. Warnings are before it. */
 static void check_reason(const struct wire *wire, int i, int *single, int *empty, int *broken)
 {
     char *text = wire_read(name_of(wire, i, ".init"), NULL);
@@ -56,7 +56,7 @@ static void check_reason(const struct wire *wire, int i, int *single, int *empty
     free(text);
 }
 
-/* Some at a time, the oldest is waited for. start gives 0 where there is nothing to do. */
+/* Runs some at a time, and waits for the oldest. `start` returns 0 where there is nothing to do. */
 static void run_all(struct wire *wire, pid_t (*start)(struct wire *wire, int i))
 {
     pid_t pid[MAX_MODELS + AT_ONCE] = {0};

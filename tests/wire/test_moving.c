@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that moves: what a client hears must be enough to take the polar points back to the scene. */
+/* A head that moves: the stream has all that a client needs to take the polar points back to the scene. */
 #include "tests/wire/room.h"
 
 static const struct room_config RIDE = {.profile = NULL,
@@ -13,7 +13,7 @@ static const struct room_config RIDE = {.profile = NULL,
                                                 " mount_heading_deg: 20, mount_pitch_deg: 5}\n"
                                                 "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
-/* The platform goes round in a circle at constant rate, leaning: a closed form, whatever the interpolation. */
+/* The platform goes round in a circle at constant rate, leaning. That is a closed form, whatever the interpolation. */
 static const double RADIUS_M = 1.7, RATE = 1.9, MIDDLE[3] = {0.6, -1.1, 0.1};
 
 static void write_ride(const struct wire *wire)
@@ -29,7 +29,7 @@ static void write_ride(const struct wire *wire)
     assert_int_equal(fclose(f), 0);
 }
 
-/* The head's origin at t by hand: the platform's y axis points along the circle, x away from its middle. */
+/* Writes the head's origin at t by hand: the platform's y axis points along the circle, x away from its middle. */
 static void head_at(double t, double p[3])
 {
     double c = cos(RATE * t), s = sin(RATE * t);
@@ -46,11 +46,13 @@ static double off_wall(const struct scanhead_point *p, int wall)
 
 struct ride {
     uint64_t points;
-    double worst_m, naive_m, pose_m; /* off the walls; with the pose of the line's first pulse; poses off the circle */
+    /* worst_m and naive_m are distances from the walls, naive_m with the pose of the line's first pulse. pose_m is the
+     * distance of poses from the circle. */
+    double worst_m, naive_m, pose_m;
     char head[65], client[65];
 };
 
-/* What a reader without poses in between would do: one pose per line. */
+/* Places points as a reader without poses in between would: with one pose per line. */
 static void place_naively(const struct scanhead_pose *pose, struct scanhead_point *p)
 {
     const double *q = pose->quat, v[3] = {p->x, p->y, p->z};
@@ -117,9 +119,9 @@ static void ride_once(struct wire *wire, const char *pace, const char *threads, 
 }
 
 /* The encoders read to half of 2^-20 turns in both axes, 3.0e-6 rad each, and the room's farthest corner is 15 m away:
- * 15 * 3.0e-6 * sqrt(2) = 6.4e-5 m; ranges are rounded to 5e-7 m. What interpolation adds is rounding. In the geo
- * layout the same encoders were read by the head. Poses follow the circle to 1e-4 m (the head's own bound), and the
- * cubic between samples of 10 ms to R (rate dt)^3 / 62 = 2e-7 m. */
+ * 15 * 3.0e-6 * sqrt(2) = 6.4e-5 m. Ranges are rounded to 5e-7 m. Interpolation only adds rounding. In the geo layout
+ * the head read the same encoders. Poses follow the circle to 1e-4 m (the head's own bound), and the cubic between
+ * samples of 10 ms to R (rate dt)^3 / 62 = 2e-7 m. */
 static void test_undistorted(void **state)
 {
     struct wire *wire = *state;
@@ -144,8 +146,8 @@ static void test_undistorted(void **state)
     assert_string_not_equal(other.head, ride.head);
 }
 
-/* At the trajectory's end the scan is over: 1.5 s of it, less where it starts later; or the platform holds its place.
- */
+/* At the trajectory's end the scan is over: after 1.5 s, or less where it starts later. Or the platform holds its
+ * place. */
 static void test_end_of_the_path(void **state)
 {
     struct wire *wire = *state;
@@ -185,7 +187,7 @@ static void test_end_of_the_path(void **state)
     }
 }
 
-/* The house from a car, taken off line, against its mesh: the distance code of `scanhead report`. */
+/* The house is scanned from a car, off line, and compared with its mesh by the distance code of `scanhead report`. */
 static void test_house(void **state)
 {
     static const char house[] = "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc";
@@ -244,8 +246,8 @@ static void write_long(struct wire *wire, const char *name, const char *gate, ch
     snprintf(config, 352, "%s", wire_write_text(wire, name, text));
 }
 
-/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides: several stretches, by any number of threads
- * the same. */
+/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides. There are several stretches, and any number of
+ * threads gives the same. */
 static void test_long_path(void **state)
 {
     struct wire *wire = *state;
@@ -265,7 +267,8 @@ static void test_long_path(void **state)
     char *text = wire_read(wire_path(wire, "check.txt"), NULL);
     assert_non_null(strstr(text, "; 3 BVH")); /* of 2 km each */
     free(text);
-    /* Without the gate, which `scanhead report` does not know. The wall is 12 m away, and up to 30 m up: encoders. */
+    /* The gate is left out, as `scanhead report` does not know it. The wall is 12 m away, and up to 30 m up; the bound
+     * is the encoders'. */
     write_long(wire, "still.yaml", "", config);
     record_hash(wire, config, "2", "noise.seed=1", other);
     assert_string_not_equal(other, one);
@@ -290,8 +293,9 @@ static int udp_to(const char *endpoint)
     return fd;
 }
 
-/* A minute of a slow ride, told ahead, so that it does not matter when the scan begins: x = 0.01 m/s t, heading 3 deg/s
- * t. Three wrong lines at the end, one beyond the zenith: when the error is in the queue, all before it has been taken. */
+/* A minute of a slow ride is sent ahead, so that it does not matter when the scan begins: x = 0.01 m/s t, heading 3
+ * deg/s t. Three wrong lines are at the end, one of them beyond the zenith. When the error is in the queue, all lines
+ * before it have been taken. */
 static void tell_ride(struct scanhead *sh, int fd)
 {
     char text[8192];
@@ -357,7 +361,7 @@ static void test_poses_over_udp(void **state)
     assert_int_equal(stats_uint(wire, "late_poses"), 0);
 }
 
-/* Without any pose the head takes itself to be at the station, and says so. */
+/* Without any pose the head assumes that it is at the station, and says so. */
 static void test_no_pose_at_all(void **state)
 {
     static const struct room_config live = {.prr_hz = 50000,

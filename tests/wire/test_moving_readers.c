@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Recordings of a moving head, and in degrees, read by other people's software: the same points in all formats. */
+/* Recordings of a moving head, and in degrees, are read by other people's software. All formats have the same
+ * points. */
 #include "drivers/record/crs_wkt.h"
 #include "tests/common/thorough.h"
 #include "tests/wire/readers.h"
@@ -43,7 +44,7 @@ static void record(const char *lat, const char *lon, const char *crs, const char
     assert_int_equal(status, 0);
 }
 
-/* The stream's points where they were hit: in the CRS, or by the library's poses in the scene. */
+/* Reads the stream's points where they were hit: in the CRS, or by the library's poses in the scene. */
 static void read_truth(void)
 {
     static struct scanhead_point point[4096];
@@ -113,8 +114,8 @@ static void check_ply(void)
 
 static const char *const ALL[] = {"f.shs", "f.las", "f.ptx", "f.e57", "f.ply", NULL};
 
-/* Half of the recording's step of 0.1 mm. CloudCompare: six decimals, and floats of less than 32 m, steps of 2e-6 m,
- * rounded and transformed. */
+/* Half of the recording's step of 0.1 mm. CloudCompare adds six decimals, and floats of less than 32 m with steps of
+ * 2e-6 m, rounded and transformed. */
 static void test_moving_in_the_scene(void **state)
 {
     wire = *state;
@@ -127,7 +128,7 @@ static void test_moving_in_the_scene(void **state)
     check_e57(0.5e-4 + 1e-12);
 }
 
-/* As in test_readers.c: steps of a double there, of E57 in turned axes, CloudCompare's floats. */
+/* The bounds are those of test_readers.c: steps of a double there, of E57 in turned axes, CloudCompare's floats. */
 static void test_moving_in_utm(void **state)
 {
     wire = *state;
@@ -139,7 +140,7 @@ static void test_moving_in_utm(void **state)
     check_e57(0.5e-4 * sqrt(3) + 3e-9);
 }
 
-/* The WKT of a LAS file. */
+/* Returns the WKT of a LAS file. */
 static char *read_wkt(const char *name)
 {
     size_t len, at;
@@ -161,9 +162,9 @@ static void transform(const char *to, const char *from, double p[3])
     free(out);
 }
 
-/* Geodetic LAS: x is longitude, and continuous across the antimeridian; the WKT has PROJ take latitude and longitude to
- * the file's own order. Counts are the stream's, so only a double's steps of 180 degrees (3e-14) are between, and a
- * reader that multiplies and adds makes two of them. */
+/* In geodetic LAS x is longitude, and continuous across the antimeridian. The WKT makes PROJ take latitude and
+ * longitude in the file's own order. Counts are the stream's, so the error is a double's steps at 180 degrees (3e-14),
+ * and a reader that multiplies and adds makes two of them. */
 static void test_degrees(void **state)
 {
     static const char *const lon[] = {"13.4", "179.9999", "-179.9999"};
@@ -202,8 +203,8 @@ static void test_degrees(void **state)
     }
 }
 
-/* Heights above EGM96: PROJ does by our text what it does by EPSG's own codes, with or without its grid of the geoid.
- */
+/* Heights are above EGM96. PROJ does the same by our text as by EPSG's own codes, with or without its grid of the
+ * geoid. */
 static void test_geoid_text(void **state)
 {
     static const struct {

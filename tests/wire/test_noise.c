@@ -4,7 +4,7 @@
 
 enum { MAX_PULSES = 4096, SCANS = 16 };
 
-/* 20 kHz over 6 degrees at 60 deg/s. Both stations are at the same place: where they differ, it is the noise. */
+/* 20 kHz over 6 degrees at 60 deg/s. Both stations are at the same place, so their only difference is the noise. */
 static const struct room_config SHORT = {.prr_hz = 20000,
                                          .lines_hz = 50,
                                          .pan_deg_s = 60,
@@ -14,7 +14,7 @@ static const struct room_config SHORT = {.prr_hz = 20000,
                                          .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 static char second[160], heading[80];
 
-/* Errors of the ranges by pulse, against the room's walls. Returns how many pulses there were. */
+/* Writes the errors of the ranges by pulse, against the room's walls. Returns how many pulses there were. */
 static size_t scan(struct scanhead *sh, double error_m[MAX_PULSES])
 {
     struct scanhead_frame frame = {0};
@@ -55,7 +55,7 @@ static double correlation(const double *x, const double *y, size_t n)
 }
 
 /* The mean of 16 scans has a quarter of one scan's noise. n normal values have an RMS that scatters by 1 / sqrt(2 n) of
- * itself, a correlation of none by 1 / sqrt(n); five times that is exceeded once in 2 million runs, and the seed is
+ * itself, and a correlation of none by 1 / sqrt(n). Five times that is exceeded once in 2 million runs, and the seed is
  * fixed. */
 static void test_averaging(void **state)
 {
@@ -113,7 +113,7 @@ static int are_equal(struct wire *wire, const char *a, const char *b)
     return equal;
 }
 
-/* A station's first scan is the same one by the live head, among all stations off line, and alone. */
+/* A station's first scan is the same by the live head, among all stations off line, and alone. */
 static void test_same_bytes(void **state)
 {
     struct wire *wire = *state;

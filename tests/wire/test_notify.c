@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* $NOTIFY_SOCKET: the service manager hears READY=1 once the links are open, and STOPPING=1 when the end begins. The test
- * is the manager: a socket of its own, by a path and by an abstract name. */
+/* $NOTIFY_SOCKET: the service manager gets READY=1 once the links are open, and STOPPING=1 when the end begins. The
+ * test is the manager, with a socket of its own, by a path and by an abstract name. */
 #include <stddef.h>
 #include <sys/un.h>
 
@@ -13,7 +13,8 @@ static const struct room_config FRAME = {.prr_hz = 20000,
                                          .frames = 1,
                                          .links = "links: [{type: tcp, port: 0}, {type: pty, path: port}]\n"};
 
-/* A datagram socket with this name, which the environment then has; an '@' stands for the NUL of an abstract one. */
+/* Opens a datagram socket with this name, which the environment then has. An '@' stands for the NUL of an abstract
+ * one. */
 static int manager_open(const char *name)
 {
     struct sockaddr_un at = {.sun_family = AF_UNIX};
@@ -28,7 +29,7 @@ static int manager_open(const char *name)
     return fd;
 }
 
-/* The next datagram; it must come before the head ends. */
+/* Returns the next datagram, which must come before the head ends. */
 static const char *manager_next(int fd, pid_t head)
 {
     static char text[4096];
@@ -45,7 +46,7 @@ static const char *manager_next(int fd, pid_t head)
     return text;
 }
 
-/* Nothing more has come. What is asked has ended, so that nothing is on its way. */
+/* Nothing more has come. The head has ended, so that nothing is on its way. */
 static void manager_close(int fd)
 {
     char byte;
@@ -55,7 +56,7 @@ static void manager_close(int fd)
     unsetenv("NOTIFY_SOCKET");
 }
 
-/* --ready-fd is not given here: the manager alone says when the head can be asked. */
+/* --ready-fd is not given here: only the manager knows when the head can be asked. */
 static void hears_both(struct wire *wire, const char *name)
 {
     char config[352], endpoint[128], pty[352];
@@ -84,7 +85,7 @@ static void test_socket_with_a_path(void **state)
     hears_both(*state, wire_path(*state, "notify"));
 }
 
-/* And the longest that there is: 107 bytes after the '@'. */
+/* This also tries the longest name: 107 bytes after the '@'. */
 static void test_abstract_socket(void **state)
 {
     char name[sizeof((struct sockaddr_un *)0)->sun_path];
@@ -110,7 +111,7 @@ static void test_end_by_itself(void **state)
     manager_close(fd);
 }
 
-/* The exit status, and that the only line says `says`. */
+/* Checks the exit status, and that the only line has `says`. */
 static void fails(struct wire *wire, int status, const char *says)
 {
     char config[352];
@@ -122,7 +123,7 @@ static void fails(struct wire *wire, int status, const char *says)
     free(text);
 }
 
-/* One link can't be opened: the head is never ready. */
+/* One link can't be opened, so the head is never ready. */
 static void test_not_ready_without_its_links(void **state)
 {
     struct wire *wire = *state;
@@ -135,7 +136,8 @@ static void test_not_ready_without_its_links(void **state)
     manager_close(fd);
 }
 
-/* A manager that can't hear would end the head after its time: better at once, with the reason. */
+/* A manager that does not get the messages would end the head after its time. So the head ends at once, with the
+ * reason. */
 static void test_bad_sockets(void **state)
 {
     static const struct {

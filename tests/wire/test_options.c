@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Options and help of each command. What is wrong has exit status 2 and one line of error, which says what was
+/* Options and help of each command. A wrong one gives exit status 2 and one line of error, which suggests what was
  * meant. */
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
@@ -130,7 +130,7 @@ static const struct {
     {{"list", "all"}, {"no arguments"}},
 };
 
-/* The word with CONFIG and DIR replaced. */
+/* Returns the word with CONFIG and DIR replaced. */
 static const char *fill_in(const struct wire *wire, const char *word, char *buf, size_t len)
 {
     const char *dir = strstr(word, "DIR");
@@ -172,8 +172,8 @@ static void test_options(void **state)
 
 /* ---- help */
 
-/* -h and --help of a command, on standard output: what it does, the usage, lines of at most 110 columns.
- * Those of check end where the keys begin. */
+/* -h and --help of a command go to standard output: its purpose, the usage, and lines of at most 110 columns. The help
+ * of check is only looked at up to its configuration keys. */
 static void expect_help(struct wire *wire, const char *name, const char *option)
 {
     char want[128];

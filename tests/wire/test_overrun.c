@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that cannot keep up, and one that stood still: what is lost is announced, and the accounts balance
- * to the pulse. Cast pulses by exact arithmetic = pulses received + pulses lost, whatever happened. */
+/* A head that cannot keep up, and one that stood still. Losses are announced, and the accounts balance to the pulse.
+ * Cast pulses by exact arithmetic = pulses received + pulses lost, whatever happened. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
 
-/* Thin triangles across a room of 40 m: their boxes all overlap, which no bounding volume hierarchy can sort. What the
- * station sees of them (cast.sight) would make them cheap, so it is off. */
+/* Thin triangles across a room of 40 m: their boxes all overlap, which no bounding volume hierarchy can sort. The
+ * station's visibility map (cast.sight) would make them cheap, so it is off. */
 enum { NEEDLES = 2000 };
 
 static double between(uint64_t *x, double lo, double hi)
@@ -30,7 +30,7 @@ static void needles_write(const struct wire *wire)
     assert_int_equal(fclose(f), 0);
 }
 
-/* What a client can know of a scan. */
+/* A client's account of a scan. */
 struct account {
     struct oracle oracle;
     uint64_t received, next, gaps, missing;   /* pulses; the last two from jumps of the pulse number */
@@ -76,8 +76,8 @@ static void take_points(struct account *a, struct scanhead *sh, const struct sca
         a->echoes += point[i].echo_count != 0;
 }
 
-/* A line that came whole says how many echoes it has; else, it says 0 rather than something wrong. (So may
- * the first line, when a tick before the scan was lost.) */
+/* A line that came whole reports how many echoes it has; else it reports 0, which is never wrong. The first line may do
+ * that, too, when a tick before the scan was lost. */
 static void take_line_end(struct account *a, const struct scanhead_frame *frame)
 {
     struct line_end end;
@@ -127,7 +127,7 @@ static const struct room_config CONFIG = {.prr_hz = 1999999.9,
                                           .links = LINK_YAML_TCP,
                                           .more = "loop: {queue_ms: 10000}\ncast: {sight: off}\n"};
 
-/* Follows one scan to its end and on until the head is idle and has told of all it lost. */
+/* Follows one scan to its end, and on until the head is idle and has reported all its losses. */
 static void follow(struct account *a, struct scanhead *sh)
 {
     struct scanhead_frame frame;
@@ -146,8 +146,8 @@ static void follow(struct account *a, struct scanhead *sh)
     assert_int_equal(stats.pulses_lost, a->told);
 }
 
-/* The statistics: fired = blind + cast, cast = delivered + lost, delivered = to a reader + lost with
- * frames, for each of so many readers. */
+/* The statistics: fired = blind + cast, cast = delivered + lost. For each of so many readers, delivered = received +
+ * lost with frames. */
 static void check_sums(const struct wire *wire, const struct oracle *oracle, uint64_t readers)
 {
     uint64_t fired = oracle_end(oracle), cast = oracle_count_cast(oracle, 0, fired);
@@ -174,7 +174,7 @@ static void check_balance(const struct account *a, const struct wire *wire)
     check_sums(wire, &a->oracle, a->readers);
 }
 
-/* A recorder counts what the head says, and what this reader counts. */
+/* A recorder counts the head's figures and this reader's. */
 static void check_recorder(const struct account *a, const struct wire *wire)
 {
     assert_int_equal(stats_uint(wire, "fired_pulses"), oracle_end(&a->oracle));
@@ -186,9 +186,9 @@ static void check_recorder(const struct account *a, const struct wire *wire)
 
 static void check_overload(struct account *a, struct scanhead *sh)
 {
-    assert_true(a->missing > 0); /* a caster computes about a seventh of them in time */
+    assert_true(a->missing > 0); /* a caster computes only about a seventh of them in time */
     assert_int_equal(a->told_first, a->first_missing);
-    /* What can be computed goes on coming; it does not end with what was computed ahead at the start. */
+    /* Pulses that can be computed go on coming. The stream does not end with those computed ahead at the start. */
     assert_true(a->in_second_half > 0);                       /* how much is the machine's affair */
     assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 103); /* once per episode: the next one is another one */
 }
@@ -237,7 +237,7 @@ static void test_overload_two_casters(void **state)
     check_balance(&a, wire);
 }
 
-/* The whole process stands still for 400 ms, twice, in mid-scan, which may or may not cost pulses. */
+/* The whole process stands still for 400 ms, twice, in mid-scan. That may or may not cost pulses. */
 static void test_stall(void **state)
 {
     struct wire *wire = *state;
@@ -267,7 +267,8 @@ static void test_stall(void **state)
     check_balance(&a, wire);
 }
 
-/* The rows of the histogram, summed up from a lateness on. A row counts those of the octave below its number. */
+/* Returns the rows of the histogram, summed up from a lateness on. A row counts those of the octave below its
+ * number. */
 static uint64_t late_ticks(const struct wire *wire, uint64_t from_ns)
 {
     static const char key[] = "\"late_below_ns\": {";
@@ -283,8 +284,7 @@ static uint64_t late_ticks(const struct wire *wire, uint64_t from_ns)
     return n;
 }
 
-/* A stall alone costs nothing with the lateness that a head has by default: what was due is sent when it goes
- * on. */
+/* A stall alone costs nothing with a head's default lateness: pulses that were due are sent when it goes on. */
 static void test_stall_with_patience(void **state)
 {
     struct wire *wire = *state;
@@ -318,7 +318,7 @@ static void test_stall_with_patience(void **state)
                 stats_uint(wire, "late_p99_us") <= stats_uint(wire, "late_p999_us"));
 }
 
-/* A run that ends with its scan still says that the scan ended, however late it is. */
+/* A run that ends with its scan still announces the scan's end, however late it is. */
 static void test_end_of_an_overloaded_run(void **state)
 {
     struct wire *wire = *state;

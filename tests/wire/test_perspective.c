@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* map --perspective: a scan, its recording, and the recording brought back from another CRS give the same picture. */
+/* map --perspective gives the same picture of a scan, of its recording, and of the recording brought back from another
+ * CRS. */
 #include "tests/wire/room.h"
 
 #include <png.h>
@@ -26,7 +27,7 @@ static struct picture load(struct wire *wire, const char *name)
     return p;
 }
 
-/* Pixels that differ by more than `most` in a channel. */
+/* Counts the pixels that differ by more than `most` in a channel. */
 static uint32_t differences(const struct picture *a, const struct picture *b, int most)
 {
     uint32_t n = 0;
@@ -108,7 +109,7 @@ static void test_same_picture(void **state)
         free(cloud.rgb);
     }
     assert_true(differences(&scans[0], &scans[1], 30) > 5000 && differences(&scans[1], &scans[2], 30) > 5000);
-    /* Without a configuration nobody knows the station's mark and its name. */
+    /* Without a configuration the picture has neither the station's mark nor its name. */
     struct picture alone = view(wire, "local.ply", NULL, "height");
     const uint32_t mark = differences(&scans[0], &alone, 0);
     assert_true(mark > 0 && mark < 3000);
@@ -117,7 +118,7 @@ static void test_same_picture(void **state)
         free(scans[i].rgb);
 }
 
-/* From UTM, turned and scaled, the points come back to the scene: to a micrometre, which moves hardly a point into
+/* From UTM, turned and scaled, the points come back to the scene to a micrometre. That moves hardly a point into
  * another pixel. */
 static void test_other_crs(void **state)
 {

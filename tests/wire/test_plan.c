@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead plan, through the program: rows and keys, the method by tolerance and extent, stations that differ, and what
- * can't be had. */
+/* scanhead plan, through the program: rows and keys, the method by tolerance and extent, stations that differ, and
+ * impossible demands. */
 #include "tests/wire/room.h"
 
 static char *plan(struct wire *wire, const char *const *args, int status)
@@ -11,8 +11,8 @@ static char *plan(struct wire *wire, const char *const *args, int status)
     return wire_read(wire_path(wire, status == 0 ? "out" : "err"), NULL);
 }
 
-/* Ground of 600 by 600 m, a station in its middle and one in its corner: points up to 430 m and 860 m away, which is
- * within the head's 1000 m. */
+/* The ground has 600 by 600 m, with a station in its middle and one in its corner. Points are up to 430 m and 860 m
+ * away, within the head's 1000 m. */
 static const char *set_up_with(struct wire *wire, const char *profile)
 {
     char text[1024];
@@ -29,7 +29,7 @@ static const char *set_up_with(struct wire *wire, const char *profile)
              "links: [{type: \"null\"}]\noutput: {crs: utm, layout: geo}\n",
              profile);
     const char *config = wire_write_text(wire, "config.yaml", text);
-    snprintf(path, sizeof path, "%s", config); /* those of wire_path are used again */
+    snprintf(path, sizeof path, "%s", config); /* wire_path uses its room again */
     return path;
 }
 
@@ -38,8 +38,8 @@ static const char *set_up(struct wire *wire)
     return set_up_with(wire, "full-sweep");
 }
 
-/* The same head without a footprint. `plan` has no beam to try then, which is four fifths of its time here; georef
- * and sight are chosen as before. */
+/* This is the same head without a footprint. `plan` has no beam to try then, which is four fifths of its time here;
+ * georef and sight are chosen as before. */
 static const char *set_up_without_footprint(struct wire *wire)
 {
     char *text = wire_read("config/heads/full-sweep.yaml", NULL);
@@ -56,7 +56,7 @@ static const char *set_up_without_footprint(struct wire *wire)
     return set_up_with(wire, "narrow.yaml");
 }
 
-/* The nth object with that stage, up to its end. */
+/* Returns the nth object with that stage, up to its end. */
 static char *row(const char *json, const char *stage, int n)
 {
     char key[64];
@@ -85,7 +85,7 @@ static void expect_row(const char *json, const char *stage, int n, const char *m
     free(text);
 }
 
-/* What order n leaves out is a fraction of range^(n+1) / R^n with R = 6400 km: of order 1 at 430 m some of 0.03 m, of
+/* The error of order n is a fraction of range^(n+1) / R^n with R = 6400 km: of order 1 at 430 m some of 0.03 m, of
  * order 2 some of 2 um, at 860 m of 16 um, of order 3 some of 2 nm. */
 static void test_method_by_tolerance(void **state)
 {
@@ -153,12 +153,12 @@ static void test_what_cannot_be(void **state)
     free(text);
 }
 
-/* Methods by stage, and a word of the reason; forced ones as such. */
+/* The expected methods by stage, and a word of the reason. Forced ones are marked. */
 struct want {
     const char *stage, *method, *left_out, *why_left_out;
 };
 
-/* The room with glass as its file has it: planned once for all who look at it. */
+/* Plans the room with glass as its file has it, once for all tests of it. */
 static const char *plan_of_glass(struct wire *wire)
 {
     static char *json;
@@ -188,8 +188,8 @@ static void expect_plan(struct wire *wire, const char *config, const struct want
     free(json);
 }
 
-/* Few edges and a tolerance of a centimetre: single rays. Leaves: they don't do. Glass: followed as far as it counts.
- */
+/* Few edges and a tolerance of a centimetre give single rays. Leaves need more. Glass is followed as far as it
+ * matters. */
 static void test_three_plans(void **state)
 {
     struct wire *wire = *state;
@@ -219,7 +219,7 @@ static void test_three_plans(void **state)
     expect_plan(wire, "config/demo.yaml", demo, sizeof demo / sizeof demo[0]);
 }
 
-/* The row of a head that may have a map: forced, or not possible. */
+/* Checks the row of a head that may have a map: forced, or not possible. */
 static void expect_sight(struct wire *wire, const char *config, const char *const *sets, const char *const *sight)
 {
     const char *const args[] = {"plan", config, "--json", "--set", sets[0], "--set", sets[1], NULL};
@@ -251,7 +251,7 @@ static void test_sight(void **state)
     }
 }
 
-/* The program of the pulse rate that is set: what it brings, and the other rates. */
+/* The plan has the program of the set pulse rate, with its properties, and the other rates. */
 static void test_program(void **state)
 {
     struct wire *wire = *state;
@@ -266,7 +266,7 @@ static void test_program(void **state)
     free(json);
 }
 
-/* What a run applies, by its own account, is what is planned; a tighter tolerance changes both. */
+/* The methods that a run reports are the planned ones. A tighter tolerance changes both. */
 static void test_run_follows_plan(void **state)
 {
     struct wire *wire = *state;
@@ -278,7 +278,7 @@ static void test_run_follows_plan(void **state)
                  {"plan.tolerance_m=1e-6", "# plan: sight none; beam single; optics depth 3; georef rotation\n"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char journal[256];
-        const char *sight = i == 0 ? "beam.rings=4" : "cast.sight=off"; /* whether it pays depends on the machine */
+        const char *sight = i == 0 ? "beam.rings=4" : "cast.sight=off"; /* a sight may pay or not, by the machine */
         snprintf(journal, sizeof journal, "%s", wire_path(wire, "journal"));
         const char *const args[] = {"run",   "config/glass.yaml", "--start",   "--duration", "0.05",  "--pace",
                                     "fast",  "--quiet",           "--journal", journal,      "--set", cases[i].set,
@@ -290,7 +290,7 @@ static void test_run_follows_plan(void **state)
     }
 }
 
-/* The example with one in eight of its leaves, and few sub-rays: planned in a fraction of the time. */
+/* The example has one in eight of its leaves, and few sub-rays, so planning takes a fraction of the time. */
 static const char *few_leaves(struct wire *wire)
 {
     char *whole = wire_read("config/foliage.yaml", NULL), *text = calloc(1, 1 << 16), *rest = whole, here[1024], *line;
@@ -310,7 +310,7 @@ static const char *few_leaves(struct wire *wire)
     return path;
 }
 
-/* Also beams that are tried on random pulses: sampled alike each time. */
+/* Beams are tried on random pulses, but the same ones each time. */
 static void test_same_plan_again(void **state)
 {
     struct wire *wire = *state;
@@ -325,7 +325,7 @@ static void test_same_plan_again(void **state)
     free(json[1]);
 }
 
-/* Forced methods have bounds, too, and say whether they hold. */
+/* Forced methods have bounds, too, and the plan says whether they hold. */
 static void test_forced(void **state)
 {
     struct wire *wire = *state;
@@ -348,8 +348,9 @@ static void test_forced(void **state)
     }
 }
 
-/* The room with glass gets single rays by choice. Forced, they are tried on the same pulses and are off by as much:
- * room for footprints, which are cast to compare with, changes nothing else. */
+/* The plan chooses single rays for the room with glass. Forced, they are tried on the same pulses and have the same
+ * error. Memory for footprints, which are cast for comparison, changes
+ * nothing else. */
 static void test_forced_as_chosen(void **state)
 {
     static const char *const keys[] = {"\"error_m\": ", "\"echo_share\": "};
@@ -369,7 +370,7 @@ static void test_forced_as_chosen(void **state)
     assert_true(figure[0][0] == figure[1][0] && figure[0][1] == figure[1][1]);
 }
 
-/* The share that the last row's reason ends with, in percent, and its cost. */
+/* Returns the share at the end of the last row's reason, in percent, and its cost. */
 static double total_of(struct wire *wire, const char *config, const char *set, double *cost_ns)
 {
     const char *const args[] = {"plan", config, "--json", "--set", set, "--set", "beam.rings=4", NULL};
@@ -386,7 +387,7 @@ static double total_of(struct wire *wire, const char *config, const char *set, d
     return share;
 }
 
-/* 61 rays cost at least 5 times one, on whatever machine; the head fires half of its sweep at the ground. */
+/* 61 rays cost at least 5 times one, on any machine. The head fires half of its sweep at the ground. */
 static void test_total(void **state)
 {
     struct wire *wire = *state;

@@ -1,17 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* A whole scan through the real program, over a pty and over TCP, against what geometry and exact arithmetic
- * say. */
+/* A whole scan through the real program, over a pty and over TCP, compared with geometry and exact arithmetic. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
 
 enum { MAX_POINTS = 4096 };
 
-/* The encoders tell the angles to half a count, so the range of a point is only known within what half a
- * count either way makes of it. Where one wall is met the range is monotonic over that square of 6e-6 rad
- * (its curvature, R * 1e-11, is below SLACK_M), so the corners bound it; where walls meet, the nearest wall
- * is the least of several such ranges. To that come half a range count and the roundings of the doubles,
- * SLACK_M. */
+/* The encoders give the angles to half a count. So the range of a point is only known within the change that half a
+ * count either way makes. Where one wall is met the range is monotonic over that square of 6e-6 rad (its curvature, R *
+ * 1e-11, is below SLACK_M), so the corners bound it. Where walls meet, the nearest wall is the least of several such
+ * ranges. Half a range count and the roundings of the doubles, SLACK_M, are added. */
 static const double SLACK_M = 1e-9;
 
 static void bounds(const struct scanhead_point *p, double half_mirror_rad, double half_pan_rad, double *lo, double *hi,
@@ -59,8 +57,8 @@ static void check_room_point(struct check *c, const struct scanhead_point *p, ui
         fail_msg("pulse %" PRIu64 ": label %u is %s", k, p->label, WALLS[c->wall_of_label[p->label]]);
 }
 
-/* The ground has an echo where the ray goes down and its range is below 800 m. Within half a mirror count of
- * that angle both are right; the range there is as steep as 800 m / tan, so it is not compared. */
+/* The ground has an echo where the ray goes down and its range is below 800 m. Within half a mirror count of that angle
+ * both results are right. The range there is as steep as 800 m / tan, so it is not compared. */
 static void check_ground_point(struct check *c, const struct scanhead_point *p, uint64_t k)
 {
     double below = STATION[2] + 1.7;
@@ -164,7 +162,7 @@ static void check_descriptor(struct check *c, const struct scanhead_frame *frame
     assert_true(c->scale_m > 0.0 && c->scale_m <= 1e-6); /* 800 m in 31 bits leave a micrometre */
 }
 
-/* The names come as frames of their own; a label is what they say it is. */
+/* The names come as frames of their own, and give the meaning of a label. */
 static void check_surfaces(struct check *c, struct scanhead *sh)
 {
     const char *object, *material;
@@ -189,7 +187,7 @@ static void take(struct check *c, struct scanhead *sh, struct scanhead_frame *fr
     if (is_event(frame, SCANHEAD_EV_SCAN_START)) c->scan_t0_ns = (int64_t)frame->event_value[1];
 }
 
-/* One scan by command, every frame of it checked; then the statistics of both sides. */
+/* One scan by command, with every frame checked; then the statistics of both sides. */
 static void scan(struct wire *wire, const struct room_config *config, struct check *c, const char *link,
                  const char *pace)
 {
@@ -221,8 +219,8 @@ static void scan(struct wire *wire, const struct room_config *config, struct che
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* Rates that divide nothing: pulse period and pulses per line are fractions, lines begin at any phase. The
- * window cuts the line within the profile's 100 of 240 deg. */
+/* Rates that divide nothing: pulse period and pulses per line are fractions, and lines begin at any phase. The window
+ * cuts the line within the profile's 100 of 240 deg. */
 static const struct room_config ODD = {.profile = "any-rate",
                                        .prr_hz = 299999.7,
                                        .lines_hz = 101.3,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The virtual serial port under clients that know nothing of it: opened with whatever settings it has, closed
- * in the middle of a frame. The next one never sees what was meant for the one before. */
+/* The virtual serial port with clients that know nothing of it. They open it with any settings, and close it in the
+ * middle of a frame. The next client never gets frames that were meant for the one before. */
 #include "tests/wire/room.h"
 
 #include <termios.h>
@@ -22,9 +22,8 @@ static int port_open(const struct wire *wire)
     return fd;
 }
 
-/* Closes the port and waits until the head tells another client that this one is gone. Somebody who opens the
- * port in the moment before that gets what the kernel still holds, which no program on the other side can
- * prevent. */
+/* Closes the port and waits until the head tells another client that this one is gone. A client that opens the port in
+ * the moment before that gets the kernel's old bytes. No program on the other side can prevent that. */
 static void close_seen(int fd, struct scanhead *watch)
 {
     struct scanhead_frame frame;
@@ -36,7 +35,7 @@ static void close_seen(int fd, struct scanhead *watch)
     }
 }
 
-/* What a client got at its place in the stream. */
+/* The frames that a client got at its place in the stream. */
 struct look {
     struct native_parser parser;
     uint64_t texts;
@@ -45,7 +44,7 @@ struct look {
     int n;
 };
 
-/* Reads as cat would, until `frames` frames have come; fails when they are not among so many bytes. */
+/* Reads as cat would, until `frames` frames have come. It fails when they are not among so many bytes. */
 static void look_at(struct look *look, int fd, int frames)
 {
     native_parser_init(&look->parser);
@@ -113,8 +112,7 @@ static void test_clients_with_default_settings(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Someone leaves with a full pipe behind and a reply he never read; someone else leaves a terminal in cooked
- * mode. */
+/* A client leaves with a full pipe behind and a reply that it never read. Another leaves a terminal in cooked mode. */
 static void test_nothing_stale(void **state)
 {
     struct wire *wire = *state;
@@ -162,8 +160,8 @@ static void test_nothing_stale(void **state)
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* Taken over at once, the stream may begin with what the one before left; then it is whole frames and in
- * order all the same. */
+/* Taken over at once, the stream may begin with frames for the client before. Even then frames are whole and in
+ * order. */
 static void test_taken_over_at_once(void **state)
 {
     struct wire *wire = *state;
@@ -184,8 +182,9 @@ static void test_taken_over_at_once(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* The kernel throws away what waits in a terminal when its master is closed. The head waits for a reader who is slow to take the
- * end: here one who reads nothing for a third of a second, when the whole scan is with the kernel. */
+/* The kernel throws away the bytes that wait in a terminal when its master is closed. So the head waits for a reader
+ * who is slow to take the end. Here one reads nothing for a third of a second, when the whole scan is with the
+ * kernel. */
 static void test_a_slow_reader_has_the_end(void **state)
 {
     struct wire *wire = *state;
@@ -226,8 +225,7 @@ static void test_a_slow_reader_has_the_end(void **state)
     assert_int_equal(parser.stats.seq_lost, 0);
 }
 
-/* Opened and closed as fast as it goes, with a command or without: the head is there for the one who stays.
- */
+/* The port is opened and closed as fast as possible, with a command or without. The client that stays is served. */
 static void test_fast_open_and_close(void **state)
 {
     struct wire *wire = *state;

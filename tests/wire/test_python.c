@@ -1,98 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The client in Python beside libscanhead: every number of every point is the same, with numpy and without. */
-#include "tests/common/thorough.h"
-#include "tests/wire/room.h"
-
-#include <nettle/sha2.h>
+#include "tests/wire/python_rig.h"
 
 #include "drivers/protocol/native_encode.h"
-
-static const char python[] = "/usr/bin/python3"; /* Debian's, for which its numpy is made */
-
-static const char *const flavours[] = {"numpy", "plain"};
-
-/* Runs python_client.py; its output, or NULL where numpy is wanted and missing. Good until the next call. */
-static const char *ask_python(struct wire *wire, const char *flavour, const char *what, const char *a, const char *b)
-{
-    static char *text;
-    const char *const args[] = {"tests/wire/python_client.py", "drivers/host/python", flavour, what, a, b, NULL};
-    const char *const probe[] = {"-c", "import numpy", NULL};
-    static int has_numpy = -1;
-    free(text);
-    text = NULL;
-    if (has_numpy < 0)
-        has_numpy = wire_wait(wire, wire_spawn_program(wire, python, probe, "probe.out", "probe.err", -1)) == 0;
-    if (strcmp(flavour, "numpy") == 0 && !has_numpy) return NULL;
-    int status = wire_wait(wire, wire_spawn_program(wire, python, args, "python.out", "python.err", -1));
-    if (status != 0) wire_show(wire, "python.err");
-    assert_int_equal(status, 0);
-    return text = wire_read(wire_path(wire, "python.out"), NULL);
-}
-
-static int setup(void **state)
-{
-    if (access(python, X_OK) == 0) return wire_setup(state);
-    print_message("# %s is missing\n", python);
-    return wire_setup(state);
-}
-
-static void need_python(void)
-{
-    if (access(python, X_OK) == 0) return;
-    print_message("# %s is missing (Debian: python3-numpy)\n", python);
-    skip();
-}
-
-/* ---- recordings */
-
-static const struct room_config SMALL = {
-    .prr_hz = 20000, .lines_hz = 50, .pan_deg_s = 100, .pan_stop_deg = 5, .frames = 1, .links = LINK_YAML_TCP};
-
-static const struct room_config RIDE = {.prr_hz = 20000,
-                                        .lines_hz = 50,
-                                        .pan_deg_s = 50,
-                                        .pan_stop_deg = 4,
-                                        .frames = 1,
-                                        .links = LINK_YAML_TCP,
-                                        .more = "platform: {kind: trajectory, file: ride.csv}\n"};
 
 #define AT(lat, lon, height)                                                                 \
     " scene.anchor.source=explicit scene.anchor.lat_deg=" #lat " scene.anchor.lon_deg=" #lon \
     " scene.anchor.height_m=" #height " scene.anchor.north_deg=17"
-
-/* One station off line, with these keys set; the file's path. */
-static const char *record(struct wire *wire, const struct room_config *c, const char *name, const char *keys)
-{
-    char config[352], path[352], stats[352], set[512], *rest = set;
-    snprintf(config, sizeof config, "%s", room_config_write(wire, c));
-    snprintf(path, sizeof path, "%s", wire_path(wire, name));
-    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
-    snprintf(set, sizeof set, "%s", keys);
-    const char *args[32] = {"record", config, "-o", path, "--stats", stats, "--quiet"};
-    for (int n = 7; (args[n + 1] = strtok_r(rest, " ", &rest)) != NULL; n += 2)
-        args[n] = "--set";
-    int status = wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1));
-    if (status != 0) wire_show(wire, "head.err");
-    assert_int_equal(status, 0);
-    return wire_path(wire, name);
-}
-
-/* A recording into another format. */
-static void convert(struct wire *wire, const char *from, const char *to)
-{
-    char source[352], file[352];
-    snprintf(source, sizeof source, "%s", wire_path(wire, from));
-    snprintf(file, sizeof file, "%s", wire_path(wire, to));
-    const char *const args[] = {"record", source, "-o", file, "--quiet", NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
-}
-
-static void write_ride(const struct wire *wire)
-{
-    wire_write_text(wire, "ride.csv",
-                    "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,0.1,-0.5,0,0,0,10\n0.05,0.3,-0.4,0,4,0,40\n"
-                    "0.1,0.4,-0.2,0.1,4,-5,80\n0.15,0.2,0,0.1,0,-3,60\n0.2,0,0.2,0,0,0,10\n");
-}
 
 /* ---- every number of every point */
 
@@ -127,8 +41,8 @@ static uint32_t take_block(struct dump *dump, char kind)
     return n;
 }
 
-/* Bit for bit: both are IEEE 754 doubles, with the same operations in the same order, sine and cosine from the same
- * C library. NaN has no sign worth comparing. */
+/* Values are equal bit for bit: both are IEEE 754 doubles, with the same operations in the same order, sine and cosine
+ * from the same C library. The sign of NaN does not count. */
 static void same(const char *what, double ours, double theirs)
 {
     if (memcmp(&ours, &theirs, sizeof ours) == 0 || (isnan(ours) && isnan(theirs))) return;
@@ -255,9 +169,10 @@ static void test_same_numbers(void **state)
     }
 }
 
-/* ---- both layouts of one scan, in the CRS and in the scene. Both are made of the same encoder counts. What differs:
- * the range is a count of range_scale_m in one (0.5 um, half of it), coordinates are counts of 1 um in the other
- * (sqrt(3) / 2 um), georeferencing is good to output.tolerance_m (set to 1 um), the axes are good to 1e-10 rad. */
+/* ---- both layouts of one scan, in the CRS and in the scene. Both are made of the same encoder counts. They differ
+ * in four ways: the range is a count of range_scale_m in one (0.5 um, half of it); coordinates are counts of 1 um in
+ * the other (sqrt(3) / 2 um); georeferencing is good to output.tolerance_m (set to 1 um); the axes are good to 1e-10
+ * rad. */
 static void test_both_layouts(void **state)
 {
     struct wire *wire = *state;
@@ -315,155 +230,14 @@ static void test_live(void **state)
     }
 }
 
-/* ---- streams that were damaged, and hostile ones */
-
-enum { ROUNDS = 6 };
-
-static uint32_t dice;
-static uint32_t roll(uint32_t n)
+/* Converts a recording into another format. */
+static void convert(struct wire *wire, const char *from, const char *to)
 {
-    dice = dice * 1664525u + 1013904223u;
-    return (dice >> 8) % n;
-}
-
-/* Bytes lost, changed and put in, headers that promise 64 KiB, line ends. */
-static size_t damage(uint8_t *to, const uint8_t *from, size_t len)
-{
-    size_t n = 0;
-    for (size_t i = 0; i < len; i++) {
-        uint32_t fate = roll(3000);
-        if (fate < 2) i += roll(700);
-        if (fate == 2) to[n++] = 0xd5;
-        if (fate == 3) n += (size_t)sprintf((char *)to + n, "OK\r\n");
-        if (i < len) to[n++] = fate == 4 ? (uint8_t)roll(256) : from[i];
-    }
-    return n;
-}
-
-/* The stream some times over, as one whose numbers run over 2^32. */
-static size_t prolong(uint8_t *to, const char *from, size_t len)
-{
-    uint32_t seq = 0u - 100u;
-    for (int i = 0; i < ROUNDS; i++)
-        memcpy(to + (size_t)i * len, from, len);
-    for (size_t at = 0; at < ROUNDS * len; at += native_frame_len(to + at))
-        native_seal(to + at, seq++);
-    return ROUNDS * len;
-}
-
-/* Some frames come twice, some after others. */
-static size_t shuffle(uint8_t *to, const uint8_t *from, size_t len)
-{
-    struct late {
-        size_t at, len;
-        uint32_t left;
-    } late[64] = {{0, 0, 0}};
-    size_t n = 0;
-    for (size_t at = 0, frame; at < len; at += frame) {
-        frame = native_frame_len(from + at);
-        const uint32_t fate = roll(20), slot = roll(64);
-        for (int i = 0; i < 64; i++) {
-            if (late[i].len == 0 || late[i].left-- > 0) continue;
-            memcpy(to + n, from + late[i].at, late[i].len);
-            n += late[i].len;
-            late[i].len = 0;
-        }
-        if (fate < 2 && late[slot].len == 0) late[slot] = (struct late){at, frame, roll(30)};
-        if (fate == 0 && late[slot].at == at && late[slot].len > 0) continue; /* it comes later */
-        memcpy(to + n, from + at, frame);
-        n += frame;
-    }
-    return n;
-}
-
-struct said {
-    struct sha256_ctx sha256;
-    uint32_t n;
-};
-
-static void on_notice(void *ctx, const struct scanhead_notice *notice)
-{
-    struct said *said = ctx;
-    char line[128];
-    const int n = snprintf(line, sizeof line, "%s %llu %u %llu %lld\n", scanhead_notice_name((int)notice->kind),
-                           (unsigned long long)notice->at_byte, notice->seq, (unsigned long long)notice->n,
-                           notice->t_ns == SCANHEAD_NO_TIME ? 0LL : (long long)notice->t_ns);
-    sha256_update(&said->sha256, (size_t)n, (const uint8_t *)line);
-    said->n++;
-}
-
-static void put_counts(char *text, size_t room, const struct scanhead_stats *s, struct said *said)
-{
-    uint8_t digest[SHA256_DIGEST_SIZE];
-    sha256_digest(&said->sha256, sizeof digest, digest);
-    int n =
-        snprintf(text, room, "%llu %llu %llu %llu %llu %llu %llu %llu %llu %llu ", (unsigned long long)s->bytes,
-                 (unsigned long long)s->frames, (unsigned long long)s->bad_payload, (unsigned long long)s->bad_bytes,
-                 (unsigned long long)s->seq_gaps, (unsigned long long)s->seq_lost, (unsigned long long)s->repeated,
-                 (unsigned long long)s->late, (unsigned long long)s->restarts, (unsigned long long)s->cuts);
-    for (size_t i = 0; i < sizeof digest; i++)
-        n += snprintf(text + n, room - (size_t)n, "%02x", digest[i]);
-    snprintf(text + n, room - (size_t)n, "\n");
-}
-
-static void test_damaged(void **state)
-{
-    struct wire *wire = *state;
-    need_python();
-    room_write(wire);
-    size_t len;
-    char *bytes = wire_read(record(wire, &SMALL, "a.shs", ""), &len);
-    uint8_t *longer = malloc(ROUNDS * len), *shuffled = malloc(2 * ROUNDS * len), *out = malloc(4 * ROUNDS * len + 16);
-    const size_t longer_len = prolong(longer, bytes, len);
-    for (dice = 1; dice < (uint32_t)thorough(3, 2); dice++) {
-        const uint32_t seed = dice;
-        const size_t n = shuffle(shuffled, longer, longer_len);
-        const char *path = wire_write(wire, "b.shs", out, damage(out, shuffled, n));
-        struct said said = {.n = 0};
-        sha256_init(&said.sha256);
-        struct scanhead_stats stats;
-        struct scanhead_frame frame;
-        struct scanhead *sh = client_open(path);
-        scanhead_on_notice(sh, on_notice, &said);
-        while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK)
-            continue;
-        scanhead_get_stats(sh, &stats);
-        char want[384], file[352];
-        put_counts(want, sizeof want, &stats, &said);
-        scanhead_close(sh);
-        snprintf(file, sizeof file, "%s", wire_path(wire, "b.shs"));
-        assert_string_equal(ask_python(wire, "plain", "count", file, NULL), want);
-        assert_true(stats.seq_gaps > 10 && stats.repeated > 1 && stats.late > 1 && said.n > 50);
-        dice = seed;
-    }
-    free(out);
-    free(shuffled);
-    free(longer);
-    free(bytes);
-}
-
-static void test_notices(void **state)
-{
-    need_python();
-    assert_string_equal(ask_python(*state, "plain", "notices", NULL, NULL), "noticed\n");
-}
-
-static void test_hostile(void **state)
-{
-    struct wire *wire = *state;
-    static const char *const seeds[] = {"1", "2"};
-    need_python();
-    room_write(wire);
-    write_ride(wire);
-    char path[352];
-    snprintf(path, sizeof path, "%s", record(wire, &RIDE, "a.shs", "output.attributes=on"));
-    for (int k = 0; k < 2; k++) {
-        unsigned taken, refused;
-        const char *said = ask_python(wire, flavours[k], "hostile", path, seeds[k]);
-        if (said == NULL) continue;
-        assert_int_equal(sscanf(said, "%u %u", &taken, &refused), 2);
-        assert_true(taken > 200 && refused > 100);
-    }
+    char source[352], file[352];
+    snprintf(source, sizeof source, "%s", wire_path(wire, from));
+    snprintf(file, sizeof file, "%s", wire_path(wire, to));
+    const char *const args[] = {"record", source, "-o", file, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
 }
 
 /* A recording of an older head, whose telemetry ends at 72 bytes, gives the same points and the same hash. */
@@ -489,14 +263,8 @@ static void test_older(void **state)
     free(same_points);
 }
 
-static void test_ends(void **state)
-{
-    need_python();
-    assert_string_equal(ask_python(*state, "plain", "ends", wire_path(*state, "ends.shs"), NULL), "ends\n");
-}
-
-/* Parts of it by numbers of one's own: of two quaternions of one rotation the turn is the short one, of 30 degrees; rings
- * from pole to pole are a degree apart; a shot without echo is nowhere. */
+/* Tries its parts with chosen numbers. Between two quaternions of one rotation the turn is the short one, of 30
+ * degrees. Rings from pole to pole are a degree apart. A shot without echo has no place. */
 static const char PARTS[] =
     "import math, sys\n"
     "sys.path.insert(0, 'drivers/host/python')\n"
@@ -525,26 +293,14 @@ static void test_parts(void **state)
     assert_int_equal(status, 0);
 }
 
-static void test_misuse(void **state)
-{
-    need_python();
-    const char *path = wire_write(*state, "a.shs", "", 0);
-    assert_string_equal(ask_python(*state, "plain", "misuse", path, NULL), "refused\n");
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_same_numbers, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_both_layouts, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_live, setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_damaged, setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_notices, setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_hostile, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_older, setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_ends, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_parts, setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_misuse, setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

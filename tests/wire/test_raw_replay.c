@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* A capture of a VLP-16, replayed by tcpreplay onto loopback, is read by rawlog-grabber as the live sensor was; so is the
- * file itself. The head is started twice, and sends the same bytes both times: to the grabber, and to the recorder.
+/* A capture of a VLP-16, replayed by tcpreplay onto loopback, is read by rawlog-grabber as the live sensor was. So is
+ * the file itself. The head is started twice, and sends the same bytes both times: to the grabber, and to the recorder.
  *
- * All runs in a network namespace of the test's own, which has the sensor's ports, and a loopback that takes packets with
+ * All runs in a network namespace of the test's own. It has the sensor's ports, and a loopback that takes packets with
  * its own addresses from outside. Without the right to that, or without the two programs, the test is skipped. */
 #include <sched.h>
 
@@ -41,7 +41,7 @@ static int put_line(const char *path, const char *text)
     return good;
 }
 
-/* As root at once, else as the root of a user namespace. */
+/* Leaves the network directly as root, else as the root of a user namespace. */
 static int leave_network(void)
 {
     char map[32];
@@ -74,7 +74,7 @@ static void network_or_skip(void)
 
 /* ---- what came */
 
-/* The data packets of a log, and what is needed of their turns. */
+/* The data packets of a log, with the times of their turns. */
 struct read_packets {
     struct rawlog log;
     struct {
@@ -84,8 +84,8 @@ struct read_packets {
     uint32_t n, n_turns, n_fixes;
 };
 
-/* By the sensor's own time, which is within one hour here. The log is in the order of its dates, and a turn before the
- * first fix has the host's. */
+/* Sorts by the sensor's own time, which is within one hour here. The log is in the order of its dates, and a turn
+ * before the first fix has the host's. */
 static int by_sensor_time(const void *a, const void *b)
 {
     const struct rawlog_item *one = a, *other = b;
@@ -112,7 +112,7 @@ static void collect(const struct grabber *grabber, struct read_packets *all)
     }
 }
 
-/* The first data packet of the capture from `i` on that has these bytes (NULL: any); captured->n: none. */
+/* Returns the first data packet of the capture from `i` on that has these bytes (NULL: any); captured->n: none. */
 static uint32_t find_packet(const struct captured *captured, uint32_t i, const uint8_t *bytes)
 {
     for (; i < captured->n; i++)
@@ -138,7 +138,7 @@ static void check_packets(const char *what, const struct read_packets *all, cons
 }
 
 /* From the first fix on a turn's date is the sensor's: that hour, and its first packet's time in it. Before, it is the
- * host's: of the first turn, at most, since fixes come while the sensor spins up. */
+ * host's. That is the first turn, at most, since fixes come while the sensor spins up. */
 static void check_dates(const char *what, const struct read_packets *all)
 {
     struct tm hour = {.tm_year = 126, .tm_mon = 4, .tm_mday = 4, .tm_hour = 3}; /* as CONFIG has it */
@@ -172,7 +172,7 @@ static int is_bound(int port)
     return found;
 }
 
-/* Its ports are open then: what comes is read, or counted as dropped. */
+/* Its ports are open when this returns, so each packet is read, or counted as dropped. */
 static void start_grabber(struct wire *wire, const char *name, struct grabber *grabber)
 {
     const int64_t end_ms = wire_now_ms() + DEADLINE_MS;

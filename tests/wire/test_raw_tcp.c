@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw` of TCP: what the recorder and a device say to each other, a Hokuyo with its client over the relay, a
- * SICK scanner and the native protocol asked by --send; and connections that end in odd ways. */
+/* These are tests of `record --raw` of TCP. They cover the exchange of the recorder and a device, and a Hokuyo with its
+ * client over the relay. Others are a SICK scanner and the native protocol asked by --send, and connections that end in
+ * odd ways. */
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
 
@@ -19,7 +20,7 @@ static int port_of(int fd)
     return ntohs(at.sin_port);
 }
 
-/* A listening device of the test's own. port 0: the system chooses. source: the recorder's SOURCE. */
+/* Opens a listening device of the test's own. port 0: the system chooses. source: the recorder's SOURCE. */
 static int device_open_at(int port, char source[64])
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
@@ -46,7 +47,7 @@ static int take_connection(int fd)
     return connection;
 }
 
-/* Exactly so many bytes; len 0: until the end. Returns how many. */
+/* Reads exactly so many bytes; len 0: until the end. Returns how many. */
 static size_t read_all(int fd, uint8_t *bytes, size_t len)
 {
     const size_t most = len != 0 ? len : ROOM;
@@ -71,7 +72,7 @@ static void expect_stream(const struct captured *captured, int from_port, const 
     free(stream);
 }
 
-/* The place in the file of the first data from a port. */
+/* Returns the place in the file of the first data from a port. */
 static uint32_t first_from(const struct captured *captured, int from_port)
 {
     uint32_t i = 0;
@@ -83,7 +84,8 @@ static uint32_t first_from(const struct captured *captured, int from_port)
 
 /* ---- this program and a device */
 
-/* The second text goes when the first one was answered; large answers come whole; the device ends it. */
+/* The second text is sent when the first one was answered. Large answers come whole, and the device ends the
+ * connection. */
 static void test_send(void **state)
 {
     struct wire *wire = *state;
@@ -141,7 +143,7 @@ static void test_reset(void **state)
     captured_free(&captured);
 }
 
-/* What the other end of a connection has not read yet, bytes. */
+/* Returns how many bytes the other end of a connection has not read yet. */
 static unsigned unread(int fd)
 {
     struct sockaddr_in peer;
@@ -158,8 +160,8 @@ static unsigned unread(int fd)
     return found;
 }
 
-/* What comes while the recorder stands still has the time at which it came. Before that is read nothing more may come: the
- * kernel would join the two, and keep the later time. */
+/* Bytes that come while the recorder stands still have the time at which they came. No more may come before they are
+ * read: the kernel would join the two, and keep the later time. */
 static void test_times(void **state)
 {
     struct wire *wire = *state;
@@ -234,7 +236,7 @@ static void ask(struct exchange *x, const char *text, int ends)
     }
 }
 
-/* A driver's exchange: what both have said, byte by byte, and each question before its answer. */
+/* A driver's exchange: both sides are captured byte by byte, and each question is before its answer. */
 static void test_relay_of_scip(void **state)
 {
     struct wire *wire = *state;
@@ -270,7 +272,7 @@ static void test_relay_of_scip(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Whether a recording of that length has what the link answers to `text`. */
+/* Returns whether a recording of that length has the link's answer to `text`. */
 static int is_answered(struct wire *wire, const char *source, const char *text, const char *answer,
                        const char *length_s)
 {
@@ -288,7 +290,7 @@ static int is_answered(struct wire *wire, const char *source, const char *text, 
     return found;
 }
 
-/* On a busy machine it takes longer. */
+/* The recording gets longer until it has the answer, as a busy machine takes longer. */
 static void check_asked(struct wire *wire, const char *source, const char *text, const char *answer)
 {
     if (!is_answered(wire, source, text, answer, "0.1") && !is_answered(wire, source, text, answer, "1") &&
@@ -296,7 +298,7 @@ static void check_asked(struct wire *wire, const char *source, const char *text,
         fail_msg("%s: no %s within 10 s", source, answer);
 }
 
-/* CoLa, the native protocol with its frames and NMEA, which needs no question. */
+/* CoLa, the native protocol with its frames, and NMEA, which needs no question. */
 static void test_others(void **state)
 {
     struct wire *wire = *state;
@@ -314,7 +316,7 @@ static void test_others(void **state)
 
 /* ---- odd ends of clients */
 
-/* A client that breaks off, one that comes while the device is away, and one that is served after that. */
+/* One client breaks off, one comes while the device is away, and one is served after that. */
 static void test_clients(void **state)
 {
     struct wire *wire = *state;
@@ -362,8 +364,8 @@ static void test_clients(void **state)
     captured_free(&captured);
 }
 
-/* A client that does not read holds its device back, and no byte is lost. Until nothing moves any more the buffers of the
- * system fill up. */
+/* A client that does not read holds its device back, and no byte is lost. The system's buffers fill up until nothing
+ * moves any more. */
 static void test_slow_client(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw` of UDP: each datagram that comes, whole and in order, of a test's socket and of a VLP-16; what the
- * kernel has no room for is counted; and what is wrong with a command line. */
+/* `record --raw` of UDP: each datagram is captured whole and in order, of a test's socket and of a VLP-16. Those that
+ * the kernel has no room for are counted. Wrong command lines are refused. */
 #include "drivers/protocol/bytes.h"
 #include "tests/wire/captured.h"
 #include "tests/wire/room.h"
@@ -37,7 +37,7 @@ static size_t length_of(int i)
     return i == 5 ? 0 : i == 77 ? LARGEST : (size_t)(i * 7 % 1473);
 }
 
-/* The ports by themselves, which together have all packets and bytes. */
+/* Checks the ports one by one; together they have all packets and bytes. */
 static void check_sources(const struct wire *wire, uint64_t bytes)
 {
     char *text = wire_read(wire_path(wire, "stats.json"), NULL);
@@ -51,7 +51,7 @@ static void check_sources(const struct wire *wire, uint64_t bytes)
     assert_true(n == 2 && packets == MANY && sum == bytes);
 }
 
-/* From one socket to two others: the order of sending is that of the file. */
+/* One socket sends to two others. The file has the order of sending. */
 static void test_datagrams(void **state)
 {
     struct wire *wire = *state;
@@ -93,7 +93,7 @@ static void test_datagrams(void **state)
     captured_free(&captured);
 }
 
-/* ---- a VLP-16: what is in the capture is what another link of the head wrote to files */
+/* ---- a VLP-16: the capture has the same packets as another link of the head wrote to files */
 
 static const char *velodyne_config(struct wire *wire, const int port[2])
 {
@@ -184,9 +184,10 @@ static void test_group(void **state)
     captured_free(&captured);
 }
 
-/* ---- a recorder that stands still while more comes than the kernel takes: what is missing is counted exactly */
+/* ---- a recorder that stands still while more comes than the kernel takes: the missing datagrams are counted
+ * exactly */
 
-/* Bytes that wait in the kernel for the reader of a port. */
+/* Returns how many bytes wait in the kernel for the reader of a port. */
 static unsigned n_held(int port)
 {
     char line[256];
@@ -224,7 +225,7 @@ static void test_dropped(void **state)
     assert_int_equal(captured.n - 1 + dropped, n_sent);
     /* The times are the kernel's, not those of reading. */
     assert_true(captured.packet[captured.n - 2].t_ns < standing_ns);
-    /* The last packet says how many are missing before it: 44 bytes, and the option with the code 4. */
+    /* The last packet has the number of those missing before it: 44 bytes, and the option with the code 4. */
     const uint8_t *last = captured.packet[captured.n - 1].data;
     assert_int_equal(captured.packet[captured.n - 1].len, 2);
     assert_int_equal(le_get32(last + 2), 4 | 8 << 16);
@@ -244,7 +245,7 @@ static void test_nothing_came(void **state)
     assert_int_equal(access(wire_path(wire, "cap.pcapng.part"), F_OK), -1);
 }
 
-/* 100 ms after its first packet it ends by itself. */
+/* It ends by itself 100 ms after its first packet. */
 static void test_duration(void **state)
 {
     struct wire *wire = *state;
@@ -258,7 +259,7 @@ static void test_duration(void **state)
     raw_recorder_end(&recorder, 0, 0, "1 packets");
 }
 
-/* A file that may have 8 KiB: an error, and no half of a file under its name. What was written is repaired. */
+/* A file may have 8 KiB. That gives an error, and no half of a file under its name. The written part is repaired. */
 static void test_disk_full(void **state)
 {
     struct wire *wire = *state;

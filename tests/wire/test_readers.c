@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Recordings as readers see them that are not ours: a scan of two stations in UTM, written in each format at once, read
- * back by other people's software, point by point against the raw stream. A reader that is not installed is skipped. */
+/* These tests give recordings to other people's readers. A scan of two stations in UTM is written in each format at
+ * once. Each format's own software reads it back, and each point is compared with the raw stream. A reader that is not
+ * installed is skipped. */
 #include "core/georef.h"
 #include "drivers/record/crs_wkt.h"
 #include "tests/wire/readers.h"
 
-/* Two stations on the ground of a yard with three walls and no roof: shots without echo, and lines of unequal length
- * (47 lines of 10,000 pulses). The second one's degrees are those of its position in metres, near enough. */
+/* Two stations on the ground of a yard with three walls and no roof. There are shots without echo, and lines of unequal
+ * length (47 lines of 10,000 pulses). The second one's degrees are close to those of its position in metres. */
 static const char CONFIG[] =
     "head: {profile: full-sweep, prr_hz: 10000, lines_hz: 47, pan_deg_s: 120, pan_stop_deg: 350, frames: 1}\n"
     "scene: {meshes: [{file: yard.obj, up: z, scale: 1}]}\n"
@@ -63,7 +64,7 @@ static void keep_points(struct scanhead *sh, const struct scanhead_frame *frame)
     }
 }
 
-/* Of the first ones, time and length. */
+/* These are time and length of the first frames. */
 static struct {
     int64_t t_ns;
     size_t len;
@@ -121,7 +122,8 @@ static void test_las(void **state)
     free(text);
 }
 
-/* Counts in the head's axes, then turned by the pose: half a step on each of three axes, at most along one. */
+/* Counts in the head's axes are turned by the pose: half a step on each of three axes, which at most add up along
+ * one. */
 static void test_e57(void **state)
 {
     (void)state;
@@ -133,9 +135,9 @@ static void test_e57(void **state)
     free(text);
 }
 
-/* CloudCompare keeps coordinates as floats of what is left after its own global shift, which is a round number within a
- * kilometre: steps of 6.1e-5 m there. Half a step is lost when it reads, when it turns and when it shifts a point: three
- * times 3.05e-5 m. (2.11 loses two of them, 2.13 all three: 6.25e-5 m was seen.) */
+/* CloudCompare keeps coordinates as floats, less its own global shift, which is a round number within a kilometre:
+ * steps of 6.1e-5 m there. Half a step is lost when it reads, when it turns and when it shifts a point: three times
+ * 3.05e-5 m. (2.11 loses two of them, 2.13 all three: 6.25e-5 m was seen.) */
 static void test_ptx(void **state)
 {
     (void)state;
@@ -165,7 +167,7 @@ static void test_ply(void **state)
     free(text);
 }
 
-/* The stream again, in colour and as older programs or viewers want it. */
+/* Records the stream again, in colour and in the forms of older programs or viewers. */
 static void record_again(const char *name, const char *option, const char *value)
 {
     char from[352], to[352];
@@ -188,7 +190,7 @@ static void test_las_12(void **state)
     free(text);
 }
 
-/* CloudCompare lists as columns what it has loaded: colours and scalar fields. Its positions are floats, as for PTX. */
+/* CloudCompare lists the loaded colours and scalar fields as columns. Its positions are floats, as for PTX. */
 static void test_ply_cloudcompare(void **state)
 {
     (void)state;
@@ -219,7 +221,7 @@ static void test_ply_pcl(void **state)
     free(text);
 }
 
-/* As many packets as frames, of their length, with their times to the nanosecond. */
+/* There are as many packets as frames, of the same length, with their times to the nanosecond. */
 static void test_pcapng(void **state)
 {
     (void)state;
@@ -243,7 +245,7 @@ static void test_pcapng(void **state)
     free(text);
 }
 
-/* The LAS file's CRS, by PROJ: it takes the stations' degrees to the positions that .poses.csv has. */
+/* The LAS file's CRS, by PROJ, takes the stations' degrees to the positions in .poses.csv. */
 static void test_crs(void **state)
 {
     (void)state;
@@ -278,7 +280,7 @@ static void test_crs(void **state)
     free(las);
 }
 
-/* Every kind of CRS, by PROJ against GeographicLib. */
+/* Every kind of CRS is compared, by PROJ and by GeographicLib. */
 static void test_all_crs(void **state)
 {
     (void)state;

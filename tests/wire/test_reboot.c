@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A reboot that a client of SCIP asks for, and what it says of the head's state, by the program. Most is in the pace
- * step: then nothing depends on when a client connects. */
+/* A client of SCIP asks for a reboot, and for the head's state, from the program. Most tests run in the pace step,
+ * where nothing depends on when a client connects. */
 #include "tests/wire/room.h"
 #include "tests/wire/usbip_host.h"
 
@@ -21,7 +21,7 @@ struct client {
     size_t len;
 };
 
-/* Whether the connection has come to its end within a time. What comes before is thrown away. */
+/* Returns whether the connection ends within a time. Bytes before the end are thrown away. */
 static int is_over(int fd, int within_ms)
 {
     char bytes[4096];
@@ -31,7 +31,7 @@ static int is_over(int fd, int within_ms)
     return 0;
 }
 
-/* The next answer up to its empty line, good until the next call. */
+/* Returns the next answer up to its empty line, which is good until the next call. */
 static const char *answer(struct client *c)
 {
     static char text[sizeof c->bytes + 1];
@@ -70,7 +70,7 @@ static void expect_not_in(struct client *c, const char *line, const char *piece)
     if (strstr(said, piece) != NULL) fail_msg("%s: %s in %s", line, piece, said);
 }
 
-/* The time stamp of TM1, ms. */
+/* Returns the time stamp of TM1 in ms. */
 static uint32_t time_ms(struct client *c)
 {
     uint32_t ms = 0;
@@ -86,7 +86,7 @@ static void connect_to(struct client *c, const struct head *head)
     *c = (struct client){.fd = raw_connect(head_endpoint(head, "tcp"))};
 }
 
-/* ---- who grants time has control, and its session ends with the head's power, too */
+/* ---- the client that grants time has control, and its session ends with the head's power, too */
 
 static void step(struct scanhead *sh, int ms)
 {
@@ -95,8 +95,8 @@ static void step(struct scanhead *sh, int ms)
     client_tell(sh, line);
 }
 
-/* Time passes until the client is hung up: a second, and what the link of the client is behind. At most half a second
- * more, since a link holds back the head when it is further behind than loop.queue_ms. */
+/* Grants time until the client is hung up: a second, and the delay of the client's link. That is at most half a second,
+ * since a link holds the head back when it is later than loop.queue_ms. */
 static void reboot(struct scanhead *sh, struct client *c, const struct head *head)
 {
     char reply[64];
@@ -118,7 +118,7 @@ static void reboot(struct scanhead *sh, struct client *c, const struct head *hea
 
 static const char LINKS[] = "links: [{type: tcp, port: 0, protocol: scip}, {type: pty, path: native}]\n";
 
-/* The device's own time to boot, and its clock from 0. */
+/* The device takes its own time to boot, and its clock starts from 0. */
 static void reboots(void **state)
 {
     struct wire *wire = *state;
@@ -188,7 +188,7 @@ static void fails_its_self_test(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* ---- USB: the device is unplugged, and comes back as it was */
+/* ---- USB: the device is unplugged, and the same device comes back */
 
 static void usb_goes_and_comes(void **state)
 {

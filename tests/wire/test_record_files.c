@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead record` and the files it is to write: what can't be is refused before anything is scanned. */
+/* `scanhead record` and the files that it writes. Impossible ones are refused before anything is scanned. */
 #include <dirent.h>
 #include <sys/inotify.h>
 
@@ -25,7 +25,7 @@ static int count_files(const struct wire *wire)
     return n;
 }
 
-/* One line that says so, status 2, and no file more than before. */
+/* There is one line that says so, status 2, and no new file. */
 static void expect_refusal(struct wire *wire, const char *const *args, const char *says)
 {
     wire_write_text(wire, "out", "");
@@ -44,7 +44,7 @@ static void begin(struct wire *wire, char config[352])
     snprintf(config, 352, "%s", room_config_write(wire, &SCAN));
 }
 
-/* Two names of one file would make a mess of it, and so would two recordings. */
+/* Two names of one file would spoil it, and so would two recordings. */
 static void test_same_file(void **state)
 {
     struct wire *wire = *state;
@@ -59,7 +59,7 @@ static void test_same_file(void **state)
                    "is the file of --output, too");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL},
                    "is read, and would be");
-    /* what a recording that was killed has left is not overwritten: it may be all that there is of it */
+    /* The part that a killed recording left is not overwritten: it may be the only one. */
     snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
     const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};
     expect_refusal(wire, args, "a.las.part: an earlier recording has left 32 bytes there; scanhead record --repair ");
@@ -95,7 +95,7 @@ static void test_no_file(void **state)
                    "known are .ply .las .ptx .e57 .poses.csv .pcapng .shs");
 }
 
-/* Formats with rigid poses take no degrees, and say so before the scan. */
+/* Formats with rigid poses take no degrees, and report that before the scan. */
 static void test_degrees(void **state)
 {
     struct wire *wire = *state;
@@ -117,7 +117,7 @@ static void test_degrees(void **state)
     }
 }
 
-/* --crs says that points are to be in it: no recording in the scene frame instead. */
+/* --crs demands points in that system. There is no recording in the scene frame instead. */
 static void test_crs(void **state)
 {
     struct wire *wire = *state;
@@ -142,7 +142,7 @@ static void test_crs(void **state)
     expect_refusal(wire, args, "output.layout is polar");
 }
 
-/* --duration ends each scan, not the row of stations. */
+/* --duration ends each scan, but not the row of stations. */
 static void test_duration_of_each(void **state)
 {
     struct wire *wire = *state;
@@ -181,7 +181,7 @@ static void put_shot(FILE *out, uint32_t line, uint64_t pulse0)
     assert_true(len > 0 && fwrite(buf, 1, len, out) == len);
 }
 
-/* A scan whose descriptor says no end, and a shot in each of two lines of it. Returns the file's size. */
+/* Writes a scan whose descriptor has no end, and a shot in each of two lines of it. Returns the file's size. */
 static size_t write_two_lines(const struct wire *wire, const char *name, uint32_t line)
 {
     static uint8_t buf[1024];
@@ -203,7 +203,7 @@ static size_t write_two_lines(const struct wire *wire, const char *name, uint32_
     return len;
 }
 
-/* A kilobyte of stream with lines 0 and 2^32 - 1: no 43 GB of empty places between. */
+/* A kilobyte of stream has lines 0 and 2^32 - 1. It gives no 43 GB of empty places between. */
 static void test_lines_far_apart(void **state)
 {
     struct wire *wire = *state;
@@ -221,7 +221,7 @@ static void test_lines_far_apart(void **state)
     free(err);
 }
 
-/* A stream that ends within its scan, as that of a recorder that was killed: its statistics are there all the same. */
+/* A stream ends within its scan, as that of a killed recorder. Its statistics are there all the same. */
 static void test_end_within_scan(void **state)
 {
     struct wire *wire = *state;
@@ -240,7 +240,8 @@ static void test_end_within_scan(void **state)
     assert_int_equal(stats_uint(wire, "scans"), 0);
 }
 
-/* Text of a grid: an empty one of 4 bytes is there from the first shot on, before the file is completed. */
+/* Returns whether a grid has text. An empty one of 4 bytes is there from the first shot on, before the file is
+ * completed. */
 static int has_grid(const struct wire *wire, const char *name)
 {
     struct stat st = {0};
@@ -255,7 +256,7 @@ static int has_percent(const struct wire *wire, const char *name)
     return has;
 }
 
-/* Waits until the file is written to, and it is so. */
+/* Waits for writes to the file until the condition holds. */
 static void wait_for(const struct wire *wire, const char *name, int (*is_so)(const struct wire *, const char *))
 {
     _Alignas(struct inotify_event) char buf[4096];
@@ -269,7 +270,7 @@ static void wait_for(const struct wire *wire, const char *name, int (*is_so)(con
 }
 
 /* Three grids of 16 million places take seconds to write, one after the other. A signal ends that, and leaves nothing
- * behind of those that are not complete. */
+ * of the incomplete ones. */
 static void test_signal_while_completing(void **state)
 {
     struct wire *wire = *state;
@@ -292,8 +293,8 @@ static void test_signal_while_completing(void **state)
         assert_int_equal(access(wire_path(wire, part[i]), F_OK), -1);
 }
 
-/* Two stations, of which the first takes long: less than half of it is done, and the share is known. The first report
- * comes after a second. */
+/* The first of two stations takes long. Less than half of it is done at the first report, after a second, and the share
+ * is known. */
 static void test_percent(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a configuration says can't be recorded is refused before the first scan: one line, status 2, no file. Each case has
- * its fault at the last of three stations, where earlier ones could be scanned. */
+/* Configurations that can't be recorded are refused before the first scan: one line, status 2, no file. Each case has
+ * its error at the last of three stations, where earlier ones could be scanned. */
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Recorders that are killed, and disks that are full, at random moments: what came to the disk is in the repaired file, and it
- * says that its end is missing. The recorder reads a stream through a pipe, so that a moment is a byte of the stream, and a
- * little after it. What was left is known from FILE.part itself. REPAIR_N is how many moments each format has; from 20 on
- * programs of others read some of them, too (make repair). */
+/* Recorders are killed, and disks are full, at random moments. The repaired file has all that came to the disk, and
+ * says that its end is missing. The recorder reads a stream through a pipe, so a moment is a byte of the stream, and a
+ * little after it. FILE.part itself shows what was left. REPAIR_N is how many moments each format has. From 20 on other
+ * people's programs read some of them, too (make repair). */
 #include <limits.h>
 #include <sched.h>
 #include <sys/inotify.h>
@@ -30,7 +30,7 @@ static const char YARD[] = "v -20 -15 -1.5\nv 25 -15 -1.5\nv 25 18 -1.5\nv -20 1
 static struct wire *wire;
 static struct bytes stream;
 static uint64_t n_moments = N_QUICK;
-static char disk[80]; /* a small one, where such can be had; else empty */
+static char disk[80]; /* a small one, where it can be had; else empty */
 static uint64_t random_state = 20261123;
 
 /* splitmix64; below n */
@@ -51,7 +51,7 @@ static struct bytes slurp(const char *path)
 
 /* ---- one recording */
 
-/* Bytes of the stream that the recorder gets; then it is killed, unless it ends by itself. */
+/* The bytes of the stream that the recorder gets. Then it is killed, unless it ends by itself. */
 struct moment {
     size_t fed;
     int kills, ends; /* ends: nothing more comes */
@@ -76,7 +76,7 @@ static pid_t spawn(const struct repair_row *row, const char *path, int from, int
     _exit(127);
 }
 
-/* The exit status, or 256 + the signal. */
+/* Returns the exit status, or 256 + the signal. */
 static int record(const struct repair_row *row, const char *path, const struct moment *m)
 {
     int ends[2], err[2]; /* a file of messages would have the limit, too */
@@ -91,7 +91,7 @@ static int record(const struct repair_row *row, const char *path, const struct m
         at += (size_t)n;
     }
     if (m->ends) close(ends[1]);
-    if (m->wait_us > 0) usleep(m->wait_us); /* which moment it is struck at, nothing waits for that */
+    if (m->wait_us > 0) usleep(m->wait_us); /* nothing waits for this moment */
     if (m->kills) kill(pid, SIGKILL);
     const int status = wire_wait(wire, pid);
     if (!m->ends) close(ends[1]);
@@ -101,7 +101,7 @@ static int record(const struct repair_row *row, const char *path, const struct m
     return status;
 }
 
-/* The lines that it printed are in `out`. */
+/* Repairs, and writes its printed lines to `out`. */
 static int repair(const char *path, char out[2048])
 {
     const char *const args[] = {"record", "--repair", path, NULL};
@@ -112,7 +112,7 @@ static int repair(const char *path, char out[2048])
     return status;
 }
 
-/* A repair that is killed itself: another one goes on with what it left. */
+/* A repair that is itself killed. Another one continues with the files that it left. */
 static void repair_in_part(const char *path)
 {
     const char *const args[] = {"record", "--repair", path, NULL};
@@ -122,7 +122,7 @@ static void repair_in_part(const char *path)
     wire_wait(wire, pid);
 }
 
-/* ---- what was left of it */
+/* ---- the left part */
 
 struct tally {
     uint64_t whole, repaired, none;
@@ -218,7 +218,7 @@ static void remove_all(const struct repair_row *row, const char *path)
     remove_both(path);
 }
 
-/* As many lines as the file has units. */
+/* The reader prints as many lines as the file has units. */
 static void check_reader(const struct repair_row *row, const char *path, uint64_t n)
 {
     const char *args[10] = {"env", "QT_QPA_PLATFORM=offscreen"};
@@ -289,10 +289,10 @@ static void kill_one_format(const struct repair_row *row, const struct bytes *wh
         remove_all(row, path);
     }
     tell(row, "killed", &tally);
-    assert_true(tally.repaired > 0 || whole->len < SMALL); /* of small files nothing is on the disk within a second */
+    assert_true(tally.repaired > 0 || whole->len < SMALL); /* a small file may not be on the disk within a second */
 }
 
-/* A disk with room for so many bytes; or a limit on the file's size. */
+/* Makes a disk with room for so many bytes, or sets a limit of the file's size. */
 static void fill(const struct repair_row *row, const struct bytes *whole, struct tally *tally)
 {
     char path[160], size[32];
@@ -354,7 +354,7 @@ static int is_written(const char *const *path, int n)
     return 1;
 }
 
-/* Far less came than a buffer holds, and then nothing: within a second or two it is on the disk all the same. */
+/* Far fewer bytes come than a buffer holds, and then none. Within a second or two they are on the disk all the same. */
 static void test_slow_head(void **state)
 {
     enum { N = 4 };
@@ -398,7 +398,7 @@ static int set_up(void **state)
     const char *n = getenv("REPAIR_N");
     if (wire_setup(state) != 0) return -1;
     wire = *state;
-    *state = NULL; /* that of each test is its row */
+    *state = NULL; /* each test sets it to its row */
     if (n != NULL) n_moments = strtoull(n, NULL, 10);
     signal(SIGPIPE, SIG_IGN);
     char readers[PATH_MAX];

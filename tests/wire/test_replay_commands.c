@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What a recording answers to commands: queries as the head did, settings not at all; and how it is played. */
+/* Answers of a recording to commands. It answers queries as the head did, and takes no settings. Commands play it. */
 #include "drivers/protocol/native_encode.h"
 #include "tests/wire/replay_rig.h"
 
 static const char *const LINK[] = {"--link", "type: tcp, port: 0", "--pace", "step", "--quiet", NULL};
 
-/* The same head as replay_room has. */
+/* The head is the same as replay_room's. */
 static const struct room_config ROOM = {
     .prr_hz = 10000, .lines_hz = 100, .pan_deg_s = 10, .pan_stop_deg = 3, .frames = 1, .links = LINK_YAML_TCP};
 static const struct room_config BEAMS = {
@@ -25,7 +25,7 @@ static void grant(struct scanhead *sh, int ms)
     client_tell(sh, line);
 }
 
-/* Of a whole run of a head in the pace step: what it answers when it is idle, and its recording. */
+/* A whole run of a head in the pace step: its answers when it is idle, and its recording. */
 static const char *const QUERIES[] = {
     "*IDN?",           "HEAD:PRR?",       "HEAD:LINes?",     "HEAD:PAN?",       "HEAD:STATE?",
     "HEAD:STATION?",   "HEAD:RANGe:MIN?", "HEAD:RANGe:MAX?", "SCAN:STEP:LINE?", "SCAN:LINE:STARt?",
@@ -130,7 +130,7 @@ static void test_settings_are_refused(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Frames up to the reply of the last grant. */
+/* Takes the frames up to the reply of the last grant. */
 static uint32_t take_all(struct scanhead *sh, uint64_t *first_t_ns, uint64_t *last_t_ns)
 {
     struct scanhead_frame frame;
@@ -156,9 +156,9 @@ static void test_how_it_is_played(void **state)
     starts_with(sh, "SCAN:STOP", "ERR -221", "");
     client_tell(sh, "SCAN:STARt");
     grant(sh, 1);
-    /* The head as it was: boot, idle, and so on; a reader that asks sees what its frames say. */
+    /* The state is the recorded head's: boot, idle, and so on. A reader that asks gets the state of its frames. */
     assert_string_equal(client_ask(sh, "HEAD:STATe?"), "boot");
-    /* What is played can be stopped, whatever the head was then; and what is to be played. */
+    /* A playing recording can be stopped, whatever the head's state was. So can one that is about to play. */
     client_tell(sh, "SCAN:STOP");
     client_tell(sh, "SCAN:STARt");
     client_tell(sh, "SCAN:STOP");
@@ -173,13 +173,13 @@ static void test_how_it_is_played(void **state)
     assert_true(take_all(sh, &first_ns, &last_ns) > 10);
     assert_int_equal(first_ns, 0);
     assert_in_range(last_ns, 245000000, 250000000);
-    /* Anew while it plays. */
+    /* It starts anew while it plays. */
     client_tell(sh, "SCAN:STARt");
     grant(sh, 300);
     assert_true(take_all(sh, &first_ns, &last_ns) > 30);
     assert_int_equal(first_ns, 0);
     assert_in_range(last_ns, 295000000, 300000000);
-    /* Stopped: no more frames, and it is idle. */
+    /* It is stopped: no more frames come, and it is idle. */
     client_tell(sh, "SCAN:STOP");
     grant(sh, 1);
     take_all(sh, &first_ns, &last_ns);
@@ -195,7 +195,7 @@ static void test_how_it_is_played(void **state)
     take_all(sh, &first_ns, &last_ns);
     grant(sh, 300);
     assert_int_equal(take_all(sh, &first_ns, &last_ns), 0);
-    /* Then to its end. */
+    /* It plays to its end. */
     client_tell(sh, "SCAN:STARt");
     grant(sh, 600);
     assert_true(take_all(sh, &first_ns, &last_ns) > 200);
@@ -210,7 +210,7 @@ static void test_how_it_is_played(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A descriptor and, where e is not NULL, an emitter of the same moment. */
+/* Writes a descriptor and, where e is not NULL, an emitter of the same moment. */
 static const char *write_moment(struct wire *wire, const struct native_emitter *e)
 {
     struct tape tape = {0};
@@ -231,7 +231,7 @@ static const char *write_moment(struct wire *wire, const struct native_emitter *
     return wire_write(wire, "moment.shs", bytes, len);
 }
 
-/* One that is over in a tick is never seen to be played, and yet it can be stopped. */
+/* A recording that is over in a tick is never seen to play, and yet it can be stopped. */
 static void test_a_loop_is_stopped(void **state)
 {
     const char *const args[] = {"--link", "type: tcp, port: 0", "--loop", "--pace", "step", "--quiet", NULL};
@@ -250,7 +250,7 @@ static void test_a_loop_is_stopped(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A word that is none: as if the recording did not say it. */
+/* A word that is none counts as if the recording did not have it. */
 static void test_unknown_echoes(void **state)
 {
     const struct native_emitter e = {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What goes wrong while a recording is replayed: faults on the wire, readers that are too slow or leave, an end. */
+/* Trouble while a recording is replayed: faults on the wire, readers that are too slow or leave, an end. */
 #include "tests/wire/replay_rig.h"
 
 enum { MOST = 400 };
 
-/* Numbers of frames, as a set. */
+/* A set of frame numbers. */
 struct numbers {
     uint32_t seq[MOST];
     int n;
@@ -29,7 +29,7 @@ static void same_numbers(const struct numbers *a, const struct numbers *b, const
     if (a->n != b->n) fail_msg("%s: %d frames and %d", what, a->n, b->n);
 }
 
-/* ---- what the truth says, and what a client notices */
+/* ---- the truth, and the client's notices */
 
 struct seen {
     struct numbers missing, repeated, broken;
@@ -45,7 +45,7 @@ static void see(void *ctx, const struct scanhead_notice *notice)
     if (notice->kind == SCANHEAD_NOTICE_BAD_PAYLOAD) put(&seen->broken, notice->seq);
 }
 
-/* Of the truth's lines about this link. */
+/* Reads the truth's lines about this link. */
 static void read_truth(const struct wire *wire, int link, struct seen *truth)
 {
     char *text = wire_read(wire_path(wire, "truth.json"), NULL), *save = NULL, of[16];
@@ -62,8 +62,8 @@ static void read_truth(const struct wire *wire, int link, struct seen *truth)
     free(text);
 }
 
-/* Byte 40 is of the payload: the header is right, and says which frame it was. The last frames are left alone: nothing
- * would come after them that shows that they are missing. */
+/* Byte 40 is of the payload: the header is right, and tells which frame it was. The last frames are spared, as no frame
+ * after them would show that they are missing. */
 static const char SCENARIO[] = "faults:\n"
                                "  - {link: 1, kind: drop, from: 5, every: 17, until: 420}\n"
                                "  - {link: 1, kind: flip, byte: 40, from: 12, every: 17, until: 420}\n"
@@ -92,7 +92,7 @@ static void test_a_client_notices_what_the_truth_says(void **state)
     client_ask(hit, "*OPC?");
     client_ask(other, "*OPC?");
     scanhead_hash_start(other);
-    for (int time = 0; time < 2; time++) { /* the second time has other numbers */
+    for (int time = 0; time < 2; time++) { /* the second time has other sequence numbers */
         client_tell(hit, "SCAN:STARt");
         client_until(other, SCANHEAD_EV_SCAN_END, &frame);
         client_until(hit, SCANHEAD_EV_SCAN_END, &frame);
@@ -114,7 +114,8 @@ static void test_a_client_notices_what_the_truth_says(void **state)
     same_numbers(&truth.broken, &seen.broken, "broken");
 }
 
-/* The same faults with the same seeds hit the replay where they hit the head: its link's bytes, and the truth. */
+/* The same faults with the same seeds hit the replay where they hit the head. Its link's bytes, and the truth, are the
+ * same. */
 static void test_hit_as_the_head_was(void **state)
 {
     struct wire *wire = *state;
@@ -129,7 +130,7 @@ static void test_hit_as_the_head_was(void **state)
     size_t n[2], m[2];
     char *hurt[2], *told[2];
     snprintf(file, sizeof file, "%s", replay_room(wire, "head.shs", 30));
-    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml")); /* which it has left */
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml")); /* the configuration that it has left */
     snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, "faults.yaml", faults));
     snprintf(truth, sizeof truth, "%s", wire_path(wire, "truth.json"));
     snprintf(text, sizeof text, "links.0.path=%s", wire_path(wire, "hurt.shs"));
@@ -152,7 +153,7 @@ static void test_hit_as_the_head_was(void **state)
 
 /* ---- readers */
 
-/* Half a second of 1 MHz, 10 MB, in open ground. */
+/* The recording is half a second of 1 MHz, 10 MB, in open ground. */
 static const char *record_much(struct wire *wire)
 {
     struct room_config config = {.prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 45, .frames = 1};
@@ -166,7 +167,8 @@ static const char *record_much(struct wire *wire)
     return wire_path(wire, "much.shs");
 }
 
-/* A receiver whose buffer takes 4 KiB, so that little is on its way to it: what it does not read, the head keeps. */
+/* Connects a receiver whose buffer takes 4 KiB, so that little is on its way to it. The head keeps the frames that it
+ * does not read. */
 static int connect_small(const char *endpoint)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)endpoint_port(endpoint))};
@@ -220,7 +222,7 @@ static void test_too_slow(void **state)
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* Who commanded leaves in the middle: the others hear all of it, and one may ask why nobody commands. */
+/* The client that commanded leaves in the middle. The others get all of it, and one may ask why nobody commands. */
 static void test_a_client_leaves(void **state)
 {
     struct wire *wire = *state;
@@ -249,7 +251,7 @@ static void test_a_client_leaves(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Ended while it plays: what its file link has is the recording up to there, in whole frames. */
+/* The head is ended while it plays. Its file link has the recording up to there, in whole frames. */
 static void test_ended_while_it_plays(void **state)
 {
     struct wire *wire = *state;

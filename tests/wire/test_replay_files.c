@@ -14,7 +14,7 @@ static void record(struct wire *wire, const char *name)
     snprintf(file, sizeof file, "%s", replay_room(wire, name, LINES));
 }
 
-/* Pulses of a file, and the device times of the first and the last one. Nothing may be wrong with it. */
+/* Returns the pulses of a file, and the device times of the first and the last one. The file must be without errors. */
 static uint64_t pulses_of(const char *path, int64_t *first_ns, int64_t *last_ns, uint64_t restarts)
 {
     struct scanhead *sh = client_open(path);
@@ -38,7 +38,7 @@ static uint64_t pulses_of(const char *path, int64_t *first_ns, int64_t *last_ns,
     return n;
 }
 
-/* Part of a recording: what a reader needs comes first, and then the points of that time. */
+/* A part of a recording begins with what a reader needs. Then come the points of that time. */
 static void test_from_and_to(void **state)
 {
     struct wire *wire = *state;
@@ -56,7 +56,7 @@ static void test_from_and_to(void **state)
         const int64_t from_ns = ranges[i].from_ns, to_ns = ranges[i].to_ns;
         replay_to_file(wire, file, more, "part.shs");
         const uint64_t n = pulses_of(wire_path(wire, "part.shs"), &first_ns, &last_ns, 0);
-        /* By the time at which they went out, which is that of their packet's last pulse, or later. */
+        /* The time that counts is the one of sending: that of the packet's last pulse, or later. */
         assert_in_range(first_ns, from_ns - PACKET_NS, from_ns + PACKET_NS);
         assert_in_range(last_ns, to_ns - 2 * PACKET_NS, to_ns);
         assert_int_equal(n, (last_ns - first_ns) / 100000 + 1);
@@ -72,7 +72,8 @@ static void test_from_and_to(void **state)
 
 /* ---- again and again */
 
-/* The frames of time `time` from 0, in the order of the tape. A time begins where numbers go back. */
+/* Collects the frames of repetition `time` from 0, in the order of the tape. A repetition begins where numbers go
+ * back. */
 static void of_time(const struct tape *all, int time, struct tape *out)
 {
     *out = (struct tape){.bytes = all->bytes, .frame = calloc(all->n, sizeof *out->frame)};
@@ -83,7 +84,7 @@ static void of_time(const struct tape *all, int time, struct tape *out)
     }
 }
 
-/* But for their numbers, and the checksum of the header that goes with them. */
+/* Frames are the same but for their numbers, and the header's checksum, which depends on them. */
 static void same_but_numbers(const struct tape *a, const struct tape *b)
 {
     assert_int_equal(a->n, b->n);
@@ -98,7 +99,7 @@ static void same_but_numbers(const struct tape *a, const struct tape *b)
     }
 }
 
-/* Thrice, tick by tick, each as the first time. Numbers go back by 2^30 from where they were. */
+/* It plays three times, tick by tick, each as the first time. Numbers go back by 2^30 from where they were. */
 static void three_times(struct wire *wire, const char *path, const char *const *more, int n_ticks)
 {
     static const struct tape_line start[] = {{0, "SCAN:STARt"}, {0, NULL}};
@@ -132,7 +133,7 @@ static void test_loop(void **state)
     three_times(*state, file, part, 52);
 }
 
-/* A recording that begins within a scan, as a reader who joined has it: with frames that are for it alone. */
+/* A recording that begins within a scan, as that of a reader who joined: it has frames for that reader alone. */
 static void test_begun_within_a_scan(void **state)
 {
     struct wire *wire = *state;
@@ -161,7 +162,7 @@ static void test_begun_within_a_scan(void **state)
     tape_free(&all);
 }
 
-/* A client that hears it twice: one restart, and nothing is missing. */
+/* A client reads it twice: there is one restart, and nothing is missing. */
 static void test_twice(void **state)
 {
     static const char *const more[] = {"--link", "type: tcp, port: 0", "--pace", "fast", "--quiet", NULL};
@@ -208,7 +209,7 @@ static void test_several_scans(void **state)
     assert_int_equal(stats_uint(wire, "scans"), 3);
 }
 
-/* All stations one after the other into one file, as record does it. */
+/* All stations come one after the other into one file, as record writes it. */
 static void test_several_stations(void **state)
 {
     struct wire *wire = *state;
@@ -228,7 +229,7 @@ static void test_several_stations(void **state)
     assert_int_equal(replay_call(wire, args), 0);
     replay_to_file(wire, file, NULL, "out.shs");
     replay_same_file(wire, "out.shs", "stations.shs");
-    /* What commands are told follows the stream. */
+    /* The answers to commands follow the stream. */
     static const char *const more[] = {"--link", "type: tcp, port: 0", "--pace", "fast", "--quiet", NULL};
     struct head head = head_start(wire, file, more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
@@ -243,7 +244,7 @@ static void test_several_stations(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Two recordings of different heads, one after the other: the second one's time goes on at once. */
+/* Two recordings of different heads come one after the other. The second one's time goes on at once. */
 static void test_concatenated(void **state)
 {
     struct wire *wire = *state;
@@ -253,7 +254,7 @@ static void test_concatenated(void **state)
     record(wire, "a.shs");
     tape_read(file, &a);
     tape_read(replay_room(wire, "b.shs", 7), &b);
-    uint32_t from = 0; /* what both have in the beginning is the same, and would be taken for a repetition */
+    uint32_t from = 0; /* the common beginning of both would be taken for a repetition */
     while (b.frame[from].type != SCANHEAD_DESCRIPTOR)
         from++;
     const size_t at = b.frame[from].at;
@@ -309,7 +310,7 @@ static void test_waits_for_clients(void **state)
     sh[0] = client_open(head_endpoint(&head, "tcp"));
     assert_string_equal(client_ask(sh[0], "HEAD:STATe?"), "idle");
     while ((rc = scanhead_next(sh[0], &frame, 50)) == SCANHEAD_OK)
-        assert_true((frame.flags & SCANHEAD_LOCAL) != 0); /* what those who join are told */
+        assert_true((frame.flags & SCANHEAD_LOCAL) != 0); /* clients that join are told this */
     assert_int_equal(rc, SCANHEAD_ETIMEOUT);
     sh[1] = client_open(head_endpoint(&head, "tcp"));
     for (int i = 0; i < 2; i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is hurt, what is no recording, and options that are wrong. */
+/* Damaged recordings, files that are no recordings, and wrong options. */
 #include "tests/wire/replay_rig.h"
 
 #include "drivers/protocol/native_encode.h"
@@ -31,7 +31,7 @@ static void test_cut_and_bad_bytes(void **state)
     replay_same_file(wire, "out.shs", "bad.shs");
 }
 
-/* One line, and the exit status of a file that is none, or of one that can't be had. */
+/* There is one line, and an exit status for a file that is none, or for one that can't be had. */
 static void refused(struct wire *wire, const char *path, int status, const char *why)
 {
     char link[400];
@@ -71,7 +71,7 @@ static void test_no_recordings(void **state)
     tape_free(&tape);
 }
 
-/* A descriptor whose numbers are of no head, with checksums that are right: it is served all the same, at once. */
+/* A descriptor has absurd numbers, with right checksums. It is served all the same, at once. */
 static void test_absurd_numbers(void **state)
 {
     struct wire *wire = *state;

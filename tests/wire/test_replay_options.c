@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Options of a replay: which are refused, and what they must not do. */
+/* Options of a replay: some are refused, and none may change the recording. */
 #include "tests/wire/replay_rig.h"
 
 static char file[352];
@@ -43,7 +43,7 @@ static void test_wrong_options(void **state)
             fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
         free(text);
     }
-    /* within the recording: nothing else is wrong with it */
+    /* The times are within the recording, so nothing else is wrong. */
     const char *const backward[] = {"run", file, "--start", "--quiet", "--from", "0.002", "--to", "0.001", NULL};
     assert_int_equal(replay_call(wire, backward), 2);
     replay_said(wire, "is not after --from");
@@ -56,7 +56,7 @@ static void test_wrong_options(void **state)
     }
 }
 
-/* A link does not write over what is replayed. */
+/* A link does not overwrite the replayed file. */
 static void test_recording_stays(void **state)
 {
     struct wire *wire = *state;
@@ -72,7 +72,7 @@ static void test_recording_stays(void **state)
     tape_free(&tape);
 }
 
-/* The page's link comes beside the others, wherever they are from and whatever they are called. */
+/* The page's link is added to the others, wherever they come from and whatever they are called. */
 static void test_view(void **state)
 {
     struct wire *wire = *state;
@@ -101,7 +101,7 @@ static uint32_t grant(struct scanhead *sh, const char *step, uint64_t *last_ns)
     return n;
 }
 
-/* It begins once both are there, and lasts its time from then on: waiting, of any length, does not count. */
+/* It begins once both are there, and lasts its time from then on. Waiting, of any length, does not count. */
 static void test_clients_and_duration(void **state)
 {
     static const char *const args[] = {"--start", "--clients", "2",      "--duration",         "0.1",

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What is replayed and what was recorded are the same bytes: over each link, in each pace, from each kind of recording,
- * and once more from a recording of the replay. */
+/* The replayed bytes are the recorded ones: over each link, in each pace, from each kind of recording, and once more
+ * from a recording of the replay. */
 #include "tests/wire/replay_rig.h"
 
 enum { LINES = 15 }; /* a scan of 150 ms of device time: 1500 pulses */
 
-/* As a client hears it. */
+/* The stream as a client receives it. */
 struct heard {
     struct tape tape; /* without what was for it alone */
     char hash[65];
@@ -52,7 +52,7 @@ static void hear(struct wire *wire, const char *file, const char *link, const ch
     assert_string_equal(hash, heard->hash);
 }
 
-/* The recording of the head, with its hash. */
+/* Makes the recording of the head, with its hash. */
 static void original(struct wire *wire, struct tape *tape, char file[352], char hash[65])
 {
     snprintf(file, 352, "%s", replay_room(wire, "head.shs", LINES));
@@ -131,8 +131,8 @@ static void same_file(const struct wire *wire, const char *a, const char *b)
     free(second);
 }
 
-/* Our own recorder, which ends with the scan, thrice in a row: each a further time of the replay. Of a .pcapng the
- * frames. */
+/* Our own recorder ends with the scan, three times in a row: each is a further repetition of the replay. For .pcapng
+ * the frames are compared. */
 static void test_recorder(void **state)
 {
     struct wire *wire = *state;

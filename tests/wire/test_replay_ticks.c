@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording that is replayed has the timing that the head had: in the pace step, where each tick is granted by itself,
- * each frame comes with the same tick, and all bytes are the same. */
+/* A replayed recording has the timing of the head. In the pace step, where each tick is granted by itself, each frame
+ * comes with the same tick, and all bytes are the same. */
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/replay_rig.h"
 
-/* Of a head: boot, spin-up, a scan, spin-down. It is recorded to the last tick, and replayed with some more. */
+/* A head boots, spins up, scans and spins down. It is recorded to the last tick, and replayed with some more. */
 static void same_ticks(struct wire *wire, const struct room_config *c, const struct tape_line *lines, int n)
 {
     const struct tape_line start[] = {{3, "SCAN:STARt"}, {0, NULL}};
@@ -26,7 +26,7 @@ static void same_ticks(struct wire *wire, const struct room_config *c, const str
     tape_free(&replay);
 }
 
-/* 100 of 360 degrees are cast: a line's packets end before it does. Full-sweep's slowest lines last 250 ticks. */
+/* 100 of 360 degrees are cast, so a line's packets end before it does. Full-sweep's slowest lines last 250 ticks. */
 static void test_line_head_with_a_blind_part(void **state)
 {
     static const struct room_config config = {.prr_hz = 10000,
@@ -40,7 +40,7 @@ static void test_line_head_with_a_blind_part(void **state)
     same_ticks(*state, &config, lines, 1500);
 }
 
-/* Fast pulses, in a mirror of three facets; attributes, and colours. */
+/* Fast pulses in a mirror of three facets, with attributes and colours. */
 static void test_line_head_of_any_rate(void **state)
 {
     static const struct room_config config = {.profile = "any-rate",
@@ -54,7 +54,7 @@ static void test_line_head_of_any_rate(void **state)
     same_ticks(*state, &config, lines, 700);
 }
 
-/* Rates change within lines, and the scan is stopped within one; then another. */
+/* Rates change within lines, and the scan is stopped within one; then another follows. */
 static void test_changes_and_a_stop(void **state)
 {
     static const struct room_config config = {
@@ -90,7 +90,7 @@ static void test_a_sphere(void **state)
     same_ticks(*state, &config, lines, 1000);
 }
 
-/* Poses stand between the points, whose places are made with them. */
+/* Poses come between the points whose places they give. */
 static void test_a_head_that_moves(void **state)
 {
     static const struct room_config config = {

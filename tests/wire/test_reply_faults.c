@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Answers of SCIP and CoLa that go wrong on request: none, another one, a late one, an echo before it. What is counted
- * as an answer, and what as a unit of the stream. */
+/* Answers of SCIP and CoLa that go wrong on request: none, another one, a late one, an echo before it. The counts of
+ * answers, and of units of the stream, are checked. */
 #include "tests/wire/room.h"
 #include "tests/wire/unit_faults.h"
 
@@ -26,7 +26,7 @@ static struct head start(struct wire *wire, const char *profile, const char *pro
     return head_start(wire, wire_write_text(wire, "config.yaml", config), args);
 }
 
-/* What is sent at once, and exactly what comes for it. */
+/* A line that is sent at once, and the exact answer. */
 struct step {
     const char *request, *answer;
     int late_ms; /* not before */
@@ -73,7 +73,7 @@ static void check_truth(struct wire *wire)
     free(note);
 }
 
-/* Asks until the truth has a unit of the stream: each answer comes from the head, so this is no busy loop. */
+/* Asks until the truth has a unit of the stream. Each answer comes from the head, so this is no busy loop. */
 static void wait_for_units(struct wire *wire, int fd, const struct step *question)
 {
     for (uint32_t n_dropped = 0, n; n_dropped == 0;) {
@@ -96,8 +96,8 @@ static void check(struct wire *wire, const char *profile, const char *protocol, 
     check_truth(wire);
 }
 
-/* A scan that was asked for comes after its turn, or 0A after 2 s: it is a unit of the stream, and dropped here. The
- * head has booted before the late answer came. Answers keep their order. (299: milliseconds are rounded down twice.) */
+/* A requested scan comes after its turn, or 0A after 2 s. It is a unit of the stream, and dropped here. The head has
+ * booted before the late answer comes. Answers keep their order. (299: milliseconds are rounded down twice.) */
 static void test_scip(void **state)
 {
     static const struct step steps[] = {

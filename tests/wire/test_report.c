@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead report: a noise-free recording deviates by no more than plan and counts allow, a noisy one by its noise, in
- * all layouts; what is not so is said; the page is whole, whatever the names. */
+/* These are tests of scanhead report. A noise-free recording deviates by no more than plan and counts allow, a noisy
+ * one by its noise, in all layouts. Contradictions are reported. The page is complete for any names. */
 #include "tests/wire/room.h"
 
 enum { MAX_SETS = 10 };
 
-/* Names that a page must escape; the room's walls are planes between x, y and z of ROOM_MIN and ROOM_MAX. */
+/* Some names have characters that a page must escape. The room's walls are planes between x, y and z of ROOM_MIN and
+ * ROOM_MAX. */
 static const char CONFIG[] =
     "head: {profile: full-sweep, prr_hz: 20000, lines_hz: 100, pan_deg_s: 240, frames: 1}\n"
     "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
@@ -44,7 +45,7 @@ static void record(struct wire *wire, const char *name, const char *const *sets)
     fail_msg("recording %s", name);
 }
 
-/* The report as JSON; free it. */
+/* Returns the report as JSON; free it. */
 static char *report(struct wire *wire, const char *name, const char *const *sets)
 {
     char config[256], cloud[256];
@@ -58,7 +59,7 @@ static char *report(struct wire *wire, const char *name, const char *const *sets
     return wire_read(wire_path(wire, "report.json"), NULL);
 }
 
-/* The number behind the first `key` after the first `after`. */
+/* Returns the number after the first `key` after the first `after`. */
 static double number(const char *json, const char *after, const char *key)
 {
     char quoted[64];
@@ -75,7 +76,7 @@ static void must_say(const char *json, const char *judgement)
     if (strstr(json, expected) == NULL) fail_msg("not %s: %.300s", judgement, strstr(json, "\"verdict\""));
 }
 
-/* The longest range in the room, from the station to the farthest corner. */
+/* Returns the longest range in the room, from the station to the farthest corner. */
 static double farthest_m(void)
 {
     double sum = 0.0;
@@ -84,8 +85,9 @@ static double farthest_m(void)
     return sqrt(sum);
 }
 
-/* What a point may be off by, by hand: 1e-6 m of the cast and the tolerance of georeferencing (1e-5 m is what the
- * cheapest method has to hold here), half a count an axis, and half a count of each encoder, of which there are 2^20. */
+/* The bound of a point's error, worked out by hand. It is 1e-6 m of the cast and the tolerance of georeferencing (the
+ * cheapest method has to hold 1e-5 m here). Half a count an axis is added, and half a count of each encoder, which has
+ * 2^20. */
 static void noise_free_scans_hold_the_bound(void **state)
 {
     struct wire *wire = *state;
@@ -116,7 +118,7 @@ static void noise_free_scans_hold_the_bound(void **state)
     }
 }
 
-/* In the text, with a second station that has no points. */
+/* Checks the text, with a second station that has no points. */
 static void verdict_is_said_once(struct wire *wire, const char *name, const char *const *sets)
 {
     static const char verdict[] = "Within the expected error";
@@ -140,7 +142,7 @@ static void verdict_is_said_once(struct wire *wire, const char *name, const char
     free(text);
 }
 
-/* The RMS of n normal deviations scatters by 1 / sqrt(2 n) of itself; six times that is exceeded once in 5e8 runs, and
+/* The RMS of n normal deviations scatters by 1 / sqrt(2 n) of itself. Six times that is exceeded once in 5e8 runs, and
  * the seed is fixed. full-sweep's sigma is 3 mm. */
 static void a_noisy_scan_deviates_by_its_noise(void **state)
 {
@@ -155,7 +157,7 @@ static void a_noisy_scan_deviates_by_its_noise(void **state)
     assert_true(n > 10000.0);
     if (fabs(rms_m / 0.003 - 1.0) > 6.0 / sqrt(2.0 * n)) fail_msg("RMS %g m", rms_m);
     assert_true(fabs(number(json, "\"all\"", "expected_rms_m") / 0.003 - 1.0) < 1e-4); /* counts add 1e-5 m */
-    /* Figures stand in the text with four decimals, and the only station is judged as the whole. */
+    /* Figures in the text have four decimals, and the only station is judged like the whole. */
     const double least = number(json, "\"verdict\"", "least_rms_sigmas"),
                  most = number(json, "\"verdict\"", "most_rms_sigmas");
     char allowed[64];
@@ -165,14 +167,14 @@ static void a_noisy_scan_deviates_by_its_noise(void **state)
     assert_true(number(json, "\"stations\"", "least_rms_sigmas") == least);
     free(json);
     verdict_is_said_once(wire, "noisy.ply", on);
-    /* The same cloud is not what a head without noise would record. */
+    /* The same cloud does not fit a head without noise. */
     json = report(wire, "noisy.ply", off);
     must_say(json, "beyond");
     free(json);
 }
 
-/* In a ball of 5 mm the distance from a plane is 3/8 of the radius in the mean (of |x|, x uniform in the unit ball), with
- * a scatter of 0.244 of it. Six standard errors of 10,000 points are 1.5 % of the radius. */
+/* In a ball of 5 mm the mean distance from a plane is 3/8 of the radius (|x| for x uniform in the unit ball). Its
+ * scatter is 0.244 of the radius. Six standard errors of 10,000 points are 1.5 % of the radius. */
 static void noise_of_balls_and_angles_is_known(void **state)
 {
     struct wire *wire = *state;
@@ -199,7 +201,7 @@ static void noise_of_balls_and_angles_is_known(void **state)
     free(json);
 }
 
-/* A station with a scanner of its own is judged by that: one without noise, one with. */
+/* A station with a scanner of its own is judged by that. One is without noise, one with it. */
 static void stations_are_judged_by_their_scanners(void **state)
 {
     struct wire *wire = *state;
@@ -226,8 +228,8 @@ static void stations_are_judged_by_their_scanners(void **state)
     free(json);
 }
 
-/* With a footprint only points on smooth faces are judged. A cloud of another place has none there: whether it lies in
- * the room's middle or farther than everything, it may not pass. A place whose squares no double holds is far. */
+/* With a footprint only points on smooth faces are judged. A cloud of another place has none there, so it may not pass.
+ * It lies in the room's middle, or farther than everything. A place whose squares no double holds is far. */
 static void another_place_does_not_pass(void **state)
 {
     struct wire *wire = *state;
@@ -256,7 +258,7 @@ static void another_place_does_not_pass(void **state)
     }
 }
 
-/* Tags that are opened are closed, in order; only these elements have no end. */
+/* Elements that are opened are closed, in order. Only these elements have no end. */
 static void assert_well_formed(const char *html)
 {
     char open[64][32];
@@ -279,7 +281,7 @@ static void assert_well_formed(const char *html)
     assert_int_equal(depth, 0);
 }
 
-/* Of one point, of one that is far and one that is none, of names with marks: whole by itself in each case. */
+/* The page is complete by itself in each case: with one point, with a far one and none, with marks in names. */
 static void the_page_is_whole(void **state)
 {
     struct wire *wire = *state;

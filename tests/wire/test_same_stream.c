@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* stream_sha256 is the same for every pace, number of threads and link, as the head computes it, as a client
- * hears it and as `record` makes it off line; and a journal brings back a whole session. */
+/* stream_sha256 is the same for every pace, number of threads and link, by the head, by a client and by `record` off
+ * line. A journal brings back a whole session. */
 #include "tests/wire/room.h"
 
 static const struct room_config SHORT = {.profile = "any-rate",
@@ -12,7 +12,7 @@ static const struct room_config SHORT = {.profile = "any-rate",
                                          .links = LINK_YAML_BOTH,
                                          .more = "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
-/* What a session leaves: the hash of the head, of the client, and what was scanned. */
+/* The results of a session: the hash of the head and of the client, and the scan's counts. */
 struct result {
     char head[65], client[65];
     uint64_t pulses, echoes;
@@ -89,7 +89,7 @@ static void test_pace_threads_link(void **state)
     assert_string_equal(first.head, other.head);
 }
 
-/* The hash is no constant: noise and its seed, layout and rate all change it. */
+/* Different streams have different hashes: noise and its seed, layout and rate all change it. */
 static void test_hash_tells_streams_apart(void **state)
 {
     static const char *const sets[] = {"noise.seed=1", "noise.range=on", "output.layout=geo", "head.prr_hz=399999.8",
@@ -111,8 +111,7 @@ static void test_hash_tells_streams_apart(void **state)
     }
 }
 
-/* A head that idles for longer than its queue still has a hash: that of no bytes (FIPS 180-4's example
- * values). */
+/* A head that idles for longer than its queue still has a hash: that of no bytes (FIPS 180-4's example values). */
 static void test_hash_of_an_idle_head(void **state)
 {
     struct wire *wire = *state;
@@ -170,7 +169,7 @@ static void replay(struct wire *wire, const char *config, const char *journal, c
     result->echoes = stats_uint(wire, "echoes");
 }
 
-/* What a head replays ends where its session ended, within a scan, too; a head that was killed left no end. */
+/* A replayed session ends where the journal's session ended, within a scan, too. A head that was killed left no end. */
 static void test_journal_ends_where_its_session_ended(void **state)
 {
     struct wire *wire = *state;
@@ -207,8 +206,8 @@ static void test_journal_ends_where_its_session_ended(void **state)
     free(said);
 }
 
-/* A session in real time: settings change in mid-scan, each at a moment that the clock chose; the first scan
- * is stopped, a second one runs to its end; one command is refused. */
+/* The session runs in real time. Settings change in mid-scan, each at a moment that the clock chose. The first scan is
+ * stopped, a second one runs to its end, and one command is refused. */
 static void live_session(struct wire *wire, const char *config, const char *journal, struct result *result)
 {
     static const char *const changes[] = {"HEAD:PRR 250000.5",      "HEAD:LIN 33.3",     "HEAD:PAN 77.7",

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SAMPLES.md beside the program: its frames are what the encoder writes, its session is what the head says. */
+/* SAMPLES.md beside the program: its frames are those of the encoder, and its session is the head's. */
 #include "tests/wire/room.h"
 
 #include <nettle/sha2.h>
@@ -8,7 +8,7 @@
 
 static const char page_path[] = "drivers/protocol/SAMPLES.md";
 
-/* The text after the `n`-th line that begins so; NULL: there are fewer. */
+/* Returns the text after the `n`-th line that begins so; NULL: there are fewer. */
 static const char *find_line(const char *text, const char *begin, int n)
 {
     for (const char *at = text; (at = strstr(at, begin)) != NULL; at++)
@@ -18,7 +18,7 @@ static const char *find_line(const char *text, const char *begin, int n)
 
 /* ---- frames */
 
-/* Block n of hex into bytes; how many there are, or 0. */
+/* Writes block n of hex into bytes. Returns how many there are, or 0. */
 static size_t read_hex(const char *page, int n, uint8_t *bytes, size_t room)
 {
     size_t len = 0;
@@ -33,7 +33,7 @@ static size_t read_hex(const char *page, int n, uint8_t *bytes, size_t room)
     return len;
 }
 
-/* The attributes of the block come from the frame after it, its colours from the one after that. */
+/* Encodes a block. Its attributes come from the frame after it, its colours from the one after that. */
 static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *out, size_t room)
 {
     struct native_header header;
@@ -125,7 +125,7 @@ static size_t encode_emitter(const uint8_t *payload, size_t len, int64_t t_ns, u
     return native_encode_emitter(out, room, &e, beam, t_ns, 0);
 }
 
-/* Decodes the frame and writes it anew; returns how much, of all frames that come of it. */
+/* Decodes the frame and writes it anew. Returns the length of all frames that it gives. */
 static size_t encode_again(const uint8_t *frame, const uint8_t *next, uint8_t *out, size_t room)
 {
     struct native_header h;
@@ -189,7 +189,7 @@ static void test_frames(void **state)
             native_read_header(frame + i, &header);
             native_seal(again + i, header.seq);
             types |= 1 << header.type;
-            /* The hash in COUNTS.md's words: u8 type, u32 length, payload; these stand at 1 and 4. */
+            /* The hash includes, in COUNTS.md's words: u8 type, u32 length, payload; these are at 1 and 4. */
             if ((header.flags & 3) != 0 || header.type == 5 || header.type == 6 || header.type == 7) continue;
             sha256_update(&sha256, 1, frame + i + 1);
             sha256_update(&sha256, 4, frame + i + 4);
@@ -208,7 +208,7 @@ static void test_frames(void **state)
     free(page);
 }
 
-/* Runs python_client.py; free() its output. */
+/* Runs python_client.py and returns its output; free() it. */
 static char *ask_python(struct wire *wire, const char *what, const char *page, const char *stream)
 {
     const char python[] = "/usr/bin/python3";
@@ -220,7 +220,7 @@ static char *ask_python(struct wire *wire, const char *what, const char *page, c
     return wire_read(wire_path(wire, "python.out"), NULL);
 }
 
-/* What stands below each frame is what the Python client reads in it, and what the tables of the protocol's pages make of it. */
+/* The words below each frame are those of the Python client, and follow from the tables of PROTOCOL.md. */
 static void test_words(void **state)
 {
     struct wire *wire = *state;
@@ -291,7 +291,7 @@ static void say_frame(struct scanhead *sh, const struct scanhead_frame *f)
     }
 }
 
-/* The page's lines with `> ` are sent, and all is written down as the page has it. */
+/* Sends the page's lines with `> `, and writes all down in the page's form. */
 static void play(struct scanhead *sh, const char *session)
 {
     struct scanhead_frame frame;
@@ -328,7 +328,7 @@ static void test_session(void **state)
     head_end(&head, SIGTERM);
     int same = strncmp(session, played, played_len) == 0 && session[played_len] == '`';
     for (char *line = strtok(played, "\n"); !same && line != NULL; line = strtok(NULL, "\n"))
-        print_message("# %s\n", line); /* to be put into the page where the head is right */
+        print_message("# %s\n", line); /* ready for the page, where the head is right */
     assert_true(same);
     free(page);
 }

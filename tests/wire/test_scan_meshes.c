@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes of scans through the real program: a sphere in a closed room is a closed surface, in every format, as readers that
- * are not ours see it; points spread over it; what is no mesh. */
+/* Meshes of scans through the real program. A sphere in a closed room is a closed surface in every format, by other
+ * people's readers. Points are spread over it. Recordings that give no mesh are refused. */
 #include "core/scene.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
@@ -22,7 +22,7 @@ static void run_well(struct wire *wire, const char *program, const char *const *
     assert_int_equal(status, 0);
 }
 
-/* `record` of the sphere, with up to twelve more arguments; -o NAME is a file of the folder. */
+/* Runs `record` on the sphere, with up to twelve more arguments; -o NAME is a file of the folder. */
 static void record(struct wire *wire, const char *const *more)
 {
     char path[12][128], config[128];
@@ -56,7 +56,7 @@ static int read_numbers(struct wire *wire, const char *name, const char *format,
     return n;
 }
 
-/* By Python's struct and the header alone. */
+/* Reads it by Python's struct and the header alone. */
 static void read_ply(struct wire *wire, const char *name, int has_faces)
 {
     char script[PATH_MAX], in[128], points[128];
@@ -104,7 +104,7 @@ static void assert_closed(void)
     assert_int_equal(n_vertices - n_edges + n_faces, 2);
 }
 
-/* Ranges have steps of a millimetre on the wire at most: each point is within one of a wall, and none is outside. */
+/* Ranges have steps of a millimetre on the wire at most. Each point is within one of a wall, and none is outside. */
 static void assert_on_walls(void)
 {
     for (int i = 0; i < n_vertices; i++) {
@@ -142,7 +142,7 @@ static void a_sphere_in_every_format(void **state)
         for (uint32_t t = 0; t < scene->n_triangles; t++)
             for (int k = 0; k < 3; k++)
                 sum += scene->vertex_m[scene->triangle[t][k]][2] - vertex[corner[t][k]][2];
-        /* triangles come in the same order, each corner within half a float's step of 6.3 m */
+        /* Triangles come in the same order, each corner within half a float's step of 6.3 m. */
         assert_true(fabs(sum) / (3 * N_FACES) < 4e-7);
         scene_free(scene);
     }
@@ -182,7 +182,7 @@ static int is_same(struct wire *wire, const char *name, const char *other)
     return same;
 }
 
-/* Beside the mesh of all, each has its own image still: its colours have limits of its own. */
+/* Beside the mesh of all, each station's mesh still has its image: its colours have limits of its own. */
 static void each_station_beside_all(void **state)
 {
     struct wire *wire = *state;
@@ -242,7 +242,8 @@ static void what_is_refused(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
-/* By its chunks: images lie within, and numbers begin at multiples of their size, as the format demands. */
+/* The file's chunks are read: images lie within, and numbers begin at multiples of their size, as the format
+ * demands. */
 static void a_glb_holds_its_images(void **state)
 {
     static const char script[] =

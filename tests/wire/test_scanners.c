@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Several scanners in one scene, range limits and targets: what `record` writes of them, point by point. The room's
- * walls are known planes; a board stands before one of them. */
+/* Several scanners in one scene, range limits and targets: the recorded points are checked one by one. The room's walls
+ * are known planes; a board stands before one of them. */
 #include "tests/wire/room.h"
 
 /* Its label is 6, after the walls. */
 static const char BOARD[] = "v 2 -2 -1\nv 2 2 -1\nv 2 2 2\nv 2 -2 2\no board\nusemtl wood\nf -4 -3 -2 -1\n";
 
-/* Of three stations the middle one has a Velodyne. */
+/* The middle one of three stations has a Velodyne. */
 static const char CONFIG[] =
     "head: {profile: full-sweep, prr_hz: 20000, lines_hz: 50, pan_deg_s: 150, pan_stop_deg: 60}\n"
     "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
@@ -29,7 +29,7 @@ static void begin(struct wire *wire)
     wire_write_text(wire, "config.yaml", CONFIG);
 }
 
-/* scanhead record config.yaml -o NAME --ascii --quiet and more. The exit status. */
+/* Runs scanhead record config.yaml -o NAME --ascii --quiet and more. Returns the exit status. */
 static int record(struct wire *wire, const char *name, const char *const *more)
 {
     char config[352], out[352];
@@ -75,11 +75,11 @@ static struct vertex cloud_next(struct cloud *c)
     return v;
 }
 
-/* Half a count of full-sweep's encoders, of 2^20 a turn, is 3e-6 rad: over 12 m, by two angles, 5e-5 m; a range's count
+/* Half a count of full-sweep's encoders, of 2^20 a turn, is 3e-6 rad: over 12 m, by two angles, 5e-5 m. A range's count
  * and the text's last digit are less. */
 static const double NEAR_M = 6e-5;
 
-/* On one of the walls, or the board. */
+/* Returns whether the point is on one of the walls, or the board. */
 static int is_on_plane(const double p[3])
 {
     for (int w = 0; w < 6; w++)
@@ -87,8 +87,8 @@ static int is_on_plane(const double p[3])
     return fabs(p[0] - 2.0) < NEAR_M;
 }
 
-/* One cloud of all and one of each: the same points, each with the number of its scanner's station; and they are those of
- * the scanners, which the Velodyne's elevations show: odd degrees from -15 to 15, by its manual. */
+/* There are one cloud of all and one of each, with the same points, each with the number of its scanner's station. They
+ * are the scanners' points: the Velodyne's elevations are odd degrees from -15 to 15, by its manual. */
 static void test_together(void **state)
 {
     struct wire *wire = *state;
@@ -113,7 +113,7 @@ static void test_together(void **state)
             if (fabs(deg - odd) > 0.001 || fabs(odd) > 15.0) fail_msg("an elevation of %.4f deg", deg);
         }
         n += one.n;
-        /* Alone it is the same file. */
+        /* Alone it gives the same file. */
         assert_int_equal(record(wire, "one.ply", (const char *const[]){"--station", number, "--ascii", NULL}), 0);
         char *alone = wire_read(wire_path(wire, "one.ply"), NULL);
         assert_string_equal(alone, one.text);
@@ -145,7 +145,7 @@ static void test_what_a_file_cannot_hold(void **state)
     expect_refusal(wire, "a.ptx", all, "this head fires beams in turn");
     expect_refusal(wire, "a.ply", (const char *const[]){"--split", "--each", NULL}, "allowed one of them");
     assert_int_equal(record(wire, "a.ptx", (const char *const[]){"--station", "1", NULL}), 0);
-    /* Each stream by itself is one head's. */
+    /* Each stream by itself belongs to one head. */
     char ply[352];
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "a.ply"));
     assert_int_equal(record(wire, "a.shs", (const char *const[]){"--station", "all", "--split", "-o", ply, NULL}), 0);
@@ -201,7 +201,7 @@ static void test_the_head_on_the_wire(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Shots, points, and points that pass a test, of the first station's scan. */
+/* Shots, points, and points that pass a test, in the first station's scan. */
 struct tally {
     uint64_t shots, points, chosen;
 };
@@ -230,7 +230,7 @@ static int is_within(const struct vertex *v)
     return v->range_m >= 3.0 && v->range_m <= 5.0;
 }
 
-/* No range is within a micrometre of a limit by chance: 8,000 of them over metres. */
+/* No range is within a micrometre of a limit by chance: 8,000 of them spread over metres. */
 static void test_range_limit(void **state)
 {
     struct wire *wire = *state;
@@ -254,7 +254,7 @@ static int is_board_alone(const struct vertex *v)
     return v->label == 0 && fabs(v->p[0] - 2.0) < NEAR_M;
 }
 
-/* With the walls as the target a pulse to the board is an empty shot, or meets the wall behind it. */
+/* With the walls as the target, a pulse to the board is an empty shot, or meets the wall behind it. */
 static void test_target(void **state)
 {
     struct wire *wire = *state;
@@ -277,7 +277,7 @@ static void test_target(void **state)
     t = tally_of(wire, board, is_board_alone); /* the only label */
     assert_int_equal(t.points, whole.chosen);
     assert_int_equal(t.chosen, t.points);
-    /* Of footprints that the board cuts, the part on the wall stays: board and wall are metres apart, two echoes. */
+    /* If the board cuts a footprint, the part on the wall stays: board and wall are metres apart, two echoes. */
     const char *const rings[] = {"beam.mode=rings", NULL};
     const char *const behind[] = {"beam.mode=rings", "scene.target.objects.0=[!b]*", walls[3], NULL};
     const struct tally edges = tally_of(wire, rings, is_board);
@@ -291,8 +291,8 @@ static void test_target(void **state)
                    "scene.target.others: but there are no scene.target.objects");
 }
 
-/* What is wrong with a scanner whose turn comes late is said before the first scan: no file is there. The
- * room isn't 9 m high. */
+/* An error of a scanner whose turn comes late is reported before the first scan, and there is no file. The room isn't 9
+ * m high. */
 static void test_wrong_at_the_end(void **state)
 {
     struct wire *wire = *state;
@@ -324,8 +324,8 @@ static unsigned times_said(struct wire *wire, const char *text)
     return n;
 }
 
-/* What several scanners warn of is one warning, with their stations; what all warn of is the first one's. A step of 7 deg
- * divides no turn. */
+/* A warning of several scanners is printed once, with their stations. A warning of all is printed as the first one's. A
+ * step of 7 deg divides no turn. */
 static void test_warnings_are_said_once(void **state)
 {
     struct wire *wire = *state;

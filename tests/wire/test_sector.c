@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Panoramas by angle through the real program: a sector of a sphere and a circle on the wire, in the client in Python,
- * and as rows and columns of files; what is said of a step that doesn't divide; tripods with any number of threads. */
+ * and as rows and columns of files. A step that doesn't divide is reported. Tripods work with any number of threads. */
 #include "tests/wire/room.h"
 
 #include <math.h>
@@ -9,8 +9,8 @@ enum { MAX_POINTS = 4096 };
 static const char PYTHON[] = "/usr/bin/python3";
 static const double RAD = M_PI / 180;
 
-/* What is recorded: of 180 / gaps degrees from ring to ring those from ring `first` on, or a circle; of 360 / steps
- * degrees along a ring those from step `from` on. */
+/* The recorded part. Rings are 180 / gaps degrees apart: those from ring `first` on, or a circle. Steps along a ring
+ * are 360 / steps degrees apart: those from step `from` on. */
 struct panorama {
     const char *head;
     int gaps, steps;
@@ -58,7 +58,7 @@ static void run(struct wire *wire, const char *const *args)
     assert_int_equal(status, 0);
 }
 
-/* A path that lasts. */
+/* Returns a path that stays good. */
 static const char *path_of(const struct wire *wire, const char *name, char buf[128])
 {
     snprintf(buf, 128, "%s", wire_path(wire, name));
@@ -70,8 +70,8 @@ static double ring_deg(const struct panorama *p, int ring)
     return p->gaps == 0 ? p->circle_deg : -90 + 180.0 * (p->first + ring) / p->gaps;
 }
 
-/* Angles to half a count of 2^-32 of a turn; at 11 m in the room that moves a range by less than 1e-6 m but at walls
- * that are met at a small angle, and there are none here. */
+/* Angles are right to half a count of 2^-32 of a turn. At 11 m in the room that moves a range by less than 1e-6 m.
+ * Walls that are met at a small angle are the exception, and there are none here. */
 static void check_shot(const struct panorama *p, const struct scanhead_point *at, int ring, int step)
 {
     struct room_ray ray;
@@ -83,7 +83,7 @@ static void check_shot(const struct panorama *p, const struct scanhead_point *at
     assert_true(fabs(at->range_m - ray.range_m) < 0.6e-6);
 }
 
-/* By its own account of itself: elevation of ring i, azimuth of step s. */
+/* Checks the emitter's own account: elevation of ring i, azimuth of step s. */
 static void check_emitter(const struct panorama *p, const struct scanhead_emitter *e)
 {
     assert_int_equal(e->kind, SCANHEAD_EMIT_SPHERE);
@@ -143,7 +143,7 @@ static void assert_python_agrees(struct wire *wire, const struct panorama *p)
     free(text);
 }
 
-/* E57 keeps its bytes in pages of 1020 with a sum behind them. */
+/* E57 keeps its bytes in pages of 1020, each with a checksum after it. */
 static char *e57_text(const char *path, size_t *n)
 {
     size_t len;
@@ -197,7 +197,8 @@ static void assert_said(const struct wire *wire, const char *file, const char *w
     free(text);
 }
 
-/* Cells of a grid are two triangles; a ring closes where it is whole; only a ring at 90 deg is a pole, with a fan. */
+/* Cells of a grid are two triangles, and a ring closes where it is whole. Only a ring at 90 deg is a pole, with a
+ * fan. */
 static void meshes_of_parts(void **state)
 {
     static const struct {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Sessions of protocols that are not native: they don't touch the stream, take part in journals, hold back what may
- * wait, and lose whole units where a client doesn't read. */
+/* Sessions of protocols that are not native. They don't change the stream, are part of journals, hold the head back in
+ * pace fast, and lose whole units where a client doesn't read. */
 #include "tests/common/thorough.h"
 #include "tests/wire/room.h"
 
@@ -26,7 +26,8 @@ static void say(struct client *c, const char *text)
     raw_send(c->fd, text, strlen(text));
 }
 
-/* The next answer without its empty line, NUL-terminated; NULL: the connection is over. Good until the next call. */
+/* Returns the next answer without its empty line, NUL-terminated and good until the next call; NULL: the connection is
+ * over. */
 static const char *answer(struct client *c)
 {
     static char text[1 << 16];
@@ -62,7 +63,7 @@ static void expect(struct client *c, const char *text, const char *begin)
     if (strncmp(said, begin, strlen(begin)) != 0) fail_msg("%s: %s", text, said);
 }
 
-/* Up to the end of the head's start: it says when by accepting a measurement. */
+/* Waits for the end of the head's boot, which it shows by accepting a measurement. */
 static void laser_on(struct client *c)
 {
     while (strncmp(ask(c, "BM\n"), "BM\n1", 4) == 0)
@@ -81,7 +82,7 @@ static void wait_for_scan(const char *at)
 
 /* ---- the stream is the same with and without them */
 
-/* One head alone on a null link, then with other protocols beside it. */
+/* A head runs alone on a null link, then with other protocols beside it. */
 static void expect_same(struct wire *wire, struct room_config config, const char *beside)
 {
     static const char *const args[] = {"--start",
@@ -126,8 +127,8 @@ static void the_stream_is_the_same(void **state)
     assert_int_equal(len, 289351 / 192 * 1206);
 }
 
-/* ---- a client that connects is answered at once, before the first scan, in it and between scans; and what it makes
- * the head do stands in the journal, which does the same again */
+/* ---- a client that connects is answered at once, before the first scan, in it and between scans. Its commands to the
+ * head are in the journal, which repeats them. */
 
 static void what_a_client_does_is_replayed(void **state)
 {
@@ -181,8 +182,8 @@ static void many_come_one_after_the_other(void **state)
         if (i % 3 != 2) refused += answer(&c) == NULL;
         close(c.fd);
     }
-    /* None is turned away because of the one before, except where the system delivers the end of one and the begin of
-     * the next out of order, on two processors: seen once in 50,000 on a busy machine. */
+    /* None is turned away because of the one before. The exception is where the system delivers the end of one and the
+     * begin of the next out of order, on two processors: seen once in 50,000 on a busy machine. */
     assert_true(refused <= connections / 100);
     head_end(&head, SIGTERM);
     assert_true(stats_uint(wire, "pulses") > 0); /* the scan went on */
@@ -191,8 +192,8 @@ static void many_come_one_after_the_other(void **state)
 
 /* ---- a client that doesn't read */
 
-/* Streams scans and does not read them until the system holds no more; then all that comes is whole, and what is
- * missing is what was counted. */
+/* Streams scans and does not read them until the system holds no more. Then all that comes is whole, and the missing
+ * units are the counted ones. */
 static void a_client_that_does_not_read(void **state)
 {
     struct wire *wire = *state;
@@ -238,8 +239,8 @@ static void a_client_that_does_not_read(void **state)
     assert_true(stats_link_uint(wire, "lost_units") > 0);
 }
 
-/* The same in the pace fast: nothing is lost, the head waits. 2 MB of scans; the head makes them faster than a pty and
- * this client carry them, and its queue has room for a fraction. */
+/* In the pace fast nothing is lost, as the head waits. There are 2 MB of scans. The head makes them faster than a pty
+ * and this client carry them, and its queue has room for a fraction. */
 static void a_fast_head_waits(void **state)
 {
     struct wire *wire = *state;
@@ -257,7 +258,7 @@ static void a_fast_head_waits(void **state)
         const char *text = answer(&c);
         assert_memory_equal(text, "MD0000108001000\n99b\n", 20);
         memcpy(t, text + 20, 4);
-        /* 25 ms from scan to scan by the device's own clock: 24 bits, 6 a character */
+        /* By the device's own clock scans are 25 ms apart; it has 24 bits, 6 a character. */
         int ms = 0, was = 0;
         for (int i = 0; i < 4; i++) {
             ms = ms << 6 | (t[i] - 48);
@@ -271,7 +272,7 @@ static void a_fast_head_waits(void **state)
     assert_int_equal(stats_link_uint(wire, "lost_units"), 0);
 }
 
-/* ---- garbage as fast as it can be sent, and a client that is gone in the middle of an answer */
+/* ---- garbage as fast as it can be sent, and a client that leaves in the middle of an answer */
 
 static void garbage_and_sudden_ends(void **state)
 {
@@ -286,7 +287,7 @@ static void garbage_and_sudden_ends(void **state)
         head_start(wire, room_config_write(wire, &config), (const char *const[]){"--set", "head.start=on", NULL});
     const char *at = head_endpoint(&head, "tcp");
     wait_for_scan(at);
-    for (int i = 0; i < 20; i++) { /* with scans under way to it */
+    for (int i = 0; i < 20; i++) { /* scans are on their way to it */
         c = (struct client){.fd = raw_connect(at)};
         expect(&c, "BM\nMD0000108001000\nMD00", "BM\n00P");
         assert_memory_equal(answer(&c), "MD0000108001000\n00P", 19);
@@ -318,9 +319,9 @@ static void garbage_and_sudden_ends(void **state)
     assert_true(stats_uint(wire, "pulses") > 0); /* the scan went on */
 }
 
-/* ---- the session's end from the head's side */
+/* ---- the head ends the session */
 
-/* RB twice within a second: the sensor starts anew, and its connection is over; the port stays. */
+/* RB twice within a second starts the sensor anew. Its connection is over, and the port stays. */
 static void a_session_that_the_head_ends(void **state)
 {
     struct wire *wire = *state;

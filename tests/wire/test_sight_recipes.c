@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a station sees, mapped or not: the ready configurations give the same stream with cast.sight on and off, and a
- * head that can have no map says so. */
+/* Scans with and without a visibility map. The ready configurations give the same stream with cast.sight on and off,
+ * and a head that can have no map says so. */
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
 
@@ -12,9 +12,9 @@ struct recipe {
     const char *sets[5]; /* short scans, of which a map shows all */
 };
 
-/* demo and foliage: single rays, and beams, without the seconds of planning which. Where the pan of a
- * recipe stands still, one that moves as well. The last three take half of the time, and show what others do:
- * they run with THOROUGH=1. */
+/* demo and foliage, with single rays and with beams, without the seconds of planning. If the pan of a recipe stands
+ * still, there is also one that moves. The last three take half of the time, and show only what others show, so they
+ * run with THOROUGH=1. */
 static const struct recipe RECIPES[] = {
     {"demo", 1, {"head.station=3", "head.pan_stop_deg=30", "beam.mode=single"}},
     {"demo", 1, {"head.pan_stop_deg=1", "beam.mode=single", "output.layout=polar"}},
@@ -33,7 +33,7 @@ static const struct recipe RECIPES[] = {
     {"speed", 1, {"head.frames=1", "head.pan_stop_deg=2"}},
 };
 
-/* What `record` makes of it: the hash, and how many pulses. */
+/* Records it. Returns the number of pulses, and writes the hash. */
 static uint64_t record(struct wire *wire, const struct recipe *recipe, const char *sight, char hash[65])
 {
     char config[128], stats[352];
@@ -70,7 +70,7 @@ static void test_recipes(void **state)
     }
 }
 
-/* One line: key, reason, what is allowed. */
+/* There is one line: key, reason, allowed values. */
 static void test_not_possible(void **state)
 {
     struct wire *wire = *state;

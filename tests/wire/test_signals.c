@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink
- * gone, files whole. */
+/* SIGTERM and SIGINT end the program in good order at any moment: status 0, statistics written, symlink gone, files
+ * whole. */
 #include <inttypes.h>
 #include "tests/wire/room.h"
 
@@ -19,7 +19,7 @@ static void expect_symlink(const struct wire *wire, int there)
     assert_int_equal(lstat(wire_path(wire, "port"), &st) == 0, there);
 }
 
-/* With nobody there, in the middle of boot. */
+/* The signal comes in the middle of boot, without a client. */
 static void test_at_once(void **state)
 {
     struct wire *wire = *state;
@@ -35,7 +35,7 @@ static void test_at_once(void **state)
     }
 }
 
-/* In mid-scan, at each pace, with a reader, who gets everything up to the end of the scan; and with one who
+/* The signal comes in mid-scan, at each pace. One reader gets everything up to the end of the scan, and another one
  * does not read. */
 static void in_mid_scan(struct wire *wire, const char *pace, int signal_number)
 {
@@ -67,7 +67,7 @@ static void test_in_mid_scan(void **state)
     in_mid_scan(*state, "fast", SIGINT);
 }
 
-/* As `timeout` does. The second is sent when the first was taken: two that wait would be one. */
+/* Signals come as from `timeout`. The second is sent when the first was taken: two that wait would be one. */
 static void send_twice(pid_t pid, int signal_number)
 {
     char path[64], line[128];
@@ -124,7 +124,7 @@ static void test_at_pace_step(void **state)
 
 /* ---- record */
 
-/* The points of a binary PLY by its own header: the file must be as long as that says. */
+/* Returns the points of a binary PLY by its own header. The file must have the length that follows from it. */
 static uint64_t ply_points(const struct wire *wire, const char *name)
 {
     static const struct {
@@ -150,8 +150,7 @@ static uint64_t ply_points(const struct wire *wire, const char *name)
     return n;
 }
 
-/* Starts `record SOURCE -o FILE` and interrupts it once the file grows: waits by watching what is being
- * written. */
+/* Starts `record SOURCE -o FILE` and interrupts it once the file grows, which it sees by a watch on the file. */
 static void interrupt_record(struct wire *wire, const char *const *args, int signal_number, int expected)
 {
     pid_t pid = wire_spawn(wire, args, "out", "err", -1);
@@ -188,7 +187,8 @@ static uint64_t le64(const char *p)
     return v;
 }
 
-/* The points of a LAS file by its header, whose records are of 32 bytes; and it must be as long as that says. */
+/* Returns the points of a LAS file by its header, whose records have 32 bytes. The file must have the length that
+ * follows from it. */
 static uint64_t las_points(const struct wire *wire, const char *name)
 {
     size_t len;
@@ -200,7 +200,7 @@ static uint64_t las_points(const struct wire *wire, const char *name)
     return n;
 }
 
-/* An E57 file is finished when its header tells its length. */
+/* An E57 file is finished when its header has its length. */
 static void expect_whole_e57(const struct wire *wire, const char *name)
 {
     size_t len;
@@ -210,7 +210,7 @@ static void expect_whole_e57(const struct wire *wire, const char *name)
     free(e57);
 }
 
-/* A PTX grid has columns times rows lines behind its head of ten. */
+/* A PTX grid has columns times rows lines after its head of ten. */
 static void expect_whole_ptx(const struct wire *wire, const char *name)
 {
     char *ptx = wire_read(wire_path(wire, name), NULL);
@@ -263,7 +263,7 @@ static void test_record_from_a_head(void **state)
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "echoes")); /* to the last one */
 }
 
-/* full-sweep, but for one figure, in seconds. */
+/* Writes a profile like full-sweep, with another value of one key, in seconds. */
 static void profile_write(const struct wire *wire, const char *key, const char *value)
 {
     char *text = wire_read("config/heads/full-sweep.yaml", NULL), line[32];
@@ -280,8 +280,8 @@ static void profile_write(const struct wire *wire, const char *key, const char *
     free(text);
 }
 
-/* A head that takes long for the step named, and a recorder that waits for it: as soon as `state` is seen, it is
- * interrupted. */
+/* A head takes long for the named step, and a recorder waits for it. The recorder is interrupted as soon as `state` is
+ * seen. */
 static void stop_early(struct wire *wire, const char *key, const char *state, int signal_number, const char *says)
 {
     struct room_config config = ENDLESS;
@@ -311,7 +311,7 @@ static void test_record_before_the_scan(void **state)
     stop_early(*state, "spin_up_s", "spin-up", SIGTERM, "interrupted; missing: the scan\n");
 }
 
-/* Which stations an interruption left out; the first one's scan goes on for hours. */
+/* The output names the stations that an interruption left out. The first one's scan goes on for hours. */
 static void test_record_of_stations(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SITE:POSE on the wire: the scan after it is that of `record` with a configuration that says that place, in the paces fast
- * and step; the journal brings the session back; and what comes at the wrong time is refused. */
+/* These are tests of SITE:POSE on the wire. The scan after it is that of `record` with a configuration of that place,
+ * in the paces fast and step. The journal brings the session back. At the wrong time it is refused. */
 #include "tests/wire/room.h"
 
 static const struct room_config SHORT = {.profile = "any-rate",
@@ -12,7 +12,7 @@ static const struct room_config SHORT = {.profile = "any-rate",
                                          .links = LINK_YAML_TCP,
                                          .more = "loop: {queue_ms: 1000}\n"};
 
-/* Within the room, and turned; no other digits than these say it. */
+/* The place is within the room, and turned. No other text has these digits. */
 #define PLACE   "0.3,-0.2,0.15,77.5,3,-2"
 #define MOVE    "SITE:POSE 1," PLACE
 #define THERE_1 "stations[0].position_m=[0.3, -0.2, 0.15]"
@@ -36,7 +36,7 @@ static void expect_error(struct scanhead *sh, const char *line, const char *begi
     if (strncmp(reply, begin, strlen(begin)) != 0) fail_msg("%s: %s", line, reply);
 }
 
-/* The event that says so, and with it the anchor of now. */
+/* Waits for the event of the move, and for the new anchor with it. */
 static void hear_of_it(struct scanhead *sh)
 {
     static const double there[3] = {0.3, -0.2, 0.15};
@@ -80,7 +80,7 @@ static void replay(struct wire *wire, const char *config, char hash[65])
     stats_hash(wire, hash);
 }
 
-/* No time passes but what is granted: a station moves in no time. */
+/* Only granted time passes, and a station moves in no time. */
 static void stepped(struct wire *wire, const char *config, char hash[65])
 {
     const char *const more[] = {"--pace", "step", NULL};

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* A reader that cannot follow: in real time it loses whole frames and is told exactly how many, and nobody
- * else loses any; at the pace `fast` the run waits for it and nothing is lost. */
+/* A reader that cannot follow. In real time it loses whole frames and gets their exact number, and other readers lose
+ * none. At the pace `fast` the run waits for it and nothing is lost. */
 #include "tests/wire/room.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
 
-/* 20 MB/s: while the slow reader reads nothing, the buffers on its way (1 MiB of the head, at most 6 of the
- * kernel's for a receiver that asks for none) and the queue of 500 ms fill in a second. */
+/* The rate makes 20 MB/s. While the slow reader reads nothing, the buffers to it and the queue of 500 ms fill in a
+ * second. The buffers are 1 MiB of the head, and at most 6 of the kernel's for a receiver that asks for none. */
 static const struct room_config RATE = {
     .prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_TCP};
 enum { HOLD_BYTES = 40 << 20 };
 
-/* What a reader has seen. */
+/* A reader's counts. */
 struct tally {
     struct scanhead *sh;
     uint64_t frames, local, pulses, told_lost, told_pulses, told_events, told_total;
@@ -84,7 +84,8 @@ static void check_lost_nothing(const struct tally *t)
     assert_int_equal(t->last_seq - t->first_seq + 1, t->frames);
 }
 
-/* Once the scan is over, for a reader that was not there: an error for each episode, which may lose frames more than once. */
+/* Checks the errors once the scan is over, for a reader that was not there. There is an error for each episode, which
+ * may lose frames more than once. */
 static void check_errors(const struct head *head, uint64_t losses)
 {
     struct scanhead *sh = client_open(head_endpoint(head, "tcp"));
@@ -100,8 +101,8 @@ static void check_errors(const struct head *head, uint64_t losses)
 static void overtake(struct wire *wire, const char *more_yaml)
 {
     struct room_config config = RATE;
-    /* The fast one has the same queue of 500 ms, but a receive buffer of megabytes and a thread that does
-     * nothing else. */
+    /* The fast reader has the same queue of 500 ms, but a receive buffer of megabytes and a thread that does nothing
+     * else. */
     config.more = more_yaml;
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
@@ -126,9 +127,9 @@ static void overtake(struct wire *wire, const char *more_yaml)
     atomic_store(&fast.stop, 1);
     follow(&slow);
     pthread_join(thread, NULL);
-    /* On a machine that is busy with other things for 500 ms the fast one may be slow for once: then it is told, too. */
+    /* A machine that is busy for 500 ms may make the fast one slow for once. Then it has announced losses, too. */
     check_nothing_bad(&fast);
-    /* What it was told may begin before the first frame that is counted here, never end before a gap. */
+    /* The announced losses may begin before the first frame that is counted here, but never end before a gap. */
     assert_true(fast.frames + fast.told_lost >= fast.last_seq - fast.first_seq + 1);
     if (fast.told_events == 0) check_lost_nothing(&fast);
     check_nothing_bad(&slow);
@@ -149,7 +150,7 @@ static void overtake(struct wire *wire, const char *more_yaml)
     assert_int_equal(stats_uint(wire, "reader_lost_frames"), slow.told_lost + fast.told_lost);
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
     assert_int_equal(stats_uint(wire, "cast_pulses"), stats_uint(wire, "pulses"));
-    /* To the pulse, for each: what it got and what it was told is what the head delivered. */
+    /* For each reader, received and announced pulses are those that the head delivered, to the pulse. */
     assert_int_equal(slow.pulses + slow.told_pulses, stats_uint(wire, "pulses"));
     assert_int_equal(fast.pulses + fast.told_pulses, stats_uint(wire, "pulses"));
 }
@@ -159,7 +160,7 @@ static void test_realtime(void **state)
     overtake(*state, "loop: {queue_ms: 500, late_ms: 10000}\n");
 }
 
-/* Half of the frames are of attributes, and count like any other. */
+/* Half of the frames are attributes, and count like any other. */
 static void test_attributes(void **state)
 {
     overtake(*state, "loop: {queue_ms: 500, late_ms: 10000}\noutput: {attributes: on}\n");
@@ -197,7 +198,7 @@ static void test_fast(void **state)
     assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
 }
 
-/* What the recorder counts, and what the head says. The recorder was there for the whole scan. */
+/* The recorder's counts equal the head's. The recorder was there for the whole scan. */
 static void check_recorder(struct wire *wire, const char *stats)
 {
     uint64_t fired = stats_uint(wire, "fired_pulses"), cast = stats_uint(wire, "cast_pulses"),
@@ -215,8 +216,8 @@ static void check_recorder(struct wire *wire, const char *stats)
     assert_int_equal(stats_uint(wire, "reader_lost_pulses"), stats_uint(wire, "missing_pulses"));
 }
 
-/* A recorder that stands still until the scan is over has lost its end, after which a head says nothing by itself: it
- * is told the loss, asks, and ends. */
+/* A recorder that stands still until the scan is over has lost its end. After that a head sends nothing by itself. The
+ * recorder is told the loss, asks, and ends. */
 static void test_end_lost(void **state)
 {
     struct wire *wire = *state;
@@ -246,8 +247,8 @@ static void test_end_lost(void **state)
     check_recorder(wire, stats);
 }
 
-/* A reader that takes nothing until the head is gone finds what the kernel had by then. The head counts so much as
- * received, to the pulse, and the rest as left out. */
+/* A reader that takes nothing until the head is gone finds the bytes that the kernel had by then. The head counts
+ * exactly these pulses as received, and the rest as left out. */
 static void test_head_ends_first(void **state)
 {
     struct wire *wire = *state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead soak: each scenario for two seconds; the sheet against the truth about what was injected.
+/* scanhead soak: each scenario runs for two seconds, and the sheet is compared with the truth about the injected
+ * faults.
  *
  * The heads run beside each other and mostly wait. Their ticks may be late, so that a busy machine costs no pulses. */
 #include "tests/wire/room.h"
@@ -38,7 +39,7 @@ static const char *path_of(const struct wire *wire, const char *name, const char
     return wire_path(wire, file);
 }
 
-/* The scenarios that come with this source. */
+/* Starts one of the scenarios that come with this source. */
 static pid_t start(struct wire *wire, const char *name, const char *seconds, const char *link)
 {
     char config[352], file[352], json[352], truth[352], out[64], err[64];
@@ -67,7 +68,7 @@ static uint64_t value_after(const char *text, const char *key)
     return strtoull(at + strlen(quoted), NULL, 10);
 }
 
-/* The sum over the whole sheet stands behind all rows. */
+/* The sum over the whole sheet comes after all rows. */
 static uint64_t total(const char *json, const char *key)
 {
     const char *at = strstr(json, "\"clean_sha256\"");
@@ -75,7 +76,7 @@ static uint64_t total(const char *json, const char *key)
     return value_after(at, key);
 }
 
-/* How many lines of the truth have all of these, and not the last. */
+/* Returns how many lines of the truth have all of these texts, but not the last. */
 static uint64_t count_lines(const char *truth, const char *has, const char *and, const char *but)
 {
     uint64_t n = 0;
@@ -94,7 +95,7 @@ static void check_kind(const char *name, const char *json, const char *truth, co
     char quoted[64], row[64];
     snprintf(quoted, sizeof quoted, "\"kind\":\"%s\"", kind);
     snprintf(row, sizeof row, "\"fault\": \"%s\"", kind);
-    /* Faults in the head have no link, and each link has a row of them; here only one link has a client. */
+    /* Faults in the head have no link, and each link has a row of them. Only one link has a client here. */
     uint64_t n = count_lines(truth, quoted, "\"link\":1", "resealed") + count_lines(truth, quoted, "", "\"link\":");
     n -= count_lines(truth, quoted, "\"ended\"", "\"link\":");
     const char *at = strstr(json, row);
@@ -110,7 +111,7 @@ static void check(struct wire *wire, const char *name, const char *const *must)
     assert_non_null(strstr(json, "\"good\": true"));
     for (int i = 0; i < 16 && must[i] != NULL; i++)
         check_kind(name, json, truth, must[i]);
-    /* Frames that differ and were accepted are the resealed ones, one by one. */
+    /* Frames that differ and were accepted are exactly the resealed ones. */
     const uint64_t resealed = count_lines(truth, "resealed", "", "?");
     assert_int_equal(total(json, "wrongly_accepted"), resealed);
     if (strcmp(name, "hostile-wire") == 0) assert_true(resealed != 0);
@@ -154,7 +155,7 @@ static void test_a_terminal(void **state)
     }
 }
 
-/* In the pace fast the client holds the head back; the sheet is as good. */
+/* In the pace fast the client holds the head back. The sheet is as complete. */
 static void test_the_pace_fast(void **state)
 {
     struct wire *wire = *state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Several scans of one recording: in one file, and each in its own. */
+/* Several scans of one recording, in one file and each in its own. */
 #include "tests/wire/room.h"
 
 static const char CONFIG[] = "head: {profile: full-sweep, prr_hz: 10000, lines_hz: 40, pan_deg_s: 180, frames: 1}\n"
@@ -31,7 +31,7 @@ static void expect_same(const struct wire *wire, const char *a, const char *b)
     free(b_text);
 }
 
-/* `record IN -o OUT` in the folder. */
+/* Runs `record IN -o OUT` in the folder. */
 static void convert(struct wire *wire, const char *in, const char *out)
 {
     char from[352], to[352];
@@ -40,8 +40,8 @@ static void convert(struct wire *wire, const char *in, const char *out)
     record(wire, (const char *const[]){"record", from, "-o", to, "--quiet", NULL});
 }
 
-/* The raw streams one after the other are the whole stream but for the times of what is said between scans; and what
- * each of them holds is what is in the files beside it. */
+/* The raw streams one after the other are the whole stream, but for the times of frames between scans. Each has the
+ * same contents as the files beside it. */
 static void test_split(void **state)
 {
     struct wire *wire = *state;

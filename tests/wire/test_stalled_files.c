@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that a head writes beside its stream, and nobody who reads them: a FIFO takes the place of a slow disk. No pulse
- * is lost by that and no client waits; what the files lack is counted in them, by SYST:LOST? and in the statistics. */
+/* A head writes files beside its stream, and nobody reads them: a FIFO takes the place of a slow disk. That loses no
+ * pulse, and no client waits. Lines that the files lack are counted in them, by SYST:LOST? and in the statistics. */
 #include <pthread.h>
 
 #include "drivers/protocol/native.h"
@@ -47,7 +47,7 @@ static void fifo_read(struct fifo *fifo)
     assert_int_equal(pthread_create(&fifo->thread, NULL, fifo_main, fifo), 0);
 }
 
-/* All that was in it; free() it. */
+/* Returns all bytes that were in it; free() it. */
 static char *fifo_join(struct fifo *fifo)
 {
     assert_int_equal(pthread_join(fifo->thread, NULL), 0);
@@ -55,7 +55,7 @@ static char *fifo_join(struct fifo *fifo)
     return fifo->text;
 }
 
-/* ---- what the files have */
+/* ---- the files' contents */
 
 struct lines {
     uint64_t commands, lost_commands; /* of a journal; the end of the run is none of them */
@@ -84,7 +84,7 @@ static struct lines count_lines(const char *text)
     return n;
 }
 
-/* "of the journal,of the truth" */
+/* Asks for the losses: "of the journal,of the truth". */
 static uint64_t ask_lost(struct scanhead *sh, int which)
 {
     unsigned long long lost[2];
@@ -100,7 +100,7 @@ static uint64_t lost_lines(const struct scanhead_frame *frame)
     return t.lost_lines;
 }
 
-/* A scan without an end in a room of twelve triangles. late_ms: less than the journal stands still. */
+/* A scan without an end in a room of twelve triangles. late_ms is less than the time that the journal stands still. */
 static const char *write_config(const struct wire *wire, double prr_hz, const char *links)
 {
     static char path[352], more[256];
@@ -119,7 +119,7 @@ static const char *write_config(const struct wire *wire, double prr_hz, const ch
 
 /* ---- the tests */
 
-/* A command of 256 bytes that changes nothing in the scan, and is in the journal. */
+/* Sends a command of 256 bytes that changes nothing in the scan, and is in the journal. */
 static void command(struct scanhead *sh)
 {
     char line[257];
@@ -188,7 +188,7 @@ static struct head start_truth(struct wire *wire, const struct fifo *fifo, const
     return head_start(wire, config, more);
 }
 
-/* In real time. The journal, a file, has a remark for each fault as well. */
+/* The head runs in real time. The journal, a regular file, has a remark for each fault as well. */
 static void test_truth(void **state)
 {
     struct wire *wire = *state;
@@ -220,7 +220,7 @@ static void test_truth(void **state)
     free(journal);
 }
 
-/* As fast as it computes the head waits, as it does for readers. Clients have their answers meanwhile. */
+/* As fast as it computes, the head waits for the file, as it does for readers. Clients have their answers meanwhile. */
 static void test_fast_waits(void **state)
 {
     struct wire *wire = *state;
@@ -250,7 +250,7 @@ static void test_fast_waits(void **state)
     free(journal);
 }
 
-/* Nobody ever reads it: the end comes all the same, and says what is missing. */
+/* Nobody ever reads it. The head ends all the same, and reports what is missing. */
 static void test_end(void **state)
 {
     struct wire *wire = *state;
@@ -276,7 +276,7 @@ static void test_end(void **state)
     free(text);
 }
 
-/* The head's messages: each of these places gives rise to a warning. */
+/* The head's messages go there. Each of these places causes a warning. */
 static void test_messages(void **state)
 {
     struct wire *wire = *state;

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* One exit status for one kind of failure, whichever command meets it: the table of
- * firmware_sim/app/README.md. */
+/* One exit status for one kind of failure, with any command: the table of firmware_sim/app/README.md. */
 #include "tests/wire/room.h"
 
 enum { DONE = 0, FAILED = 1, WRONG = 2, MAX_WORDS = 12 };
 
-/* CONFIG: a good configuration; DIR: the folder; NOBODY: an address where nobody listens. Words are
- * separated by blanks. */
+/* CONFIG is a good configuration, DIR the folder, and NOBODY an address where nobody listens. Words are separated by
+ * blanks. */
 static const struct {
     const char *line;
     int status;
@@ -53,7 +52,7 @@ static const struct {
     {"record CONFIG -o DIR/x.ending", WRONG},
     {"record here:there -o DIR/x.ply", WRONG},
 
-    /* the configuration: not there, no file, a fault in it, a fault of --set, a mesh that is not there */
+    /* the configuration: missing, no regular file, an error in it, an error in --set, a mesh that is missing */
     {"run DIR/none.yaml", WRONG},
     {"record DIR/none.yaml -o DIR/x.ply", WRONG},
     {"plan DIR/none.yaml", WRONG},
@@ -76,7 +75,7 @@ static const struct {
     {"check CONFIG --set links[0].address=300.1.1.1", WRONG},
     {"run CONFIG --set links[0].address=300.1.1.1", WRONG},
 
-    /* input files: not there, or not what is read */
+    /* input files: missing, or of another kind */
     {"init DIR/none.obj", WRONG},
     {"init DIR/fifo.obj", WRONG},
     {"report CONFIG DIR/none.ply", WRONG},
@@ -101,7 +100,7 @@ static const struct {
     {"run CONFIG --duration 0.01 --pace fast --quiet --stats DIR/none/x", WRONG},
     {"run CONFIG --duration 0.01 --pace fast --quiet --journal DIR/none/x", WRONG},
 
-    /* a head that is not there; what was asked for and did not come */
+    /* a head that is missing; a request without an answer */
     {"record tcp:NOBODY -o DIR/x.ply", FAILED},
     {"record tty:DIR/none -o DIR/x.ply", FAILED},
     {"record usb:ffff:ffff -o DIR/x.ply", FAILED},
@@ -140,7 +139,7 @@ static int run(struct wire *wire, const char *line, const char *nobody)
     return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
 }
 
-/* The first half of a recorded stream. */
+/* Writes the first half of a recorded stream. */
 static void cut_stream(const struct wire *wire)
 {
     size_t len;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pace `step`: time is what a client grants, and the stream is the one of every other pace. */
+/* Pace `step`: time passes as a client grants it, and the stream is that of every other pace. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
@@ -18,8 +18,7 @@ static int64_t time_ns(struct scanhead *sh)
     return atoll(client_ask(sh, "TIME?"));
 }
 
-/* Takes the frames that came before the last reply; all must be of granted time. Returns 1 once the scan was
- * over. */
+/* Takes the frames that came before the last reply. All must be of granted time. Returns 1 once the scan was over. */
 static int take_frames(struct scanhead *sh, int64_t granted_ns, uint64_t *pulses)
 {
     struct scanhead_frame frame;
@@ -106,7 +105,7 @@ static void test_nothing_moves_by_itself(void **state)
     granted_ns += 100000000;
     assert_int_equal(take_frames(sh, granted_ns, &pulses), 0);
     assert_true(pulses > 0);
-    /* All frames came before the reply, and no more will. In real time 150 ms would be 50,000 pulses. */
+    /* All frames came before the reply, and no more will come. In real time 150 ms would be 50,000 pulses. */
     struct scanhead_frame frame;
     assert_int_equal(scanhead_next(sh, &frame, 150), SCANHEAD_ETIMEOUT);
     assert_int_equal(time_ns(sh), granted_ns);
@@ -141,8 +140,7 @@ static void test_refusals(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Lines sent ahead are carried out and answered one after the other: each reply says what was true in its
- * turn. */
+/* Lines sent ahead are carried out and answered one after the other: each reply was true in its turn. */
 static void test_commands_sent_ahead(void **state)
 {
     struct head head = start(*state, "step");
@@ -178,7 +176,8 @@ static const struct room_config LIVE = {.profile = NULL,
                                         .links = LINK_YAML_TCP,
                                         .more = "platform: {kind: live, reach_m: 5, extrapolate_ms: 20}\n"};
 
-/* The vehicle of the other simulator, t seconds after power-up: to and fro, turning, heading clockwise. */
+/* This is the vehicle of the other simulator, t seconds after power-up. It moves back and forth and turns, heading
+ * clockwise. */
 static void vehicle(double t, double p[6])
 {
     p[0] = 0.3 + 1.2 * sin(2 * t);
@@ -199,7 +198,8 @@ static void step_with_pose(struct scanhead *sh, int64_t *granted_ns, int64_t ste
     client_tell(sh, line);
 }
 
-/* Frames up to the reply: points must lie on the walls (encoders: 1e-4 m, see test_moving.c), flags are counted. */
+/* Takes frames up to the reply. Points must lie on the walls (encoders: 1e-4 m, see test_moving.c), and flags are
+ * counted. */
 static void take_live(struct scanhead *sh, int64_t *scan_t0_ns, uint64_t *points, uint32_t flags[4], int *late_events)
 {
     struct scanhead_frame frame;
@@ -248,8 +248,8 @@ static void test_pose_with_each_grant(void **state)
         int64_t step_ns = i % 3 == 0 ? 10000000 : i % 3 == 1 ? 3000000 : 17000000;
         step_with_pose(sh, &granted_ns, step_ns, at);
         take_live(sh, &t0_ns, &points, flags, &late_events);
-        /* At the grant's end the head was where the grant said: pose for pose, to the digits sent. The heading has a
-         * quaternion (cos, 0, 0, -sin) of its half, pitch and roll join in. */
+        /* At the grant's end the head was where the grant said: each pose is right to the digits sent. The heading has
+         * a quaternion (cos, 0, 0, -sin) of its half; pitch and roll are added. */
         assert_int_equal(scanhead_pose(sh, granted_ns - t0_ns, &pose), SCANHEAD_OK);
         for (int k = 0; k < 3; k++)
             assert_true(fabs(pose.position_m[k] - at[k]) < 1e-10);
@@ -263,7 +263,8 @@ static void test_pose_with_each_grant(void **state)
     }
     assert_true(points > 25000); /* 100,000 a second, 300 ms */
     assert_int_equal(flags[0] + flags[1] + flags[2] + (uint32_t)late_events, 0);
-    /* Grants without a pose: the motion goes on for 20 ms, then the platform stands, which is told and counted. */
+    /* Grants come without a pose. The motion goes on for 20 ms, then the platform stands, which is reported and
+     * counted. */
     client_tell(sh, "TIME:STEP 20 MS");
     take_live(sh, &t0_ns, &points, flags, &late_events);
     assert_true(flags[0] > 10 && flags[1] == 0 && late_events == 0);
@@ -281,7 +282,7 @@ static void test_pose_with_each_grant(void **state)
         if (strncmp(reply, wrong[i][1], 8) != 0) fail_msg("%s: %s", wrong[i][0], reply);
     }
     granted_ns += 50000000;
-    assert_int_equal(time_ns(sh), granted_ns); /* what is refused grants nothing */
+    assert_int_equal(time_ns(sh), granted_ns); /* a refused command grants nothing */
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     assert_true(stats_uint(wire, "late_poses") >= 10);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* TIME:STEP over every protocol at once: when OK is there, all that fell due in the granted time lies in each client's
- * socket. Each client is emptied once after OK, without waiting. What comes later than that must be due later: each
- * unit says in itself when the device could send it.
+/* These tests run TIME:STEP over every protocol at once. When OK is there, all units that fell due in the granted time
+ * are in each client's socket. Each client is emptied once after OK, without waiting. A unit that comes later must be
+ * due later: each one contains the time at which the device could send it.
  *
  * Clock here: device time, ns. */
 #include "tests/wire/room.h"
@@ -13,7 +13,7 @@ struct client {
     const char *name, *request; /* sent once the head scans; NULL: none */
     int fd;
     /* Takes the first whole unit of `len` bytes. Returns its length, 0: none is whole. *due_ns: the unit was due at
-     * this time or before; INT64_MIN: it says nothing of its time. */
+     * this time or before; INT64_MIN: it has no time. */
     size_t (*unit)(const uint8_t *bytes, size_t len, int64_t *due_ns);
     struct scanhead *native; /* instead of fd and unit */
     uint8_t bytes[ROOM];
@@ -37,7 +37,7 @@ static size_t cola_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
     return (size_t)(end - bytes) + 1;
 }
 
-/* SCIP: a reply ends with an empty line. The stamp of a scan, whole ms rounded down, is the time of step 0; an LMS111's
+/* SCIP: a reply ends with an empty line. The stamp of a scan, whole ms rounded down, is the time of step 0. An LMS111's
  * last step, 540 of 720, comes 3/4 of 20 ms later. */
 static size_t scip_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
 {
@@ -69,7 +69,8 @@ static uint32_t little_endian(const uint8_t *at)
     return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-/* VLP-16: a packet's stamp, whole us rounded down, is its first firing; it is whole 1.327104 ms later at the most. */
+/* VLP-16: a packet's stamp, whole us rounded down, is its first firing. The packet is whole 1.327104 ms later at the
+ * most. */
 static size_t data_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
 {
     if (len == 0) return 0;
@@ -91,7 +92,7 @@ static size_t position_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
 static void note(struct client *c, int64_t due_ns, int64_t before_ns)
 {
     c->units += due_ns != INT64_MIN;
-    /* What was due in a tick that had been granted whole should have been there. */
+    /* A unit that was due in a tick that had been granted whole should have been there. */
     if (due_ns == INT64_MIN || due_ns + TICK_NS > before_ns) return;
     if (c->late++ == 0)
         print_message("%s: a unit due at %" PRId64 " ns came after OK of %" PRId64 " ns\n", c->name, due_ns, before_ns);
@@ -109,7 +110,7 @@ static void take_units(struct client *c, int64_t before_ns)
     memmove(c->bytes, c->bytes + at, c->len -= at);
 }
 
-/* Takes what is there. OK of before_ns was there when it was emptied last. */
+/* Takes all units that are there. The OK of before_ns was there when it was emptied last. */
 static void empty(struct client *c, int64_t before_ns)
 {
     if (c->native != NULL) {
@@ -164,7 +165,7 @@ static struct head start(struct wire *wire, const struct bench *bench)
     return head_start(wire, wire_write_text(wire, "config.yaml", text), more);
 }
 
-/* Steps of 1 to 20 ms, in an order that is fixed. */
+/* Steps are 1 to 20 ms, in a fixed order. */
 static void run_steps(struct bench *bench, struct scanhead *stepper)
 {
     char line[32];

@@ -31,7 +31,7 @@ static void record(struct wire *wire, const char *config, const char *station, c
     assert_int_equal(status, 0);
 }
 
-/* Payloads of a scan's points. */
+/* Returns the payloads of a scan's points. */
 static uint8_t *points_of(struct wire *wire, const char *stream, size_t *len)
 {
     struct scanhead_frame frame;
@@ -50,8 +50,8 @@ static uint8_t *points_of(struct wire *wire, const char *stream, size_t *len)
     return all;
 }
 
-/* The same bytes as from a station of the configuration at that pose: stops 1 and 5 are the samples themselves, whose
- * numbers a station can be given. */
+/* The bytes are those of a station of the configuration at that pose. Stops 1 and 5 are the samples themselves, whose
+ * numbers a station can have. */
 static void test_as_a_station(void **state)
 {
     struct wire *wire = *state;
@@ -83,7 +83,7 @@ static void test_as_a_station(void **state)
     }
 }
 
-/* The frame scalar is in the anchor and, so, in what the library says; the room's walls stay where they are. */
+/* The frame scalar is in the anchor, and so in the library's poses. The room's walls stay where they are. */
 static void test_frame_scalar(void **state)
 {
     struct wire *wire = *state;
@@ -118,8 +118,8 @@ static void test_frame_scalar(void **state)
     assert_int_equal(seen, 0x3e);
 }
 
-/* `report` takes the points of what moves to where it stood at the stop: 0.065 mm as above, and it is a metre or two
- * away at rest. Of a scan during which it moves, it says that it can't. */
+/* `report` moves the points of bodies to where these stood at the stop: the error is 0.065 mm as above, and would be a
+ * metre or two at the place at rest. For a scan during which a body moves, it says that it can't. */
 static void check_report(struct wire *wire)
 {
     char config[352], ply[352];
@@ -145,8 +145,8 @@ static void check_report(struct wire *wire)
     free(text);
 }
 
-/* A stop is a snapshot: a wall that goes north at 1 m/s stands where it is at the stop's time, all scan long. It is in
- * front of the room's north wall at first, and none of it is left when it has gone through. */
+/* A stop is a snapshot: a wall that goes north at 1 m/s stands where it is at the stop's time, for the whole scan. It
+ * is in front of the room's north wall at first, and none of it is left when it has gone through. */
 static void test_snapshot(void **state)
 {
     struct wire *wire = *state;
@@ -186,7 +186,7 @@ static void test_snapshot(void **state)
     check_report(wire);
 }
 
-/* What the files have of it: `frame` in PLY, as for a moving head, and in .poses.csv. */
+/* The files have `frame` in PLY, as for a moving head, and in .poses.csv. */
 static void test_files(void **state)
 {
     struct wire *wire = *state;
@@ -228,7 +228,7 @@ static void test_files(void **state)
     free(text);
 }
 
-/* Where the file says what the configuration can't: one line, and what is allowed. */
+/* If the file contradicts the configuration there is one line with the allowed values. */
 static void test_wrong_parts(void **state)
 {
     struct wire *wire = *state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* --surfaces of record and run: what each label of a point means, as CSV beside the recording. */
+/* --surfaces of record and run: the meaning of each label of a point, as CSV beside the recording. */
 #include "tests/wire/room.h"
 
 static const char EXPECTED[] = "label,object,material,type,guid,colour\n"
@@ -48,7 +48,7 @@ static void surfaces_of_recordings(void **state)
     }
 }
 
-/* Each job of a campaign has its table, which counts among its files. */
+/* Each job of a campaign has its table, which is one of its files. */
 static void surfaces_of_a_campaign(void **state)
 {
     struct wire *wire = *state;
@@ -56,7 +56,7 @@ static void surfaces_of_a_campaign(void **state)
     write_scene(wire);
     snprintf(config, sizeof config, "%s", wire_path(wire, "c.yaml"));
     const char *line[] = {"batch", config, "-o", wire->dir, "--surfaces", "--quiet", NULL, NULL};
-    for (int i = 0; i < 2; i++) { /* made, and made again where it is lost */
+    for (int i = 0; i < 2; i++) { /* they are made, and made again where they are lost */
         if (wire_wait(wire, wire_spawn(wire, line, "out", "err", -1)) != 0)
             fail_msg("%s", wire_read(wire_path(wire, "err"), NULL));
         char *text = wire_read(wire_path(wire, "0001_station-1.surfaces.csv"), NULL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Terrain by the program: init, check --scene, record, map and coverage of a GeoTIFF. */
+/* These tests use terrain in the program: init, check --scene, record, map and coverage of a GeoTIFF. */
 #include <math.h>
 
 #include "tests/common/tif.h"

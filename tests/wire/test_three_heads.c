@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A Hokuyo, a SICK and a VLP-16 at once, each with clients of its personality, of the native stream and of the GNSS
- * receiver, for 6 s (THOROUGH=1: 15 s) of device time on whatever processors there are: nothing is lost. */
+/* These tests run a Hokuyo, a SICK and a VLP-16 at once. Each has clients of its personality, of the native stream and
+ * of the GNSS receiver, for 6 s (THOROUGH=1: 15 s) of device time. Nothing is lost on any number of processors. */
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
 
@@ -11,7 +11,7 @@
 enum { N_HEADS = 3, N_READERS = 9 };
 #define SECONDS thorough(15, 6)
 
-/* One reader, in a thread of its own. */
+/* Each reader runs in a thread of its own. */
 struct reader {
     const char *(*read)(struct reader *reader); /* NULL, or what is wrong */
     int fd;
@@ -23,7 +23,7 @@ struct reader {
     pthread_t thread;
 };
 
-/* More bytes; 0, or -1. */
+/* Reads more bytes. Returns 0, or -1. */
 static int more(struct reader *r)
 {
     struct pollfd slot = {.fd = r->fd, .events = POLLIN};
@@ -35,7 +35,7 @@ static int more(struct reader *r)
     return 0;
 }
 
-/* Takes what stands before and in `end` off the bytes into `piece`. */
+/* Moves the bytes up to and with `end` into `piece`. */
 static int take(struct reader *r, const char *end, char *piece, size_t cap)
 {
     const char *at;
@@ -54,7 +54,7 @@ static const char *wrong(struct reader *r, const char *what, long n, long got)
     return r->why;
 }
 
-/* Times of scans, in ms of 24 bits: 25 apart. */
+/* Times of scans are ms of 24 bits, 25 apart. */
 static const char *read_scip(struct reader *r)
 {
     char piece[8192] = "", *at;
@@ -76,7 +76,7 @@ static const char *read_scip(struct reader *r)
     return NULL;
 }
 
-/* Counts of telegrams, one apart, and times of scans, in us: 15 Hz. */
+/* Counts of telegrams are one apart. Times of scans are in us, at 15 Hz. */
 static const char *read_cola(struct reader *r)
 {
     char piece[16384];
@@ -94,7 +94,7 @@ static const char *read_cola(struct reader *r)
     return NULL;
 }
 
-/* Times of packets, in us of an hour: 1327.104 apart, 753.5 a second. */
+/* Times of packets are us of an hour, 1327.104 apart, 753.5 a second. */
 static const char *read_velodyne(struct reader *r)
 {
     uint8_t packet[1207];
@@ -111,7 +111,7 @@ static const char *read_velodyne(struct reader *r)
     return NULL;
 }
 
-/* One RMC a second at least, each sentence with its sum. */
+/* There is one RMC a second at least, and each sentence has its checksum. */
 static const char *read_nmea(struct reader *r)
 {
     char line[512];
@@ -148,7 +148,8 @@ static const char *read_native(struct reader *r)
     return NULL;
 }
 
-/* What has seen enough goes, so that nobody waits for it; but a port that is closed refuses packets. */
+/* A reader that has seen enough closes, so that the head does not wait for it. But a closed port refuses packets, so
+ * that of the VLP-16 stays open. */
 static void *run(void *arg)
 {
     struct reader *r = arg;
@@ -170,7 +171,7 @@ static int terminal(const char *endpoint)
     return fd;
 }
 
-/* The packets' socket, as large as may be: this test's threads share the processors with the heads. */
+/* The packets' socket is as large as possible: this test's threads share the processors with the heads. */
 static int udp_socket(int *port)
 {
     struct sockaddr_in at = {.sin_family = AF_INET};
@@ -200,7 +201,7 @@ static void expect_at_most(const struct wire *wire, const char *key, long long m
     free(text);
 }
 
-/* A ready configuration on ports of the system's choice; a key that ends in `path` gets a path in the folder. */
+/* Starts a ready configuration on ports of the system's choice. A key that ends in `path` gets a path in the folder. */
 static struct head start(struct wire *wire, const char *config, const char *const *sets)
 {
     const char *more[WIRE_MAX_ARGS] = {"--set", IFC_BY_ASSIMP};
@@ -236,7 +237,7 @@ static void test_nothing_is_lost(void **state)
                     (const char *const[]){"links.0.port=0", "links.1.path", "links.3.path", NULL});
     head[2] = start(wire[2], "config/velodyne.yaml",
                     (const char *const[]){port[0], port[1], "links.2.port=0", "links.4.path", NULL});
-    /* The velodyne's first: its packets come from now on. */
+    /* The velodyne's client is first, as its packets come from now on. */
     static const int native[N_HEADS] = {2, 2, 3}, nmea[N_HEADS] = {3, 3, 4};
     reader[0] = (struct reader){.read = read_velodyne, .fd = data};
     reader[1] = (struct reader){.read = read_scip, .fd = raw_connect(head_link(&head[0], 0))};
@@ -256,7 +257,7 @@ static void test_nothing_is_lost(void **state)
         head_end(&head[i], SIGTERM);
         for (size_t k = 0; k < sizeof zero / sizeof zero[0]; k++)
             expect_at_most(wire[i], zero[k], 0);
-        /* The end of the scan cuts the VLP-16's last packet: no reader was too slow. */
+        /* The end of the scan cuts the VLP-16's last packet. No reader was too slow. */
         expect_at_most(wire[i], "lost_units", 0);
         expect_at_most(wire[i], "reader_lost_frames", 0);
         assert_int_equal(wire_teardown((void **)&wire[i]), 0);

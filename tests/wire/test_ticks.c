@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `loop.tick_hz` cuts the stream into other frames, so that its hash is another one; the points in them are the same.
- */
+/* `loop.tick_hz` cuts the stream into other frames, so that its hash differs. The points in them are the same. */
 #include "drivers/protocol/native.h"
 #include "tests/wire/room.h"
 
@@ -14,7 +13,7 @@ static const struct room_config SCAN = {.profile = "any-rate",
                                         .frames = 1,
                                         .links = LINK_YAML_TCP};
 
-/* A scan, decoded; and how it was cut. */
+/* A decoded scan, and the frames that it was cut into. */
 struct scan {
     struct scanhead_point *point;
     uint32_t n_points, n_lines, n_frames;
@@ -23,7 +22,7 @@ struct scan {
     char hash[65];
 };
 
-/* The room, and slats in it across the lines, not quite level, each at another distance: footprints reach over their
+/* The room, and slats in it across the lines, not quite level, each at another distance. Footprints overlap their
  * edges. */
 static void slats_write(const struct wire *wire)
 {
@@ -41,7 +40,7 @@ static void slats_write(const struct wire *wire)
     assert_int_equal(fclose(f), 0);
 }
 
-/* Round the room, at another height each time. */
+/* The head goes round the room, at another height each time. */
 static void ride_write(const struct wire *wire)
 {
     FILE *f = fopen(wire_path(wire, "ride.csv"), "w");
@@ -103,7 +102,7 @@ static void scan_free(struct scan *scan)
     free(scan);
 }
 
-/* Bit by bit: what is not a number has to be that on both sides. */
+/* Values are equal bit by bit. NaN has to be NaN on both sides. */
 static int same_reals(const struct scanhead_point *a, const struct scanhead_point *b)
 {
     const double x[] = {a->x, a->y, a->z, a->range_m, a->mirror_rad, a->pan_rad, a->reflectance_db};
@@ -128,7 +127,7 @@ static void expect_same(const struct scan *a, const struct scan *b)
         assert_memory_equal(&a->line[i], &b->line[i], sizeof a->line[i]);
 }
 
-/* sets: ends with NULL. several: at least so many points are of pulses with further echoes. */
+/* sets: ends with NULL. several: at least so many points are of pulses with secondary echoes. */
 static void compare(struct wire *wire, const char *more, const char *const *sets, uint64_t several)
 {
     static const char *const ticks[] = {"loop.tick_hz=100", "loop.tick_hz=3125", "loop.tick_hz=10000"};
@@ -143,7 +142,7 @@ static void compare(struct wire *wire, const char *more, const char *const *sets
     for (size_t i = 0; i < sizeof ticks / sizeof ticks[0]; i++) {
         struct scan *other = record(wire, path, ticks[i], sets);
         expect_same(first, other);
-        /* cut otherwise, or there was nothing to compare */
+        /* the frames differ, else there was nothing to compare */
         assert_int_not_equal(first->n_frames, other->n_frames);
         assert_string_not_equal(first->hash, other->hash);
         scan_free(other);

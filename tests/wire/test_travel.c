@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A drive of 30 km: the anchor moves along with the head, so that counts keep 1e-6 m, and every point is where
- * GeographicLib has it. */
+/* These tests go on a drive of 30 km. The anchor moves along with the head, so that counts keep 1e-6 m, and every point
+ * is where GeographicLib puts it. */
 #include "tests/wire/room.h"
 
 #include "core/geoframe.h"
@@ -9,8 +9,8 @@
 static const struct georef_place PLACE = {52.5, 13.4, 80.0};
 static const double NORTH_DEG = 30.0, WAY_M = 30000.0, STRETCH_M = 2000.0;
 
-/* Along a wall, 12 m away on the left; the pan turns, so that it is met up to the head's range of 1000 m ahead and
- * behind. */
+/* The drive goes along a wall, 12 m away on the left. The pan turns, so that the wall is met up to the head's range of
+ * 1000 m ahead and behind. */
 static void write_drive(struct wire *wire, char config[352])
 {
     wire_write_text(wire, "wall.obj",
@@ -87,7 +87,7 @@ static struct drive *drive_once(struct wire *wire, const char *config, const cha
     return drive;
 }
 
-/* Farthest that a point lies from where the scene point is by GeographicLib, on the ground. */
+/* Returns the largest distance of a point from its scene point by GeographicLib, on the ground. */
 static double worst_m(const struct drive *scene, const struct drive *drive, enum georef_crs crs)
 {
     static const double origin[3] = {0, 0, 0};
@@ -126,9 +126,9 @@ static double worst_m(const struct drive *scene, const struct drive *drive, enum
     return worst;
 }
 
-/* The points as the head gave them in the polar layout, through its poses, are what is exact here, but for the range:
- * half of 1e-6 m. The polynomials are good to tolerance_m, 1e-6 m; then half a count of 1e-6 m in each coordinate. The
- * BVHs lie 2 km apart, and each of their stretches has an anchor of its own. */
+/* The truth is the points of the polar layout, through the head's poses, with an error of half of 1e-6 m in the range.
+ * The polynomials are good to tolerance_m, 1e-6 m; half a count of 1e-6 m in each coordinate is added. The BVHs lie 2
+ * km apart, and each of their stretches has an anchor of its own. */
 static void test_anchor_moves(void **state)
 {
     static const struct {
@@ -209,8 +209,8 @@ static struct replay *replay(const char *path)
     return out;
 }
 
-/* Points behind it are placed again from the next repetition on, within a second of 60, and none is placed by the
- * anchor before, 2 km away. */
+/* Points after it are placed again from the next repetition on, within a second of 60. None is placed by the anchor
+ * before, 2 km away. */
 static void test_lost_anchor(void **state)
 {
     struct wire *wire = *state;
@@ -238,8 +238,8 @@ static void test_lost_anchor(void **state)
     free(holed);
 }
 
-/* The poses of a recording in ECEF, which are in the scene frame: by what the file says of it, each comes to where
- * GeographicLib has it; and the file is a trajectory still. ECEF is rigid: only roundings of 7e6 m remain. */
+/* The poses of a recording in ECEF are in the scene frame. By the file's own comments, each comes to where
+ * GeographicLib puts it, and the file is a trajectory still. ECEF is rigid: only roundings of 7e6 m remain. */
 static void test_poses_beside_a_crs(void **state)
 {
     struct wire *wire = *state;

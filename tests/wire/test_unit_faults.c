@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on the units of SCIP, CoLa, NMEA and Velodyne: the faulty session has what the truth makes of the units of a
- * clean session beside it, byte by byte, and answers of a client go wrong as they were told to. */
+/* Faults on the units of SCIP, CoLa, NMEA and Velodyne. The truth, applied to the units of a clean session, gives the
+ * faulty session's units, byte by byte. Answers of a client go wrong as the scenario says. */
 #include "tests/wire/room.h"
 #include "tests/wire/unit_faults.h"
 
-/* Faults of numbers up to 60. Those of the datagrams stay within 150 packets, of which 20 are sent as more. */
+/* Faults have numbers up to 60. The faults of the datagrams stay within 150 packets, of which 20 are sent as
+ * several. */
 static const char FAULTS[] = "faults:\n"
                              "  - {kind: drop, link: 1, from: 3, until: 60, every: 7}\n"
                              "  - {kind: duplicate, link: 1, at: 4, n: 2}\n"
@@ -32,7 +33,7 @@ static const char CONFIG[] =
     "gnss: {rate_hz: 10}\n"
     "%s";
 
-/* A head in pace fast, where readers hold it back. links: YAML. */
+/* Starts a head in pace fast, where readers hold it back. links: YAML. */
 static struct head start(struct wire *wire, const char *profile, const char *links, const char *faults,
                          const char *const *more)
 {
@@ -50,7 +51,7 @@ static struct head start(struct wire *wire, const char *profile, const char *lin
     return head_start(wire, wire_write_text(wire, "config.yaml", config), args);
 }
 
-/* Each kind has struck, and the units are what it made of them. */
+/* Each kind has struck, and the units are its results. */
 static void check(struct wire *wire, const struct unit_kind *kind, const struct unit_list *clean,
                   const struct unit_list *got)
 {
@@ -64,7 +65,7 @@ static void check(struct wire *wire, const struct unit_kind *kind, const struct 
     free(note);
 }
 
-/* The next so many bytes; good until the next call. */
+/* Returns the next so many bytes, which are good until the next call. */
 static const char *take(int fd, size_t len)
 {
     static char got[4096];
@@ -86,20 +87,20 @@ static void expect(int fd, const void *bytes, size_t len)
         fail_msg("\"%.*s\" instead of \"%.*s\"", (int)len, got, (int)len, (const char *)bytes);
 }
 
-/* Two sessions on two links, each of which has asked for a stream. */
+/* Two sessions on two links have each asked for a stream. */
 static void check_two_streams(struct wire *wire, struct head *head, const struct unit_kind *kind, int faulty, int clean,
                               size_t least)
 {
     struct unit_list got = {0}, want = {0};
     units_read_both(faulty, &got, clean, &want, least);
-    /* The clean one goes on until it has all of the other's units: time stamps say which they are. */
+    /* The clean one goes on until it has all of the other's units, which are known by their time stamps. */
     units_cut(&want, kind->whole);
     units_read_both(faulty, &got, clean, &want, got.len + least);
     units_cut(&want, kind->whole);
     close(faulty);
     close(clean);
     head_end(head, SIGTERM);
-    got.len = least; /* as much as has its clean units for certain */
+    got.len = least; /* all these bytes have their clean units */
     check(wire, kind, &want, &got);
     units_free(&got);
     units_free(&want);
@@ -113,7 +114,7 @@ static size_t scip_whole(const uint8_t *bytes, size_t len)
     return end != NULL ? (size_t)(end - bytes) + 2 : 0;
 }
 
-/* After the echo each line ends with the sum of its characters before: 0x30 and the low six bits. */
+/* After the echo each line ends with the sum of its characters: 0x30 and the low six bits. */
 static int scip_is_sound(const uint8_t *unit, size_t len)
 {
     const uint8_t *at = memchr(unit, '\n', len), *end = at;
@@ -127,7 +128,7 @@ static int scip_is_sound(const uint8_t *unit, size_t len)
     return at != NULL && at + 1 == unit + len;
 }
 
-/* Until the head has booted it is refused: status 10. */
+/* Until the head has booted the request is refused: status 10. */
 static void scip_start(int fd)
 {
     static const char request[] = "ME0000010001000\n", refused[] = "10Q\n\n", begins[] = "00P\n\n";
@@ -208,7 +209,7 @@ static void test_cola(void **state)
 
 /* ---- NMEA: the clean units are in a file */
 
-/* From RMC to ZDA. */
+/* Returns the length of a burst, from RMC up to the end of ZDA, or 0. */
 static size_t nmea_whole(const uint8_t *bytes, size_t len)
 {
     const uint8_t *last = memmem(bytes, len, "$GNZDA", 6);

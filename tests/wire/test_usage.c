@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Wrong input through the real program: exit status 2, one line on stderr that says what, where and what is
- * allowed, nothing on stdout, no file left behind. */
+/* Wrong input through the real program: exit status 2, one line on stderr that names the error, its place and the
+ * allowed values, nothing on stdout, no new file. */
 #include "tests/common/collada.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 
 #include <sys/resource.h>
 
-/* USAGE_GOOD with one part replaced by another. */
+/* Writes USAGE_GOOD with one part replaced by another. */
 static void write_config(const struct wire *wire, const char *part, const char *by)
 {
     const char *at = strstr(USAGE_GOOD, part);
@@ -200,7 +200,7 @@ static void test_links(void **state)
     expect_link(wire, "file that is a folder", "{type: file, path: .}", 2, "irectory");
     expect_link(wire, "no such address", "{type: tcp, address: 300.1.1.1}", 2, "300.1.1.1");
 
-    /* A live platform's socket is asked by `check`, too. */
+    /* `check` opens a live platform's socket, too. */
     char config[352];
     write_config(wire, "{type: \"null\"}", "{type: \"null\"}");
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
@@ -217,16 +217,16 @@ static void test_links(void **state)
     assert_int_equal(listen(fd, 1), 0);
     getsockname(fd, (struct sockaddr *)&at, &len);
     snprintf(link, sizeof link, "{type: tcp, port: %d}", ntohs(at.sin_port));
-    /* 2, as the remedy is another port in the configuration. */
+    /* The status is 2, as the remedy is another port in the configuration. */
     expect_link(wire, "port in use", link, 2, "Address already in use; port 0 lets the system choose");
-    /* A pty made before the link that failed is gone again. */
+    /* A pty made before the link that failed is removed again. */
     snprintf(link, sizeof link, "{type: pty, path: port}, {type: tcp, port: %d}", ntohs(at.sin_port));
     expect_link(wire, "port in use, after a pty", link, 2, "Address already in use");
     close(fd);
     assert_int_equal(usage_complaints, 0);
 }
 
-/* The system's failures are status 1: a full disk, a refused connection. */
+/* The system's failures have status 1: a full disk, a refused connection. */
 static void test_system_failures(void **state)
 {
     struct wire *wire = *state;
@@ -255,7 +255,7 @@ static void test_system_failures(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
-/* A limit of the shell that is too small for any command: an error, no crash. */
+/* The shell sets a limit that is too small for any command. That is an error, not a crash. */
 static void test_small_stack(void **state)
 {
     struct wire *wire = *state;

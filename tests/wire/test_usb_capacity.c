@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head whose stream a USB of its speed can't carry says so at start, with both figures; one that it can carry runs.
+/* A head whose stream is too fast for its USB speed says so at start, with both figures. One whose stream fits runs.
  *
  * The figures are worked out by hand. A point has 20 bytes (POINTS.md), and full-sweep's mirror (36 facets, gain 10)
  * fires over its whole sweep of 100 deg. USB 2.0 fits 19 bulk packets of 64 bytes into a frame of 1 ms at full speed
@@ -62,8 +62,8 @@ static void test_capacity(void **state)
     }
 }
 
-/* A sphere of 0.1 deg steps, 1,000 rings a second: 3.6 MHz, of which those from 350 to 10 deg are sent: 200,000 points, 4 MB
- * a second. */
+/* A sphere of 0.1 deg steps, 1,000 rings a second, is 3.6 MHz. The steps from 350 to 10 deg are sent: 200,000 points, 4
+ * MB a second. */
 static void test_across_azimuth_0(void **state)
 {
     struct wire *wire = *state;

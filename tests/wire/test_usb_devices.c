@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Heads that show themselves on USB as the device whose protocol they speak: ids, strings, interfaces, and a question
- * with its answer. What is configured of the identity stays as it is. The kernel's drivers and libusb on the same
- * devices: tests/guest. */
+ * with its answer. A configured identity stays as it is. tests/guest has the kernel's drivers and libusb on the same
+ * devices. */
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/native.h"
@@ -37,7 +37,7 @@ static void expect_device(struct usbip_host *host, unsigned vid, unsigned pid, c
     assert_int_equal(usbip_host_control(host, 0x00, 9, 1, 0, NULL, 0), 0);
 }
 
-/* What the host reads up to an empty line. */
+/* The host reads the version up to an empty line. */
 static void expect_version(struct usbip_host *host)
 {
     char text[512] = "";
@@ -67,7 +67,7 @@ static void test_hokuyo(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A read gets a reply as a whole, and nothing after it. */
+/* A read gets a whole reply, and nothing after it. */
 static void test_sick(void **state)
 {
     static const uint8_t interface[4] = {0xff, 0, 0, 0};
@@ -110,7 +110,7 @@ static void test_configured(void **state)
     }
 }
 
-/* A client begins the stream again in the middle of a frame that it had half of: what comes then begins with a frame. */
+/* A client begins the stream again in the middle of a frame that it has half of. The new stream begins with a frame. */
 static void test_begun_again(void **state)
 {
     struct wire *wire = *state;

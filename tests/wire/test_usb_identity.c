@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Heads on USB/IP with nothing configured of their identity: two that run at a time differ in serial number and bus id,
- * and in nothing that belongs to the stream; what is configured stays as it is. */
+/* Heads on USB/IP without a configured identity. Two that run at a time differ in serial number and bus id, and in
+ * nothing that belongs to the stream. A configured identity stays as it is. */
 #include "tests/wire/room.h"
 #include "tests/wire/usbip_host.h"
 
@@ -8,7 +8,7 @@ struct identity {
     char bus_id[USBIP_BUS_ID_LEN + 1], serial[128], hash[65];
 };
 
-/* The scan over TCP, as its reader hashes it: the descriptor with the head's *IDN? is in it. */
+/* Reads the scan over TCP, and its hash by the reader. The descriptor with the head's *IDN? is in it. */
 static void scan(const struct head *head, struct identity *out)
 {
     struct scanhead_frame frame;
@@ -47,8 +47,8 @@ static struct head start_file(struct wire *wire, const char *name)
     return head_start(wire, wire_path(wire, name), more);
 }
 
-/* Two heads of different files, ended and started again the other way round: each has the serial number that it had,
- * though not the bus id. */
+/* Two heads of different files are ended and started again in the other order. Each has its serial number again, though
+ * not its bus id. */
 static void test_started_again(void **state)
 {
     struct wire *wire = *state;
@@ -95,7 +95,7 @@ static void test_two_heads(void **state)
     scan(&a, &one);
     scan(&b, &other);
     scan(&c, &fixed);
-    assert_string_equal(one.hash, other.hash); /* the stream knows nothing of it */
+    assert_string_equal(one.hash, other.hash); /* the stream does not depend on it */
     assert_string_equal(one.hash, fixed.hash);
     head_end(&a, SIGTERM);
     head_end(&b, SIGTERM);

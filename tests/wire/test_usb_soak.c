@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A head on usbredir whose other end goes away, comes back and resets at random, in the middle of the stream: nothing
- * may hang, nothing may leak, and what is lost must be announced. The virtual machine is played by this program, with
- * the library that QEMU has for it. USB_SOAK_EVENTS: how often (default 20; `make soak-usb`: 1000). */
+/* A head on usbredir whose other end goes away, comes back and resets at random, in the middle of the stream. Nothing
+ * may hang or leak, and losses must be announced. This program plays the virtual machine, with the library that QEMU
+ * has for it. USB_SOAK_EVENTS: how often (default 20; `make soak-usb`: 1000). */
 #include "tests/wire/wire.h"
 
 #ifdef HAVE_USBREDIR
@@ -16,8 +16,8 @@ enum { PENDING = 8, BULK = 16384, STREAM_IN = 0x83, STREAM_INTERFACE = 2, SESSIO
 
 enum { UNPLUG, RESET, REOPEN, CANCEL, UNPLUG_IN_A_PACKET, N_KINDS };
 
-/* What one event may leave behind before it shows: with 1000 events a single transfer of 16 KiB each would be 16 MB.
- * The rest is what an allocator keeps for itself. */
+/* An event may leave so much behind before it shows: with 1000 events a single transfer of 16 KiB each would be 16 MB.
+ * The allocator keeps the rest for itself. */
 enum { RSS_SLACK_KIB = 4096 };
 
 struct soak {
@@ -182,7 +182,7 @@ static void make_parser(struct soak *s)
     usbredirparser_init(p, version, caps, USB_REDIR_CAPS_SIZE, 0);
 }
 
-/* Sends what waits, and takes in what comes within the time. */
+/* Sends the waiting bytes, and takes in those that come within the time. */
 static void turn(struct soak *s, int wait_ms)
 {
     const int more = usbredirparser_has_data_to_write(s->redir) > 0;
@@ -192,7 +192,7 @@ static void turn(struct soak *s, int wait_ms)
     if ((slot.revents & POLLIN) != 0) usbredirparser_do_read(s->redir);
 }
 
-/* Until *what is set, or the head has hung up. */
+/* Waits until *what is set, or the head has hung up. */
 static int await(struct soak *s, const int *what, const char *name)
 {
     const int64_t end_ms = wire_now_ms() + DEADLINE_MS;
@@ -253,7 +253,7 @@ static void unplug(struct soak *s)
     close(s->fd);
 }
 
-/* Nothing more of the stream as it was: what is left of it is garbage, another session of the same stream begins. */
+/* The old stream is over: the rest of it is garbage, and another session of the same stream begins. */
 static void cut(struct soak *s)
 {
     s->first_id = UINT64_MAX;
@@ -271,7 +271,7 @@ static void stream(struct soak *s, uint64_t bytes)
     }
 }
 
-/* ---- what the process has */
+/* ---- the process's memory and descriptors */
 
 static unsigned long rss_kib(const struct soak *s)
 {
@@ -320,7 +320,7 @@ static void strike(struct soak *s, unsigned kind)
         session(s, 0);
         cut(s);
         break;
-    default: /* what was taken back may have had its data: the stream begins anew */
+    default: /* a transfer that was taken back may have had its data: the stream begins anew */
         for (uint64_t id = s->next_id - (uint64_t)s->pending; id < s->next_id; id++)
             usbredirparser_send_cancel_data_packet(s->redir, id);
         cut(s);
@@ -359,7 +359,7 @@ static void test_soak(void **state)
     uint64_t bytes = s->bytes;
     for (int i = 0; i < events; i++) {
         stream(s, draw((uint64_t)i, 0, 30000));
-        poll(NULL, 0, (int)draw((uint64_t)i, 2, 15)); /* what comes meanwhile is on its way when the event strikes */
+        poll(NULL, 0, (int)draw((uint64_t)i, 2, 15)); /* bytes that come meanwhile are on their way at the event */
         strike(s, draw((uint64_t)i, 1, N_KINDS));
     }
     stream(s, 200000); /* still alive */

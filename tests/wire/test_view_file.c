@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead view` through the real program: what its page gets over HTTP equals what `scanhead record` makes of the same
- * recording; its end; ports that are taken. The recording is a sphere in a closed room, whose mesh has no hole. */
+/* These tests run `scanhead view` through the real program. Its page gets the same figures over HTTP as `scanhead
+ * record` makes of the same recording. Its end and taken ports are tested, too. The recording is a sphere in a closed
+ * room, whose mesh has no hole. */
 #include <netinet/in.h>
 
 #include "drivers/protocol/bytes.h"
@@ -25,7 +26,7 @@ static void run_well(const char *const *args)
     assert_int_equal(status, 0);
 }
 
-/* `record` of the recording into NAME, with up to four more arguments. */
+/* Runs `record` on the recording into NAME, with up to four more arguments. */
 static const char *record_again(const char *name, const char *const *more)
 {
     static char to[128];
@@ -37,7 +38,7 @@ static const char *record_again(const char *name, const char *const *more)
     return to;
 }
 
-/* `view FILE` up to its ready line, which names the endpoint. */
+/* Starts `view FILE` and reads its ready line, which names the endpoint. */
 static void start(const char *file)
 {
     static const char key[] = "\"endpoint\":\"";
@@ -66,7 +67,7 @@ static void end(int signal_number)
     assert_int_equal(wire_wait(wire, viewer), 0);
 }
 
-/* The body of an answer; free() what *whole gets. */
+/* Returns the body of an answer; free() *whole. */
 static char *get(const char *resource, int status, size_t *len, char **whole)
 {
     char request[256], address[128];
@@ -91,7 +92,7 @@ static char *get(const char *resource, int status, size_t *len, char **whole)
     return body + 4;
 }
 
-/* ---- what an answer has */
+/* ---- the contents of an answer */
 
 struct answer {
     char *whole, *body;
@@ -112,7 +113,7 @@ static struct answer get_points(const char *resource)
     return a;
 }
 
-/* A column's first value. */
+/* Returns a column's first value. */
 static const char *column(const struct answer *a, const char *name)
 {
     for (uint32_t i = 0; i < le_get32(a->body + 12); i++) {
@@ -130,7 +131,7 @@ static float float_of(const char *values, uint32_t i)
     return f;
 }
 
-/* x, y, z and range of point i. */
+/* Writes x, y, z and range of point i. */
 static void figures_of(const struct answer *a, uint32_t i, double v[4])
 {
     const char *xyz = column(a, "xyz");
@@ -139,10 +140,10 @@ static void figures_of(const struct answer *a, uint32_t i, double v[4])
     v[3] = (double)float_of(column(a, "range"), i);
 }
 
-/* Point by point what a .ply as text has, whose rows begin with x, y, z, range. */
+/* Each point is that of a .ply as text, whose rows begin with x, y, z, range. */
 static void assert_same(const struct answer *a, const char *file)
 {
-    /* floats within 16 m of the origin step by 1e-6 m; the text has six decimals */
+    /* Floats within 16 m of the origin step by 1e-6 m; the text has six decimals. */
     const double tolerance_m = 2e-6;
     char *text = wire_read(file, NULL), *p = strstr(text, "end_header\n");
     assert_non_null(p);
@@ -179,7 +180,7 @@ static void the_points(void **state)
     struct answer all = get_points("/cloud");
     assert_int_equal(all.n, N_POINTS);
     assert_same(&all, record_again("again.ply", none));
-    for (uint32_t i = 0; i < all.n; i++) { /* on a wall, to a millimetre on the wire */
+    for (uint32_t i = 0; i < all.n; i++) { /* each is on a wall, to a millimetre on the wire */
         double v[4], nearest = 1;
         figures_of(&all, i, v);
         for (int k = 0; k < 3; k++)

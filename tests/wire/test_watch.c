@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page is told of a scan while it is on: a noise-free scan that the observer sees all of has the figures that
- * `scanhead report` and `scanhead coverage` have of the same one; with noise it is judged by it; stations follow the head;
- * the coarse scene is the scene. The answers come by HTTP, as a browser gets them. */
+/* The figures of a page while a scan is on. For a noise-free scan that the observer sees all of, they are those of
+ * `scanhead report` and `scanhead coverage` for the same scan. A noisy scan is judged by its noise, stations follow the
+ * head, and the coarse scene is the scene. The answers come by HTTP, as a browser gets them. */
 #include <dirent.h>
 #include <math.h>
 #include <poll.h>
@@ -33,7 +33,7 @@ static void prepare(struct wire *wire, char config[256])
 
 /* ---- answers */
 
-/* The body; free it. */
+/* Returns the body; free it. */
 static char *get(const struct head *head, const char *path, size_t *len)
 {
     char request[256], *answer = NULL;
@@ -60,7 +60,7 @@ static char *get(const struct head *head, const char *path, size_t *len)
     return answer;
 }
 
-/* The number behind the first `key` after the first `after`; NaN: null. */
+/* Returns the number after the first `key` after the first `after`; NaN: null. */
 static double number(const char *json, const char *after, const char *key)
 {
     char quoted[64];
@@ -71,7 +71,8 @@ static double number(const char *json, const char *after, const char *key)
     return strncmp(at, "null", 4) == 0 ? (double)NAN : atof(at);
 }
 
-/* The quality once a scan is over. The head works it out twice a second at most, so asking faster would only cost. */
+/* Returns the quality once a scan is over. The head computes it twice a second at most, so asking faster would only
+ * cost. */
 static char *quality_of(const struct head *head, unsigned station, unsigned scan)
 {
     char begin[64];
@@ -87,7 +88,7 @@ static char *quality_of(const struct head *head, unsigned station, unsigned scan
     return NULL;
 }
 
-/* A scan from a station, as any client asks for it. */
+/* Commands a scan from a station, as any client does. */
 static char *scan_from(const struct head *head, struct scanhead *sh, unsigned station, unsigned scan)
 {
     char line[32];
@@ -100,7 +101,7 @@ static char *scan_from(const struct head *head, struct scanhead *sh, unsigned st
     return quality_of(head, station, scan);
 }
 
-/* How many of a head's threads have a lower priority than its first one. */
+/* Returns how many of a head's threads have a lower priority than its first one. */
 static int threads_below(const struct head *head)
 {
     char path[64];
@@ -150,7 +151,7 @@ static void same(const char *what, double value, double expected, double toleran
     if (!(fabs(value - expected) <= tolerance)) fail_msg("%s: %.12g, not %.12g", what, value, expected);
 }
 
-/* The file holds the points as a client decodes them, so distances are the same but for the way back from UTM, whose
+/* The file holds the points as a client decodes them. So distances are the same but for the way back from UTM, whose
  * anchor is made twice: some units in the last place of 5.8e6 m, 1e-9 m each. Densities are of whole points in the same
  * cells: to a float's digits. */
 static void check_figures(const char *quality, const char *report)
@@ -167,15 +168,15 @@ static void check_figures(const char *quality, const char *report)
     same("p50", number(quality, "density", "p50"), number(report, "density", "p50_m2"),
          1e-6 * number(report, "density", "p50_m2"));
     same("cell", number(quality, "density", "cell_m"), number(report, "\"all\"", "density_cell_m"), 0);
-    /* Within the report's bound, which is what the plan promises and half a count an axis. */
+    /* The RMS is within the report's bound: the plan's bound and half a count an axis. */
     assert_true(number(quality, "deviation_m", "rms") <= number(report, "\"verdict\"", "bound_m"));
     assert_true(number(quality, "deviation_m", "max") <= number(report, "\"verdict\"", "bound_m"));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));
     same("lost", number(quality, "{", "lost_frames"), 0, 0);
 }
 
-/* A point is half a count from where its pulse met the surface, so it may lie in the next cell: where no other pulse
- * meets one of the two. That is one cell more or less, a rare one; its area is at most (2.5 cells)^2. */
+/* A point is half a count from where its pulse met the surface, so it may lie in the next cell. That shows only where
+ * no other pulse meets one of the two. It is one cell more or less, and rare; its area is at most (2.5 cells)^2. */
 static void check_coverage(struct wire *wire, const char *config, const char *quality)
 {
     const char *const args[] = {"coverage", config, "--json", "--quiet", NULL};
@@ -188,7 +189,7 @@ static void check_coverage(struct wire *wire, const char *config, const char *qu
     free(coverage);
 }
 
-/* A station that was moved and turned: its points still lie on the scene, which they would not from where it was. */
+/* A station was moved and turned. Its points lie on the scene; from its old place they would not. */
 static void check_move(const struct head *head, struct scanhead *sh)
 {
     size_t len;
@@ -223,7 +224,7 @@ static void figures_are_those_of_the_report(void **state)
     quality = scan_from(&head, sh, 2, 2);
     same("station", number(quality, "{", "station"), 2, 0);
     same("points of the first", number(quality, "\"name\":\"first\"", "points"), number(report, "{", "points"), 0);
-    /* Each sees some of it, together they see more than either, and no more than both. */
+    /* Each sees some of it. Together they see more than either, and no more than both. */
     const double second = number(quality, "\"name\":\"second\"", "seen_share");
     const double both = number(quality, "\"coverage\"", "share");
     same("seen by the first, still", number(quality, "\"name\":\"first\"", "seen_share"), first, 0);
@@ -236,8 +237,8 @@ static void figures_are_those_of_the_report(void **state)
     free(report);
 }
 
-/* A queue of 10 ms holds next to nothing at this pace: most of a scan is lost to the observer, and its end. Of a scan
- * that begins with the head, often even the descriptor. */
+/* A queue of 10 ms holds next to nothing at this pace. Most of a scan and its end are lost to the observer. When the
+ * scan begins with the head, often even the descriptor is lost. */
 static void a_scan_whose_end_is_lost_is_over(void **state)
 {
     struct wire *wire = *state;
@@ -258,7 +259,7 @@ static void a_scan_whose_end_is_lost_is_over(void **state)
     }
 }
 
-/* One sigma of 3 mm: judged by the noise, as a command has set it; in the histogram the middle is highest. */
+/* One sigma of 3 mm, set by a command: the scan is judged by it, and the histogram is highest in the middle. */
 static void noise_is_expected(void **state)
 {
     struct wire *wire = *state;
@@ -271,8 +272,8 @@ static void noise_is_expected(void **state)
     client_tell(sh, "HEAD:NOIS:SIGM 3 MM");
     char *quality = scan_from(&head, sh, 1, 1);
     const double n = number(quality, "along_beam", "judged"), rms_m = number(quality, "along_beam", "judged_rms");
-    /* The RMS of n normal deviations has a standard error of sigma / sqrt(2 n); six of them, and 1 % as sigma is of first
-     * order and smooth faces are told by the noisy points themselves. */
+    /* The RMS of n normal deviations has a standard error of sigma / sqrt(2 n). Six of them are allowed, and 1 %: sigma
+     * is of first order, and smooth faces are found by the noisy points themselves. */
     assert_true(n > 1000);
     same("sigma", number(quality, "deviation_m", "sigma_expected"), 0.003, 3e-6);
     same("rms", rms_m, 0.003, 0.003 * (6.0 / sqrt(2.0 * n) + 0.01));
@@ -284,8 +285,9 @@ static void noise_is_expected(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* An observer that the head waits for is not the last to get a processor: with others at work the head would stand
- * still. In real time the head does not wait, and it is the last. Its priority is set before it has seen a scan. */
+/* An observer that the head waits for is not the last to get a processor, as the head would stand still while others
+ * work. In real time the head does not wait, and the observer is the last. Its priority is set before it has seen a
+ * scan. */
 static void who_is_waited_for_is_not_last(void **state)
 {
     struct wire *wire = *state;
@@ -309,7 +311,7 @@ static uint32_t u32_at(const char *bytes)
     return v;
 }
 
-/* 7 corners, 6 triangles, as they are in the file; relative to the middle of the bounds. */
+/* The scene has 7 corners and 6 triangles, as in the file, relative to the middle of the bounds. */
 static void scene_is_the_scene(void **state)
 {
     struct wire *wire = *state;

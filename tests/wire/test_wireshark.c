@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The dissector in Wireshark beside libscanhead: frames of every kind over TCP, on USB and in packets of their own, value
- * by value. */
+/* These tests compare the dissector in Wireshark with libscanhead: frames of every kind over TCP, on USB and in packets
+ * of their own. Each value is compared. */
 #include "tests/wire/dissected_frames.h"
 
 #include "drivers/protocol/native.h"
@@ -11,7 +11,8 @@ static void put_user0(struct capture *c, uint32_t interface, const uint8_t *byte
         capture_packet(c, interface, bytes + at, native_frame_len(bytes + at));
 }
 
-/* The long one is on TCP alone: it takes as long as all others. Packets of one frame can't begin within one. */
+/* The long stream is on TCP alone, as it takes as long as all others. In packets of one frame none can begin within
+ * one. */
 static int n_streams(int carrier)
 {
     return N_STREAMS - carrier;
@@ -36,10 +37,10 @@ static void write_clean(void)
     free(c.bytes);
 }
 
-/* The second answer has its command in this capture, and the first one's is before it. */
+/* The second answer has its command in this capture; the first one's is before it. */
 static void expect_tcp_lines(int number)
 {
-    if (number != JOINED) { /* nobody knows the stream yet: what is first in a segment */
+    if (number != JOINED) { /* the stream is not known yet: the first bytes in a segment */
         expect_text(S "reply", "est,1,scanhead native 1");
         expect_text(S "reply", "idle");
     }
@@ -56,8 +57,9 @@ static void expect_usb_lines(void)
     expect_text(S "reply", "123456");
 }
 
-/* Nothing is malformed. Whole scans miss nothing; the line of the samples has 3 of its 400 pulses there. Warnings: the
- * LOCAL event of the samples, once on each carrier; the jumps from one stream to the next in packets of their own. */
+/* Nothing is malformed. Whole scans miss nothing, and the line of the samples has 3 of its 400 pulses. There are two
+ * warnings: the LOCAL event of the samples, once on each carrier, and the jumps from one stream to the next in packets
+ * of their own. */
 static void expect_marks(void)
 {
     int n_lost = 0;

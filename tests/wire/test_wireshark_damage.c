@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The dissector in Wireshark and damage: frames that were hurt are marked, and a stream with damage is read as libscanhead
- * reads it, in one pass and in two. */
+/* These tests give the dissector in Wireshark damage. Damaged frames are marked, and a damaged stream is read as
+ * libscanhead reads it, in one pass and in two. */
 #include "tests/wire/wireshark_rig.h"
 
 #include "drivers/protocol/native.h"
 
 enum { N_HURT = 1000, N_ROUNDS = 3 };
 
-/* Each kind of damage to one frame, so that it differs from any whole frame; the new length. */
+/* Damages one frame in some way, so that it differs from any whole frame. Returns the new length. */
 static size_t hurt(uint8_t *frame, size_t len, uint64_t *random)
 {
     const uint32_t kind = capture_random(random, 5), at = capture_random(random, (uint32_t)len);
@@ -29,7 +29,7 @@ static size_t hurt(uint8_t *frame, size_t len, uint64_t *random)
     return len + n;
 }
 
-/* 1,000 frames of all types, each hurt, in packets of their own. */
+/* Writes 1,000 frames of all types, each damaged, in packets of their own. */
 static void put_hurt(struct capture *c, uint32_t interface)
 {
     static uint8_t copy[NATIVE_MAX_FRAME + 32];
@@ -53,7 +53,7 @@ static void put_hurt(struct capture *c, uint32_t interface)
     free(bytes[1]);
 }
 
-/* One frame, and what may happen to it; returns how many bytes there are. next: the frame after it, which comes first. */
+/* Writes one frame, damaged or not. Returns how many bytes there are. next: the frame after it, which comes first. */
 static size_t put_one(uint8_t *out, const uint8_t *frame, const uint8_t *older, int what, uint64_t *random)
 {
     size_t to = 0;
@@ -74,8 +74,8 @@ static void set_round(uint8_t *frame, int round)
     seal_frame(frame);
 }
 
-/* From a frame of n bytes on: 1 to 3 frames, but no more than up to end. The last of them goes out now, and those between
- * lie after the n bytes, in *between. Returns how long all of them are. */
+/* Takes 1 to 3 frames from a frame of n bytes on, but no more than up to end. The last of them is sent now. Those
+ * between lie after the n bytes, in *between. Returns the length of all of them. */
 static size_t take_ahead(uint8_t *frame, size_t n, const uint8_t *end, int round, uint64_t *random, size_t *between)
 {
     size_t last = n;
@@ -88,9 +88,9 @@ static size_t take_ahead(uint8_t *frame, size_t n, const uint8_t *end, int round
     return last;
 }
 
-/* The recordings one after the other, N_ROUNDS times with other device times: each frame with a chance to be dropped, hurt,
- * to come after an older one or garbage, or after one of the next three. The last 30 are whole: nothing waits for bytes
- * that never come. */
+/* Writes the recordings one after the other, N_ROUNDS times with other device times. Each frame may be dropped or
+ * damaged, or come after an older one, after garbage, or after one of the next three. The last 30 are whole, so that
+ * nothing waits for bytes that never come. */
 static size_t put_damage(uint8_t *out)
 {
     uint64_t random = 4;
@@ -134,7 +134,8 @@ static void keep_notice(void *ctx, const struct scanhead_notice *notice)
     if (notice->kind == SCANHEAD_NOTICE_GAP) noticed.frames_missing += notice->n;
 }
 
-/* The next header with a good checksum; 1: its payload is good, too. The others have no payload status. */
+/* Takes the next header with a good checksum. Returns 1 where its payload is good, too. Other headers have no payload
+ * status. */
 static int take_good_header(size_t *n_bad_payloads)
 {
     while (dissected_left(S "header_crc.status") > 0) {
@@ -171,7 +172,7 @@ static void expect_frames(const char *name, size_t *n_bad)
     assert_true(n > 100);
 }
 
-/* And so are the notices. The stream is there twice, on two carriers. */
+/* The notices are libscanhead's, too. The stream is there twice, on two carriers. */
 static void expect_damaged(const char *name)
 {
     size_t n_bad = 0, kinds[5] = {0}, missing = 0;
@@ -190,7 +191,8 @@ static void expect_damaged(const char *name)
     assert_true(n_bad > 3);
 }
 
-/* Frames with good checksums and wrong or unknown contents: the sample of a type, with one value changed or its length. */
+/* Frames with good checksums and wrong or unknown contents: the sample of a type, with one value or its length
+ * changed. */
 static const struct {
     uint8_t type;
     uint32_t at, n, value; /* in the payload n bytes: 0: none, 4: a number, else each of them is `value` */

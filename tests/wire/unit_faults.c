@@ -68,7 +68,7 @@ void units_read_both(int fd0, struct unit_list *list0, int fd1, struct unit_list
 
 /* ---- the truth */
 
-/* What stands behind "key": in a line; NULL: it has none. */
+/* Returns the text after "key": in a line; NULL: it has none. */
 static const char *member(const char *line, const char *key)
 {
     char quoted[32];
@@ -124,11 +124,11 @@ uint32_t truth_count(const struct truth_note *note, uint32_t n, const char *kind
     return count;
 }
 
-/* ---- what must come */
+/* ---- the expected units */
 
 enum how { EXACT, RANDOM, FLIPPED, SEALED };
 
-/* A unit, or what is left of it, in the order in which it must come. */
+/* A unit, or the rest of it, in the order in which it must come. */
 struct piece {
     enum how how;
     uint8_t *bytes;
@@ -165,7 +165,8 @@ static void pieces_free(struct pieces *pieces)
     free(pieces->piece);
 }
 
-/* One fault on the unit. Returns 0 when it does not come at all. *merge: units in a write that begins with it. */
+/* Applies one fault to the unit. Returns 0 when the unit does not come at all. *merge: units in a write that begins
+ * with it. */
 static int apply(const struct truth_note *note, struct piece *unit, uint32_t *copies, uint64_t *merge,
                  struct pieces *out)
 {
@@ -193,14 +194,14 @@ static int apply(const struct truth_note *note, struct piece *unit, uint32_t *co
     return 1;
 }
 
-/* Those that waited for this unit come now. */
+/* Units that waited for this one come now. */
 static void let_go(const struct pieces *held, uint64_t number, struct pieces *out)
 {
     for (uint32_t i = 0; i < held->n; i++)
         if (held->piece[i].after == number) append(out, &held->piece[i]);
 }
 
-/* Units of the session from the clean one `first` on. */
+/* Predicts the session's units from the clean one `first` on. */
 static struct pieces predict(const struct unit_kind *kind, const struct unit_list *clean, uint32_t first,
                              const struct truth_note *note, uint32_t n_notes)
 {
@@ -230,7 +231,7 @@ static struct pieces predict(const struct unit_kind *kind, const struct unit_lis
     return out;
 }
 
-/* ---- against what came */
+/* ---- comparison with the received bytes */
 
 static uint32_t n_bits_changed(const uint8_t *a, const uint8_t *b, size_t len)
 {
@@ -253,7 +254,7 @@ static void check_flips(const struct unit_kind *kind, const struct piece *p, con
     assert_true(kind->is_sound(got, p->len));
 }
 
-/* Whether the piece is what stands there, as far as that goes. */
+/* Checks that the piece is there, as far as its bytes are known. */
 static void check_piece(const struct unit_kind *kind, const struct piece *p, uint32_t i, const uint8_t *got, size_t len)
 {
     if (p->how == RANDOM) return;
@@ -279,7 +280,7 @@ static void check_stream(const struct unit_kind *kind, const struct pieces *want
     if (at < got->len) fail_msg("%zu bytes came, and the clean session's end is at %zu", got->len, at);
 }
 
-/* Datagrams: a unit each; split into some, merged with those after it. */
+/* Each datagram is a unit. One may be split into some, or merged with those after it. */
 static void check_datagrams(const struct unit_kind *kind, const struct pieces *want, const struct unit_list *got)
 {
     uint32_t g = 0;
@@ -307,7 +308,7 @@ static void check_datagrams(const struct unit_kind *kind, const struct pieces *w
     assert_int_equal(g, got->n);
 }
 
-/* Which clean unit was the faulty session's first. */
+/* Finds the clean unit that was the faulty session's first. */
 static uint32_t find_first(const struct unit_kind *kind, const struct unit_list *clean, const struct unit_list *got)
 {
     static uint8_t unit[1 << 16];

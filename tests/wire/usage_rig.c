@@ -15,7 +15,7 @@ const char USAGE_GOOD[] = "head: {profile: full-sweep, prr_hz: 100000, lines_hz:
                           "links: [{type: \"null\"}]\n"
                           "plan: {tolerance_m: 1e-3}\n"; /* and a tenth of it for meshes */
 
-/* How many files the folder holds. */
+/* Returns how many files the folder holds. */
 static int count_files(const struct wire *wire)
 {
     DIR *dir = opendir(wire->dir);
@@ -26,7 +26,7 @@ static int count_files(const struct wire *wire)
     return n;
 }
 
-/* Lines of a text that are no warnings; *line is the last of them. */
+/* Counts the lines of a text that are no warnings; *line is the last of them. */
 static int count_errors(char *text, char **line)
 {
     int n = 0;

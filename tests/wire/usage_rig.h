@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Wrong input through the real program, for the tests that look at what it answers. */
+/* This gives the real program wrong input, for the tests of its answers. */
 #ifndef TESTS_WIRE_USAGE_RIG_H
 #define TESTS_WIRE_USAGE_RIG_H
 
@@ -8,13 +8,12 @@
 /* A configuration that runs, with room.obj in its folder. */
 extern const char USAGE_GOOD[];
 
-/* All that is wrong is told, not only the first. */
+/* Counts the wrong answers, so that all are reported and not only the first. */
 extern int usage_complaints;
 
 #define usage_complain(...) (usage_complaints++, print_message(__VA_ARGS__), print_message("\n"))
 
-/* Runs the program; its status must be `status`, and its one line of error must have all of `says` (ends with
- * NULL). */
+/* Runs the program. Its status must be `status`, and its one line of error must have all of `says` (ends with NULL). */
 void usage_expect(struct wire *wire, const char *what, const char *const *args, int status, const char *const *says);
 
 #endif

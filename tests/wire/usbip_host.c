@@ -45,7 +45,7 @@ struct usbip_host usbip_host_open(const struct head *head)
     static const uint8_t list[8] = {0x01, 0x11, 0x80, 0x05};
     uint8_t import[8 + USBIP_BUS_ID_LEN] = {0x01, 0x11, 0x80, 0x03}, reply[12];
     struct usbip_host host = {.seqnum = 0};
-    char at[128]; /* "usbip:127.0.0.1:PORT" as the socket that it is */
+    char at[128]; /* "usbip:127.0.0.1:PORT" as a socket's address */
     snprintf(at, sizeof at, "tcp%s", strchr(head_endpoint(head, "usb"), ':'));
     host.fd = raw_connect(at);
     raw_send(host.fd, list, sizeof list);
@@ -85,7 +85,7 @@ void usbip_host_ask(struct usbip_host *host, unsigned endpoint, uint32_t len)
     start_transfer(host, endpoint, 1, NULL, len);
 }
 
-/* Submits and waits for the reply; the bytes that came, or the negative status. */
+/* Submits and waits for the reply. Returns the number of bytes that came, or the negative status. */
 static int transfer(struct usbip_host *host, unsigned endpoint, int in, const uint8_t *setup, void *data, uint32_t len)
 {
     uint8_t reply[HEADER];

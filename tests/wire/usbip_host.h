@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A USB/IP host without a kernel, for heads that run: the list, the import, and one transfer at a time. Numbers on the
- * wire: the kernel's Documentation/usb/usbip_protocol.rst, version 1.1.1. */
+ * wire are those of the kernel's Documentation/usb/usbip_protocol.rst, version 1.1.1. */
 #ifndef TESTS_WIRE_USBIP_HOST_H
 #define TESTS_WIRE_USBIP_HOST_H
 
@@ -18,24 +18,24 @@ struct usbip_host {
 /* Imports the one device of the head's usb link. */
 struct usbip_host usbip_host_open(const struct head *head);
 
-/* The same, once somebody listens there. */
+/* The same, once a head listens there. */
 struct usbip_host usbip_host_open_within(const struct head *head, int timeout_ms);
 
 void usbip_host_close(struct usbip_host *host);
 
-/* A control transfer that reads up to len bytes; how many, or the negative status. */
+/* Makes a control transfer that reads up to len bytes. Returns how many, or the negative status. */
 int usbip_host_control(struct usbip_host *host, unsigned type, unsigned request, unsigned value, unsigned index,
                        void *data, unsigned len);
 
-/* A string descriptor as text; "": there is none. */
+/* Reads a string descriptor as text; "": there is none. */
 void usbip_host_string(struct usbip_host *host, unsigned index, char *text, size_t len);
 
 void usbip_host_send(struct usbip_host *host, unsigned endpoint, const void *data, uint32_t len);
 
-/* Submits such a transfer, and does not wait for it. */
+/* Submits a transfer, and does not wait for it. */
 void usbip_host_ask(struct usbip_host *host, unsigned endpoint, uint32_t len);
 
-/* One transfer of at most len bytes, waited for; how many. */
+/* Makes one transfer of at most len bytes, and waits for it. Returns how many came. */
 uint32_t usbip_host_receive(struct usbip_host *host, unsigned endpoint, void *data, uint32_t len);
 
 #endif

@@ -144,7 +144,7 @@ pid_t wire_spawn_program(struct wire *wire, const char *program, const char *con
     if (pid != 0) return pid;
     int null = open("/dev/null", O_RDONLY), o = open(out_path, O_WRONLY | O_CREAT | O_TRUNC, 0600),
         e = open(err_path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    /* High first: 3 may be any of those that are open. */
+    /* The number is high, as 3 may be any open descriptor. */
     int ready = ready_fd >= 0 ? fcntl(ready_fd, F_DUPFD, 100) : -1;
     dup2(null, 0);
     dup2(o, 1);
@@ -263,7 +263,7 @@ void head_end(struct head *head, int signal_number)
     assert_int_equal(status, 0);
 }
 
-/* The first value of the key after the text `from`. */
+/* Returns the first value of the key after the text `from`. */
 static uint64_t find_uint(const struct wire *wire, const char *from, const char *key)
 {
     char *text = wire_read(wire_path(wire, "stats.json"), NULL), name[64];

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What the wire tests share: a folder of their own, the real program started in it, its endpoints, its end.
+/* Shared by the wire tests: a folder of their own, the real program started in it, its endpoints, its end.
  *
- * Nothing here sleeps to let something happen: every wait is on a descriptor (ready line, frame, reply,
- * pidfd) and DEADLINE_MS is only when the test gives up: it is far beyond what a busy machine takes. What the head does at once is waited for by its own time
- * (wire_soon), so that its absence shows at once, too. The program dies with the test (PR_SET_PDEATHSIG), a
- * failed test included: the teardown ends what is left. */
+ * Nothing here sleeps to let something happen. Every wait is on a descriptor (ready line, frame, reply, pidfd).
+ * DEADLINE_MS is only when the test gives up, far beyond the time of a busy machine. Events that the head sends at once
+ * are waited for by the head's own time (wire_soon), so that their absence shows at once, too. The program dies with
+ * the test (PR_SET_PDEATHSIG), also with a failed one: the teardown ends what is left. */
 #ifndef TESTS_WIRE_WIRE_H
 #define TESTS_WIRE_WIRE_H
 
@@ -43,7 +43,7 @@ struct wire {
     int n_children;
 };
 
-/* A running head. */
+/* This is a running head. */
 struct head {
     struct wire *wire;
     pid_t pid;
@@ -58,11 +58,10 @@ const char *wire_program(void);
 
 int wire_setup(void **state);
 
-/* Path of a file in the folder; four of them are good at a time. */
+/* Returns the path of a file in the folder; four of them are good at a time. */
 const char *wire_path(const struct wire *wire, const char *name);
 
-/* Removes the files in the folder; the tests make no folders in it but empty ones. Returns how many there
- * were. */
+/* Removes the files in the folder; the only folders that tests make in it are empty. Returns how many there were. */
 int wire_empty(const struct wire *wire);
 
 int wire_teardown(void **state);
@@ -71,39 +70,39 @@ const char *wire_write(const struct wire *wire, const char *name, const void *da
 
 const char *wire_write_text(const struct wire *wire, const char *name, const char *text);
 
-/* The whole file, NUL-terminated; free() it. */
+/* Returns the whole file, NUL-terminated; free() it. */
 char *wire_read(const char *path, size_t *len);
 
-/* The same of a file that a head is still writing, as soon as `has` says that what is looked for is there. */
+/* The same for a file that a head is still writing, as soon as `has` returns 1 for its text. */
 char *wire_read_with(const char *path, int (*has)(const char *text, const void *ctx), const void *ctx);
 
 /* ---- processes */
 
 pid_t wire_fork(struct wire *wire);
 
-/* Starts a program with args (ends with NULL); out, err: files in the folder for the two streams; ready_fd:
- * given to it as descriptor 3, or -1. */
+/* Starts a program with args (ends with NULL). out, err: files in the folder for the two streams. ready_fd: given to it
+ * as descriptor 3, or -1. */
 pid_t wire_spawn_program(struct wire *wire, const char *program, const char *const *args, const char *out,
                          const char *err, int ready_fd);
 
 /* Starts the head's program. */
 pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err, int ready_fd);
 
-/* Waits for the end; the exit status, or 256 + the signal. */
+/* Waits for the end. Returns the exit status, or 256 + the signal. */
 int wire_wait(struct wire *wire, pid_t pid);
 
 void wire_show(const struct wire *wire, const char *name);
 
-/* `scanhead run CONFIG ...` up to its ready line. more: further arguments, ends with NULL, or NULL. */
+/* Starts `scanhead run CONFIG ...` and reads its ready line. more: further arguments, ends with NULL, or NULL. */
 struct head head_start(struct wire *wire, const char *config, const char *const *more);
 
-/* The endpoint of the first link of a type ("tcp", "pty", "file"), as the ready line names it. */
+/* Returns the endpoint of the first link of a type ("tcp", "pty", "file"), as the ready line names it. */
 const char *head_endpoint(const struct head *head, const char *type);
 
-/* The endpoint of link i of the configuration, from 0; good until the next call. */
+/* Returns the endpoint of link i of the configuration, from 0; good until the next call. */
 const char *head_link(const struct head *head, int i);
 
-/* The port at the end of an endpoint. */
+/* Returns the port at the end of an endpoint. */
 int endpoint_port(const char *endpoint);
 
 /* Ends the head with a signal (0: it ends by itself) and checks that it went in good order. */
@@ -113,7 +112,7 @@ void head_end(struct head *head, int signal_number);
 
 uint64_t stats_uint(const struct wire *wire, const char *key);
 
-/* The same of the first link: received_pulses, left_out_pulses, left_out_frames. */
+/* The same for the first link: received_pulses, left_out_pulses, left_out_frames. */
 uint64_t stats_link_uint(const struct wire *wire, const char *key);
 
 void stats_hash(const struct wire *wire, char hex[65]);
@@ -122,39 +121,38 @@ void stats_hash(const struct wire *wire, char hex[65]);
 
 struct scanhead *client_open(const char *source);
 
-/* The reply; good until the next call. */
+/* Returns the reply, which is good until the next call. */
 const char *client_ask(struct scanhead *sh, const char *command);
 
 void client_tell(struct scanhead *sh, const char *command);
 
 void client_next(struct scanhead *sh, struct scanhead_frame *frame);
 
-/* For loops over frames or replies that go on for as long as the head runs: fails once its time is SOON_MS beyond the first
- * one given (*since_ns, 0 at first). The head's time stands still where the machine does. */
+/* For loops over frames or replies that go on for as long as the head runs. It fails once the head's time is SOON_MS
+ * beyond the first one given (*since_ns, 0 at first). The head's time stands still where the machine does. */
 void wire_soon(int64_t *since_ns, int64_t t_ns, const char *what);
-/* The head's time, by asking. */
+/* Asks for the head's time. */
 int64_t client_time_ns(struct scanhead *sh);
 
 int is_event(const struct scanhead_frame *frame, uint32_t code);
 
-/* Takes frames until an event of this code, and gives that one. */
+/* Takes frames until an event of this code, and writes that one. */
 void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
-/* Likewise of one that the head says at once (wire_soon). */
+/* Does the same for an event that the head sends at once (wire_soon). */
 void client_until_soon(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
 
-/* Waits for the state by asking; each answer comes from the head, so this is no busy loop. Frames are taken.
- */
+/* Waits for the state by asking. Each answer comes from the head, so this is no busy loop. Frames are taken. */
 void client_wait_state(struct scanhead *sh, const char *state);
 
-/* IFC by Assimp alone, for tests with another subject: the other readers take 3 s of processor time a start. */
+/* Only Assimp reads IFC, for tests with another subject: the other readers take 3 s of processor time a start. */
 #define IFC_BY_ASSIMP "scene.ifc_reader=assimp"
 
-/* A plain socket to the "tcp:127.0.0.1:PORT" of the head. */
+/* Opens a plain socket to the "tcp:127.0.0.1:PORT" of the head. */
 int raw_connect(const char *endpoint);
 /* The same; -1: nobody listens there now. */
 int raw_try_connect(const char *endpoint);
-/* The same when the head has rebooted: until the question is answered, which is left to be read. While power is off nobody
- * listens, or the connection ends with it. */
+/* The same after the head has rebooted: tries until the question is answered; the answer is left to be read. While
+ * power is off nobody listens, or the connection ends with it. */
 int raw_connect_again(const char *endpoint, const char *question);
 
 void raw_send(int fd, const void *data, size_t len);

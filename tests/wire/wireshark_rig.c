@@ -72,7 +72,8 @@ void seal_frame(uint8_t *frame)
     le_put32(frame + 24, crc32c(0, frame, 24));
 }
 
-/* The samples' descriptor and anchor, and then points of every value that a point may have; two of three have echoes. */
+/* Writes the samples' descriptor and anchor, and then points with every value that a point may have. Two of three have
+ * echoes. */
 static void write_long(void)
 {
     size_t len, at = 0;
@@ -97,7 +98,8 @@ static void write_long(void)
     free(all);
 }
 
-/* Each stream has sequence numbers of its own, so that they can follow each other: a jump forward between two. */
+/* Each stream gets sequence numbers of its own, so that they can follow each other: between two there is a jump
+ * forward. */
 static void number_all(void)
 {
     for (int i = 0; i < N_STREAMS; i++) {
@@ -143,7 +145,7 @@ void put_tcp(struct capture *c, uint32_t interface, int number, const uint8_t *b
     uint64_t random = (uint64_t)number;
     static const char early[] = "*IDN?\nHEAD:STATe?\r\n", answers[] = "scanhead,test,1,scanhead native 1\r\nidle\r\n";
     static const char late[] = "ERR -222,\"Data out of range\"\r\nid";
-    if (number != JOINED) { /* what it answers to is before the capture */
+    if (number != JOINED) { /* its command is before the capture */
         capture_segment(c, interface, &tcp, 1, answers, 10);
         capture_segment(c, interface, &tcp, 1, answers + 10, sizeof answers - 11);
     }

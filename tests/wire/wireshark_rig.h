@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams of every kind, and the carriers that a capture has them on: what the tests of the dissector share. */
+/* Streams of every kind, and the carriers of a capture, for the tests of the dissector. */
 #ifndef TESTS_WIRE_WIRESHARK_RIG_H
 #define TESTS_WIRE_WIRESHARK_RIG_H
 
@@ -17,10 +17,10 @@ extern const char *const stream_name[N_STREAMS]; /* the recordings first */
 /* Makes them. The sequence numbers of each are its own, so that one may follow the other by a jump forward. */
 int wireshark_setup(void **state);
 
-/* Both checksums of a frame made right again. */
+/* Makes both checksums of a frame right again. */
 void seal_frame(uint8_t *frame);
 
-/* A stream cut at random: with two commands and their replies on TCP, with one on USB. */
+/* Writes a stream cut at random: with two commands and their replies on TCP, with one on USB. */
 void put_tcp(struct capture *capture, uint32_t interface, int number, const uint8_t *bytes, size_t len);
 void put_usb(struct capture *capture, uint32_t interface, int number, const uint8_t *bytes, size_t len);
 
