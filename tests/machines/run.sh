@@ -50,7 +50,7 @@ for name; do
     at=$build/machines/$name
     mkdir -p "$at" || exit 1
     rm -f "$at/tests.txt" "$at/record.txt" "$at/built.txt" "$at/skipped.txt"
-    echo "$name: $(sed -n '2s/^# //p' "$here/$name.sh")"
+    echo "$name: $(sed -n '3s/^# //p' "$here/$name.sh")"
     sh "$here/$name.sh" "$build" "$at"
     { row "$name"; echo; grep -h '^FAIL' "$at/tests.txt"; sed -n '/^skipped:$/,$p' "$at/tests.txt"; } >"$at.txt" 2>/dev/null
 done
