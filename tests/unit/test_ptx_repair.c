@@ -333,7 +333,7 @@ static void test_refused(void **state)
     memcpy(grid, s->grid, s->grid_len);
     grid[HEAD_LEN + 3 * CELL_LEN + 5] ^= 1;
     check_refused((char *)s->text, grid, s->grid_len, "damaged");
-    check_refused("1\n1\n" POSE "1 2 3 1\n", s->grid, s->grid_len, "has no end of a grid"); /* of another recording */
+    check_refused("1\n1\n" POSE "1 2 3 1\n", s->grid, s->grid_len, "no grid ends there"); /* of another recording */
     free(grid);
     remove_state();
 }

@@ -151,8 +151,8 @@ static void a_step_as_ply(void **state)
     has(text, "property double scalar_range\n");
     has(text, "element vertex 0\n");
     has(text, "element face 0\n");
-    has(rig_notes, "there is no triangle in it");
-    has(rig_notes, "12 points left out that are in no triangle");
+    has(rig_notes, "it has no triangles");
+    has(rig_notes, "12 points left out that belong to no triangle");
     free(text);
 }
 
@@ -296,9 +296,9 @@ static void later_echoes_and_lines_that_go_back(void **state)
     record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 0});
     char *text = text_of("a.ply");
     has(text, "element face 14\n"); /* a cell, and the step */
-    has(rig_notes, "2 echoes left out; a mesh has the first of a shot\n");
-    has(rig_notes, "1 meshes begun within a scan, since its lines went back\n");
-    has(rig_notes, "2 points left out that are in no triangle\n"); /* behind the empty shots */
+    has(rig_notes, "2 echoes left out; a mesh holds the first of a shot\n");
+    has(rig_notes, "1 additional meshes begun within a scan, since its line numbers went back\n");
+    has(rig_notes, "2 points left out that belong to no triangle\n"); /* behind the empty shots */
     free(text);
 }
 
@@ -345,7 +345,7 @@ static void what_can_be_no_mesh(void **state)
     rig_anchor(&a);
     put_step(0);
     if (sysconf(_SC_PHYS_PAGES) * (sysconf(_SC_PAGESIZE) >> 20) < 170000)
-        refused("a.ply", mesh, SH_EINPUT, "takes 174.2 GiB of memory, and there are");
+        refused("a.ply", mesh, SH_EINPUT, "takes 174.2 GiB of memory, and ");
     else
         rig_record(rig_path("a.ply"), mesh, 0, &err);
 
@@ -383,7 +383,7 @@ static void what_can_be_no_mesh(void **state)
     rig_begin();
     begin_scan(1, 1);
     put_step(0);
-    refused("a.fbx", (struct recorder_options){.long_edge = 1}, SH_EINPUT, "there is no triangle in this scan");
+    refused("a.fbx", (struct recorder_options){.long_edge = 1}, SH_EINPUT, "this scan has no triangles");
 }
 
 int main(void)

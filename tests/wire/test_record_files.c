@@ -62,7 +62,7 @@ static void test_same_file(void **state)
     /* what a recording that was killed has left is not overwritten: it may be all that there is of it */
     snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
     const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};
-    expect_refusal(wire, args, "a.las.part: an earlier recording has left 32 bytes there; scanhead record --repair ");
+    expect_refusal(wire, args, "a.las.part: an earlier recording left 32 bytes there; scanhead record --repair ");
     assert_int_equal(unlink(part), 0);
     wire_write_text(wire, "a-1.las.part", "left behind");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--quiet", "--split", NULL}, "a-1.las.part");

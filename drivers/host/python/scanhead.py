@@ -760,7 +760,7 @@ class _Poses:
             raise ScanheadError("a poses frame whose times do not rise")
         if not all(abs(sum(v * v for v in p.quat) - 1) < 1e-9 and
                    all(map(math.isfinite, p.position_m + (p.frame,))) for p in poses):
-            raise ScanheadError("a poses frame with numbers that are no pose")
+            raise ScanheadError("a poses frame with numbers that are not a pose")
         self._frames.append((times, poses))
         self._n += n
         while self._n > _KEEP_POSES:
@@ -1115,7 +1115,7 @@ class Head:
                 left_ms = min(max(0.0, 1000 * (deadline_s - time.monotonic())), _POLL_MS)
             ready = poll.poll(left_ms)
             if not ready:
-                raise Timeout(f"{self._source.name}: nothing came in time")
+                raise Timeout(f"{self._source.name}: no data came within the time limit")
             if write and ready[0][1] & select.POLLOUT and not ready[0][1] & select.POLLIN:
                 return True
         try:
@@ -1148,7 +1148,7 @@ class Head:
         if self._source.is_file:
             raise ScanheadError(f"{self._source.name}: a recording takes no commands")
         if self._stuck:
-            raise ScanheadError(f"{self._source.name}: half a command went out before; open the head again")
+            raise ScanheadError(f"{self._source.name}: an earlier command was sent only in part; open the head again")
         if not line.strip() or len(line) > 256 or not all(" " <= c <= "~" for c in line):
             raise ScanheadError("not a command: one line of 1 to 256 printable ASCII characters")
         deadline_s = time.monotonic() + timeout_s
@@ -1425,7 +1425,7 @@ class Head:
         if frame.type != POINTS:
             raise ScanheadError("not a points frame")
         if self.descriptor is None or self.anchor is None:
-            raise ScanheadError("points before the descriptor and the anchor of their scan")
+            raise ScanheadError("points came before the descriptor and the anchor of their scan")
         raw = _raw_columns(frame.payload, frame.fields["n_points"])
         p = _common(raw, frame.fields["t0_ns"], self.descriptor["layout"])
         if p.layout == POLAR:
@@ -1481,7 +1481,7 @@ class Head:
 
     def _earth_now(self) -> _Earth:
         if not self.can_place():
-            raise ScanheadError("points before the descriptor and the anchor of their scan")
+            raise ScanheadError("points came before the descriptor and the anchor of their scan")
         if self._earth is None:
             self._earth = _Earth(self.anchor, self.descriptor["layout"])
         return self._earth

@@ -10,9 +10,9 @@ const TIMEOUT_S = 5, FIRST_DELAY_S = 0.5, MAX_DELAY_S = 5, FULL_DELAY_S = 10, FU
 
 // Why a connection ended, for people.
 function closeWords(code, reason, wasOpen) {
-  if (code === FULL) return reason || 'all places of this link are taken';
+  if (code === FULL) return reason || 'all sessions of this link are taken';
   if (reason) return reason;
-  if (!wasOpen) return 'the head is not there, or does not want this page';
+  if (!wasOpen) return 'nothing answers there, or the head refuses this page';
   return code === 1000 || code === 1001 ? 'the head has ended' : 'the connection broke: the head is gone';
 }
 
