@@ -99,7 +99,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
          "too fine; allowed multiples of 0.001 ns"},
         {vlp, "firing_ns: { value: 55296,", "firing_ns: { value: 60000000,", "firing_ns",
          "longer than a turn at lines_max_hz; allowed up to 50000000 ns"},
-        {vlp, "offset_ns: 2304,", "offset_ns: 4608,", "beams", "beam 3 fires after 4608 ns, the one before it"},
+        {vlp, "offset_ns: 2304,", "offset_ns: 4608,", "beams", "beam 3 fires after 4608 ns, but the beam before it"},
         {vlp, "offset_ns: 0,", "offset_ns: 1,", "beams", "the first beam fires after 1 ns; allowed 0"},
         {vlp, "offset_ns: 0,", "offset_ns: -1,", "beams[0].offset_ns", "allowed a whole number"},
         {vlp, "elevation_deg: -15,", "elevation_deg: -91,", "beams[0].elevation_deg", "allowed -90 to 90 deg"},
@@ -135,7 +135,7 @@ static void settings_that_do_not_fit_are_refused(void **state)
          ":4: head.ring_stop_deg: the rings go from 1 to 0.5 deg; allowed a ring_start_deg of at most 0.5, or a "
          "ring_stop_deg of at least 1"},
         {"sphere", "  ring_start_deg: 0.1\n  ring_stop_deg: 0.9\n",
-         "no ring lies from 0.1 to 0.9 deg; allowed are limits around one, such as 0 or 1 deg"},
+         "no ring lies from 0.1 to 0.9 deg; allowed are limits around a ring, such as 0 or 1 deg"},
         {"sphere", "  line_start_deg: 90\n  line_stop_deg: 90\n",
          "the line goes from 90 to 90 deg; allowed a line_start_deg other than 90"},
         {"sphere", "  step_deg: 0.01\n  lines_hz: 278\n",

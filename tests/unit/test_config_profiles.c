@@ -89,7 +89,7 @@ static void malformed_profiles_are_refused(void **state)
          "allowed data sheet, quoted, assumed"},
         {"range_m: 130, from: assumed }",
          "range_m: 130, from: assumed }\n  - { reflectance: 0.2, range_m: 140, from: assumed }", "reaches",
-         "falls at least with the square of the range"},
+         "must fall at least with the square of the range"},
         {"range_max_m:", "range_mx_m:", "range_mx_m", "did you mean range_max_m?"},
         {"range_max_m: " FARTHEST "\n", "", "range_max_m", "missing"},
         {"facets: { value: 1,", "facets: { value: 2,", "fov_max_deg", "allowed up to 180 deg"},

@@ -38,7 +38,7 @@ static void cut_off_anywhere(void **state)
     const size_t n = pack(data);
     for (size_t cut = 0; cut < n; cut += cut < 16 ? 1 : (size_t)thorough(1, 11))
         refuse("cut.tif", data, cut, cut < 8 ? "no TIFF" : "");
-    refuse("text.tif", "solid hall, or any other text", 29, "no TIFF by its first bytes");
+    refuse("text.tif", "solid hall, or any other text", 29, "not a TIFF: its first bytes");
 }
 
 /* One byte in a hundred is another one, by a fixed seed: terrain, or one line that names the file; no reader that crashes. */
@@ -80,7 +80,8 @@ static void what_follows_is_broken(void **state)
     memset(data + at + 2 + 12 * tags, 0x7f, 4);
     const struct scene_mesh_spec spec = {.file = write_file("next.tif", data, n), .scale = 1};
     assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_OK);
-    if (n_warnings != 1 || strstr(warnings, "next.tif: only its first image is read; what follows is broken: ") == NULL)
+    if (n_warnings != 1 ||
+        strstr(warnings, "next.tif: only its first image is read; the data after it are broken: ") == NULL)
         fail_msg("%s", warnings);
     scene_free(s);
     unlink(path);

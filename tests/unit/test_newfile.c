@@ -161,7 +161,7 @@ static void test_kinds(void **state)
     assert_int_equal(mkfifo(path, 0600), 0);
     expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a FIFO");
     expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path,
-                 "FIFO that nobody reads"); /* and did not wait for a reader */
+                 "FIFO without a reader"); /* and did not wait for a reader */
     assert_int_equal(kind_of(path), S_IFIFO);
     unlink(path);
     assert_int_equal(mkfifo(part, 0600), 0);

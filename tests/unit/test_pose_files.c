@@ -82,8 +82,8 @@ static void test_csv_errors(void **state)
         const char *text, *where, *what;
     } wrong[] = {
         {"", ":", "empty"},
-        {"t_s,x_m,y_m\n0,1,2\n", "line 1", "columns have to be"},
-        {"t_s,x_m,y_m,z_m,heading_deg,qw\n", "line 1", "columns have to be"},
+        {"t_s,x_m,y_m\n0,1,2\n", "line 1", "columns must be"},
+        {"t_s,x_m,y_m,z_m,heading_deg,qw\n", "line 1", "columns must be"},
         {"t_s,x_m,y_m,z_m,heading\n", "line 1", "\"heading\" is unknown; allowed t_s"},
         {"t_s,t_s\n", "line 1", "twice"},
         {NAMES, ":", "no samples"},

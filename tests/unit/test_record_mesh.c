@@ -328,7 +328,8 @@ static void what_can_be_no_mesh(void **state)
     put_descriptor(&d);
     rig_anchor(&a);
     put_step(0);
-    refused("a.glb", mesh, SH_EINPUT, ".glb holds coordinates as float, which moves those of 5000100 m by up to 0.3 m");
+    refused("a.glb", mesh, SH_EINPUT,
+            ".glb holds coordinates as float, which moves coordinates of 5000100 m by up to 0.3 m");
 
     d.frames = 10000000; /* 10^7 turns of 11 lines of a tenth of 1001 pulses */
     a = anchor_of(1);

@@ -214,7 +214,7 @@ static void test_refusals(void **state)
         struct view_spec spec;
         const char *says;
     } bad[] = {
-        {{{{1, 1, 1}, {1, 1, 1}, 1, 200, 150}, 0, 1}, "at the place it looks at"},
+        {{{{1, 1, 1}, {1, 1, 1}, 1, 200, 150}, 0, 1}, "the eye is at its target"},
         {{{{NAN, 0, 0}, {0, 1, 0}, 1, 200, 150}, 0, 1}, "eye's x"},
         {{{{0, 0, 0}, {0, 1, 0}, 3, 200, 150}, 0, 1}, "0.01 to 2.8"},
         {{{{0, 0, 0}, {0, 1, 0}, 1, 8, 150}, 0, 1}, "8 x 150 pixels"},

@@ -302,7 +302,7 @@ static void test_two_heads_one_file(void **state)
     begin(wire);
     snprintf(config, sizeof config, "%s", wire_path(wire, "f.yaml"));
     struct head first = head_start(wire, config, (const char *const[]){"--start", "--set", "head.frames=0", NULL});
-    snprintf(says, sizeof says, "is being written by process %ld (scanhead); allowed is a file of its own",
+    snprintf(says, sizeof says, "is being written by process %ld (scanhead); choose another file name",
              (long)first.pid);
     static const char *const lines[] = {"run @f.yaml --start --frames=1", "run @c.yaml --start --frames=1 --journal=@o",
                                         "run @c.yaml --start --frames=1 --truth=@o", "soak @f.yaml --duration=1"};

@@ -165,7 +165,7 @@ static void unit_and_axes_can_be_given(void **state)
     assert_int_equal(RUN(wire, "check", "twice.yaml"), 0);
     write_room(wire, "nm.obj", 1e9, 0); /* in metres it would be larger than a scene may be */
     assert_int_equal(RUN(wire, "init", "nm.obj"), 2);
-    contains(text, "is the scale of 1 metres per unit right?");
+    contains(text, "check the scale of 1 metres per unit");
     assert_int_equal(RUN(wire, "init", "nm.obj", "--up", "z", "--scale", "1e-9"), 0);
     contains(out, "size      8 x 6 x 3 m");
     forget();
@@ -311,7 +311,7 @@ static void wrong_use_says_what_is_allowed(void **state)
     assert_int_equal(RUN(wire, "init", "room.obj", "--up", "x"), 2);
     contains(text, "--up x: allowed y, z");
     assert_int_equal(RUN(wire, "init", "points.obj"), 2);
-    contains(text, "no triangles in it");
+    contains(text, "has no triangles");
     contains(text, "export it again");
     wire_write_text(
         wire, "apart.gltf",

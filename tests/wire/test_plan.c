@@ -242,7 +242,7 @@ static void test_sight(void **state)
         {{"cast.sight=off", "beam.mode=single"}, {"none", "forced by cast.sight"}},
         {{"instrument.mirror_offset_m=0.01", "head.frames=0"}, {"none", "moves the beam"}},
         {{"beam.mode=rings", "head.frames=0"}, {"none", "no ray for the centre"}},
-        {{"head.frames=1", "head.pan_stop_deg=1"}, {"none", "too few to pay"}},
+        {{"head.frames=1", "head.pan_stop_deg=1"}, {"none", "too few: a map would cost"}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const int is_rings = strcmp(cases[i].sets[0], "beam.mode=rings") == 0;

@@ -62,8 +62,8 @@ static void warn_unknown(struct gltf *g, const json_t *used)
         n++;
     }
     if (n > 0)
-        sh_warn(g->b->report, "%s: %u extensions are not known, and were not required: they are not read: %s",
-                g->b->name, n, names);
+        sh_warn(g->b->report, "%s: %u extensions are unknown but not required; they are not read: %s", g->b->name, n,
+                names);
 }
 
 bool gltf_is_by_shaders(const json_t *material)
@@ -81,8 +81,8 @@ static int check_for_assimp(struct gltf *g, const json_t *required)
         if (is_in(required, other[i]))
             return gltf_fail(g, "it needs KHR_draco_mesh_compression and %s; allowed is one of them", other[i]);
     if (json_array_size(json_object_get(g->root, "skins")) > 0)
-        sh_warn(g->b->report,
-                "%s: its meshes are packed by Draco, and so Assimp reads it: its skins move nothing there", g->b->name);
+        sh_warn(g->b->report, "%s: its meshes are packed by Draco, so Assimp reads it, which ignores its skins",
+                g->b->name);
     return SH_OK;
 }
 
@@ -116,13 +116,14 @@ int gltf_check_extensions(struct gltf *g)
     if (rc != SH_OK) return rc;
     for (size_t i = 0; i < json_array_size(required); i++) {
         const char *name = json_string_value(json_array_get(required, i));
-        if (name == NULL) return gltf_fail(g, "extensionsRequired[%zu] is no text", i);
+        if (name == NULL) return gltf_fail(g, "extensionsRequired[%zu] is not a text", i);
         if (!is_known(name))
             return gltf_fail(g, "it requires the extension %.60s, which is not known; known are " KNOWN_SAYS, name);
     }
     warn_unknown(g, used);
     if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
-        sh_warn(g->b->report, "%s: it has colours by shaders (KHR_techniques_webgl), which are not read", g->b->name);
+        sh_warn(g->b->report, "%s: its colours come from shaders (KHR_techniques_webgl), which are not read",
+                g->b->name);
     g->by_assimp = is_in(required, "KHR_draco_mesh_compression") || has_packed(g);
     return g->by_assimp ? check_for_assimp(g, required) : SH_OK;
 }

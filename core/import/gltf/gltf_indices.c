@@ -133,7 +133,7 @@ void gltf_say_indices(const struct gltf *g)
     struct search s = {.g = g};
     walk(&s, g->root, "", "", 0);
     if (s.n > 0)
-        sh_warn(g->b->report, "%s: %llu ind%s what is not there; the first: %s is %g, and there are %zu %s", g->b->name,
+        sh_warn(g->b->report, "%s: %llu ind%s missing elements; the first: %s is %g, but there are %zu %s", g->b->name,
                 (unsigned long long)s.n, s.n > 1 ? "ices name" : "ex names", s.first.text, s.number,
                 json_array_size(json_object_get(g->root, s.list)), s.list);
 }

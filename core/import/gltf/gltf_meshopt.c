@@ -58,8 +58,8 @@ static int check(struct gltf *g, const struct packed *p, const char *at)
         return gltf_fail(g, "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL",
                          at, p->filter);
     if (!sizes_fit(p) || p->count >= GLTF_NONE)
-        return gltf_fail(g, "%s: meshopt has no %s of %llu times %llu bytes", at, p->mode, (unsigned long long)p->count,
-                         (unsigned long long)p->stride);
+        return gltf_fail(g, "%s: meshopt does not allow %s with %llu elements of %llu bytes", at, p->mode,
+                         (unsigned long long)p->count, (unsigned long long)p->stride);
     return SH_OK;
 }
 

@@ -66,11 +66,11 @@ int gltf_uri_data(struct gltf *g, const char *uri, const char *at, void **own, s
 {
     const char *comma = strchr(uri, ','), *wrong;
     if (comma == NULL || comma - uri < 7 || strncasecmp(comma - 7, ";base64", 7) != 0)
-        return gltf_fail(g, "%s.uri has data that are not base64", at);
+        return gltf_fail(g, "%s.uri must have its data in base64", at);
     uint8_t *data = malloc(strlen(comma) + 1);
     if (data == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for %s", at);
     *own = data;
     wrong = decode_base64(comma + 1, data, &out->n);
     out->p = data;
-    return wrong == NULL ? SH_OK : gltf_fail(g, "%s.uri: byte %td is none of base64", at, wrong - uri);
+    return wrong == NULL ? SH_OK : gltf_fail(g, "%s.uri: byte %td is not a base64 character", at, wrong - uri);
 }

@@ -41,16 +41,15 @@ static int read_converted(const struct ifc_records *r, const struct step_record 
     const struct step_record *measure = follow(r, ref, "IFCMEASUREWITHUNIT");
     struct text_span arg[2], list;
     double factor;
-    if (measure == NULL)
-        return ifc_records_fail(r, unit, err, "no reference to IFCMEASUREWITHUNIT where one is needed");
+    if (measure == NULL) return ifc_records_fail(r, unit, err, "a reference to IFCMEASUREWITHUNIT is missing");
     if (step_split(measure->args, arg, 2) != 2) return ifc_records_fail(r, measure, err, "attributes are missing");
     const struct step_record *si = follow(r, arg[1], "IFCSIUNIT");
-    if (si == NULL) return ifc_records_fail(r, measure, err, "no reference to IFCSIUNIT where one is needed");
+    if (si == NULL) return ifc_records_fail(r, measure, err, "a reference to IFCSIUNIT is missing");
     const char *open = memchr(arg[0].p, '(', arg[0].n);
     const size_t skip = open != NULL ? (size_t)(open - arg[0].p) : 0;
     if (!step_list((struct text_span){arg[0].p + skip, arg[0].n - skip}, &list) ||
         !step_real(&r->text, list, &factor) || factor <= 0.0)
-        return ifc_records_fail(r, measure, err, "no factor of a length unit");
+        return ifc_records_fail(r, measure, err, "the factor of a length unit is missing");
     int rc = read_si(r, si, m, err);
     *m *= factor;
     return rc;
@@ -65,7 +64,7 @@ static bool is_length(const struct step_record *unit, struct text_span of[SI_ARG
 int ifc_unit_of(const struct ifc_records *r, const struct step_record *unit, double *m, struct sh_err *err)
 {
     struct text_span of[SI_ARGS];
-    if (!is_length(unit, of)) return ifc_records_fail(r, unit, err, "no unit of length where one is needed");
+    if (!is_length(unit, of)) return ifc_records_fail(r, unit, err, "not a unit of length");
     return text_is(unit->type, "IFCSIUNIT") ? read_si(r, unit, m, err) : read_converted(r, unit, of[3], m, err);
 }
 
