@@ -58,8 +58,7 @@ static int fail_unknown(struct cfg_reader *rd, struct set *set)
     const struct cfg_key *section = cfg_find(&rd->table, parent);
     if (rd->in_scanner && (strncmp(set->path, "surfaces.", 9) == 0 || strncmp(set->path, "surfaces[", 9) == 0))
         return cfg_fail(rd, CFG_FROM_SET, set->name,
-                        "surfaces of a scanner are set as one list; allowed "
-                        "surfaces=[{...}, ...]");
+                        "surfaces of a scanner can be set only as one list; allowed surfaces=[{...}, ...]");
     if (rd->in_scanner && (section == NULL || section->type != CFG_MAP))
         return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->path);
     if (rd->in_scanner) return cfg_fail_unknown(rd, CFG_FROM_SET, parent, 0, word);

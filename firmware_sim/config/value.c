@@ -297,7 +297,7 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
     case CFG_PAIR:
         return store_vec3_text(&at, text);
     default:
-        return refuse(&at, text, "not what belongs here");
+        return refuse(&at, text, "not a value of this key");
     }
 }
 

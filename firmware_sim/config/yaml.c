@@ -116,9 +116,9 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     char allowed[CFG_ALLOWED_MAX] = "a text in one line";
     for (size_t i = 0, used = 0; words != NULL && words[i] != NULL && used < sizeof allowed; i++)
         used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", words[i]);
-    cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must say %s; allowed %s", figure_parts[part],
-                   part == FIGURE_FROM         ? "where the figure is from"
-                   : part == FIGURE_DEFINITION ? "how the width is defined"
+    cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must give %s; allowed %s", figure_parts[part],
+                   part == FIGURE_FROM         ? "the figure's source"
+                   : part == FIGURE_DEFINITION ? "the width's definition"
                                                : "it in words",
                    allowed);
 }

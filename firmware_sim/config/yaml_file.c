@@ -51,7 +51,7 @@ static int fail_syntax(struct cfg_reader *rd, const yaml_parser_t *parser, const
     }
     const char *hint =
         rd->set == NULL && indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
-    if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
+    if (parser->error == YAML_READER_ERROR) hint = "; allowed is UTF-8 text without control characters";
     return cfg_fail_file(rd, SH_EINPUT, line, "not YAML: %s%s%s%s",
                          parser->problem != NULL ? parser->problem : "unknown problem",
                          parser->context != NULL ? " " : "", parser->context != NULL ? parser->context : "", hint);

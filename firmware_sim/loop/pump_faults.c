@@ -256,12 +256,14 @@ void pump_plug(struct pump *pump)
 {
     if (pump->plug_ns == 0 || clock_now_ns() < pump->plug_ns) return;
     if (pump->ops->fault(pump->link, LINK_FAULT_PLUG, 0, 0, 0.0) == SH_OK) {
-        if (pump->plug_failed) pump_say(pump, "is there again");
+        if (pump->plug_failed) pump_say(pump, "is plugged in again");
         pump->plug_ns = pump->plug_failed = 0;
         return;
     }
     if (!pump->plug_failed)
-        pump_say(pump, "was unplugged on request, and somebody else has its endpoint now; tries until it is free");
+        pump_say(
+            pump,
+            "was unplugged on request, and another program has its endpoint now; it tries again until that is free");
     pump->plug_failed = 1;
     pump->plug_ns = clock_now_ns() + AGAIN_NS;
 }

@@ -143,8 +143,10 @@ const struct bad bad[] = {
     {LINES, "  station: 0\n", 4, "head.station", "1 to 4096"},
     {LINES, "  range_min_m: 0.1\n", 4, "head.range_min_m", "0.1 is outside the limits of head profile any-rate; allowed 1.5 to 800 m"},
     {LINES, "  range_max_m: 801\n", 4, "head.range_max_m", "801 is outside the limits of head profile any-rate; allowed 1.5 to 800 m"},
-    {LINES, "  range_max_m: 1.5\n", 4, "head.range_max_m", "the head sees from 1.5 to 1.5 m; allowed a range_min_m below 1.5"},
-    {LINES, "  range_min_m: 9\n  range_max_m: 8\n", 5, "head.range_max_m", "the head sees from 9 to 8 m; allowed a range_min_m below 8"},
+    {LINES, "  range_max_m: 1.5\n", 4, "head.range_max_m", "the head measures from 1.5 to 1.5 m; allowed a "
+                                                           "range_min_m below 1.5"},
+    {LINES, "  range_min_m: 9\n  range_max_m: 8\n", 5, "head.range_max_m", "the head measures from 9 to 8 m; allowed "
+                                                                           "a range_min_m below 8"},
     {LINES, "  range_max_m: far\n", 4, "head.range_max_m", "\"far\" is not a number; allowed range_min_m to range_max_m of the head profile"},
     {"crs: local", "utm_zone: 33", 17, "output.utm_zone", "only with crs: utm"},
     /* 800 m / 2^31 = 3.7e-7 m fits; the row's lower limit is 1e-6 */
@@ -159,7 +161,7 @@ const struct bad bad[] = {
     {"output:", "platform:\n  kind: trajectory\n  file: a\n  step_s: 1\noutput:", 19, "platform.step_s", "a trajectory platform has no such key"},
     {"output:", "platform:\n  kind: trajectory\n  file: a\n  start_s: 2\n  end_s: 2\noutput:", 20, "platform.end_s", "allowed more than 2 s"},
     {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: 1\n  start_s: 2\n  end_s: 1.5\noutput:", 21, "platform.end_s", "allowed at least 2 s"},
-    {"output:", "platform:\n  kind: stops\n  file: a\noutput:", 17, "platform.kind", "platform.step_s; allowed above 0"},
+    {"output:", "platform:\n  kind: stops\n  file: a\noutput:", 17, "platform.kind", "platform.step_s, the time"},
     {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: 0\noutput:", 19, "platform.step_s", "allowed above 0"},
     {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: -1\noutput:", 19, "platform.step_s", "allowed 0 to 1000000000 s"},
     {"output:", "platform:\n  kind: stops\n  step_s: 1\noutput:", 17, "platform.kind", "need an end; allowed is platform.end_s"},
@@ -229,7 +231,7 @@ const struct bad bad[] = {
     {"type: tcp", "type: usb\n    backend: usbredir\n    attach: on", 17, "links[0].port", "allowed 1 to 65535"},
     {"type: tcp", "type: usb\n    backend: functionfs", 16, "links[0].port", "the back end functionfs has no such key"},
     {"type: tcp", "type: usb\n    udc: dummy_udc.0", 15, "links[0].udc", "the back end usbip has no such key"},
-    {"type: tcp\n    port: 0", "type: file", 14, "links[0].path", "required for a file link"},
+    {"type: tcp\n    port: 0", "type: file", 14, "links[0].path", "a file link requires"},
     {"type: tcp\n    port: 0", "type: file\n    path: a\n  - type: file\n    path: a", 17, "links[1].path", "same path"},
     {"heading_deg: 90", "name: a\n  - position_m: [0, 0, 0]\n    name: a", 14, "stations[1].name", "same name"},
     /* noise, signal, surfaces, instrument */
@@ -268,7 +270,8 @@ const struct bad bad[] = {
     {"heading_deg: 90", "utm_zone: 61\n    hemisphere: north\n    easting_m: 5e5\n    northing_m: 5e6\n    height_m: 0", 12, "stations[0].utm_zone", "0 to 60"},
     {"heading_deg: 90", "hemisphere: N\n    utm_zone: 33\n    easting_m: 5e5\n    northing_m: 5e6\n    height_m: 0", 12, "stations[0].hemisphere", "allowed south, north"},
     {"heading_deg: 90", UTM_PLACE "    lat_deg: 5\n", 12, "stations[0].utm_zone", "together with lat_deg"},
-    {"heading_deg: 90", "ecef_m: [6378137, 0, 0]\n    height_m: 5", 13, "stations[0].height_m", "ecef_m says the height"},
+    {"heading_deg: 90", "ecef_m: [6378137, 0, 0]\n    height_m: 5", 13, "stations[0].height_m", "ecef_m also gives "
+                                                                                                "the height"},
     {"heading_deg: 90", "ecef_m: [6378137, 0, 1e8]", 12, "stations[0].ecef_m", "each -10000000 to 10000000 m"},
     {"heading_deg: 90", "pitch_deg: 91", 12, "stations[0].pitch_deg", "allowed -90 to 90 deg"},
     {"heading_deg: 90", "roll_deg: -181", 12, "stations[0].roll_deg", "allowed -180 to 180 deg"},
@@ -276,9 +279,9 @@ const struct bad bad[] = {
     {"heading_deg: 90", "tripod: {legs: on}", 12, "stations[0].tripod.leg_m", "missing, and it has no default; allowed 0.01 to 100 m"},
     {"heading_deg: 90", "tripod: {leg_m: 1.8, opening_min_deg: 90}", 12, "stations[0].tripod.opening_min_deg", "allowed 0 to 89 deg"},
     {"heading_deg: 90", "tripod: {leg_m: 1.8, legs: on, leg_diameter_m: 0.9}", 12, "stations[0].tripod.leg_diameter_m",
-     "0.9 m, and a leg is 1.8 m long; allowed below half of that, 0.9 m"},
+     "0.9 m, but a leg is 1.8 m long; allowed is less than half of that, 0.9 m"},
     {"heading_deg: 90", "tripod: {leg_m: 1.8}\nplatform: {kind: live}", 12, "stations[0].tripod",
-     "a tripod stands, and platform.kind is live; allowed with static and stops"},
+     "a tripod must stand still, but platform.kind is live; allowed with static and stops"},
     {"heading_deg: 90", "tripod: 1.8", 12, "stations[0].tripod", "here stands a single value"},
     {"position_m: [1, 2, 3]\n    heading_deg: 90", "ecef_m: [6378137, 0, 0]", 11, "stations[0].position_m", "no scene.anchor"},
     {ANCHOR("source: mesh"), 6, "scene.anchor.source", "allowed none, explicit, ifc, utm, ecef"},

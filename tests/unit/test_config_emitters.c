@@ -150,8 +150,9 @@ static void settings_that_do_not_fit_are_refused(void **state)
     const char *const sets[] = {"head.profile=sick-lms111", "head.lines_hz=25", "head.prr_hz=36000",
                                 "instrument.mirror_index_deg=0.1"};
     assert_int_equal(load_sets(sets, 4), SH_EINPUT);
-    assert_says("--set instrument.mirror_index_deg: an error of a mirror, and head profile sick-lms111 has emitter: "
-                "planar; allowed with a line head");
+    assert_says(
+        "--set instrument.mirror_index_deg: an error of a mirror, but head profile sick-lms111 has emitter: planar; "
+        "allowed with a line head");
 }
 
 /* ---- lists of directions */
@@ -272,11 +273,10 @@ static void a_planar_head_has_its_geometries(void **state)
     static const char lms[] = "sick-lms111", list[] = "50 Hz at 0.5 deg, 25 Hz at 0.25 deg, 25 Hz at 0.5 deg";
     static const struct wrong wrong[] = {
         {lms, "lines_hz: 50,", "lines_hz: 51,", "geometries[0].lines_hz", "allowed 25 to 50 Hz"},
-        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn",
-         "700; allowed what divides"},
-        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "allowed what divides"},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn", "700; steps_per_turn, "},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "steps_per_turn, "},
         {lms, "front_step: { value: 540,", "front_step: { value: 541,", "geometries[0].steps_per_turn", "front_step"},
-        {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "stands there before"},
+        {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "is given twice"},
         {"velodyne-vlp16", "beams:\n", "geometries: []\nbeams:\n", "geometries", "allowed only with emitter: planar"},
     };
     expect_geometry("", 50, 720); /* the first one: what the device has from the factory */

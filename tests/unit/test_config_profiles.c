@@ -82,7 +82,7 @@ static void malformed_profiles_are_refused(void **state)
         {FARTHEST, "{ value: 1, from: assumed, source: [a] }", "range_max_m", "allowed a text in one line"},
         {"definition: 1/e2,", "definition: 1/e3,", "beam_divergence_rad", "allowed 1/e2, 1/e, FWHM, half angle 1/e2"},
         {"definition: 1/e2 }", "definition: half angle 1/e2 }", "beam_exit_m", "allowed 1/e2, 1/e, FWHM, radius 1/e2"},
-        {FARTHEST, "{ value: 0.4, from: assumed }", "range_min_m", "0.5 is too much; allowed below 0.4"},
+        {FARTHEST, "{ value: 0.4, from: assumed }", "range_min_m", "0.5 is too large; allowed below 0.4"},
         {SIGMA, "range_sigma_floor_m: { value: 0.002,", "range_sigma_floor_m", "allowed at most 0.0005"},
         {"range_m: 130, from: assumed", "range_m: 130", "reaches[0].from", "missing"},
         {"range_m: 130, from: assumed", "range_m: 130, from: memory", "reaches[0].from",

@@ -115,7 +115,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
         {"reach_90_m: { value: 600,", "reach_90_m: { value: 601,", 19, "programs[0].reach_90_m",
          "601 m is beyond range_max_m; allowed up to 600 m"},
         {"    reach_90_m: { value: 200, from: assumed }\n", "", 23, "programs[1].reach_90_m",
-         "missing; required, as other programs have it"},
+         "missing; required, since other programs have this key"},
         {"reach_20_m: { value: 300,", "reach_20_m: { value: 600,", 20, "programs[0].reach_20_m", "allowed below 600 m"},
         /* sqrt(0.9 / 0.2) = 2.121: 600 m on 90 % are 283 m on 20 % in clear air, more in haze; 10 % are rounding */
         {"reach_20_m: { value: 300,", "reach_20_m: { value: 265,", 19, "programs[0].reach_90_m",
@@ -176,7 +176,7 @@ static void only_rates_of_programs_are_taken(void **state)
         assert_int_equal(load_head("maker", "maker", setting), SH_EINPUT);
         assert_int_equal(faults.n, 1);
         assert_says(":3: head.prr_hz: ");
-        assert_says(" is no pulse rate of head profile mine; allowed 100000, 400000 Hz");
+        assert_says(" is not a pulse rate of head profile mine; allowed 100000, 400000 Hz");
     }
 }
 

@@ -340,8 +340,8 @@ static void a_scan_of_nothing_is_told(void **state)
     write_room(wire, "room.obj", 1, 0);
     assert_int_equal(RUN(wire, "init", "room.obj"), 0);
     assert_int_equal(RUN(wire, "check", "room.yaml", "--set", moved), 0);
-    contains(text, "nothing within range_max_m, 130 m");
-    contains(text, "the scan is mostly empty: of 1024 directions 0 meet something");
+    contains(text, "no surface within range_max_m, 130 m");
+    contains(text, "the scan is mostly empty: of 1024 directions 0 hit something");
     assert_int_equal(RUN(wire, "record", "room.yaml", "--set", moved, "-o", "no.ply", "--quiet"), 0);
     contains(text, "the scan is mostly empty");
     contains(text, "mostly empty: 0 of ");

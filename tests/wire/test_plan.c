@@ -416,9 +416,9 @@ static void test_run_warns(void **state)
                                     "--set", cases[i].set[0], "--set",      cases[i].set[1], "--set", cases[i].set[2],
                                     NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
-        char *text = wire_read(wire_path(wire, "err"), NULL), *at = strstr(text, "need about");
+        char *text = wire_read(wire_path(wire, "err"), NULL), *at = strstr(text, "needs about");
         if ((at != NULL) != cases[i].warns) fail_msg("%s", text);
-        if (at != NULL) assert_null(strstr(at + 1, "need about"));
+        if (at != NULL) assert_null(strstr(at + 1, "needs about"));
         free(text);
     }
 }

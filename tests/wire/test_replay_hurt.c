@@ -55,7 +55,7 @@ static void test_no_recordings(void **state)
     memcpy(pcapng + 28, interface, sizeof interface);
     memcpy(pcapng + 48, packet, sizeof packet);
     pcapng[140] = 96;
-    refused(wire, wire_write(wire, "empty.shs", "", 0), 1, "no descriptor is in it");
+    refused(wire, wire_write(wire, "empty.shs", "", 0), 1, "it has no descriptor");
     refused(wire, wire_write_text(wire, "text.shs", "head: {profile: any-rate}\nlinks: []\n"), 1, "not");
     refused(wire, wire_write(wire, "ethernet.pcapng", pcapng, sizeof pcapng), 1, "link type 1");
     refused(wire, wire_path(wire, "none.shs"), 2, "cannot open");
@@ -67,7 +67,7 @@ static void test_no_recordings(void **state)
     while (tape.frame[i].type != SCANHEAD_DESCRIPTOR)
         i++;
     const size_t at = tape.frame[i + 1].at;
-    refused(wire, wire_write(wire, "late.shs", tape.bytes + at, tape.len - at), 1, "no descriptor is in it");
+    refused(wire, wire_write(wire, "late.shs", tape.bytes + at, tape.len - at), 1, "it has no descriptor");
     tape_free(&tape);
 }
 
