@@ -48,7 +48,7 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
     char *text = sets->text + sets->used;
     const size_t room = sizeof sets->text - sets->used, n = strlen(key) + strlen(value) + 2;
     if (n > room) {
-        fprintf(stderr, "scanhead: %s: too long; options that stand for a key have %zu characters in all\n", key,
+        fprintf(stderr, "scanhead: %s: the text is too long; all options that set keys share %zu characters\n", key,
                 sizeof sets->text);
         return APP_USAGE;
     }

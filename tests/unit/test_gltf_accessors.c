@@ -212,7 +212,7 @@ static void nothing_is_read_beyond_the_file(void **state)
         {"\"bufferView\":0,\"componentType\":5126,\"count\":4294967294,\"type\":\"VEC3\"", "go beyond"},
         {"\"bufferView\":0,\"componentType\":5126,\"count\":-4,\"type\":\"VEC3\"", "not a whole number"},
         {"\"bufferView\":0,\"componentType\":5126,\"count\":3.5,\"type\":\"VEC3\"", "not a whole number"},
-        {"\"bufferView\":9,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"", "bufferViews[9] is not there"},
+        {"\"bufferView\":9,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"", "bufferViews[9] is missing"},
         {"\"bufferView\":0,\"componentType\":5124,\"count\":4,\"type\":\"VEC3\"", "componentType is 5124"},
         {"\"bufferView\":1,\"componentType\":5126,\"count\":4,\"type\":\"VEC2\"", "type is VEC2; allowed here is VEC3"},
         {"\"bufferView\":0,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"", "index 2 out of range; there are 2"},

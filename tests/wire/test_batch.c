@@ -59,9 +59,9 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--stations", "3"), 2, "allowed 1 to 2");
     batch_expect(wire, "none", WITH("--set", "time.epoch=utc"), 2, "time.epoch");
     /* names of files would say what isn't so */
-    batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames sets it, too");
-    batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs sets it, too");
-    batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "that of --stations");
+    batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames also sets it");
+    batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs also sets it");
+    batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "--stations sets the station");
     batch_expect(wire, "none", WITH("--sweep", "scene.meshes.0.scale=1,2", "--set", "scene.meshes[0].scale=3"), 2,
                  "is in --set and in --sweep");
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
@@ -81,7 +81,7 @@ static void test_images(void **state)
     job[sizeof job / sizeof job[0] - 2] = "--merge";
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 1);
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    assert_non_null(strstr(err, "0001_station-2.2.png: is not there"));
+    assert_non_null(strstr(err, "0001_station-2.2.png: is missing"));
     free(err);
 }
 

@@ -121,7 +121,7 @@ static void test_spoilt(void **state)
     assert_true(part != NULL && fputs("ply\n", part) >= 0 && fclose(part) == 0);
     batch_expect(wire, "one", WITH("--merge"), 1, "job 1, ");
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    for (const char *const *says = WITH("bytes, and had", "job 3, ", "(sha256)", "job 4, ", "is not there", "job 6, ",
+    for (const char *const *says = WITH("bytes, but had", "job 3, ", "(sha256)", "job 4, ", "is missing", "job 6, ",
                                         ": missing", "4 of 6 jobs");
          *says != NULL; says++)
         if (strstr(err, *says) == NULL) fail_msg("no \"%s\" in: %s", *says, err);
@@ -179,7 +179,8 @@ static void test_nothing_is_mixed(void **state)
     batch_expect(wire, "one", WITH("--force", "--quiet"), 0, "");
     batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are whole");
     assert_int_equal(link(batch_file(wire, "one", 0, ".ply"), batch_in(wire, "one", "0001_before.ply")), 0);
-    batch_expect(wire, "one", WITH("--merge"), 0, "1 files are of no job of this campaign, the first: 0001_before.ply");
+    batch_expect(wire, "one", WITH("--merge"), 0,
+                 "1 files belong to no job of this campaign, the first: 0001_before.ply");
 }
 
 /* ---- others at work, and jobs that fail */
@@ -190,7 +191,7 @@ static void test_locked(void **state)
     assert_int_equal(batch_call(wire, "one", WITH("--shard", "1/2", "--quiet")), 0);
     const int fd = open(batch_in(wire, "one", "manifest-2-of-2.jsonl"), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     assert_int_equal(flock(fd, LOCK_EX | LOCK_NB), 0);
-    batch_expect(wire, "one", WITH("--shard", "2/2"), 1, "another process is at shard 2/2");
+    batch_expect(wire, "one", WITH("--shard", "2/2"), 1, "another process does shard 2/2");
     close(fd);
     batch_expect(wire, "one", WITH("--shard", "2/2"), 0, "3 jobs done, 3 of them now");
 }

@@ -54,11 +54,11 @@ static void test_same_file(void **state)
     snprintf(b, sizeof b, "%s", wire_path(wire, "./a.las"));
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", a, NULL}, "given twice");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", b, NULL},
-                   "is the file of --output, too");
+                   "--output writes the same file");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--truth", b, NULL},
-                   "is the file of --output, too");
+                   "--output writes the same file");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL},
-                   "is read, and would be");
+                   "is also read as");
     /* what a recording that was killed has left is not overwritten: it may be all that there is of it */
     snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
     const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};

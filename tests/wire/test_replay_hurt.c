@@ -20,14 +20,14 @@ static void test_cut_and_bad_bytes(void **state)
     char *bytes = wire_read(file, &n);
     snprintf(file, sizeof file, "%s", wire_write(wire, "cut.shs", bytes, n - 20));
     replay_to_file(wire, file, quiet, "out.shs");
-    replay_said(wire, "bytes are in no whole frame, and were left out; it is cut at its end");
+    replay_said(wire, "bytes left out, which belong to no complete frame; its end is cut off");
     replay_same_file(wire, "out.shs", "cut.shs");
     bytes[n / 2] ^= 1;
     memset(bytes + n / 3, 0x55, 400);
     snprintf(file, sizeof file, "%s", wire_write(wire, "bad.shs", bytes, n));
     free(bytes);
     replay_to_file(wire, file, quiet, "out.shs");
-    replay_said(wire, "bytes are in no whole frame, and were left out");
+    replay_said(wire, "bytes left out, which belong to no complete frame");
     replay_same_file(wire, "out.shs", "bad.shs");
 }
 

@@ -15,15 +15,15 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
     const int has_mirror = soak->cfg->profile.emitter.kind == EMITTER_LINE && soak->cfg->output.layout == LINE_POLAR;
     switch (kind) {
     case FAULT_PAN_SLIP:
-        return "no encoder shows it: points that no longer fit do";
+        return "no encoder shows it; only points that no longer fit do";
     case FAULT_WINDOW_SOILED:
-        return "amplitudes fall: that needs others to compare with";
+        return "amplitudes fall: a client has no others to compare with";
     case FAULT_COUNTERS_HIGH:
-        return "numbers go on over their wrap";
+        return "counters continue after their wrap";
     case FAULT_MIRROR_SLOW:
     case FAULT_MIRROR_STUCK:
     case FAULT_MIRROR_WOBBLE:
-        return has_mirror ? NULL : "the encoder of a mirror is in the polar layout of a line head alone";
+        return has_mirror ? NULL : "only the polar layout of a line head has the encoder of the mirror";
     default:
         return NULL;
     }

@@ -61,10 +61,10 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
         link->row[link->plug[i].kind].missed++;
     for (int row = 0; row < SOAK_N_ROWS; row++)
         add(&sum, &link->row[row]);
-    fail(soak, has_open_rows(link->row), "a fault was neither noticed nor known to be hidden");
+    fail(soak, has_open_rows(link->row), "a fault was neither detected nor known to be undetectable");
     if (!link->usable) return;
     fail(soak, link->failed[0] != '\0', "a client gave up");
-    fail(soak, sum.missed != 0, "a fault that can be noticed was not");
+    fail(soak, sum.missed != 0, "a fault that can be detected was not detected");
     fail(soak, link->wrong_plain != 0, "a frame that was accepted differs from the clean one, without a fault");
     fail(soak, link->lost_plain > link->reader_lost, "frames were lost without a fault");
     fail(soak, link->ask.odd != 0, "a reply was wrong or missing without a fault");
@@ -72,7 +72,7 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
     fail(soak, link->frames == 0, "a client got no frame");
     fail(soak, !link->in_session, "a client had no connection at the end");
     fail(soak, bad < link->expected_bad_min || bad > link->expected_bad_max,
-         "the bytes that belong to no frame are not those of the faults");
+         "the number of bytes outside of frames is not that of the faults");
 }
 
 void soak_conclude(struct soak *soak)
