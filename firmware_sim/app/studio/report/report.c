@@ -58,7 +58,7 @@ static const struct app_option OPTIONS[] = {
      .help = "distance up to which the scene is searched; points farther away count as far, and fail (default 10)"},
     {APP_NUMBER, "cell-m", "C", .min = 1e-3, .max = 1000.0, .at = AT(cell_m),
      .help = "side of the cells in which the density of points is counted (default: 0.1, doubled until half of the points "
-             "lie in cells of 16)"},
+             "are in cells with 16 or more)"},
     {APP_FLAG, "json", NULL, .at = AT(json),
      .help = "print the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, "
              "max_m, beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst, verdict, all, "

@@ -248,17 +248,17 @@ static const struct app_option OPTIONS[] = {
 
 static const char NOTES[] =
     "The results have a row for each link and kind of fault: how often it was injected, how often the client\n"
-    "detected it at its place, frames that the client lost by it, and frames that it accepted although they differ\n"
-    "from the clean ones. A fault that no client can detect has a - and the reason.\n"
+    "noticed it at its place, frames that the client lost by it, and frames that it accepted although they differ\n"
+    "from the clean ones. A fault that no client can notice has a - and the reason.\n"
     "\n"
-    "Exit status 0: each fault that can be detected was detected; frames were lost only by faults; all frames that\n"
+    "Exit status 0: each fault that can be noticed was noticed; frames were lost only by faults; all frames that\n"
     "were wrongly accepted have flipped bits with a corrected checksum; the head is healthy. 1: one of these is\n"
     "not so.\n";
 
 const struct app_command app_soak = {
     .name = "soak",
     .operand = {"CONFIG"},
-    .summary = "inject faults into a head with clients, and report what the clients detect",
+    .summary = "inject faults into a head with clients, and report what the clients notice",
     .options = OPTIONS,
     .opens_links = 1,
     .notes = NOTES,
