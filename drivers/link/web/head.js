@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// One head: its connection, commands and replies, control, its description, and losses.
+// A Head has one connection: commands and replies, control, the head's description, and losses.
 import {STATES} from './native.js';
 import {Losses} from './losses.js';
 import {CommandError, Replies} from './replies.js';
@@ -8,7 +8,7 @@ import {Wire} from './wire.js';
 export {CommandError};
 const TIMEOUT_S = 5, FIRST_DELAY_S = 0.5, MAX_DELAY_S = 5, FULL_DELAY_S = 10, FULL = 1013;
 
-// Why a connection ended, for people.
+// Says why a connection ended, for people.
 function closeWords(code, reason, wasOpen) {
   if (code === FULL) return reason || 'all sessions of this link are taken';
   if (reason) return reason;
@@ -18,7 +18,7 @@ function closeWords(code, reason, wasOpen) {
 
 const unquoted = (text) => text.replace(/^"|"$/g, '');
 
-/** Who took control, as a CONTROL event has it: kind of link and address. '': it doesn't say. */
+/** Returns who took control, as a CONTROL event has it: kind of link and address. '' means that it doesn't say. */
 export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ? text : '');
 
 /**
@@ -33,29 +33,29 @@ export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ?
  */
 export class Head extends EventTarget {
   isOpen = false;
-  state = null; // a word of STATES
-  session = 0; // this page's; 0: not known
-  controller = 0; // the session in control; 0: nobody
-  who = ''; // kind of link and address of the session in control; '': not known
+  state = null; // it is a word of STATES
+  session = 0; // it is this page's session; 0: not known
+  controller = 0; // this session has control; 0: nobody has it
+  who = ''; // it has kind of link and address of the session in control; '': not known
   idn = '';
-  descriptor = null; // the last frame of each type on this connection
+  descriptor = null; // these are the last frames of each type on this connection
   anchor = null;
   emitter = null;
   telemetry = null;
-  names = new Map(); // label: {object, material}
+  names = new Map(); // it maps a label to {object, material}
 
   #url;
   #past;
   #wire;
   #replies;
-  #connection = 0; // as the wire numbers them
+  #connection = 0; // the wire numbers connections
   #delay_s = FIRST_DELAY_S;
   #timer = 0;
   #isClosed = false;
   #figures = {};
   #losses = null;
   #knowsWho = false; // the head says who has control
-  #told = ''; // who has control, as in the last `control` event
+  #told = ''; // it says who has control, as in the last `control` event
 
   /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points from
    * before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again until
@@ -76,7 +76,8 @@ export class Head extends EventTarget {
 
   // ---- commands
 
-  /** A promise of the reply to one command line. It throws CommandError {number, text} for an ERR; its number is 0
+  /** Returns a promise of the reply to one command line. It throws CommandError {number, text} for an ERR; its number
+   * is 0
    * where no reply came. */
   command(line, {timeout_s = TIMEOUT_S} = {}) {
     return this.#replies.ask(line, timeout_s);
@@ -107,7 +108,8 @@ export class Head extends EventTarget {
     this.#wire.end();
   }
 
-  /** Counts of this connection, by the words of PROTOCOL.md (*What the counts mean*): - frames, bytes, points
+  /** Returns the counts of this connection, in the words of PROTOCOL.md (*What the counts mean*): - frames, bytes,
+   * points
    * (records, shots without echo among them), pulses (received), empty - lost_frames: missing in the sequence; of these
    * left_out_frames with left_out_pulses because this page was too slow - lost_pulses: lost by the head;
    * missing_pulses: of all scans that ended here, delivered and not received - dropped_points, dropped_pulses: decoded,
@@ -202,7 +204,7 @@ export class Head extends EventTarget {
     this.isOpen = true;
     this.#replies.open();
     this.#say('open', {connection});
-    this.#introduce().catch(() => {}); // gone again, which `close` says
+    this.#introduce().catch(() => {}); // it is gone again, and `close` says so
   }
 
   // Asks for identity and state. HELP comes first: an older head has no session numbers, and the question would put an

@@ -1,32 +1,33 @@
 /* SPDX-License-Identifier: MIT */
-// Losses of a connection's scans, as PROTOCOL.md defines them (*What the counts mean*). It also finds the end of a scan
+// This class counts losses of a connection's scans, as PROTOCOL.md defines them (*What the counts mean*). It also
+// finds the end of a scan
 // whose SCAN_END was lost (*A reader that lost SCAN_END*). Pure.
 import {STATES} from './native.js';
 
 const IN_SCAN = ['scanning', 'spin-down'];
 
 export class Losses {
-  leftOutFrames = 0; // by the head, since this page was too slow (READER_LOST)
+  leftOutFrames = 0; // the head left these out, since this page was too slow (READER_LOST)
   leftOutPulses = 0;
-  missing = 0; // pulses of the scans that ended: delivered, and not received
-  #said = 0; // pulses lost by the head, from OVERRUN events, and
-  #ended = 0; // the same from the ends of scans; some events of either kind may not have come
-  #damaged = 0; // missing frames that no READER_LOST explains, and that were reported
-  #unexplained = 0; // all such frames at the last telemetry
+  missing = 0; // these pulses of ended scans were delivered, but not received
+  #said = 0; // the head lost these pulses by OVERRUN events, and
+  #ended = 0; // these by the ends of scans; some events of either kind may not have come
+  #damaged = 0; // these missing frames were reported, and no READER_LOST explains them
+  #unexplained = 0; // there were so many such frames at the last telemetry
   #scan = null;
   #isRunning = false;
-  #shots = 0; // pulses received before the scan
-  #before = {scan: null, shots: 0}; // pulses received of a scan from before this page came
-  #counts = null; // the last telemetry
+  #shots = 0; // so many pulses were received before the scan
+  #before = {scan: null, shots: 0}; // so many pulses came of a scan that began before this page
+  #counts = null; // these are the counts of the last telemetry
   #say;
 
-  /** say(name, detail): 'lost' and 'scan', as Head's events. Events given to this class have `shots`, the pulses
+  /** say(name, detail) takes 'lost' and 'scan', as Head's events. Events given to this class have `shots`, the pulses
    * received before them. */
   constructor(say) {
     this.#say = say;
   }
 
-  /** Pulses that the head says it lost. */
+  /** Returns the pulses that the head reports as lost. */
   get byHead() {
     return Math.max(this.#said, this.#ended);
   }
@@ -39,14 +40,14 @@ export class Losses {
     this.#isRunning ||= batch.scan === this.#scan;
   }
 
-  /** Points that the head had kept: of a scan that this page joined late they are not missing. */
+  /** Takes points that the head had stored: in a scan that this page joined late they are not missing. */
   past({scan, shots}) {
     if (scan !== this.#before.scan) this.#before = {scan, shots: 0};
     this.#before.shots += shots;
     if (scan === this.#scan) this.#shots -= shots;
   }
 
-  /** lost_frames: missing in the sequence so far. */
+  /** lost_frames is the number of frames missing in the sequence so far. */
   telemetry(t, lost_frames) {
     this.#counts = t;
     if (t.scan !== this.#scan) this.#end(this.#scan, null, t.shots);
@@ -98,7 +99,8 @@ export class Losses {
     return t !== null && t.scan === scan && STATES[t.state] === 'spin-down' ? t : null;
   }
 
-  // counts: a telemetry's; null: they were lost. If this page joined the scan late, the pulses before that are missing,
+  // counts come from a telemetry; null: they were lost. If this page joined the scan late, the pulses before that are
+  // missing,
   // too.
   #end(scan, counts, shots) {
     if (!this.#isRunning || scan !== this.#scan) return;

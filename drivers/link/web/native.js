@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The native protocol, from PROTOCOL.md alone: bytes to frames (Parser), frames to values and batches of points in the
-// scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
+// This is the native protocol, written from PROTOCOL.md alone. Parser turns bytes into frames; Decoder turns frames
+// into values and batches of points in the scene frame. It is pure: it runs in a page, in a worker and in node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';
 import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,
   readTelemetry, refuse, Refused} from './native_fields.js';
@@ -17,10 +17,10 @@ export const STATES = ['off', 'boot', 'idle', 'spin-up', 'scanning', 'spin-down'
 const [, DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS] =
   TYPES.keys();
 export {POINTS};
-export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
+export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // these are points, and frames that add values to them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768;
 
-/** Frames to values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
+/** Turns frames into values. It forgets state that PROTOCOL.md calls void. A frame that it tells readers to refuse is
  * counted, and otherwise ignored. Only callbacks may throw. */
 export class Decoder {
   /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),
@@ -29,24 +29,24 @@ export class Decoder {
   constructor(callbacks = {}) {
     this.on = callbacks;
     this.descriptor = this.anchor = null;
-    this.emitter = null; // null: a line head
+    this.emitter = null; // it is null for a line head
     this.stats = {points: 0, shots: 0, empty: 0, unplaced_points: 0, unplaced_shots: 0, refused: 0, unknown: 0};
     this.hash = new PointHash();
     this.poses = new Poses();
     this.columns = new Columns(ROOM);
     this.lastPulse0 = -1;
     this.shots = 0;
-    this.batch = null; // what the points in the columns have in common
-    this.last = null; // the last points frame, until its attributes and colours have come
+    this.batch = null; // the points in the columns have this in common
+    this.last = null; // it is the last points frame, until its attributes and colours have come
     this.placer = null;
   }
 
-  /** 16 hexadecimal digits over all records of all points frames so far. */
+  /** Returns 16 hexadecimal digits over all records of all points frames so far. */
   get pointHash() {
     return this.hash.toString();
   }
 
-  /** Whether points can be placed. */
+  /** Returns whether points can be placed. */
   get canPlace() {
     return this.descriptor !== null && this.anchor !== null;
   }
@@ -65,7 +65,7 @@ export class Decoder {
     }
   }
 
-  /** Hands on the points that are there. A frame whose attributes or colours are still to come stays, unless `all`. */
+  /** Passes on the points that came. A frame whose attributes or colours are still to come stays, unless `all`. */
   flush(all = false) {
     const {columns: c, batch} = this;
     const waits = this.last !== null && !all; // the last frame waits for its attributes or colours
@@ -101,7 +101,7 @@ export class Decoder {
       case EVENT: return this.#event(Object.assign(readEvent(view), own));
       case SURFACES: return this.on.names?.(readNames(view));
       case POSES: return this.#poses(readPoses(view));
-      default: this.stats.unknown++; // of later heads
+      default: this.stats.unknown++; // only later heads send it
     }
     return undefined;
   }
@@ -193,8 +193,8 @@ export class Decoder {
     if (missing > 0) c.dropNaN(from);
   }
 
-  // The points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to another
-  // one.
+  // Returns the points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to
+  // another frame.
   #besidePoints(frame, beside, after) {
     const l = this.last;
     const isOfIt = l !== null && frame.seq === (l.seq + after) >>> 0 && beside.pulse0_low === l.low &&

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Payloads of fixed layout by the tables of PROTOCOL.md, as objects. A payload that PROTOCOL.md tells a reader to
+// This module reads payloads of fixed layout, by the tables of PROTOCOL.md, as objects. A payload that PROTOCOL.md
+// tells a reader to
 // refuse throws Refused.
 //
 // Whole numbers of 64 bits: times (`_ns`), the seed and an event's a, b, c are BigInt. All others are Numbers, or
@@ -19,7 +20,7 @@ const readers = {
   i32: [4, (v, at) => v.getInt32(at, true)],
   u64: [8, (v, at) => exact(v.getBigUint64(at, true))],
   i64: [8, (v, at) => exact(v.getBigInt64(at, true))],
-  U64: [8, (v, at) => v.getBigUint64(at, true)], // always BigInt
+  U64: [8, (v, at) => v.getBigUint64(at, true)], // these are always BigInt
   I64: [8, (v, at) => v.getBigInt64(at, true)],
   f64: [8, (v, at) => finite(v.getFloat64(at, true))],
 };
@@ -34,7 +35,7 @@ function text(view, at, width) {
   return refuse('a text without an end');
 }
 
-// "name type" or "name type[count]", one after the other.
+// The fields are "name type" or "name type[count]", one after the other.
 function layout(table) {
   let at = 0;
   const fields = table.trim().split(/\s*,\s*/).map((row) => {
@@ -117,7 +118,7 @@ export function readTelemetry(view) {
   return t;
 }
 
-// Names of an event's a, b and c, in this order; _ns is BigInt, the others are Numbers.
+// These are the names of an event's a, b and c, in this order; _ns is BigInt, the others are Numbers.
 const EVENTS = {
   1: ['STATE', 'state', 'before'],
   2: ['SCAN_START', 'scan', 'at_ns', 'gps_ns'],
@@ -133,7 +134,8 @@ const EVENTS = {
   12: ['SITE', 'station', 'warnings'],
 };
 
-/** Besides code, a, b, c and text: `name`, and what a, b, c mean under names of their own. An unknown code has the
+/** Besides code, a, b, c and text an event has `name`, and the values a, b, c under names of their own. An unknown
+ * code has the
  * name ''. */
 export function readEvent(view) {
   const e = whole(event, view, 'an event');
@@ -147,7 +149,7 @@ export function readEvent(view) {
   return e;
 }
 
-/** beams: {elevation_udeg, azimuth_udeg, offset_ns (a Number)} in the order in which they fire. */
+/** beams are {elevation_udeg, azimuth_udeg, offset_ns (a Number)} in the order in which they fire. */
 export function readEmitter(view) {
   const e = whole(emitter, view, 'an emitter');
   if (e.kind > 4 || e.sequence_ns_den === 0 || Math.abs(e.turn) !== 1) refuse('an emitter of an unknown kind');
@@ -158,7 +160,7 @@ export function readEmitter(view) {
   return e;
 }
 
-/** {t_ns, position_m, quat (w, x, y, z), frame, flags}, their times rising. */
+/** Returns {t_ns, position_m, quat (w, x, y, z), frame, flags} of each pose, with rising times. */
 export function readPoses(view) {
   const n = view.byteLength >= 8 ? view.getUint32(0, true) : 0;
   if (n < 2 || n > (view.byteLength - 8) / pose.bytes) refuse('a poses frame with a wrong number of poses');
@@ -173,7 +175,7 @@ export function readPoses(view) {
 
 const utf8 = new TextDecoder();
 
-/** [{label, object, material}]. */
+/** Returns [{label, object, material}]. */
 export function readNames(view) {
   const first = view.byteLength >= 8 ? view.getUint32(0, true) : 0;
   const count = view.byteLength >= 8 ? view.getUint32(4, true) : Infinity;
@@ -191,7 +193,7 @@ export function readNames(view) {
   return Array.from({length: count}, (_, i) => ({label: first + i, object: name(), material: name()}));
 }
 
-/** The beginning of attributes and colours frames. */
+/** Reads the beginning of attributes and colours frames. */
 export function readBeside(view, bytes, what) {
   if (view.byteLength < 16) refuse(`${what} shorter than their header`);
   const n_points = view.getUint32(12, true);

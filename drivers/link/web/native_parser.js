@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Bytes into frames and reply lines, as PROTOCOL.md has it (*Frames*, *Resynchronisation*). Pure: no page, no network.
+// Turns bytes into frames and reply lines, by PROTOCOL.md (*Frames*, *Resynchronisation*). It is pure: it needs no
+// page and no network.
 import {crc32c} from './crc32c.js';
 import {Sequence} from './native_sequence.js';
 
@@ -7,8 +8,8 @@ const SYNC = 0xd5, HEADER = 28, MAX_PAYLOAD = 65536, MAX_TEXT = 512;
 export const REPEAT = 1, LOCAL = 2;
 const GOOD = 1, WAIT = 2, BAD = 3;
 
-/** A frame. `payload` and `t_ns` (BigInt, device time) read the parser's bytes: they are good until the call that
- * has handed on the frame returns. */
+/** This is a frame. `payload` and `t_ns` (BigInt, device time) read the parser's bytes: they are valid until the call
+ * that passed on the frame returns. */
 class Frame {
   #view;
   #at;
@@ -30,7 +31,7 @@ class Frame {
 
 const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
-/** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
+/** Takes bytes as they come. It stores bytes that are not decoded yet: less than a frame, 64 KiB. */
 export class Parser {
   /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
    * n, t_ns}). A notice comes before the item that follows it. kind is gap, repeated, late, restarted, bad payload, bad
@@ -42,11 +43,11 @@ export class Parser {
     this.stats = {bytes: 0, frames: 0, texts: 0, bad_bytes: 0, bad_payloads: 0, jumps: 0, jumps_back: 0,
       lost_frames: 0, repeated_frames: 0, late_frames: 0, cuts: 0};
     this.kept = new Uint8Array(0); // room
-    this.n = 0; // bytes kept in it
+    this.n = 0; // so many bytes are stored in it
     this.inStep = true;
     this.sequence = new Sequence();
-    this.bad = null; // bytes that belong to nothing, and for which there is no notice yet
-    this.last_t_ns = null; // of the last whole frame
+    this.bad = null; // these bytes belong to nothing, and have no notice yet
+    this.last_t_ns = null; // it is that of the last complete frame
   }
 
   /** Takes a Uint8Array (or Buffer), of any size. It is read only within this call. */
@@ -62,7 +63,7 @@ export class Parser {
     this.n -= used;
   }
 
-  /** Nothing more will come, as at the end of a recording: what is kept is searched for frames. */
+  /** No more bytes will come, as at the end of a recording: the stored bytes are searched for frames. */
   end() {
     const n = this.n;
     this.n = 0;
@@ -89,10 +90,10 @@ export class Parser {
     this.#append(bytes.subarray(from));
   }
 
-  // How many of the n bytes are done with.
+  // Returns how many of the n bytes are decoded.
   #parse(bytes, n, last) {
     const view = new DataView(bytes.buffer, bytes.byteOffset, n);
-    this.from = this.stats.bytes - n; // where the first of them stands in all bytes
+    this.from = this.stats.bytes - n; // it is the place of the first of them in all bytes
     let at = 0;
     while (at < n) {
       let look = BAD, length = 0;
@@ -137,7 +138,7 @@ export class Parser {
   #noticeNumber(kind, at) {
     const {first: seq, n} = this.sequence, s = this.stats;
     s.jumps += kind === 'gap' || kind === 'restarted' ? 1 : 0;
-    s.jumps_back += kind === 'restarted' ? 1 : 0; // the head has started again: how much is missing isn't known
+    s.jumps_back += kind === 'restarted' ? 1 : 0; // the number of missing frames isn't known then
     s.lost_frames += kind === 'gap' ? n : 0;
     s.repeated_frames += kind === 'repeated' ? 1 : 0;
     s.late_frames += kind === 'late' ? 1 : 0;
@@ -151,13 +152,13 @@ export class Parser {
     this.bad = {kind, at_byte, t_ns, seq, most, n: 0};
   }
 
-  // The header at hand is right, and what follows it is not its payload.
+  // The present header is right, but the bytes after it are not its payload.
   #beginBadFrame(kind, view, at) {
     this.#beginBad(kind, this.from + at, view.getBigInt64(at + 16, true), view.getUint32(at + 8, true),
       HEADER + view.getUint32(at + 4, true));
   }
 
-  // No more bytes will come, and what is at hand is not whole.
+  // No more bytes will come, and the present frame is not complete.
   #beginCut(view, at, n) {
     if (view.getUint8(at) === SYNC && n - at >= HEADER) this.#beginBadFrame('cut', view, at);
     else if (!this.bad || this.bad.n === this.bad.most) this.#beginBad('cut', this.from + at);
@@ -202,7 +203,7 @@ export class Parser {
     this.onText(String.fromCharCode(...bytes.subarray(at, at + length)));
   }
 
-  // Where the next sync byte stands.
+  // Returns the place of the next sync byte.
   #skip(bytes, at, n) {
     const sync = bytes.indexOf(SYNC, at + 1);
     const to = sync < 0 || sync > n ? n : sync;

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-// Poses of a head that moves: points of the polar layout go from its frame to the scene by the pose of their time
+// This class has the poses of a moving head: points of the polar layout go from its frame to the scene by the pose of
+// their time
 // (PROTOCOL.md, *8 poses*, Rule).
 
-const KEEP = 8192; // some seconds, and more than two of the longest frames
+const KEEP = 8192; // this is some seconds, and more than two of the longest frames
 
-// From pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from there.
+// Returns the motion from pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from
+// there.
 function leg(a, b) {
   const [w, x, y, z] = a.quat, q = b.quat;
   const d = [w * q[0] + x * q[1] + y * q[2] + z * q[3], w * q[1] - x * q[0] - y * q[3] + z * q[2],
@@ -28,14 +30,14 @@ export class Poses {
     this.n = 0;
   }
 
-  /** poses: as readPoses gives them. Times are Numbers from here on, exact for 104 days. */
+  /** poses are as readPoses gives them. Times are Numbers from here on, exact for 104 days. */
   add(poses) {
     this.frames.push(poses.map((p) => ({...p, time: Number(p.t_ns)})));
     this.n += poses.length;
     while (this.n > KEEP) this.n -= this.frames.shift().length;
   }
 
-  // The latest two poses of a frame with the time between them; null: the stream has not said it.
+  // Returns the latest two poses of a frame with the time between them; null: the stream has not sent them.
   #leg(t_ns) {
     for (let f = this.frames.length - 1; f >= 0; f--) {
       const poses = this.frames[f], last = poses.length - 1;
@@ -51,8 +53,8 @@ export class Poses {
     return null;
   }
 
-  /** Points from..c.n of the columns, from the head's frame to the scene. `times` gives the ns of each since the
-   * scan's start. Those without a pose become NaN; how many. */
+  /** Moves points from..c.n of the columns from the head's frame to the scene. `times` gives the ns of each since the
+   * scan's start. Points without a pose become NaN; it returns how many. */
   place(c, from, times) {
     let now = null, missing = 0;
     for (let i = from; i < c.n; i++) {
@@ -69,7 +71,7 @@ export class Poses {
   }
 }
 
-// Rodrigues' formula in the head's frame, then the rotation at the leg's begin.
+// This is Rodrigues' formula in the head's frame, then the rotation at the leg's begin.
 function turn({a, b, axis, angle, rotation: m}, f, c, i) {
   const s = Math.sin(f * angle), versine = 1 - Math.cos(f * angle), [ax, ay, az] = axis;
   let x = c.x[i], y = c.y[i], z = c.z[i];

@@ -1,28 +1,29 @@
 /* SPDX-License-Identifier: MIT */
-// The sequence numbers of frames, as PROTOCOL.md has them (*Sequence numbers*): which are missing, repeated or late.
-const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
+// This class checks the sequence numbers of frames, by PROTOCOL.md (*Sequence numbers*): some are missing, repeated or
+// late.
+const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // a jump is searched so far back, as libscanhead does
 const LOCAL = 2;
 
-/** Whether number a comes before b, modulo 2^32. */
+/** Returns whether number a comes before b, modulo 2^32. */
 export const isBefore = (a, b) => ((a - b) >>> 0) >= 2 ** 31;
 
 /** Takes the headers of whole frames, one after the other. */
 export class Sequence {
-  #next = -1; // -1: none came yet
-  #n = 0; // frames seen
+  #next = -1; // it is -1 before the first one
+  #n = 0; // these frames came
   #seq = new Uint32Array(SEEN);
   #crc = new Uint32Array(SEEN);
   #length = new Uint32Array(SEEN);
-  #kind = new Uint32Array(SEEN); // type and flags
+  #kind = new Uint32Array(SEEN); // it has type and flags
   #t_ns = new BigInt64Array(SEEN);
-  #gaps = []; // {first, n}
-  #local = null; // the frame before, if it was LOCAL
+  #gaps = []; // each gap is {first, n}
+  #local = null; // it is the previous frame, if that was LOCAL
   #lastLate = 0;
-  #lateRun = 0; // late frames in a row, up to that one
+  #lateRun = 0; // so many late frames came in a row, up to that one
   first = 0;
   n = 1;
 
-  /** '', or what is noticed of the frame: 'gap': `n` frames are missing from number `first` on; 'restarted': another
+  /** Returns '', or what is noticed: 'gap': `n` frames are missing from number `first` on; 'restarted': another
    * sequence begins; 'repeated', 'late': it is to be dropped. `first` is its own number but for a gap. */
   take(frame) {
     const {seq} = frame;
@@ -73,7 +74,7 @@ export class Sequence {
     return false;
   }
 
-  // Whether LATE_RUN late frames came in a row: they are another sequence, whose numbers were all missing.
+  // Returns whether LATE_RUN late frames came in a row: they are another sequence, whose numbers were all missing.
   #isRun(seq) {
     this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
     this.#lastLate = seq;
