@@ -32,7 +32,7 @@ ${more}`;
 const sleep = (s) => new Promise((done) => setTimeout(done, 1000 * s));
 const figures = (page) => page.eval('(({point_hash, ...f}) => f)(scanhead.head.figures())');
 
-// Rows of texts, the first one the head; numbers to the right.
+// Prints rows of texts, the first one as the head, with numbers to the right.
 function table(rows) {
   const width = rows[0].map((_, k) => Math.max(...rows.map((row) => String(row[k]).length)));
   for (const row of rows) console.log(`  ${row.map((cell, k) => (k === 0 ? String(cell).padEnd(width[k]) : String(cell).padStart(width[k]))).join('  ')}`);
@@ -70,7 +70,7 @@ async function load() {
 }
 
 // ---- 2
-// Points on the walls of a hall, as a scan has them: all of these are in sight from outside.
+// These are points on the walls of a hall, as a scan has them; all are in sight from outside.
 const fill = (n) => `(() => {
   const cloud = scanhead.cloud, N = 50000;
   cloud.clear();

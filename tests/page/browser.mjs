@@ -6,9 +6,9 @@ import {accessSync, constants, mkdirSync, writeFileSync} from 'node:fs';
 import {folder, forget, remember} from './work.mjs';
 
 const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
-const DEADLINE_MS = 90000; // for what hangs; a busy machine is many times slower than a quiet one
+const DEADLINE_MS = 90000; // it is for things that hang; a busy machine is many times slower than a quiet one
 
-/** The program's path, or null. $CHROMIUM names another. */
+/** Returns the program's path, or null. $CHROMIUM names another one. */
 export function findBrowser() {
   if (process.env.CHROMIUM) return process.env.CHROMIUM;
   for (const folder of (process.env.PATH ?? '').split(':')) {
@@ -16,7 +16,7 @@ export function findBrowser() {
       try {
         accessSync(`${folder}/${name}`, constants.X_OK);
         return `${folder}/${name}`;
-      } catch { /* not there */ }
+      } catch { /* it is not there */ }
     }
   }
   return null;
@@ -24,11 +24,11 @@ export function findBrowser() {
 
 export class Browser {
   #next = 1;
-  #waiting = new Map(); // number of a command: [resolve, reject, its name]
-  #pages = new Map(); // session: page
+  #waiting = new Map(); // it maps the number of a command to [resolve, reject, its name]
+  #pages = new Map(); // it maps a session to its page
   #rest = [];
 
-  /** nice: of all its processes. size: of its window. */
+  /** nice is that of all its processes; size is that of its window. */
   constructor({nice = 0, size = [1280, 900]} = {}) {
     mkdirSync(`${folder}/profile`, {recursive: true});
     const flags = ['--headless=new', '--remote-debugging-pipe', `--user-data-dir=${folder}/profile`, '--use-angle=swiftshader',
@@ -47,7 +47,7 @@ export class Browser {
     this.child.stdio[4].on('data', (bytes) => this.#read(bytes)).on('error', () => {});
   }
 
-  /** A command of the protocol; its result. */
+  /** Sends a command of the protocol, and returns its result. */
   send(method, params = {}, sessionId = undefined) {
     return new Promise((resolve, reject) => {
       if (this.child.exitCode !== null) throw new Error('the browser has ended');
@@ -58,7 +58,8 @@ export class Browser {
     });
   }
 
-  /** A page of its own. size: of the view, in CSS pixels; before: a program that runs before those of the page. */
+  /** Opens a new page. size is that of the view, in CSS pixels; before is a program that runs before those of the
+   * page. */
   async open(url, {size = [1280, 900], dark = false, before = ''} = {}) {
     const {targetId} = await this.send('Target.createTarget', {url: 'about:blank'});
     const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});
@@ -75,7 +76,7 @@ export class Browser {
   async end() {
     try {
       process.kill(-this.child.pid, 'SIGKILL');
-    } catch { /* ended already */ }
+    } catch { /* it has ended */ }
     await this.ended;
     forget(-this.child.pid);
   }
@@ -112,9 +113,9 @@ export class Browser {
 }
 
 class Page {
-  sent = []; // text that the page has sent by WebSocket
-  faults = []; // errors of its scripts, and what the console had as an error
-  failed = []; // {url, why} of requests that got no answer
+  sent = []; // the page has sent this text by WebSocket
+  faults = []; // these are errors of its scripts, and errors on the console
+  failed = []; // these are {url, why} of requests without an answer
   #urls = new Map();
   #loaded = () => {};
 
@@ -144,14 +145,14 @@ class Page {
     await loaded;
   }
 
-  /** The value of an expression, or what its promise resolves to. */
+  /** Returns the value of an expression, or that of its promise. */
   async eval(expression) {
     const {result, exceptionDetails: wrong} = await this.send('Runtime.evaluate', {expression, awaitPromise: true, returnByValue: true});
     if (wrong) throw new Error(`${expression}: ${wrong.exception?.description ?? wrong.text}`);
     return result.value;
   }
 
-  /** Waits until the expression is true, which the page itself looks after every 20 ms. The value it then has. */
+  /** Waits until the expression is true, which the page itself checks every 20 ms. It returns the value. */
   async until(expression, what = expression) {
     const limit_ms = DEADLINE_MS - 5000; // the page answers before send() gives up
     const answer = await this.send('Runtime.evaluate', {awaitPromise: true, returnByValue: true, expression: `new Promise((done, fail) => {
@@ -168,7 +169,8 @@ class Page {
     return answer.result.value;
   }
 
-  /** Middle of the first element that a selector finds, scrolled into view: once it rests, and nothing else lies there. */
+  /** Returns the middle of the first element that a selector finds, scrolled into view, once it rests and nothing else
+   * is over it. */
   where(selector) {
     return this.until(`(() => {
       const e = document.querySelector(${JSON.stringify(selector)});
@@ -192,7 +194,8 @@ class Page {
     await this.mouse('mouseReleased', at);
   }
 
-  /** Presses what a selector finds. What comes meanwhile may have moved it: where nothing was pressed instead, once more. */
+  /** Presses the element that a selector finds. Something new may have moved it: if nothing was pressed instead, it
+   * tries again. */
   async click(selector) {
     for (let tries = 1; ; tries++) {
       const at = await this.where(selector);
@@ -205,13 +208,13 @@ class Page {
     }
   }
 
-  /** The same, once it may be pressed. */
+  /** Does the same, once it may be pressed. */
   async press(selector) {
     await this.until(`!document.querySelector(${JSON.stringify(selector)}).disabled`, `${selector} stays disabled`);
     await this.click(selector);
   }
 
-  /** From one place to another in steps, as a hand does. */
+  /** Drags from one place to another in steps, as a hand does. */
   async drag(from, to, steps = 8) {
     await this.mouse('mouseMoved', from);
     await this.mouse('mousePressed', from, 1);
@@ -226,7 +229,7 @@ class Page {
     await this.send('Input.dispatchKeyEvent', {type: 'keyUp', key, modifiers, windowsVirtualKeyCode: code});
   }
 
-  /** Another text into a field, and Enter. */
+  /** Puts another text into a field, and presses Enter. */
   async fill(selector, text) {
     await this.click(selector);
     await this.eval(`document.querySelector(${JSON.stringify(selector)}).select?.()`);
@@ -247,7 +250,7 @@ class Page {
     writeFileSync(file, Buffer.from(data, 'base64'));
   }
 
-  /** What the page knows of its head, the newest events first, and what went wrong in it: for a test that failed. */
+  /** Returns what the page knows of its head, the newest events first, and its errors, for a test that failed. */
   async knows() {
     const words = await this.eval(`(() => {
       const {head, cloud} = window.scanhead ?? {}, all = head?.figures();
@@ -265,7 +268,7 @@ class Page {
   }
 }
 
-/** Name and version, for tables. */
+/** Returns name and version, for tables. */
 export function browserVersion() {
   return spawnSync(findBrowser(), ['--version'], {encoding: 'utf8'}).stdout.trim().replace(/ built on.*/, '');
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-// The program under test: heads with their ready line, recordings, and a client by TCP that shares nothing with the page.
+// This module runs the program under test: heads with their ready line, recordings, and a client by TCP that shares
+// nothing with the page.
 import {spawn, spawnSync} from 'node:child_process';
 import {createConnection} from 'node:net';
 import {forget, remember} from './work.mjs';
 
 export const PROGRAM = process.env.SCANHEAD || 'build/scanhead';
-const DEADLINE_MS = 90000; // for what hangs
+const DEADLINE_MS = 90000; // it is for things that hang
 
 /** Starts the program (`run`, `view`) and waits for its ready line. It dies with this program. */
 export async function start(args, {nice = 0} = {}) {
@@ -29,25 +30,25 @@ export async function start(args, {nice = 0} = {}) {
   return head;
 }
 
-/** The endpoint of its first link of a type. */
+/** Returns the endpoint of its first link of a type. */
 export function endpoint(head, type) {
   return head.ready.endpoints.find((link) => link.type === type).endpoint;
 }
 
-/** Ends it with a signal; its exit status, or the signal that ended it. */
+/** Ends it with a signal, and returns its exit status, or the signal that ended it. */
 export function end(head, signal = 'SIGTERM') {
   head.child.kill(signal);
   return head.ended;
 }
 
-/** Runs the program to its end; its output. A status other than 0 is an error. */
+/** Runs the program to its end, and returns its output. A status other than 0 is an error. */
 export function run(...args) {
   const {status, stdout, stderr} = spawnSync(PROGRAM, args, {encoding: 'utf8'});
   if (status !== 0) throw new Error(`${args.join(' ')}: ${stderr}`);
   return stdout;
 }
 
-/** A client of the head: command lines and their replies; frames are skipped by their length. */
+/** This is a client of the head: it sends command lines and reads their replies; frames are skipped by their length. */
 export class Client {
   #rest = Buffer.alloc(0);
   #waiting = [];

@@ -16,7 +16,8 @@ const links = ['--set', `links.0.path=${folder}/pty`];
 if (values.best === undefined) mkdirSync(values.out, {recursive: true});
 const browser = new Browser();
 
-// Pace step: the scan stands where it is, for as long as the pictures take. The page grants the time, as it has control.
+// With the pace step the scan stands still for as long as the pictures take. The page grants the time, as it has
+// control.
 const head = await start(['run', 'config/demo.yaml', '--quiet', '--pace', 'step', '--view', ...links]);
 
 async function shots(name) {
@@ -33,7 +34,7 @@ async function shots(name) {
   }
 }
 
-// All points are drawn, and what the page asks for once a second has come.
+// All points are drawn, and the answers that the page asks for once a second have come.
 async function settled() {
   await page.eval('new Promise((done) => setTimeout(done, 1500))');
   await page.eval('scanhead.view.screenshotReady()');

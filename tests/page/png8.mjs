@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// A picture with 256 colours: a PNG of a browser's (8 bits a channel, not interlaced) as a smaller one, for documents.
-// Needs node 20.15 or later.
+// Turns a browser's PNG (8 bits a channel, not interlaced) into a smaller one with 256 colours, for documents.
+// It needs node 20.15 or later.
 import zlib from 'node:zlib';
 
 function* chunks(png) {
@@ -28,7 +28,7 @@ function pixelsOf(png) {
   return {width, height, size, out};
 }
 
-// The mean colours of the 256 fullest cells of a grid of 16 x 16 x 16, and the nearest of them for each cell.
+// Returns the mean colours of the 256 fullest cells of a grid of 16 x 16 x 16, and the nearest of them for each cell.
 function paletteOf({out, size}) {
   const cells = Array.from({length: 4096}, (_, cell) => ({cell, n: 0, sum: [0, 0, 0]}));
   const cellOf = (i) => (out[i] >> 4 << 8) | (out[i + 1] >> 4 << 4) | (out[i + 2] >> 4);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The scene of the page's tests, and what the page has to show of it.
+// This module has the scene of the page's tests, and the figures that the page must show of it.
 import {execFileSync} from 'node:child_process';
 import {resolve} from 'node:path';
 import {run} from './head.mjs';
@@ -7,7 +7,7 @@ import {folder, write} from './work.mjs';
 
 const ROOT = new URL('../..', import.meta.url).pathname;
 
-/** A room with glass and a mirror, several echoes a pulse, 50,000 points; two places to stand. */
+/** It is a room with glass and a mirror, several echoes a pulse, 50,000 points and two stations. */
 export const CONFIG = write('page.yaml', `head: {profile: riegl-vz400i, prr_hz: 100000, lines_hz: 100, pan_deg_s: 150, pan_stop_deg: 180, frames: 1}
 scene: {meshes: [{file: ${resolve(ROOT, 'config/scenes/glass_room.obj')}, up: z, scale: 1}]}
 stations:
@@ -26,7 +26,7 @@ export function recorded(name, settings, ...options) {
   return {...JSON.parse(text), file};
 }
 
-/** The sum of two hashes: of the records of both scans. */
+/** Returns the sum of two hashes, those of the records of both scans. */
 export function both(a, b) {
   const half = (at) => ((parseInt(a.slice(at, at + 8), 16) + parseInt(b.slice(at, at + 8), 16)) >>> 0).toString(16).padStart(8, '0');
   return half(0) + half(8);

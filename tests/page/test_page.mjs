@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The page of a head, of a recording, and of a head that goes: in one browser. What is expected is computed by others:
-// `record`, the Python client, and a client by TCP.
+// It tests the page of a head, of a recording, and of a head that ends, in one browser. Expected values are computed
+// by others: `record`, the Python client, and a client by TCP.
 import {createServer} from 'node:http';
 import {connect} from 'node:net';
 import {readFileSync} from 'node:fs';
@@ -10,14 +10,14 @@ import {both, CONFIG, recorded} from './rig.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
-giveUpAfter(1100); // before run_tap.sh does
+giveUpAfter(1100); // it gives up before run_tap.sh does
 
-// A head, its page, and somebody else who asks it.
+// Starts a head, its page, and another client that asks it.
 async function open(browser, ...more) {
   const head = await start(['run', CONFIG, '--quiet', '--pace', 'fast', ...more]);
   const page = await browser.open(endpoint(head, 'web'), {size: SIZE});
   await page.until('scanhead.head.isOpen && scanhead.head.state === "idle" && document.querySelector("#knob-head-lines")?.value');
-  await page.until('document.querySelector("#model").textContent && document.querySelector("#station-2-x_m")?.value'); // all is in its place
+  await page.until('document.querySelector("#model").textContent && document.querySelector("#station-2-x_m")?.value'); // all is shown
   return {head, page, other: new Client(endpoint(head, 'tcp'))};
 }
 
@@ -41,7 +41,7 @@ function sameBounds(bounds, {min, max}) {
   max.forEach((v, k) => near(bounds.max[k], v, tolerance, `upper bound ${k}`));
 }
 
-// As the picture says it, when a station is let go.
+// The picture reports it, when a station is let go.
 const dragged = ([x, y, z]) => `scanhead.view.dispatchEvent(new CustomEvent('move', {detail: {station: 1, x: ${x}, y: ${y}, z: ${z}, heading_deg: 30}}))`;
 const IS_RED = `getComputedStyle(document.querySelector('#banner')).color === (() => {
   const probe = document.body.appendChild(document.createElement('i'));
@@ -51,8 +51,8 @@ const IS_RED = `getComputedStyle(document.querySelector('#banner')).color === ((
   return color;
 })()`;
 
-// In a page, before its scripts: a pixel of each canvas of WebGL at the end of the task that made it, or changed its size;
-// the browser shows it as it is then.
+// It runs in a page, before its scripts. It takes a pixel of each canvas of WebGL at the end of the task that made it,
+// or changed its size; the browser shows it as it is then.
 function seesBlack() {
   window.seen = [];
   const look = (canvas) => queueMicrotask(() => {
@@ -185,7 +185,7 @@ await test('control is given back by the button, and then anybody may have it', 
   await other.until('SYST:CONT?', (reply) => reply === '0');
   equal(await other.ask('HEAD:LIN 70'), 'OK', 'a setting of another client');
   await page.until('scanhead.head.controller !== 0 && document.querySelector("#control").disabled');
-  const wanted = `${other.name} has control`; // its kind of link and its address
+  const wanted = `${other.name} has control`; // it has its kind of link and its address
   await page.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);
   const late = await browser.open(endpoint(head, 'web'), {size: SMALL});
   await late.until(`document.querySelector("#owner").textContent === ${JSON.stringify(wanted)}`);

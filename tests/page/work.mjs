@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: MIT */
-// A folder of one's own and what was started, both gone at the end, whatever kind of end it is; and TAP.
+// This module has a folder of its own and the programs started, both gone at any kind of end; and TAP.
 import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 
 export const folder = mkdtempSync(`${tmpdir()}/scanhead-page-`);
-const started = new Set(); // process groups and processes
+const started = new Set(); // these are process groups and processes
 
 process.on('exit', () => {
   for (const pid of started) {
     try {
       process.kill(pid, 'SIGKILL');
-    } catch { /* ended already */ }
+    } catch { /* it has ended */ }
   }
   rmSync(folder, {recursive: true, force: true, maxRetries: 5});
 });
 for (const [signal, status] of [['SIGINT', 130], ['SIGTERM', 143], ['SIGHUP', 129]]) process.on(signal, () => process.exit(status));
 
-/** pid: of a process; negative: of its group. */
+/** pid is that of a process, or negative that of its group. */
 export function remember(pid) {
   started.add(pid);
 }
@@ -25,7 +25,7 @@ export function forget(pid) {
   started.delete(pid);
 }
 
-/** Writes a file into the folder; its path. */
+/** Writes a file into the folder, and returns its path. */
 export function write(name, text) {
   writeFileSync(`${folder}/${name}`, text);
   return `${folder}/${name}`;
@@ -56,7 +56,7 @@ export async function test(name, body) {
   }
 }
 
-/** The plan, at the end; the exit status. */
+/** Prints the plan at the end, and returns the exit status. */
 export function finish() {
   console.log(`1..${results}`);
   process.exit(failures > 0 ? 1 : 0);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-// The page's decoder (drivers/link/web/native.js): samples of SAMPLES.md value by value, damage, and recordings beside
-// the client in Python. TAP on standard output.
+// It tests the page's decoder (drivers/link/web/native.js) with samples of SAMPLES.md value by value, with damage, and
+// with recordings beside the client in Python. It prints TAP on standard output.
 //
-//     node page_native.mjs FOLDER    FOLDER: with polar.shs, utm.shs, ... and the points that Python makes of each
+//     node page_native.mjs FOLDER    FOLDER has polar.shs, utm.shs, ... and the points that Python makes of each
 import fs from 'node:fs';
 import {crc32c, Decoder, Parser, LOCAL, REPEAT, TYPES} from '../../drivers/link/web/native.js';
 import {Losses} from '../../drivers/link/web/losses.js';

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The page's panels without a browser: contrast of its colours, what a head says of its settings, events in words, the
-// files of a recording. Expected values are by hand.
+// It tests the page's panels without a browser: contrast of its colours, a head's descriptions of its settings, events
+// in words, the files of a recording. Expected values are computed by hand.
 import {readFileSync} from 'node:fs';
 import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
@@ -17,7 +17,7 @@ const equal = (got, want, what = '') => {
   if (JSON.stringify(got) !== JSON.stringify(want)) throw new Error(`${what}: ${JSON.stringify(got)}, expected ${JSON.stringify(want)}`);
 };
 
-// WCAG 2.1, relative luminance and contrast ratio.
+// Relative luminance and contrast ratio follow WCAG 2.1.
 const channel = (v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
 const luminance = (hex) => [0.2126, 0.7152, 0.0722].reduce((sum, weight, i) =>
   sum + weight * channel(parseInt(hex.slice(1 + 2 * i, 3 + 2 * i), 16) / 255), 0);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The points from before a page came (drivers/link/web/past.js): each points frame is shown once, whichever way it comes,
-// whatever the page's connections did meanwhile. TAP on standard output. The stream is made here, with a keeper of it that
-// answers as the head's does.
+// It tests the points from before a page came (drivers/link/web/past.js): each points frame is shown once, whichever
+// way it comes, whatever the page's connections did meanwhile. It prints TAP on standard output. The stream is made
+// here, with an observer that answers as the head's does.
 import {crc32c, LOCAL, Parser, REPEAT} from '../../drivers/link/web/native.js';
 import {Cloud} from '../../drivers/link/web/cloud.js';
 import {Losses} from '../../drivers/link/web/losses.js';
@@ -14,7 +14,7 @@ function equal(got, wanted, what) {
   if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
 }
 
-// A descriptor and an anchor of the polar layout, from the samples of the protocol.
+// These are a descriptor and an anchor of the polar layout, from the samples of the protocol.
 const text = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
 const samples = [...text.matchAll(/```text\n(d5 [0-9a-f \n]*)```/g)].map(([, hex]) => Buffer.from(hex.replace(/\s/g, ''), 'hex'));
 const sampleOf = (type) => samples.find((s) => s[1] === type).subarray(28);
@@ -31,7 +31,7 @@ function frame(type, payload, seq, flags = 0) {
   return bytes;
 }
 
-// One shot with one echo, pulse k of the scan.
+// Makes one shot with one echo, pulse k of the scan.
 function shot(k) {
   const payload = Buffer.alloc(60);
   payload.writeUInt32LE(k, 8); // pulse0
@@ -42,7 +42,7 @@ function shot(k) {
   return payload;
 }
 
-// A head's stream, from a number on, and what its keeper has of it.
+// Makes a head's stream, from a number on, and the part that its observer has.
 class Stream {
   frames = [];
   kept = [];
@@ -61,7 +61,7 @@ class Stream {
   shots(from, to) { return Array.from({length: to - from}, (_, i) => this.push(POINTS, shot(from + i))); }
   telemetry() { return [this.push(TELEMETRY, sampleOf(TELEMETRY))]; }
 
-  // The body of /past, a frame a piece; keeps: how many frames of those that are kept it has so far.
+  // Returns the body of /past, with one frame a piece; keeps is how many of the stored frames it has so far.
   get = async (url) => {
     const at = Number(url.split('=')[1]), head = Buffer.alloc(56), end = this.keeps ?? this.kept.length;
     const piece = at < end ? this.kept[at] : Buffer.alloc(0);
@@ -77,9 +77,9 @@ class Stream {
   };
 }
 
-// A page as wire.js makes one: what is live goes through `takes`.
+// This is a page as wire.js makes one: live frames go through `takes`.
 class Page {
-  pulses = []; // shown, in the order in which they came
+  pulses = []; // these are shown, in the order in which they came
   live = 0;
 
   constructor(stream) {
@@ -101,7 +101,7 @@ class Page {
   }
   take(frames) { for (const bytes of frames) this.parser.push(new Uint8Array(bytes)); }
 
-  // Each of the pulses once, after a while; a pulse more, or one twice, fails at once.
+  // Each of the pulses must come once, after a while; an additional pulse, or one twice, fails at once.
   async shows(from, to, what) {
     const until = Date.now() + 30000;
     while (this.pulses.length < to - from && Date.now() < until) await new Promise((done) => setTimeout(done, 5));
@@ -123,7 +123,7 @@ test('a page that joins within a scan has each pulse once, over the end of the n
   stream.places();
   stream.shots(0, 30);
   const page = new Page(stream);
-  page.take(stream.shots(30, 40)); // before it can be placed
+  page.take(stream.shots(30, 40)); // it comes before it can be placed
   page.take(stream.places(REPEAT));
   page.take(stream.shots(40, 50));
   await page.shows(0, 50, 'pulses');
@@ -137,7 +137,7 @@ test('the keeper may be slower than the connection', async () => {
   stream.keeps = 8;
   const page = new Page(stream);
   page.take(stream.telemetry());
-  await page.shows(0, 5, 'what is kept so far'); // attributes of the last may follow
+  await page.shows(0, 5, 'what is kept so far'); // attributes of the last one may follow
   stream.keeps = undefined;
   await page.shows(0, 20, 'all');
 });
@@ -210,7 +210,7 @@ test('pulses from before are not missing at the end of their scan, whichever com
   }
 });
 
-// n points of a scan.
+// Makes n points of a scan.
 const batch = (n, station, scan, more = {}) => {
   const f = () => new Float64Array(n);
   return {n, shots: n, scan, station, frame: 0, line: 0, pulse0: 0, x: f(), y: f(), z: f(), pulse: f(), t: f(), range: f(), reflectance: f(),
@@ -236,7 +236,7 @@ test('of a head that has started again, the same number is another scan', () => 
   take(cloud, batch(3, 1, 1));
   take(cloud, batch(3, 2, 2));
   const came = cloud.cut();
-  take(cloud, batch(4, 1, 1)); // before the page knows
+  take(cloud, batch(4, 1, 1)); // it is so before the page has the reply
   cloud.outdate(came);
   take(cloud, batch(4, 1, 1));
   equal(held(cloud), [[2, 2, 3], [1, 1, 8]], 'blocks');

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The form in which a reader gives its products to scanhead, on descriptor 3; and errors, on descriptor 4. Numbers are in
+// A reader gives its products to scanhead in this form on descriptor 3, and errors on descriptor 4. Numbers are in
 // the machine's order. Coordinates are metres, y up, as other formats of y up come.
 //
 //   head     "shifc01\0"
@@ -19,7 +19,7 @@ function write(bytes) {
   for (let done = 0; done < bytes.length;) done += fs.writeSync(RESULT, bytes, done)
 }
 
-// The file, read whole. Of a small one the bodies are made sooner than the optimised code for them would be compiled.
+// Reads the complete file. For a small one making the bodies takes less time than compiling optimised code for them.
 const SMALL = 6e6
 
 export function load(file) {
@@ -36,7 +36,7 @@ export function begin() {
   write(Buffer.from('shifc01\0', 'latin1'))
 }
 
-// parts: [{ vertex: Float64Array, index: Uint32Array, colour: [r, g, b, a], largest }]
+// parts are [{ vertex: Float64Array, index: Uint32Array, colour: [r, g, b, a], largest }]
 export function product(id, type, failures, parts) {
   const text = Buffer.from(`${type}\n${failures.length > 0 ? failures[0] : ''}`.slice(0, MAX_TEXT), 'utf8')
   write(bytes_of(new Uint32Array([id, parts.length, failures.length, text.length])))
@@ -56,7 +56,7 @@ export function end() {
   write(bytes_of(new Uint32Array([0, 0, 0, 0])))
 }
 
-// One line as a struct import_note of core/import/import.h: kind 3 is an error, code -1 that of a wrong file.
+// Writes one line as a struct import_note of core/import/import.h: kind 3 is an error, and code -1 means a wrong file.
 export function fail(error) {
   const note = Buffer.alloc(528), put = new DataView(note.buffer, note.byteOffset)
   const little = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1
@@ -67,7 +67,7 @@ export function fail(error) {
   process.exit(1)
 }
 
-// Points as `local` has them, stride numbers each, through a 4 x 4 matrix in columns; in double.
+// Moves the points of `local`, stride numbers each, through a 4 x 4 matrix in columns, in double.
 export function placed(local, stride, m) {
   const n = local.length / stride, vertex = new Float64Array(3 * n)
   let largest = 0
