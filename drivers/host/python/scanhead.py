@@ -62,7 +62,7 @@ class ScanheadError(Exception):
 
 
 class Timeout(ScanheadError, TimeoutError):
-    """Nothing came in time. Call again."""
+    """No data came within the time limit. Call again."""
 
 
 class Closed(ScanheadError):
@@ -70,7 +70,7 @@ class Closed(ScanheadError):
 
 
 class CommandError(ScanheadError):
-    """The head refused a command. number: SCPI's; text: the head's words."""
+    """The head refused a command. number is SCPI's; text has the head's words."""
 
     def __init__(self, command: str, number: int, text: str) -> None:
         super().__init__(f"{command}: {number},{text}")
@@ -80,7 +80,7 @@ class CommandError(ScanheadError):
 # ---- CRC-32C
 
 def _crc_tables(n: int) -> List[List[int]]:
-    """Table k: what a byte adds to the register when k bytes follow it."""
+    """Table k has the value that a byte adds to the register when k bytes follow it."""
     first = []
     for byte in range(256):
         for _ in range(8):
@@ -101,7 +101,7 @@ if np is not None:
 
 
 def _crc_pure(data: bytes) -> int:
-    """Two bytes a step."""
+    """Takes two bytes a step."""
     pairs, crc = _crc_pairs, 0xFFFFFFFF
     for pair in struct.unpack_from("<%dH" % (len(data) // 2), data):
         crc = pairs[(crc ^ pair) & 0xFFFF] ^ crc >> 16
@@ -111,7 +111,7 @@ def _crc_pure(data: bytes) -> int:
 
 
 def _crc_numpy(data: bytes) -> int:
-    """Rows of 256 bytes: each byte's share by its place, the rows then one after the other. Zeros before the
+    """Sums rows of 256 bytes: each byte's share by its place, the rows then one after the other. Zeros before the
     message add nothing, so the first row is filled up with them. The register's start is XORed into the
     message's first 4 bytes."""
     rows = -(-len(data) // _ROW)
@@ -127,12 +127,12 @@ def _crc_numpy(data: bytes) -> int:
 
 
 def crc32c(data: bytes) -> int:
-    """CRC-32C of RFC 3720."""
+    """Returns the CRC-32C of RFC 3720."""
     return _crc_numpy(data) if np is not None and len(data) >= 512 else _crc_pure(data)
 
 
 def _shift_tables() -> List[List[List[int]]]:
-    """Level k, place i: what byte i of a register becomes when 2^k zero bytes follow; linear."""
+    """Level k, place i has the value that byte i of a register becomes when 2^k zero bytes follow; it is linear."""
     levels = [[[_crc_table[0][v << 8 * i & 255] ^ v << 8 * i >> 8 for v in range(256)] for i in range(4)]]
     for _ in range(16):
         a, b, c, d = levels[-1]
@@ -142,7 +142,7 @@ def _shift_tables() -> List[List[List[int]]]:
 
 
 class _RunningCrc:
-    """CRCs of any pieces of a buffer, each byte summed once. For a damaged or hostile stream: there payloads
+    """Computes CRCs of any pieces of a buffer, each byte summed once. For a damaged or hostile stream: there payloads
     that are wrong may overlap, up to 65536 for a byte."""
     _shifts = None  # type: Optional[List[List[List[int]]]]
 
@@ -151,7 +151,7 @@ class _RunningCrc:
         self.until = 0  # where the last wrong payload ends
 
     def dropped(self, n: int) -> None:
-        """The buffer's first n bytes have gone."""
+        """Call it after the buffer's first n bytes were removed."""
         del self._registers[:n]
         self.until -= n
         if not self._registers:
@@ -231,7 +231,7 @@ def _take(layout, payload: bytes, offset: int) -> Dict[str, object]:
 
 
 def _decode(kind: int, payload: bytes) -> Dict[str, object]:
-    """The fixed part of a payload by its names. What follows the part that is known is left alone."""
+    """Returns the fixed part of a payload by its names. It ignores bytes after the known part."""
     form = _UNPACK[kind][0]
     if len(payload) < form.size:
         raise ScanheadError(f"a frame of type {kind} with {len(payload)} bytes; {form.size} are the least")
@@ -246,7 +246,7 @@ def _decode(kind: int, payload: bytes) -> Dict[str, object]:
 
 
 class Frame(NamedTuple):
-    """A frame as it came. t_ns: device time. fields: the fixed part of the payload by its names."""
+    """This is a frame as it came. t_ns: device time. fields: the fixed part of the payload by its names."""
     type: int
     version: int
     flags: int
@@ -262,7 +262,7 @@ class Frame(NamedTuple):
 # ---- bytes into frames and reply lines ("Sequence numbers", "Resynchronisation")
 
 class Notice(NamedTuple):
-    """Something wrong in the stream; each thing gives one. kind is one of
+    """It reports something wrong in the stream; each thing gives one. kind is one of
         gap          n frames are missing, from seq on
         repeated     a frame came once more; late: it was missing, and comes after newer ones. Neither is given
         restarted    another sequence begins with seq: the head started again
@@ -282,7 +282,7 @@ class Notice(NamedTuple):
 
 
 class _Sequence:
-    """The numbers of frames: what is missing, came already, or too late."""
+    """Checks the numbers of frames: frames may be missing, repeated or late."""
 
     def __init__(self) -> None:
         self._next = None  # type: Optional[int]
@@ -292,8 +292,8 @@ class _Sequence:
         self._last_late, self._late_run = 0, 0  # the last late frame; how many came in a row up to it
 
     def take(self, frame: Tuple) -> Tuple[str, int, int]:
-        """frame: its number, flags and all that makes it another one. What is noticed of it ("": nothing), and
-        from which number on how many frames."""
+        """Takes a frame: its number, flags and all that distinguishes it from others. Returns what is noticed of it
+        ("": nothing), the number of the first frame that this is about, and how many frames it is about."""
         seq, flags = frame[:2]
         if flags & LOCAL:
             kind = "repeated" if frame == self._local else ""
@@ -331,7 +331,8 @@ class _Sequence:
         return False
 
     def _is_run(self, seq: int) -> bool:
-        """Of a late frame: so many in a row are another sequence, whose numbers were all missing."""
+        """Returns whether a late frame ends a run: so many late frames in a row are another sequence, whose numbers
+        were all missing."""
         follows = self._late_run > 0 and seq == (self._last_late + 1) % 2**32
         self._late_run, self._last_late = self._late_run + 1 if follows else 1, seq
         return self._late_run == _LATE_RUN
@@ -342,7 +343,7 @@ class _Sequence:
 
 
 class _Bad:
-    """Bytes that belong to nothing, one after the other. most: what a broken frame may have at most."""
+    """Bytes in a row that belong to nothing. most is the largest number that a broken frame may have."""
 
     def __init__(self, kind: str, at_byte: int, t_ns: Optional[int], seq: Optional[int] = None,
                  most: float = math.inf) -> None:
@@ -374,7 +375,8 @@ class Parser:
         self.bytes += len(data)
 
     def next(self, last: bool = False) -> Union[Frame, str, None]:
-        """A frame, a reply line without its end, or None: more bytes are needed. last: none will come."""
+        """Returns a frame, a reply line without its end, or None: more bytes are needed. last means that none will
+        come."""
         while self._at < len(self._bytes):
             first, item, wait = self._bytes[self._at], None, False
             if first == 0xD5:
@@ -404,8 +406,8 @@ class Parser:
             self.on_notice(Notice(*fields))
 
     def _end_bad(self, at_end: bool = False) -> None:
-        """What follows is good, or at_end nothing. A frame that seemed to be cut by the end is a broken one if
-        others stood within its length."""
+        """Ends a run of bad bytes: good bytes follow, or with at_end none. A frame that seemed to be cut by the end
+        is a broken one if others were within its length."""
         bad, self._bad = self._bad, None
         if bad is None:
             return
@@ -420,7 +422,7 @@ class Parser:
         self._bad = bad
 
     def _begin_cut(self) -> None:
-        """No more bytes will come, and what is at hand is not whole."""
+        """No more bytes will come, and the present frame is not complete."""
         header = self._bytes[self._at:self._at + _HEADER_LEN]
         if header[0] == 0xD5 and len(header) == _HEADER_LEN:
             length, seq, t_ns = struct.unpack("<4xII4xq4x", header)
@@ -502,7 +504,7 @@ class Parser:
 
 
 class _Dropped:
-    """In place of a frame that is repeated or late."""
+    """It takes the place of a frame that is repeated or late."""
 
 
 _DROPPED = _Dropped()
@@ -524,12 +526,12 @@ class Points:
 
 
 def _column(values, n: int):
-    """An iterable of n numbers as a column."""
+    """Returns an iterable of n numbers as a column."""
     return np.fromiter(values, dtype=np.float64, count=n) if np is not None else list(values)
 
 
 def _mapped(function, *columns):
-    """function of each row, in plain floats: the same numbers with numpy and without."""
+    """Returns the function of each row, in plain floats: the same numbers with numpy and without."""
     plain = [c.tolist() if np is not None and isinstance(c, np.ndarray) else c for c in columns]
     return _column(map(function, *plain), len(plain[0]))
 
@@ -542,7 +544,7 @@ if np is not None:
 
 
 def _sincos(turns):
-    """sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series,
+    """Returns sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series,
     whose next terms are below 2^-56. libscanhead computes the same, in the same order."""
     part = turns * _PARTS
     if np is not None and isinstance(turns, np.ndarray):
@@ -559,7 +561,7 @@ def _sincos(turns):
 
 
 def _fold(turns, low: float):
-    """turns within low .. low + 1."""
+    """Brings turns within low .. low + 1."""
     v = turns - low
     if np is not None and isinstance(v, np.ndarray):
         whole = v.astype(np.int64).astype(np.float64)
@@ -569,7 +571,7 @@ def _fold(turns, low: float):
 
 
 def _raw_columns(payload: bytes, n: int):
-    """a, b, c, reflectance, label, tail of n records."""
+    """Returns a, b, c, reflectance, label, tail of n records."""
     if np is None:
         rows = _POINT.iter_unpack(payload[40:40 + 20 * n])
         return list(map(list, zip(*rows))) if n else [[] for _ in range(6)]
@@ -579,7 +581,7 @@ def _raw_columns(payload: bytes, n: int):
 
 
 def _common(raw, t0_ns: int, layout: int) -> Points:
-    """What both layouts share."""
+    """Reads the columns that both layouts share."""
     p = Points()
     refl, label, tail = raw[3:]
     if np is not None:
@@ -603,7 +605,7 @@ def _empty_as_nan(values, count):
 
 
 def _rings(e: Dict) -> Dict:
-    """Of a sphere: ring i has the elevation first_ring_deg + i ring_step_deg. On the wire the first one is rounded."""
+    """Ring i of a sphere has the elevation first_ring_deg + i ring_step_deg. On the wire the first one is rounded."""
     gaps = e["gaps"] or max(e["rings"], 1) - 1
     first_deg = 1e-6 * e["first_ring_udeg"]
     if gaps == 0:
@@ -677,7 +679,7 @@ def _distance(a, b) -> float:
 # ---- poses of a moving head
 
 def _rotation(q) -> Tuple[float, ...]:
-    """Row by row, of the unit quaternion w, x, y, z."""
+    """Returns the rotation of the unit quaternion w, x, y, z, row by row."""
     w, x, y, z = q
     return (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
             2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
@@ -702,7 +704,7 @@ def _cross(a, b):
 
 
 class Pose(NamedTuple):
-    """Where the head was: scene frame, metres; quaternion w, x, y, z from the head's frame to the scene's."""
+    """The place of the head: scene frame, metres; quaternion w, x, y, z from the head's frame to the scene's."""
     t_ns: int
     position_m: Tuple[float, float, float]
     quat: Tuple[float, float, float, float]
@@ -711,7 +713,7 @@ class Pose(NamedTuple):
 
 
 class _Leg(NamedTuple):
-    """From one pose to the next: the turn's axis is in the head's frame."""
+    """The motion from one pose to the next; the turn's axis is in the head's frame."""
     a: Pose
     b: Pose
     rotation: Tuple[float, ...]
@@ -740,7 +742,7 @@ def _leg(a: Pose, b: Pose) -> _Leg:
 
 
 class _Poses:
-    """The poses frames of late, newest last."""
+    """Keeps the latest poses frames, newest last."""
 
     def __init__(self) -> None:
         self.forget()
@@ -775,7 +777,7 @@ class _Poses:
 
 
 def _place_moving(leg: _Leg, t_ns: int, v) -> Tuple[float, float, float]:
-    """Rodrigues' formula in the head's frame, then the rotation at the leg's begin."""
+    """Uses Rodrigues' formula in the head's frame, then the rotation at the leg's begin."""
     f = leg.fraction(t_ns)
     angle = f * leg.angle_rad
     s, versine = math.sin(angle), 1 - math.cos(angle)
@@ -790,7 +792,7 @@ def _place_moving(leg: _Leg, t_ns: int, v) -> Tuple[float, float, float]:
 # (1987) 161
 
 class _Plain:
-    """The functions of numpy that are used here, for plain floats."""
+    """It has the functions of numpy that are used here, for plain floats."""
     sin, cos, tan, sinh, cosh = math.sin, math.cos, math.tan, math.sinh, math.cosh
     sqrt, hypot = math.sqrt, math.hypot
     arctan, arctan2, arcsinh, arctanh = math.atan, math.atan2, math.asinh, math.atanh
@@ -811,7 +813,7 @@ _UPS_M = 2 * _A_M * 0.994 / math.sqrt((1 + _E) ** (1 + _E) * (1 - _E) ** (1 - _E
 
 
 def geodetic_to_ecef(lat_deg, lon_deg, height_m, m=_Plain):
-    """X, Y, Z in metres."""
+    """Returns X, Y, Z in metres."""
     s, c = m.sin(lat_deg * _RAD), m.cos(lat_deg * _RAD)
     n = _A_M / m.sqrt(1 - _E2 * s * s)
     return (n + height_m) * c * m.cos(lon_deg * _RAD), (n + height_m) * c * m.sin(lon_deg * _RAD), \
@@ -819,7 +821,7 @@ def geodetic_to_ecef(lat_deg, lon_deg, height_m, m=_Plain):
 
 
 def ecef_to_geodetic(x_m, y_m, z_m, m=_Plain):
-    """Latitude, longitude in degrees, ellipsoidal height in metres. Bowring's iteration (Survey Review 23,
+    """Returns latitude, longitude in degrees, ellipsoidal height in metres. Bowring's iteration (Survey Review 23,
     1976); near the Earth three steps leave rounding alone."""
     p = m.hypot(x_m, y_m)
     beta = m.arctan2(z_m, (1 - _F) * p)
@@ -832,14 +834,14 @@ def ecef_to_geodetic(x_m, y_m, z_m, m=_Plain):
 
 
 def _conformal(tau, m):
-    """tan of the latitude -> tan of the conformal latitude."""
+    """Turns tan of the latitude into tan of the conformal latitude."""
     sec = m.sqrt(1 + tau * tau)
     sigma = m.sinh(_E * m.arctanh(_E * tau / sec))
     return tau * m.sqrt(1 + sigma * sigma) - sigma * sec
 
 
 def _geographic(tau_c, m):
-    """The way back, by Newton's method: five steps from anywhere (Karney's equations 19 to 21)."""
+    """Does the reverse by Newton's method: five steps from anywhere (Karney's equations 19 to 21)."""
     tau = tau_c / (1 - _E2)
     for _ in range(5):
         now = _conformal(tau, m)
@@ -849,7 +851,7 @@ def _geographic(tau_c, m):
 
 
 def _series(coefficients, xi, eta, m):
-    """The sums of sin 2j xi cosh 2j eta and cos 2j xi sinh 2j eta."""
+    """Returns the sums of sin 2j xi cosh 2j eta and cos 2j xi sinh 2j eta."""
     a = b = 0.0
     for j, c in enumerate(coefficients, 1):
         a = a + c * m.sin(2 * j * xi) * m.cosh(2 * j * eta)
@@ -858,7 +860,7 @@ def _series(coefficients, xi, eta, m):
 
 
 class _Grid:
-    """UTM or UPS of an EPSG code: degrees <-> easting, northing in metres."""
+    """It converts between degrees and easting, northing in metres, for UTM or UPS of an EPSG code."""
 
     def __init__(self, epsg: int) -> None:
         self.ups, self.south = epsg in (32661, 32761), epsg // 100 == 327
@@ -892,7 +894,9 @@ class _Grid:
         return m.arctan(tau) / _RAD, self.lon0_deg + m.arctan2(m.sinh(eta), m.cos(xi)) / _RAD
 
     def convergence_rad(self, lat_deg: float, lon_deg: float) -> float:
-        """Bearing of grid north, clockwise from true north: by differences over 22 m, good to 1e-10 rad."""
+        """Returns the bearing of grid north, clockwise from true north. It takes differences over 22 m; errors are
+        up to
+        1e-10 rad."""
         if self.ups:
             return -lon_deg * _RAD if self.south else lon_deg * _RAD
         (e0, n0), (e1, n1) = (self.forward(lat_deg + d, lon_deg, _Plain) for d in (-1e-4, 1e-4))
@@ -900,7 +904,7 @@ class _Grid:
 
 
 def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
-    """The EPSG code of the grid in which the place has the station's coordinates: that of the scene."""
+    """Returns the EPSG code of the grid in which the place has the station's coordinates: that of the scene."""
     zone = int((lon_deg + 180) // 6)
     codes = [side + (zone + k) % 60 + 1 for side in (32600, 32700) for k in (-1, 0, 1)] + [32661, 32761]
     for epsg in codes:
@@ -911,7 +915,8 @@ def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
 
 
 class _Earth:
-    """From the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1 um, and
+    """It converts from the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1
+    um, and
     a geoid that is taken to be as high everywhere as at the station."""
 
     def __init__(self, anchor: Dict, layout: int) -> None:
@@ -970,7 +975,7 @@ class _Earth:
 
 
 def _by_row(function, columns):
-    """function(x, y, z, m) -> three columns, on whole arrays or row by row."""
+    """Applies function(x, y, z, m), which gives three columns, on whole arrays or row by row."""
     if np is not None:
         with np.errstate(invalid="ignore"):
             return tuple(function(*columns, np))
@@ -981,7 +986,7 @@ def _by_row(function, columns):
 # ---- sources
 
 class _Source:
-    """Bytes in and out by a descriptor that does not block. owner: what has to live as long."""
+    """It reads and writes bytes by a descriptor that does not block. owner is an object that must live as long."""
 
     def __init__(self, name: str, fd: int, owner=None, is_file: bool = False) -> None:
         self.name, self.fd, self.owner, self.is_file = name, fd, owner, is_file
@@ -1033,7 +1038,7 @@ def _is_identity(reply: str) -> bool:
 
 
 class Head:
-    """A head or a recording. State (descriptor, anchor, names, poses, clock, hash) is that of the frame that
+    """This is a head or a recording. State (descriptor, anchor, names, poses, clock, hash) is that of the frame that
     frames() gave last; points(), to_scene() and to_crs() belong to that frame."""
 
     def __init__(self, source: _Source) -> None:
@@ -1068,7 +1073,8 @@ class Head:
 
     @property
     def pulses_lost(self) -> int:
-        """Pulses that the head says it lost. Two kinds of events count the same; of either, some may be lost."""
+        """Returns the pulses that the head reports as lost. Two kinds of events count the same; of either, some may
+        be lost."""
         return max(self._lost_told, self._lost_ended)
 
     # -- notices
@@ -1086,7 +1092,7 @@ class Head:
         self._hand_on(Notice(kind, self.parser.text_at, 0, len(text), self.parser.last_t_ns))
 
     def _stray(self, text: str) -> None:
-        """A line that nobody waits for. An answer to a question of _settle is as it should be."""
+        """Takes a line that nobody waits for. An answer to a question of _settle is expected, and is no error."""
         if self._asked and _is_identity(text):
             self._asked -= 1
             if not self._given_up_identities:
@@ -1095,7 +1101,7 @@ class Head:
         self._note_line(text)
 
     def _gone(self) -> Closed:
-        """To be raised when all that had come was taken."""
+        """Returns the error to raise when all data that came were taken."""
         if not self._closed_told:
             self._closed_told = True
             self._hand_on(Notice("closed", self.parser.bytes, 0, 1, self.parser.last_t_ns))
@@ -1104,7 +1110,7 @@ class Head:
     # -- bytes
 
     def _fill(self, deadline_s: Optional[float], write: bool = False) -> bool:
-        """Waits for bytes and takes them. write: returns True as soon as the head takes bytes."""
+        """Waits for bytes and takes them. With write it returns True as soon as the head takes bytes."""
         if self._source.fd < 0:
             raise Closed(f"{self._source.name}: close() was called")
         if not self._source.is_file:
@@ -1131,7 +1137,7 @@ class Head:
         return False
 
     def _next_item(self, deadline_s: Optional[float]) -> Union[Frame, str, None]:
-        """A frame or a line; None at the end."""
+        """Returns a frame or a line; None at the end."""
         item = self.parser.next(self._ended)
         while item is None and not self._ended:
             self._fill(deadline_s)
@@ -1166,7 +1172,7 @@ class Head:
             raise
 
     def command(self, line: str, timeout_s: float = 5.0) -> str:
-        """The same; "ERR ..." becomes a CommandError."""
+        """Does the same; "ERR ..." becomes a CommandError."""
         reply = self.query(line, timeout_s)
         if reply.startswith("ERR "):
             number, _, text = reply[4:].partition(",")
@@ -1221,7 +1227,7 @@ class Head:
             self._stuck = 0 < done < len(data)
 
     def _check(self, deadline_s: Optional[float]) -> None:
-        """For loops that a head could keep busy with what nobody waits for."""
+        """Raises Timeout after the deadline. Loops need it that a head could keep busy with items nobody waits for."""
         if deadline_s is not None and time.monotonic() > deadline_s:
             raise Timeout(f"{self._source.name}: what was waited for did not come in time")
 
@@ -1233,7 +1239,7 @@ class Head:
             raise self._gone()
 
     def _reply(self, deadline_s: float, line: str) -> str:
-        """The next line but for those that are what was sent, come back."""
+        """Returns the next line. It skips lines that are the sent line as an echo."""
         while True:
             item = self._next_item(deadline_s)
             if item is None:
@@ -1247,7 +1253,7 @@ class Head:
             self._check(deadline_s)
 
     def _keep_frames(self) -> None:
-        """What has come: frames are kept, lines answer what nobody waits for any more."""
+        """Stores frames that came; lines are answers that nobody waits for any more."""
         item = self.parser.next(self._ended)
         while item is not None:
             if isinstance(item, Frame):
@@ -1271,7 +1277,9 @@ class Head:
     # -- frames
 
     def frames(self, timeout_s: Optional[float] = None) -> Iterator[Frame]:
-        """Frames in order. It ends with a recording. Closed: the head is gone; Timeout: none in timeout_s."""
+        """Yields frames in order. It ends at the end of a recording. It raises Closed if the head is gone, and
+        Timeout if
+        none came in timeout_s."""
         while True:
             frame = self.next_frame(timeout_s)
             if frame is None:
@@ -1279,7 +1287,7 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them."""
+        """Returns the next frame; None at a recording's end. Reply lines are noticed: nobody waits for them."""
         deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
@@ -1313,7 +1321,7 @@ class Head:
         return frame
 
     def _follow_scan(self, frame: Frame) -> None:
-        """SCAN_END may be lost: the next frame that knows better ends the scan, too."""
+        """SCAN_END may be lost: the next frame of another scan or state ends the scan, too."""
         f, now = frame.fields, self._scan
         if frame.is_event(EV_SCAN_START):
             now = f["a"]
@@ -1421,7 +1429,7 @@ class Head:
     # -- what frames mean
 
     def points(self, frame: Frame) -> Points:
-        """The points of a points frame, as columns."""
+        """Returns the points of a points frame, as columns."""
         if frame.type != POINTS:
             raise ScanheadError("not a points frame")
         if self.descriptor is None or self.anchor is None:
@@ -1435,16 +1443,16 @@ class Head:
         return p
 
     def can_place(self) -> bool:
-        """Whether descriptor and anchor have come, so that points() works."""
+        """Returns whether descriptor and anchor have come, so that points() works."""
         return self.descriptor is not None and self.anchor is not None
 
     def _is_of_points(self, frame: Frame, after: int) -> bool:
-        """Whether it follows the last points as the frame of that number, from 1 on, and is about them."""
+        """Returns whether it follows the last points as the frame of that number, from 1 on, and is about them."""
         keys = ("pulse0", "line", "n_points")
         return self._points_key == ((frame.seq - after + 1) % 2**32, *(frame.fields[k] for k in keys))
 
     def colours(self, frame: Frame) -> Optional[Tuple]:
-        """Columns red, green and blue, 0 to 255, of the points in the last points frame; None: these were
+        """Returns columns red, green and blue, 0 to 255, of the points in the last points frame; None: these were
         lost."""
         after = 2 if self.descriptor is not None and self.descriptor["content"] & 1 else 1
         if not self._is_of_points(frame, after):
@@ -1455,7 +1463,7 @@ class Head:
         return tuple(list(data[k::3]) for k in range(3))
 
     def attributes(self, frame: Frame) -> Optional[Tuple]:
-        """Columns amplitude_db and width_ns of the points in the frame before; None: those were lost."""
+        """Returns columns amplitude_db and width_ns of the points in the frame before; None: those were lost."""
         n = frame.fields["n_points"]
         if not self._is_of_points(frame, 1):
             return None
@@ -1464,7 +1472,8 @@ class Head:
                 _column((w / 100.0 if w else _NAN for _, w in raw), n))
 
     def to_scene(self, p: Points) -> Tuple:
-        """x, y, z in the scene frame, metres; of a moving head each point with the pose of its time. NaN: no
+        """Returns x, y, z in the scene frame, metres; for a moving head each point with the pose of its time. NaN
+        means no
         echo, or no pose because frames were lost."""
         if p.layout == GEO:
             return _by_row(self._earth_now().inverse, (p.x, p.y, p.z))
@@ -1475,7 +1484,7 @@ class Head:
                        (p.x, p.y, p.z))
 
     def to_crs(self, p: Points) -> Tuple:
-        """x, y, z in the CRS of the anchor: metres, or degrees, degrees, metres. Points of a tilted or moving
+        """Returns x, y, z in the CRS of the anchor: metres, or degrees, degrees, metres. Points of a tilted or moving
         head in the polar layout go by the scene frame."""
         return (p.x, p.y, p.z) if p.layout == GEO else _by_row(self._earth_now().forward, self.to_scene(p))
 
@@ -1499,7 +1508,7 @@ class Head:
         return tuple(_column(c, len(rows)) for c in columns)
 
     def pose(self, t_ns: int) -> Optional[Pose]:
-        """Where a moving head was t_ns after the scan's start; None: the stream has not said it."""
+        """Returns the pose of a moving head t_ns after the scan's start; None: the stream has not sent it."""
         leg = self._poses.leg(t_ns)
         if leg is None:
             return None
@@ -1510,19 +1519,20 @@ class Head:
                     leg.a.frame + f * (leg.b.frame - leg.a.frame), leg.a.flags | leg.b.flags)
 
     def gps_time_ns(self, t_ns: int) -> Optional[int]:
-        """GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds. None:
+        """Returns the GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds.
+        None:
         the head does not know the time, or has not said it yet."""
         if self._gps is None or self._scan_t0_ns is None:
             return None
         return self._gps[1] + self._scan_t0_ns + t_ns - self._gps[0]
 
     def stream_sha256(self) -> str:
-        """The hash of all frames so far, as PROTOCOL.md defines it."""
+        """Returns the hash of all frames so far, as PROTOCOL.md defines it."""
         return self._sha256.hexdigest()
 
 
 def open(source: str, timeout_s: float = 5.0) -> Head:  # noqa: A001, the module's name says what is opened
-    """A head or a recording: "tcp:HOST:PORT", "tty:PATH", or the path of a .shs file."""
+    """Opens a head or a recording: "tcp:HOST:PORT", "tty:PATH", or the path of a .shs file."""
     try:
         return Head(_open_source(source, timeout_s))
     except OSError as error:
