@@ -28,10 +28,10 @@
 
     {"coverage", .type = CFG_MAP, .help = "How `scanhead coverage` cuts the scene's surface."},
     {KEY(coverage.cell_m), CFG_REAL, "m", "0.25", 1e-4, 1e4,
-     .help = "Size of a cell. A cell is seen where a pulse meets it, so it should be several times as wide as the points "
-             "are apart."},
+     .help = "Size of a cell. A cell is seen where a pulse hits it, so it should be several times as wide as the "
+             "distance between points."},
     {KEY(coverage.memory_mib), CFG_REAL, "MiB", "2048", 1, 1048576,
-     .help = "Memory that cells, or a mesh of them, may take. Smaller cells than fit are refused."},
+     .help = "Memory that cells, or a mesh of them, may take. Cells that need more are refused."},
 
     {"plan", .type = CFG_MAP,
      .help = "Tolerances. Each stage uses the cheapest method that keeps them (`scanhead plan`)."},

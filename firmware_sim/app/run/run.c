@@ -23,8 +23,8 @@ static void say_sights(const struct site *site)
         n++;
     }
     if (n == 0) return;
-    fprintf(stderr, "scanhead: maps of what is seen from %u station%s in %.2f s, %.1f MiB\n", n, n > 1 ? "s" : "",
-            build_s, mib);
+    fprintf(stderr, "scanhead: visibility maps of %u station%s in %.2f s, %.1f MiB\n", n, n > 1 ? "s" : "", build_s,
+            mib);
 }
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)

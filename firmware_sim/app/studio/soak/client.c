@@ -26,7 +26,7 @@ static const char *why_not(const struct link_place *place, const struct link_spe
         return soak_usb_is_here(spec) ? NULL
                                       : "only a head of protocol native with backend usbip and attach on is on this "
                                         "machine";
-    if (strcmp(place->type, "udp") == 0) return "its packets go elsewhere, or their port is taken";
+    if (strcmp(place->type, "udp") == 0) return "its packets go to another place, or their port is taken";
     if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
         if (strcmp(place->type, "web") == 0) return "libscanhead does not support WebSocket";
         return "nothing answers there";

@@ -298,7 +298,7 @@ void soak_judge_head(struct soak_link *link)
         if (m->kind == FAULT_LEAP_SECOND)
             soak_hide(&link->row[m->kind], 1, "the minute was not over");
         else if (m->kind == FAULT_SLOW_BOOT && !link->soak->realtime)
-            soak_hide(&link->row[m->kind], 1, "out of real time it may be over before a client is there");
+            soak_hide(&link->row[m->kind], 1, "out of real time it may end before a client connects");
         else
             link->row[m->kind].missed++;
     }
