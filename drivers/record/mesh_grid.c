@@ -19,7 +19,7 @@ int mesh_grid_check(const struct track *t, struct sh_err *err)
     if (kind == SCANHEAD_EMIT_BEAMS || kind == SCANHEAD_EMIT_DIRECTIONS)
         return sh_fail(
             err, SH_EFORMAT,
-            "%s: a mesh needs rows and columns, and this head fires %s; allowed are .ply (without --mesh and "
+            "%s: a mesh needs rows and columns, but this head fires %s; allowed are .ply (without --mesh and "
             "--sparse) .las .e57 .shs",
             t->path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
     const int is_flat = kind == SCANHEAD_EMIT_PLANAR || (kind == SCANHEAD_EMIT_LINE && !(t->info.pan_deg_s > 0)) ||

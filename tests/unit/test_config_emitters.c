@@ -182,9 +182,10 @@ static void lists_name_their_line(void **state)
     } wrong[] = {
         {"", "list.txt: no direction; allowed 1 to 1000000 rows"},
         {"# nothing\n", "no direction"},
-        {"0 1 0\n1 0\n", "list.txt, line 2: 2 numbers; allowed 3, x y z, in each row"},
-        {"0 1\n\n1 0 0\n", "list.txt, line 3: 3 numbers; allowed 2, azimuth and elevation in degrees, in each row"},
-        {"0\n", "list.txt, line 1: 1 number; allowed 3, x y z, or 2,"},
+        {"0 1 0\n1 0\n", "list.txt, line 2: a row with 2 numbers; allowed 3, x y z, in each row"},
+        {"0 1\n\n1 0 0\n",
+         "list.txt, line 3: a row with 3 numbers; allowed 2, azimuth and elevation in degrees, in each row"},
+        {"0\n", "list.txt, line 1: a row with 1 number; allowed 3, x y z, or 2,"},
         {"0 1 0 0\n", "list.txt, line 1: not a direction"},
         {"0 one 0\n", "list.txt, line 1: not a direction"},
         {"0 nan 0\n", "list.txt, line 1: not a direction"},

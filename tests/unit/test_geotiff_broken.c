@@ -37,7 +37,7 @@ static void cut_off_anywhere(void **state)
     static uint8_t data[8192];
     const size_t n = pack(data);
     for (size_t cut = 0; cut < n; cut += cut < 16 ? 1 : (size_t)thorough(1, 11))
-        refuse("cut.tif", data, cut, cut < 8 ? "no TIFF" : "");
+        refuse("cut.tif", data, cut, cut < 8 ? "not a TIFF" : "");
     refuse("text.tif", "solid hall, or any other text", 29, "not a TIFF: its first bytes");
 }
 

@@ -99,8 +99,8 @@ static void quantized_positions(void **state)
         const void *data;
         const char *scale, *normalized, *says;
         double within, error_m;
-    } tries[] = {{unit, "2,2,2", "true", "good to 3.1e-05 m only", 3.1e-5, 1.0 / 32767},
-                 {mm, "0.001,0.001,0.001", "false", "good to 0.0005 m only", 1e-15, 0.0005}};
+    } tries[] = {{unit, "2,2,2", "true", "errors up to 3.1e-05 m", 3.1e-5, 1.0 / 32767},
+                 {mm, "0.001,0.001,0.001", "false", "errors up to 0.0005 m", 1e-15, 0.0005}};
     for (int i = 0; i < 2; i++) {
         char rest[2048];
         gltf_quad();

@@ -112,11 +112,11 @@ static void indices_of_nothing(void **state)
     static const struct {
         const char *old, *with, *says;
     } as[] = {
-        {"\"mesh\":0", "\"mesh\":0,\"camera\":4", "nodes[0].camera is 4, and there are 0 cameras"},
-        {"\"at\":1", "\"bufferView\":9", "images[0].bufferView is 9, and there are 3 bufferViews"},
-        {"\"tx\":1", "\"source\":1,\"sampler\":2", "textures[0].source is 1, and there are 1 images"},
+        {"\"mesh\":0", "\"mesh\":0,\"camera\":4", "nodes[0].camera is 4, but there are 0 cameras"},
+        {"\"at\":1", "\"bufferView\":9", "images[0].bufferView is 9, but there are 3 bufferViews"},
+        {"\"tx\":1", "\"source\":1,\"sampler\":2", "textures[0].source is 1, but there are 1 images"},
         {"\"mx\":1", "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":3}}",
-         "materials[0].pbrMetallicRoughness.baseColorTexture.index is 3, and there are 1 textures"},
+         "materials[0].pbrMetallicRoughness.baseColorTexture.index is 3, but there are 1 textures"},
         {"\"mx\":1", "\"extensions\":{\"KHR_materials_clearcoat\":{\"clearcoatTexture\":{\"index\":-1}}}",
          "KHR_materials_clearcoat.clearcoatTex.index is -1, but there are 1 textures"},
         {"\"sx\":1", "\"joints\":[0,1,5],\"inverseBindMatrices\":0", "skins[0].joints[2] is 5, but there are 2 nodes"},

@@ -77,7 +77,7 @@ static void hang_ends_in_time(void **state)
     struct sh_err err;
     assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_EINPUT);
     remove_endless();
-    if (strstr(err.text, "endless.dae: Assimp has not read it within 0.15 s (scene.import_s)") == NULL)
+    if (strstr(err.text, "endless.dae: Assimp did not read it within 0.15 s (scene.import_s)") == NULL)
         fail_msg("%s", err.text);
     no_child_is_left();
 }

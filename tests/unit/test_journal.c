@@ -177,7 +177,7 @@ static void what_is_no_journal_is_refused(void **ctx)
     const int at = snprintf(line, sizeof line, "# scanhead journal 1\n1 0 1 ");
     memset(line + at, 'x', COMMAND_MAX_LINE + 1);
     line[at + COMMAND_MAX_LINE + 1] = '\n';
-    expect_unreadable(line, (size_t)at + COMMAND_MAX_LINE + 2, ":2: no command");
+    expect_unreadable(line, (size_t)at + COMMAND_MAX_LINE + 2, ":2: there must be a command");
     struct sh_err err = {0};
     struct journal_entry *out;
     size_t n;

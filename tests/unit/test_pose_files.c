@@ -213,7 +213,7 @@ static void test_slow_waypoints(void **state)
     write_file(text);
     assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, path));
-    assert_non_null(strstr(err.text, "allowed 10000000"));
+    assert_non_null(strstr(err.text, "allowed are 10000000"));
     FILE *f = fopen(path, "w");
     assert_non_null(f);
     fputs("x_m,y_m,z_m,speed_m_s,pause_s\n", f);

@@ -321,8 +321,8 @@ static void check_refused(const char *text, const void *grid, size_t grid_len, c
 static void test_refused(void **state)
 {
     (void)state;
-    check_refused("", NULL, 0, "is no PTX grid");
-    check_refused("ply\nformat ascii 1.0\n", NULL, 0, "is no PTX grid");
+    check_refused("", NULL, 0, "is not a PTX grid");
+    check_refused("ply\nformat ascii 1.0\n", NULL, 0, "is not a PTX grid");
     check_refused("2\n1\n" POSE "1 2 3 1\nhello\n4 5 6 1\n", NULL, 0, "damaged");
     check_refused("18446744073709551615\n1\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
     check_refused("1\n0\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");

@@ -337,7 +337,7 @@ static void what_can_be_no_mesh(void **state)
     put_descriptor(&d);
     rig_anchor(&a);
     put_step(0);
-    refused("a.ply", mesh, SH_EINPUT, "up to 11011000000 points; a mesh holds 2147483647");
+    refused("a.ply", mesh, SH_EINPUT, "up to 11011000000 points; a mesh holds up to 2147483647");
 
     d.frames = 100000;
     d.prr_uhz = 10000000000;

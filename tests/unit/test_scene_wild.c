@@ -147,7 +147,7 @@ static void missing_things_are_named(void **state)
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS, "r.mtl, line 5: the opacity '2' is left out; allowed are numbers");
     put("r.mtl", RED_GREEN "map_Kd C:\\maps\\no.png\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
-                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; it belongs beside");
+                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; put it beside");
 }
 
 /* Whatever is in it: a file of that name is the texture. */

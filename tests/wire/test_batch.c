@@ -30,13 +30,13 @@ static void test_shared(void **state)
     struct wire *wire = *state;
     batch_change(wire_path(wire, "config.yaml"), "heading_deg: 30", "scanner: {head: {prr_hz: 300000}}");
     batch_expect(wire, "one", WITH("--sweep", sweep), 0, "12 jobs done, 12 of them now; meshes read 1 time\n");
-    batch_expect(wire, "one", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are whole");
+    batch_expect(wire, "one", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are complete");
     for (int i = 1; i <= 12; i++) {
         char shard[32];
         snprintf(shard, sizeof shard, "%d/12", i);
         batch_expect(wire, "each", WITH("--sweep", sweep, "--shard", shard), 0, "1 jobs done, 1 of them now");
     }
-    batch_expect(wire, "each", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are whole");
+    batch_expect(wire, "each", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are complete");
     batch_expect_same(batch_in(wire, "each", "manifest.json"), batch_in(wire, "one", "manifest.json"));
 }
 
@@ -149,7 +149,7 @@ static void test_slurm(void **state)
         by_script(wire, "/bin/bash", "config/campaign/slurm.sh", "slurm");
     }
     assert_int_equal(access(batch_in(wire, "slurm", "manifest-3-of-3.jsonl"), F_OK), 0);
-    batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "slurm", "ref");
     /* some tasks again, of an array of seven */
     setenv("SHARDS", "7", 1);

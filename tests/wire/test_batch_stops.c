@@ -66,7 +66,7 @@ static void test_killed(void **state)
     }
     batch_expect(wire, "killed", WITH("--shard", "1/2"), 0, "shard 1/2");
     batch_expect(wire, "killed", WITH("--shard", "2/2"), 0, "shard 2/2");
-    batch_expect(wire, "killed", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "killed", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "killed", "ref");
 }
 
@@ -129,7 +129,7 @@ static void test_spoilt(void **state)
     free(err);
     batch_expect(wire, "one", NULL, 0, "6 jobs done, 4 of them now");
     assert_int_not_equal(access(batch_in(wire, "one", "manifest.json"), F_OK), 0); /* it was out of date */
-    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "one", "ref");
     batch_expect(wire, "one", NULL, 0, "6 jobs done, 0 of them now");
     assert_int_equal(access(batch_in(wire, "one", "manifest.json"), F_OK), 0);
@@ -177,7 +177,7 @@ static void test_nothing_is_mixed(void **state)
     batch_change(manifest, "\"program\":\"", "\"program\":\"0.");
     batch_expect(wire, "one", WITH("--shard", "2/3"), 1, "release");
     batch_expect(wire, "one", WITH("--force", "--quiet"), 0, "");
-    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are complete");
     assert_int_equal(link(batch_file(wire, "one", 0, ".ply"), batch_in(wire, "one", "0001_before.ply")), 0);
     batch_expect(wire, "one", WITH("--merge"), 0,
                  "1 files belong to no job of this campaign, the first: 0001_before.ply");
