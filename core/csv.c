@@ -52,14 +52,14 @@ static int read_names(struct csv *csv, struct sh_err *err)
     char cell[CELL_LEN];
     struct text_span line = next_line(csv);
     const char *p = line.p;
-    if (line.n == 0) return text_fail(&csv->text, 0, SH_EINPUT, err, "empty; its first line has to name the columns");
+    if (line.n == 0) return text_fail(&csv->text, 0, SH_EINPUT, err, "empty; the first line must name the columns");
     for (int got; (got = next_cell(&p, line.p + line.n, cell)) != 0;) {
         int k = 0;
         if (got < 0) return text_fail(&csv->text, csv->line, SH_EINPUT, err, "a column's name is too long");
         while (csv->known[k] != NULL && strcmp(csv->known[k], cell) != 0)
             k++;
         if (csv->known[k] == NULL) return fail_name(csv, cell, "is unknown", err);
-        if (csv->has & 1u << k) return fail_name(csv, cell, "stands there twice", err);
+        if (csv->has & 1u << k) return fail_name(csv, cell, "is there twice", err);
         csv->has |= 1u << k;
         csv->column[csv->n_columns++] = k;
     }
@@ -111,7 +111,7 @@ int csv_next(struct csv *csv, struct sh_err *err)
                              csv->known[csv->column[n]], got < 0 ? "..." : cell);
     }
     if (n < csv->n_columns)
-        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%d values; the first line names %d", n,
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%d values, but the first line names %d", n,
                          csv->n_columns);
     return 1;
 }

@@ -55,7 +55,7 @@ int sh_stopped(const struct sh_report *report)
 
 int sh_fail_stopped(struct sh_err *err)
 {
-    return sh_fail(err, SH_ESTOPPED, "interrupted while loading; nothing ran");
+    return sh_fail(err, SH_ESTOPPED, "stopped while loading; no scan was run");
 }
 
 int sh_check_stop(const struct sh_report *report, struct sh_err *err)

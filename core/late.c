@@ -21,7 +21,8 @@ int late_load(enum late_library which, const char *const *name, void *calls, siz
     if (library == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", libraries[which].needs, dlerror());
     for (size_t i = 0; i < n; i++) {
         void *call = dlsym(library, name[i]);
-        if (call == NULL) return sh_fail(err, SH_EINPUT, "%s is without %s: another version is needed", file, name[i]);
+        if (call == NULL)
+            return sh_fail(err, SH_EINPUT, "%s lacks the function %s: install another version", file, name[i]);
         memcpy((char *)calls + i * sizeof call, &call, sizeof call);
     }
     return SH_OK;

@@ -47,12 +47,12 @@ static int fail_link(const char *path, struct sh_err *err)
     ssize_t n = readlink(path, to, sizeof to - 1);
     to[n > 0 ? n : 0] = '\0';
     return sh_fail(err, SH_EINPUT,
-                   "%s: is a symbolic link to %s; links are not followed: remove it, or name its target", path, to);
+                   "%s: is a symbolic link to %s; links are not followed: remove it, or give its target", path, to);
 }
 
 static int fail_hard_link(const char *path, const struct stat *st, struct sh_err *err)
 {
-    return sh_fail(err, SH_EINPUT, "%s: is a file with %lu names (hard links), which would all change; remove it first",
+    return sh_fail(err, SH_EINPUT, "%s: is a file with %lu hard links, and all of them would change; remove it first",
                    path, (unsigned long)st->st_nlink);
 }
 
@@ -82,7 +82,7 @@ static int check_target(const char *path, struct sh_err *err)
     if (lstat(path, &st) != 0) return errno == ENOENT ? SH_OK : fail(path, "create", err);
     if (S_ISLNK(st.st_mode)) return fail_link(path, err);
     if (!S_ISREG(st.st_mode))
-        return sh_fail(err, SH_EINPUT, "%s: is a %s; allowed is the name of a file, or one that is free", path,
+        return sh_fail(err, SH_EINPUT, "%s: is a %s; allowed is a regular file, or a name that doesn't exist", path,
                        kind_of(st.st_mode));
     return SH_OK;
 }
@@ -115,9 +115,8 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
     if (in != NULL && fgets(name, sizeof name, in) != NULL) name[strcspn(name, "\n")] = '\0';
     if (in != NULL) fclose(in);
     if (name[0] == '\0')
-        return sh_fail(err, code, "%s: is being written by another process; allowed is a file of its own", path);
-    return sh_fail(err, code, "%s: is being written by process %ld (%s); allowed is a file of its own", path, pid,
-                   name);
+        return sh_fail(err, code, "%s: is being written by another process; choose another file name", path);
+    return sh_fail(err, code, "%s: is being written by process %ld (%s); choose another file name", path, pid, name);
 }
 
 /* Locks the file as long as fd is open. Does nothing on a file system without locks. */
@@ -150,10 +149,11 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
         fd = open(path, flags, 0666);
     }
     if (fd < 0 && errno == ENXIO)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: is a FIFO that nobody reads, or a socket; allowed are a regular file, a device, and a FIFO "
-                       "with a reader",
-                       path);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: is a FIFO without a reader, or a socket; allowed are a regular file, a device, and a FIFO with a "
+            "reader",
+            path);
     if (fd < 0) return fail(path, "be opened for writing", err);
     int rc = SH_OK;
     if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = fail(path, "be opened for writing", err);
@@ -192,9 +192,11 @@ static int check_left(const char *part, int fd, struct sh_err *err)
     struct stat st;
     if (fstat(fd, &st) != 0) return fail(part, "create", err);
     if (!S_ISREG(st.st_mode))
-        return sh_fail(err, SH_EINPUT, "%s: is a %s, where a file is to be made; remove it", part, kind_of(st.st_mode));
+        return sh_fail(err, SH_EINPUT, "%s: is a %s, but a file must be created here; remove it", part,
+                       kind_of(st.st_mode));
     if (st.st_uid != geteuid())
-        return sh_fail(err, SH_EINPUT, "%s: is a file of another user, where one is to be made; remove it", part);
+        return sh_fail(err, SH_EINPUT, "%s: is a file of another user, but a file must be created here; remove it",
+                       part);
     return st.st_nlink > 1 ? fail_hard_link(part, &st, err) : SH_OK;
 }
 
@@ -240,7 +242,7 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         }
         close(fd);
     }
-    return rc != SH_OK ? rc : sh_fail(err, SH_EIO, "%s: comes and goes; other programs write it", part);
+    return rc != SH_OK ? rc : sh_fail(err, SH_EIO, "%s: appears and disappears; another program writes it", part);
 }
 
 int newfile_left(const char *part, int *out, struct sh_err *err)
@@ -356,7 +358,7 @@ int newfile_settle_free(const char *path, const char *part, int fd, struct sh_er
 {
     if (fsync(fd) != 0) return fail(part, "be synced", err);
     if (rename_free(path, part) == 0) return close_renamed(path, fd);
-    return errno == EEXIST ? sh_fail(err, SH_ESTATE, "%s: is there, and is not replaced by %s", path, part)
+    return errno == EEXIST ? sh_fail(err, SH_ESTATE, "%s: exists, and is not replaced by %s", path, part)
                            : fail_rename(path, part, err);
 }
 

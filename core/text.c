@@ -25,7 +25,7 @@ static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ct
         size_t want = t->size - at < step ? t->size - at : step;
         size_t got = fread(t->data + at, 1, want, f);
         if (got < want)
-            return text_fail(t, 0, SH_EINPUT, err, "%s", ferror(f) ? strerror(errno) : "got shorter while read");
+            return text_fail(t, 0, SH_EINPUT, err, "%s", ferror(f) ? strerror(errno) : "got shorter while it was read");
         at += got;
         int rc = progress != NULL ? progress(ctx, -1.0, err) : SH_OK;
         if (rc != SH_OK) return rc;

@@ -36,14 +36,15 @@ static int parse_line(const char *line, int number, struct utc_table *out, struc
     if (ntp_s < 0 || labs(offset) > 1000) return sh_fail(err, SH_EFORMAT, "line %d: out of range", number);
     struct utc_leap leap = {ntp_s - NTP_TO_POSIX_S, (int32_t)offset};
     if ((*end != '#' && *end != '\n' && *end != '\0') || leap.posix_s % DAY_S != 0)
-        return sh_fail(err, SH_EFORMAT, "line %d: not NTP seconds of a midnight and TAI-UTC", number);
+        return sh_fail(err, SH_EFORMAT, "line %d: allowed are the NTP seconds of a midnight and TAI-UTC", number);
     if (out->n == UTC_MAX_LEAPS)
         return sh_fail(err, SH_EFORMAT, "line %d: more than %d leap seconds", number, UTC_MAX_LEAPS);
     /* Before the first a second less, so that it is one step as the others are. */
     struct utc_leap before = out->n != 0 ? out->leap[out->n - 1] : (struct utc_leap){0, 9};
     if (labs(offset - before.tai_minus_utc) != 1 || leap.posix_s <= before.posix_s ||
         (out->n == 0 && (leap.posix_s != 63072000 || offset != 10)))
-        return sh_fail(err, SH_EFORMAT, "line %d: not the table from 1972-01-01 (10 s) on in steps of 1 s", number);
+        return sh_fail(err, SH_EFORMAT, "line %d: allowed is the table from 1972-01-01 (10 s) on in steps of 1 s",
+                       number);
     out->leap[out->n++] = leap;
     return SH_OK;
 }

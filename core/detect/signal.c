@@ -31,9 +31,10 @@ static int fit_reaches(const struct detect_signal_spec *spec, struct detect_sign
         /* A data sheet rounds its figures to a few percent: a deviation from R^2 of less than 10 % is no
          * claim of it. */
         if (!(b->range_m > a->range_m) || slope * (b->range_m - a->range_m) < -0.1)
-            return sh_fail(err, SH_EINPUT,
-                           "%.4g m on %.4g and %.4g m on %.4g: a signal falls at least with the square of the range",
-                           a->range_m, a->reflectance, b->range_m, b->reflectance);
+            return sh_fail(
+                err, SH_EINPUT,
+                "%.4g m on %.4g and %.4g m on %.4g: a signal must fall at least with the square of the range",
+                a->range_m, a->reflectance, b->range_m, b->reflectance);
         signal->at_m[i] = a->range_m;
         signal->more_1_m[i] = slope - before;
         before = slope;

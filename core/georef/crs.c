@@ -51,7 +51,7 @@ static int read_system(struct grid *grid, struct sh_err *err)
     if (is_projected) read_projected(grid, crs);
     lib->proj_destroy(crs);
     if (is_projected) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system, as EPSG:25832 is", grid->name,
+    return sh_fail(err, SH_EINPUT, "%s: %s; allowed is a projected system such as EPSG:25832", grid->name,
                    is_known ? "not a projected coordinate reference system" : "no such coordinate reference system");
 }
 
@@ -69,7 +69,7 @@ static int read_vertical(const struct grid *grid, double *unit_m, struct sh_err 
     lib->proj_destroy(axes);
     lib->proj_destroy(crs);
     if (is_up) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s: not a system of heights that count upward; allowed is one, as EPSG:5773 is",
+    return sh_fail(err, SH_EINPUT, "%s: not a vertical system with heights upward; allowed is one such as EPSG:5773",
                    grid->name);
 }
 
@@ -79,7 +79,8 @@ static int open_transformation(struct grid *grid, struct sh_err *err)
     PJ *raw = lib->proj_create_crs_to_crs(grid->context, grid->name, "EPSG:4326", NULL);
     grid->to = raw != NULL ? lib->proj_normalize_for_visualization(grid->context, raw) : NULL;
     lib->proj_destroy(raw);
-    return grid->to != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "%s: PROJ knows no way from it to WGS 84", grid->name);
+    return grid->to != NULL ? SH_OK
+                            : sh_fail(err, SH_EINPUT, "%s: PROJ has no transformation from it to WGS 84", grid->name);
 }
 
 static PJ_COORD transformed(const struct grid *grid, double easting_m, double northing_m)
@@ -120,7 +121,7 @@ static int locate(const struct grid *grid, double easting_m, double northing_m, 
 {
     const PJ_COORD at = transformed(grid, easting_m, northing_m);
     if (!is_within(grid, &at))
-        return sh_fail(err, SH_EINPUT, "%s: easting %.10g, northing %.10g m are outside of where it is used",
+        return sh_fail(err, SH_EINPUT, "%s: easting %.10g, northing %.10g m are outside of the system's area of use",
                        grid->name, easting_m, northing_m);
     place->at.lon_deg = at.xy.x;
     place->at.lat_deg = at.xy.y;

@@ -42,7 +42,7 @@ static int check_rotation(const double r[9], struct sh_err *err)
         int row = i / 3, other = i % 3;
         double dot = vec3_dot(r + 3 * row, r + 3 * other);
         if (!(fabs(dot - (row == other)) <= 1e-9))
-            return sh_fail(err, SH_EINPUT, "georef: the rotation of the scene frame is none");
+            return sh_fail(err, SH_EINPUT, "georef: the scene frame's matrix is not a rotation");
     }
     return SH_OK;
 }
@@ -100,7 +100,7 @@ static int fail_map(const struct georef_spec *spec, const char *why, struct sh_e
 {
     if (spec->prcs_is_grid)
         return sh_fail(err, SH_EINPUT,
-                       "georef: the scene's grid, or the output's, does not reach latitude %g, longitude %g (%s)",
+                       "georef: the grid of the scene or of the output does not reach latitude %g, longitude %g (%s)",
                        spec->lat_deg, spec->lon_deg, why);
     if (spec->crs == GEOREF_UTM)
         return sh_fail(err, SH_EINPUT,
@@ -197,8 +197,8 @@ int georef_recentre(const struct georef *georef, const double centre_m[3], struc
     }
     if (moved->method != GEOREF_EXACT && moved->polynomial.half_m == 0.0 && georef_has_map(moved)) {
         georef_free(moved);
-        return sh_fail(err, SH_EINPUT, "georef: no polynomial about %.0f %.0f %.0f m: too near a pole", centre_m[0],
-                       centre_m[1], centre_m[2]);
+        return sh_fail(err, SH_EINPUT, "georef: no polynomial about %.0f %.0f %.0f m: the place is too close to a pole",
+                       centre_m[0], centre_m[1], centre_m[2]);
     }
     *out = moved;
     return SH_OK;
@@ -256,7 +256,7 @@ int georef_set_method(struct georef *georef, enum georef_method method, struct s
         return sh_fail(err, SH_EINPUT, "georef: method %d; allowed exact, order1, order2, order3, order5", (int)method);
     if (method != GEOREF_EXACT && georef_has_map(georef) && georef->polynomial.half_m == 0.0)
         return sh_fail(err, SH_EINPUT, "georef: there is no polynomial %s; allowed exact",
-                       georef->has_geoid ? "for heights above the geoid" : "about a place so near to the pole");
+                       georef->has_geoid ? "for heights above the geoid" : "about a place so close to a pole");
     if (method != GEOREF_EXACT && georef_has_map(georef) &&
         !polynomial_has_order(&georef->polynomial, order_of(method)))
         return sh_fail(err, SH_EINPUT, "georef: no polynomial of order %d here; allowed exact, order1, order2, order3",

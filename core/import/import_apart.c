@@ -199,18 +199,20 @@ void import_watch(struct import_apart *const a[], size_t n)
 
 static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
 {
-    return build_fail(a->task.b, SH_EINPUT, err,
-                      "%s takes more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh "
-                      "needs it; a broken file takes any amount: " IMPORT_ELSE_CONVERT,
-                      a->task.name, a->task.limits.memory_mib);
+    return build_fail(
+        a->task.b, SH_EINPUT, err,
+        "%s needs more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh needs more; a "
+        "broken file may need any amount: " IMPORT_ELSE_CONVERT,
+        a->task.name, a->task.limits.memory_mib);
 }
 
 static int fail_by_time(const struct import_apart *a, struct sh_err *err)
 {
-    return build_fail(a->task.b, SH_EINPUT, err,
-                      "%s has not read it within %g s (scene.import_s): raise that where the mesh needs it; with "
-                      "a broken file it may hang: " IMPORT_ELSE_CONVERT,
-                      a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
+    return build_fail(
+        a->task.b, SH_EINPUT, err,
+        "%s did not read it within %g s (scene.import_s): raise that where the mesh needs more; a broken file may "
+        "make the reader hang: " IMPORT_ELSE_CONVERT,
+        a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
 }
 
 static int fail_by_signal(const struct import_apart *a, int number, struct sh_err *err)
@@ -218,11 +220,13 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
     const char *name = sigabbrev_np(number);
     if (number == SIGXCPU) return fail_by_time(a, err);
     if (number == SIGKILL)
-        return build_fail(a->task.b, SH_EINPUT, err,
-                          "the process in which %s read it was killed (SIGKILL), as the system does where memory "
-                          "is short; scene.import_memory_mib is %u: " IMPORT_ELSE_CONVERT,
-                          a->task.name, a->task.limits.memory_mib);
-    return build_fail(a->task.b, SH_EINPUT, err, "%s crashed on it (SIG%s): the file is broken: " IMPORT_ELSE_CONVERT,
+        return build_fail(
+            a->task.b, SH_EINPUT, err,
+            "the process in which %s read it was killed (SIGKILL), as the system does when memory is short; "
+            "scene.import_memory_mib is %u: " IMPORT_ELSE_CONVERT,
+            a->task.name, a->task.limits.memory_mib);
+    return build_fail(a->task.b, SH_EINPUT, err,
+                      "%s crashed while it read the file (SIG%s): the file is broken: " IMPORT_ELSE_CONVERT,
                       a->task.name, name != NULL ? name : "?");
 }
 
@@ -237,7 +241,7 @@ int import_judge(struct import_apart *a, struct sh_err *err)
     if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
     if (WEXITSTATUS(a->status) == 0) return SH_OK;
     return build_fail(a->task.b, SH_EINPUT, err,
-                      "the process in which %s read it ended without a word (exit status %d): the file is "
+                      "the process in which %s read it ended without a message (exit status %d): the file is "
                       "broken: " IMPORT_ELSE_CONVERT,
                       a->task.name, WEXITSTATUS(a->status));
 }

@@ -114,8 +114,8 @@ struct result {
 
 static int wrong(const struct result *r, const char *what, uint64_t number)
 {
-    return build_fail(r->b, SH_EINPUT, r->err, "what Assimp gave back makes no sense: %s %llu; the file is broken",
-                      what, (unsigned long long)number);
+    return build_fail(r->b, SH_EINPUT, r->err, "the reader's result is inconsistent: %s %llu; the file is broken", what,
+                      (unsigned long long)number);
 }
 
 /* Reads from any place of the file. The part that is read is cut out of the file, so that the scene is not
@@ -126,7 +126,7 @@ static int take_at(struct result *r, uint64_t at, void *data, size_t size)
     for (size_t done = 0; done < size;) {
         ssize_t got = pread(r->fd, (char *)data + done, size - done, (off_t)(at + done));
         if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) return wrong(r, "nothing to read at byte", at + done);
+        if (got <= 0) return wrong(r, "there are no data at byte", at + done);
         done += (size_t)got;
     }
     if (size >= AT_ONCE) fallocate(r->fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, (off_t)at, (off_t)size);
@@ -147,7 +147,7 @@ static int add_texture(struct result *r, const char *file, const void *bytes, co
     const char *mesh = r->b->spec->file, *slash = strrchr(mesh, '/');
     size_t folder = slash != NULL && file[0] != '/' ? (size_t)(slash - mesh) + 1 : 0;
     if (size->name_len < folder || memcmp(file, mesh, folder) != 0) return wrong(r, "the path of texture", i);
-    if (size->wrap[0] > TEXTURE_DECAL || size->wrap[1] > TEXTURE_DECAL) return wrong(r, "how it repeats, texture", i);
+    if (size->wrap[0] > TEXTURE_DECAL || size->wrap[1] > TEXTURE_DECAL) return wrong(r, "the repetition of texture", i);
     const struct build_image image = {.name = {file + folder, size->name_len - folder},
                                       .bytes = size->n_bytes > 0 ? bytes : NULL,
                                       .n_bytes = size->n_bytes,
@@ -318,8 +318,7 @@ static int take_head(struct result *r)
     if (fstat(r->fd, &st) != 0) return build_fail(r->b, SH_EIO, r->err, "%s", strerror(errno));
     r->size = (uint64_t)st.st_size;
     int rc = take(r, &r->head, sizeof r->head);
-    if (rc == SH_OK && memcmp(r->head.magic, MAGIC, sizeof MAGIC) != 0)
-        rc = wrong(r, "its head is not one, of byte", 0);
+    if (rc == SH_OK && memcmp(r->head.magic, MAGIC, sizeof MAGIC) != 0) rc = wrong(r, "the header is wrong at byte", 0);
     if (rc == SH_OK && r->head.n_triangles == 0) rc = wrong(r, "number of triangles:", 0);
     if (rc == SH_OK && r->head.has_uv > 1) rc = wrong(r, "texture coordinates:", r->head.has_uv);
     if (rc == SH_OK && r->head.has_rgb > 1) rc = wrong(r, "colours:", r->head.has_rgb);
@@ -329,7 +328,7 @@ static int take_head(struct result *r)
     if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= BUILD_MAX_COORDINATE_M))
         rc = wrong(r, "its unit:", 0);
     if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes:", 0);
-    if (rc == SH_OK && (r->head.says.is_left_handed & ~1) != 0) rc = wrong(r, "the hand of its axes:", 0);
+    if (rc == SH_OK && (r->head.says.is_left_handed & ~1) != 0) rc = wrong(r, "the handedness of its axes:", 0);
     return rc;
 }
 

@@ -14,13 +14,13 @@ static int read_format(struct ply_header *h, struct text *t, struct sh_err *err)
 {
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
     struct text_span word = text_word(t), version = text_word(t);
-    if (!text_is(version, "1.0")) return fail(t, err, "format version has to be 1.0, not", version);
+    if (!text_is(version, "1.0")) return fail(t, err, "the format version must be 1.0, not", version);
     for (unsigned i = 0; i < 3; i++) {
         if (!text_is(word, names[i])) continue;
         h->format = (enum ply_format)i;
         return SH_OK;
     }
-    return fail(t, err, "format has to be ascii, binary_little_endian or binary_big_endian, not", word);
+    return fail(t, err, "the format must be ascii, binary_little_endian or binary_big_endian, not", word);
 }
 
 static int read_element(struct ply_header *h, struct text *t, struct sh_err *err)
@@ -31,7 +31,7 @@ static int read_element(struct ply_header *h, struct text *t, struct sh_err *err
     bool ok = text_integer(t, &count) && count >= 0;
     text_skip_blanks(t);
     if (name.n == 0 || !ok || !text_at_line_end(t))
-        return fail(t, err, "element takes a name and a count; this one is", name);
+        return fail(t, err, "an element must have a name and a count; this one is", name);
     if (h->n_elements == PLY_MAX_ELEMENTS)
         return text_fail(t, t->line, SH_EINPUT, err, "more than %d elements", PLY_MAX_ELEMENTS);
     struct ply_element *e = &h->element[h->n_elements++];
@@ -153,7 +153,7 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
     p->use = use_of(e, p, word);
     for (int i = e->first; i < h->n_properties - 1; i++) {
         if (p->use == PLY_SKIP || h->property[i].use != p->use) continue;
-        if (p->use < PLY_TIME || p->use >= PLY_SCALARS) return fail(t, err, "property is there twice:", word);
+        if (p->use < PLY_TIME || p->use >= PLY_SCALARS) return fail(t, err, "a property is given twice:", word);
         p->use = PLY_SKIP; /* of properties that don't concern the position, the first one counts */
     }
     return SH_OK;
@@ -173,7 +173,7 @@ static int check_header(const struct ply_header *h, const struct text *t, struct
     for (int i = 0; i < h->n_elements; i++) {
         const struct ply_element *e = &h->element[i];
         if (++n[e->kind] > 1 && e->kind != PLY_OTHER)
-            return text_fail(t, t->line, SH_EINPUT, err, "element %s is there twice", e->name);
+            return text_fail(t, t->line, SH_EINPUT, err, "element %s is given twice", e->name);
         if (e->n_properties == 0 && e->count > 0)
             return text_fail(t, t->line, SH_EINPUT, err, "element %s has no properties", e->name);
         if (e->kind == PLY_VERTEX && !(ply_find(h, e, PLY_X) && ply_find(h, e, PLY_Y) && ply_find(h, e, PLY_Z)))
@@ -188,11 +188,11 @@ int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err)
     struct text_span word = text_word(t);
     text_skip_blanks(t);
     if (!text_is(word, "ply") || !text_at_line_end(t))
-        return text_fail(t, t->line, SH_EINPUT, err, "not a PLY file: the first line has to be 'ply'");
+        return text_fail(t, t->line, SH_EINPUT, err, "not a PLY file: the first line must be 'ply'");
     bool has_format = false;
     for (;;) {
         text_next_line(t);
-        if (t->p >= t->end) return text_fail(t, t->line, SH_EINPUT, err, "the file ends within the header");
+        if (t->p >= t->end) return text_fail(t, t->line, SH_EINPUT, err, "the file ends in the header");
         int rc = SH_OK;
         word = text_word(t);
         if (text_is(word, "end_header")) break;

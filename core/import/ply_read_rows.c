@@ -76,7 +76,7 @@ static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, st
         if (text_number(&r->t, value)) return SH_OK;
         return ply_fail(r, err, text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
     }
-    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_fail(r, err, "the file ends within it");
+    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_fail(r, err, "the file ends in it");
     *value = load_binary((const unsigned char *)r->t.p, type, r->h.format == PLY_BIG);
     r->t.p += ply_type_size[type];
     return SH_OK;
@@ -96,7 +96,7 @@ static int read_list(struct ply_rows *r, const struct ply_property *p, struct sh
     int rc = read_scalar(r, p->count_type, &count, err);
     if (rc != SH_OK) return rc;
     if (!(count >= 0 && count <= UINT32_MAX) || count != floor(count))
-        return ply_fail(r, err, "a list's count is not a whole number from 0");
+        return ply_fail(r, err, "a list's count is not a whole number from 0 on");
     for (uint64_t i = 0; i < (uint64_t)count && rc == SH_OK; i++) {
         double value;
         rc = read_scalar(r, p->type, &value, err);
@@ -144,7 +144,8 @@ static int begin(struct ply_rows *r, int i, struct sh_err *err)
     }
     uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* no line end at the end */
     if (e->count == 0 || e->count <= rest / least) return SH_OK;
-    return text_fail(&r->t, 0, SH_EINPUT, err, "%llu of element %s need %llu bytes or more each; %llu are left",
+    return text_fail(&r->t, 0, SH_EINPUT, err,
+                     "%llu elements %s need at least %llu bytes each, but %llu bytes are left in the file",
                      (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
 }
 
@@ -210,7 +211,7 @@ int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err
         at[i] = r->t;
         rc = walk_element(r, i, is_early[i] ? NULL : user, err);
         if (rc == SH_OK && e->count > 0 && (e->kind == PLY_OTHER || (has_corners(e) && !user->has_faces)))
-            sh_warn(user->report, "%s: element '%s' (%llu of it) ignored", r->t.path, e->name,
+            sh_warn(user->report, "%s: element '%s' (%llu of them) is not used", r->t.path, e->name,
                     (unsigned long long)e->count);
     }
     if (rc == SH_OK) rc = walk_again(r, at, is_early, user, err);

@@ -271,7 +271,7 @@ static void warn_of_missing(const struct mtl *m, const char *path)
         sh_warn(m->b->report, "%s, line %llu: Kd '%s' is left out%s; allowed are numbers from 0 to 1", path,
                 (unsigned long long)m->colour.line, m->colour.first, others(&m->colour, more));
     if (m->texture.n > 0)
-        sh_warn(m->b->report, "%s, line %llu: the texture '%s' is missing%s; it belongs beside the library or the mesh",
+        sh_warn(m->b->report, "%s, line %llu: the texture '%s' is missing%s; put it beside the library or the mesh",
                 path, (unsigned long long)m->texture.line, m->texture.first, others(&m->texture, more));
 }
 
@@ -304,8 +304,8 @@ static int read_if_there(struct mtl *m, struct text_span name, uint64_t line, bo
 static void warn_of_library(const struct mtl *m, struct text_span name, uint64_t line)
 {
     if (!build_wants_textures(m->b)) return;
-    sh_warn(m->b->report, "%s, line %llu: the material library '%.*s' is missing; it belongs beside the mesh",
-            m->b->name, (unsigned long long)line, (int)(name.n < 200 ? name.n : 200), name.p);
+    sh_warn(m->b->report, "%s, line %llu: the material library '%.*s' is missing; put it beside the mesh", m->b->name,
+            (unsigned long long)line, (int)(name.n < 200 ? name.n : 200), name.p);
 }
 
 /* The next name: within quotes, or up to a blank. */

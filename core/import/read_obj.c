@@ -99,7 +99,7 @@ static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
 static int read_vertex(struct obj *o, struct sh_err *err)
 {
     double v[8] = {[5] = NAN};
-    int rc = read_numbers(o, 3, 8, v, "v takes 3 to 8 numbers", err);
+    int rc = read_numbers(o, 3, 8, v, "v must have 3 to 8 numbers", err);
     o->b->line = o->t.line;
     if (rc == SH_OK) rc = build_vertex(o->b, v, err);
     if (rc != SH_OK || !build_wants_colours(o->b) || isnan(v[5])) return rc;
@@ -110,7 +110,7 @@ static int read_vertex(struct obj *o, struct sh_err *err)
 static int read_uv(struct obj *o, struct sh_err *err)
 {
     double number[3] = {0.0, 0.0, 0.0};
-    int rc = read_numbers(o, 1, 3, number, "vt takes 1 to 3 numbers", err);
+    int rc = read_numbers(o, 1, 3, number, "vt must have 1 to 3 numbers", err);
     if (rc != SH_OK) return rc;
     if (!grow(&o->uv, &o->cap_uv, o->n_uv + 1, sizeof *o->uv))
         return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
@@ -150,7 +150,7 @@ static int read_corner(struct obj *o, uint32_t *corner, float uv[2], uint8_t rgb
     }
     if (!ok || !text_at_word_end(&o->t)) {
         o->t = at;
-        return fail_at(o, err, "f takes v, v/vt, v//vn or v/vt/vn");
+        return fail_at(o, err, "f must have corners of the form v, v/vt, v//vn or v/vt/vn");
     }
     int64_t n = o->b->scene->n_vertices - o->b->vertex0;
     int64_t number = index < 0 ? (o->again != NULL ? o->again->n_vertices : n) + index : index - 1;
@@ -210,7 +210,7 @@ static int read_face(struct obj *o, struct sh_err *err)
         if (rc != SH_OK) return rc;
         n++;
     }
-    if (n == 0) return fail_at(o, err, "f takes three corners or more");
+    if (n == 0) return fail_at(o, err, "f must have three corners or more");
     b->line = o->t.line;
     if (n < 3) {
         b->counts.not_triangles++;

@@ -22,8 +22,8 @@ static int check_mesh(const struct ply *y, struct sh_err *err)
         if (ply_find(h, e, PLY_CORNERS) == NULL)
             return build_fail(y->b, SH_EINPUT, err, "element %s lacks the list vertex_indices", e->name);
     }
-    if (!faces) return build_fail(y->b, SH_EINPUT, err, "no element face: points are not a mesh");
-    if (!vertices) return build_fail(y->b, SH_EINPUT, err, "no element vertex, so that faces have no corners");
+    if (!faces) return build_fail(y->b, SH_EINPUT, err, "there is no element face: points are not a mesh");
+    if (!vertices) return build_fail(y->b, SH_EINPUT, err, "there is no element vertex, so faces have no corners");
     return SH_OK;
 }
 

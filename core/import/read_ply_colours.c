@@ -41,7 +41,7 @@ static int add_texture(struct ply *y, int i, uint32_t *missing, struct sh_err *e
     if (access(texture->file, F_OK) == 0) return SH_OK;
     texture->unreadable = 1;
     if ((*missing)++ == 0)
-        sh_warn(b->report, "%s, line %llu: the texture '%.*s' is missing; it belongs beside the mesh", b->name,
+        sh_warn(b->report, "%s, line %llu: the texture '%.*s' is missing; put it beside the mesh", b->name,
                 (unsigned long long)y->r.h.texture_line[i], (int)(image.name.n < 200 ? image.name.n : 200),
                 image.name.p);
     return SH_OK;
@@ -70,7 +70,8 @@ int ply_begin_textures(struct ply *y, struct sh_err *err)
     if (rc != SH_OK) return rc;
     if (missing > 1) sh_warn(y->b->report, "%s: %u of %d textures are missing", y->b->name, missing, n);
     if (n > 1 && !y->has_texnumbers && y->has_uv)
-        sh_warn(y->b->report, "%s: it names %d textures, and no texnumber of faces: the first is taken", y->b->name, n);
+        sh_warn(y->b->report, "%s: it names %d textures, but its faces have no texnumber: the first texture is used",
+                y->b->name, n);
     if (n > 0 && !y->has_uv && build_wants_textures(y->b))
         sh_warn(y->b->report, "%s: it names a texture, but has no texture coordinates: the texture is not used",
                 y->b->name);
@@ -98,7 +99,7 @@ void ply_end_textures(struct ply *y)
 {
     if (y->n_unfit > 0)
         sh_warn(y->b->report,
-                "%s: %llu faces have other numbers of texture coordinates than corners: theirs are left out",
+                "%s: %llu faces have more or fewer texture coordinates than corners: these coordinates are left out",
                 y->b->name, (unsigned long long)y->n_unfit);
 }
 

@@ -106,8 +106,8 @@ static int fail_at(struct stl *s, struct text_span word, const char *expected, s
     s->b->line = s->t.line;
     if (word.n == 0 && s->t.p >= s->t.end)
         return build_fail(s->b, SH_EINPUT, err, "cut off: the file ends where %s is expected", expected);
-    return build_fail(s->b, SH_EINPUT, err, "'%.*s' where %s is expected", (int)(word.n < 40 ? word.n : 40), word.p,
-                      expected);
+    return build_fail(s->b, SH_EINPUT, err, "'%.*s' is found where %s is expected", (int)(word.n < 40 ? word.n : 40),
+                      word.p, expected);
 }
 
 /* Words may stand in any lines. */
@@ -195,9 +195,10 @@ static int read_either(struct stl *s, struct sh_err *err)
     if (size <= s->t.size) return read_binary(s, err);
     if (size == UINT64_MAX)
         return build_fail(s->b, SH_EINPUT, err, "neither a text that begins with 'solid' nor a binary STL");
-    return build_fail(s->b, SH_EINPUT, err,
-                      "cut off: a binary STL of %u triangles has %llu bytes, and there are %zu; it isn't a text either",
-                      load_u32(s->t.data + COUNT_AT), (unsigned long long)size, s->t.size);
+    return build_fail(
+        s->b, SH_EINPUT, err,
+        "cut off: a binary STL of %u triangles has %llu bytes, but the file has %zu; it isn't a text either",
+        load_u32(s->t.data + COUNT_AT), (unsigned long long)size, s->t.size);
 }
 
 int read_stl(struct scene_build *b, struct sh_err *err)

@@ -46,7 +46,7 @@ static void say_why(struct plan_row *row, const struct plan_option *it, uint32_t
         snprintf(first, sizeof first, "forced by %s", choice->key);
     else
         snprintf(first, sizeof first, "%s",
-                 can == 1 ? "the only one that can be had"
+                 can == 1 ? "the only possible one"
                  : holds  ? "the cheapest"
                           : "the one with the least error");
     if (known)

@@ -36,10 +36,10 @@ static void leave_out(const struct georef *georef, const struct plan_georef_need
                                      .cost_ns = cost_ns(georef, m)};
         snprintf(left->method, sizeof left->method, "%s", methods[m].name);
         snprintf(left->why_not, sizeof left->why_not, "%s",
-                 !isfinite(left->error_m)            ? "it has no bound here"
+                 !isfinite(left->error_m)            ? "its error has no bound here"
                  : left->error_m > need->tolerance_m ? "its error is above the tolerance"
                  : need->forced != GEOREF_AUTO       ? "not asked for"
-                                                     : "costs more, or is no better");
+                                                     : "costs more, or is not better");
     }
 }
 
@@ -82,5 +82,5 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
 void plan_georef_polar(struct plan_row *row)
 {
     plan_say(row, "georef", "none", 0.0, 0.0,
-             "output.layout is polar: points leave as range and angles, the anchor says where");
+             "output.layout is polar: points are sent as range and angles, and the anchor gives the place");
 }

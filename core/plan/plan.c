@@ -30,16 +30,16 @@ void plan_mesh(double error_m, struct plan_row *row)
 {
     if (error_m > 0.0)
         plan_say(row, "mesh", "single precision", error_m, 0.0,
-                 "its coordinates were rounded to single precision: in the file, or where it was read");
+                 "its coordinates were rounded to single precision, in the file or by its reader");
     else
-        plan_say(row, "mesh", "double", 0.0, 0.0, "its vertices are as the file says them");
+        plan_say(row, "mesh", "double", 0.0, 0.0, "its vertices have the file's coordinates");
 }
 
 void plan_cast(uint32_t packet, struct plan_row *row)
 {
     char method[sizeof row->method];
     snprintf(method, sizeof method, "packets of %u, in double", packet);
-    plan_say(row, "cast", method, CAST_ERROR_M, 0.0, "triangle and range in double, wherever rays begin");
+    plan_say(row, "cast", method, CAST_ERROR_M, 0.0, "triangle and range in double, for any origin of rays");
 }
 
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option)
@@ -69,18 +69,19 @@ static struct plan_row *plan_noise(struct plan_row *row, const struct plan_head 
 {
     char why[192];
     if (head->noise_on && head->range_sigma_at_m > 0.0) {
-        snprintf(why, sizeof why, "noise.range: sigma %.3g m at %.4g m, by the signal elsewhere, and %.3g ppm",
+        snprintf(why, sizeof why,
+                 "noise.range: sigma %.3g m at %.4g m, elsewhere it depends on the signal, and %.3g ppm",
                  head->range_sigma_m, head->range_sigma_at_m, head->range_sigma_ppm);
         row = add(row, "noise", "gauss, by signal", 0.0, 3.0, why);
     } else if (head->noise_on) {
-        snprintf(why, sizeof why, "noise.range: sigma %.3g m and %.3g ppm, which are the head's, not an error",
+        snprintf(why, sizeof why, "noise.range: sigma %.3g m and %.3g ppm; noise of the head, not an error of the plan",
                  head->range_sigma_m, head->range_sigma_ppm);
         row = add(row, "noise", "gauss", 0.0, 1.5, why);
     } else {
         row = add(row, "noise", "none", 0.0, 0.0, "noise.range is off");
     }
     if (!(head->ball_radius_m > 0.0)) return row;
-    snprintf(why, sizeof why, "noise.ball: points move by up to %.3g m, and more by its factors", head->ball_radius_m);
+    snprintf(why, sizeof why, "noise.ball: points move by up to %.3g m, times its factors", head->ball_radius_m);
     return add(row, "ball", "uniform in a ball", 0.0, 130.0, why);
 }
 
@@ -88,7 +89,7 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
 {
     struct plan_row *row = rows;
     if (head->n_movers > 0)
-        row = add(row, "movers", "cast on their own", CAST_ERROR_M, (double)NAN, "meshes that move");
+        row = add(row, "movers", "cast separately", CAST_ERROR_M, (double)NAN, "meshes that move");
     else
         row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
     row = plan_signal(row, head);
@@ -99,8 +100,9 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
         row = add(row, "zones", head->ambiguity == DETECT_FOLDED ? "folded" : "resolved", 0.0, 1.0,
                   "head.ambiguity: echoes that return after the next pulse");
     if (head->instrument || head->angle_noise)
-        row = add(row, "geometry", head->instrument ? "errors of geometry" : "angle noise", 0.0, 15.0,
-                  "instrument, noise.angle: each beam is aimed by the real mechanics, read by the encoders");
+        row = add(
+            row, "geometry", head->instrument ? "errors of geometry" : "angle noise", 0.0, 15.0,
+            "instrument, noise.angle: the beam follows the mechanics with their errors, points follow the encoders");
     else
         row = add(row, "geometry", "none", 0.0, 0.0, "instrument is all zero, noise.angle off: the head is ideal");
     return (size_t)(row - rows);

@@ -87,10 +87,9 @@ static void say_tries_ended(struct plan_sample *s)
 {
     if (s->tries_ended) return;
     s->tries_ended = 1;
-    sh_warn(
-        s->report,
-        "the plan drew %d pulses, and only %llu of them lie within the field of view: its bounds are wider for that",
-        TRIES, (unsigned long long)s->found);
+    sh_warn(s->report,
+            "the plan drew %d pulses, but only %llu of them lie within the field of view: so its bounds are wider",
+            TRIES, (unsigned long long)s->found);
 }
 
 /* Draws the next pulse that is cast. Returns 0 where none is found. */

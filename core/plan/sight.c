@@ -114,7 +114,7 @@ static void say_why(const struct plan_sight_need *need, const struct plan_sight_
     if (need->why_not != NULL)
         snprintf(why, room, "%s", need->why_not);
     else if (found == NULL)
-        snprintf(why, room, "%.4g million pulses of a scan are too few to pay for a map", pulses_m);
+        snprintf(why, room, "%.4g million pulses of a scan are too few: a map would cost more than it saves", pulses_m);
     else if (!it_pays && c->map >= c->bvh)
         snprintf(why, room, "a map saves nothing: only %.3g %% of the pulses go to a cell of one surface or none",
                  plain);

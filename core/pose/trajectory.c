@@ -54,7 +54,7 @@ static int check_sample(const struct pose_sample *s, const struct pose_sample *b
 int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct trajectory **out, struct sh_err *err)
 {
     *out = NULL;
-    if (n == 0) return sh_fail(err, SH_EINPUT, "a trajectory without samples");
+    if (n == 0) return sh_fail(err, SH_EINPUT, "the trajectory has no samples");
     for (size_t i = 0; i < n; i++) {
         int rc = check_sample(&sample[i], i > 0 ? &sample[i - 1] : NULL, i, err);
         if (rc != SH_OK) return rc;

@@ -47,9 +47,9 @@ static int check_columns(const struct csv *csv, struct sh_err *err)
     int by_quat = has_all(csv, quat) && !(csv->has & angles),
         by_angles = has_all(csv, 1u << HEADING) && !(csv->has & quat);
     if (has_all(csv, place) && (by_quat || by_angles)) return SH_OK;
-    return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                     "the columns have to be t_s, x_m, y_m, z_m and either heading_deg (with pitch_deg, roll_deg) or "
-                     "qw, qx, qy, qz");
+    return text_fail(
+        &csv->text, csv->line, SH_EINPUT, err,
+        "the columns must be t_s, x_m, y_m, z_m and either heading_deg (with pitch_deg, roll_deg) or qw, qx, qy, qz");
 }
 
 static int check_position(const struct csv *csv, int x, struct sh_err *err)
@@ -86,7 +86,7 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
                          LATEST_S);
     if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                         "t_s %.9g after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
+                         "t_s %.9g comes after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
                          1e-6 * POSE_MIN_STEP_US);
     return SH_OK;
 }
@@ -159,8 +159,8 @@ static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way
     double chord_m = trajectory_chord_m(s, s - 1), way_s = chord_m / speed_m_s;
     if (!(way_s >= 1e-6 * POSE_MIN_STEP_US && way_s < 1e6))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                         "%.6g m from the way-point before, %.6g s at its speed; allowed %g to 1e6 s", chord_m, way_s,
-                         1e-6 * POSE_MIN_STEP_US);
+                         "%.6g m from the previous way-point, which take %.6g s at its speed; allowed %g to 1e6 s",
+                         chord_m, way_s, 1e-6 * POSE_MIN_STEP_US);
     s->t_s = s[-1].t_s + way_s;
     if (s->t_s + way->pauses_s <= LATEST_S) return SH_OK;
     return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%.9g s from the first way-point on; allowed %g",
@@ -172,7 +172,7 @@ static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
     double speed_m_s = 0.0;
     if (!has_all(csv, 1u << WX | 1u << WY | 1u << WZ | 1u << SPEED))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                         "the columns have to be x_m, y_m, z_m, speed_m_s, and pause_s where wanted");
+                         "the columns must be x_m, y_m, z_m, speed_m_s, and may have pause_s");
     for (;;) {
         int rc = csv_next(csv, err);
         if (rc == 0 && way->points.n < 2) return text_fail(&csv->text, 0, SH_EINPUT, err, "fewer than two way-points");
@@ -254,8 +254,8 @@ static int follow(struct walk *w, const double *pause_s, struct sh_err *err)
     for (size_t i = 0; i < curve->n; i++)
         n += leg_parts(curve, i) + 1;
     if (n > POSE_MAX_KNOTS)
-        return sh_fail(err, SH_EINPUT, "too long a way: %zu samples every %g s or %g m; allowed %d", n, STEP_S, STEP_M,
-                       POSE_MAX_KNOTS);
+        return sh_fail(err, SH_EINPUT, "the path is too long: %zu samples every %g s or %g m; allowed are %d", n,
+                       STEP_S, STEP_M, POSE_MAX_KNOTS);
     for (size_t i = 0; i < curve->n && rc == SH_OK; i++) {
         double at_s = curve->sample[i].t_s, h = i + 1 < curve->n ? curve->sample[i + 1].t_s - at_s : 0.0;
         size_t parts = leg_parts(curve, i);

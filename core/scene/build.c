@@ -81,7 +81,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
         sh_warn(b->report, "%s: %llu names cut to %d bytes", b->name, (unsigned long long)b->counts.names_cut,
                 SCENE_NAME_LEN - 1);
     if (b->not_simple > 0)
-        sh_warn(b->report, "%s: %llu polygons cross themselves; their triangles overlap", b->name,
+        sh_warn(b->report, "%s: the outlines of %llu polygons cross themselves; their triangles overlap", b->name,
                 (unsigned long long)b->not_simple);
     if (b->n_rgb_limited > 0)
         sh_warn(b->report, "%s: %llu colour%s of corners or vertices beyond the range of 0 to %g, limited to it",
@@ -91,7 +91,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     b->scene->counts.names_cut += b->counts.names_cut;
     if (b->reported_ns > b->file_ns) report(b, 1);
     if (b->scene->n_triangles == b->triangle0)
-        return build_fail(b, SH_EINPUT, err, "no triangles in it (%llu without area, %llu points and lines)",
+        return build_fail(b, SH_EINPUT, err, "it has no triangles (%llu without area, %llu points and lines)",
                           (unsigned long long)b->counts.zero_area, (unsigned long long)b->counts.not_triangles);
     return SH_OK;
 }
@@ -205,8 +205,8 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
     }
     b->scene->error_m = fmax(b->scene->error_m, error_m);
     if (error_m > 1e-6)
-        sh_warn(b->report, "%s: in single precision, so good to %.2g m only: coordinates go up to %.9g%s", b->name,
-                error_m, largest, error_m > coarse_m ? "; move it near its origin, then export it again" : "");
+        sh_warn(b->report, "%s: read in single precision, with errors up to %.2g m: coordinates go up to %.9g%s",
+                b->name, error_m, largest, error_m > coarse_m ? "; move it near its origin, then export it again" : "");
     return SH_OK;
 }
 
@@ -253,10 +253,10 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
         if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
-            return build_fail(b, SH_EINPUT, err,
-                              "vertex %llu is at %g m; allowed are coordinates up to %g m: is the scale of "
-                              "%g metres per unit right?",
-                              number, p[k], BUILD_MAX_COORDINATE_M, spec->scale);
+            return build_fail(
+                b, SH_EINPUT, err,
+                "vertex %llu is at %g m; allowed are coordinates up to %g m: check the scale of %g metres per unit",
+                number, p[k], BUILD_MAX_COORDINATE_M, spec->scale);
     }
     s->n_vertices++;
     return SH_OK;

@@ -73,10 +73,11 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
 {
     const size_t sets = places->own_surfaces ? places->n : 1, n = sets * mesh->n_surfaces;
     if (n > SCENE_MAX_SURFACES - scene->n_surfaces)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: %zu copies with %u surfaces each are too many: a scene holds up to %d, and has %u; allowed "
-                       "without surfaces of their own",
-                       places->says, places->n, mesh->n_surfaces, SCENE_MAX_SURFACES, scene->n_surfaces);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: %zu copies with %u surfaces each are too many: a scene holds up to %d, and has %u; allowed are "
+            "copies without surfaces of their own (copy_labels: off)",
+            places->says, places->n, mesh->n_surfaces, SCENE_MAX_SURFACES, scene->n_surfaces);
     struct scene_surface *surface = realloc(scene->surface, (scene->n_surfaces + n + 1) * sizeof *surface);
     if (surface != NULL) scene->surface = surface;
     struct scene_texture *texture =
@@ -125,11 +126,11 @@ static int set_copy(const struct copied *of, size_t number, uint32_t label0, str
     scene_set_copy_bounds(of->mesh, of->hull, copy);
     for (int k = 0; k < 3; k++)
         if (!(fabs(copy->min_m[k]) <= BUILD_MAX_COORDINATE_M && fabs(copy->max_m[k]) <= BUILD_MAX_COORDINATE_M))
-            return sh_fail(err, SH_EINPUT,
-                           "%s: copy %zu goes from %g to %g m; allowed are coordinates up to %g m: are its place and "
-                           "its scale of %g right?",
-                           of->places->says, number + 1, copy->min_m[k], copy->max_m[k], BUILD_MAX_COORDINATE_M,
-                           copy->scale);
+            return sh_fail(
+                err, SH_EINPUT,
+                "%s: copy %zu goes from %g to %g m; allowed are coordinates up to %g m: check its place and its scale "
+                "of %g",
+                of->places->says, number + 1, copy->min_m[k], copy->max_m[k], BUILD_MAX_COORDINATE_M, copy->scale);
     return SH_OK;
 }
 

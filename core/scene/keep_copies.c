@@ -25,10 +25,11 @@ static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_
         if (!keeps_any(here, surfaces)) continue;
         if (*kept == NULL) *kept = here;
         if (memcmp(*kept, here, surfaces) != 0)
-            return sh_fail(err, SH_EINPUT,
-                           "scene.target.objects: copy %u of a mesh would keep other objects of it than one before; "
-                           "allowed are patterns that fit the same ones of each copy",
-                           k + 1);
+            return sh_fail(
+                err, SH_EINPUT,
+                "scene.target.objects: copy %u of a mesh would keep other objects than an earlier copy; allowed are "
+                "patterns that fit the same objects of each copy",
+                k + 1);
         of->copy[n] = of->copy[k];
         of->copy[n++].label0 =
             label[of->copy[k].label0 + (uint32_t)((const uint8_t *)memchr(here, 1, surfaces) - here)];

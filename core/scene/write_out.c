@@ -83,10 +83,11 @@ int scene_write_out_copies(struct scene *s, uint64_t most, const struct sh_repor
         cutouts |= s->copied[i].mesh->cutout != NULL;
     }
     if (s->n_all > most || vertices > UINT32_MAX - 1)
-        return sh_fail(err, SH_EINPUT,
-                       "scene.meshes[].copies: %u copies come to %u triangles; reports, coverage and the page of `run` "
-                       "look at them one by one: allowed there are %llu",
-                       s->n_copies, s->n_all, (unsigned long long)most);
+        return sh_fail(
+            err, SH_EINPUT,
+            "scene.meshes[].copies: %u copies come to %u triangles; reports, coverage and the page of `run` need each "
+            "of them in memory: allowed there are %llu",
+            s->n_copies, s->n_all, (unsigned long long)most);
     if (!make_room(s, vertices, s->n_all, uv, rgb, cutouts))
         return sh_fail(err, SH_ENOMEM, "no memory for the %u triangles of copies", s->n_all);
     for (uint32_t i = 0; i < s->n_copied && rc == SH_OK; i++) {

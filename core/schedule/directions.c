@@ -35,7 +35,8 @@ static int add_row(const struct text *t, struct list *list, const double v[3], i
 {
     double azimuth_turn = v[0] / TURN_DEG, elevation_turn = v[1] / TURN_DEG;
     if (n < 2 || (list->columns != 0 && n != list->columns))
-        return text_fail(t, t->line, SH_EINPUT, err, "%d number%s; allowed %s in each row", n, n == 1 ? "" : "s",
+        return text_fail(t, t->line, SH_EINPUT, err, "a row with %d number%s; allowed %s in each row", n,
+                         n == 1 ? "" : "s",
                          list->columns == 2   ? "2, azimuth and elevation in degrees,"
                          : list->columns == 3 ? "3, x y z,"
                                               : "3, x y z, or 2, azimuth and elevation in degrees,");

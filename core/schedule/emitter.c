@@ -25,12 +25,13 @@ static int check_beams(const struct emitter_beam *beam, uint32_t n, uint64_t seq
     if (n < 1 || n > EMITTER_MAX_BEAMS)
         return sh_fail(err, SH_EINPUT, "%u beams; allowed 1 to %d", n, (int)EMITTER_MAX_BEAMS);
     if (beam[0].offset_ns != 0)
-        return sh_fail(err, SH_EINPUT, "the first beam fires after %u ns; allowed 0: a sequence begins with it",
+        return sh_fail(err, SH_EINPUT, "the first beam fires after %u ns; allowed 0: it begins the sequence",
                        beam[0].offset_ns);
     for (uint32_t i = 1; i < n; i++)
         if (beam[i].offset_ns <= beam[i - 1].offset_ns)
-            return sh_fail(err, SH_EINPUT, "beam %u fires after %u ns, the one before it after %u ns; allowed more",
-                           i + 1, beam[i].offset_ns, beam[i - 1].offset_ns);
+            return sh_fail(err, SH_EINPUT,
+                           "beam %u fires after %u ns, but the beam before it after %u ns; allowed more", i + 1,
+                           beam[i].offset_ns, beam[i - 1].offset_ns);
     if (sequence_ps <= 1000ull * beam[n - 1].offset_ns)
         return sh_fail(err, SH_EINPUT, "a sequence of %.15g ns ends before its last firing; allowed more than %u ns",
                        1e-3 * (double)sequence_ps, beam[n - 1].offset_ns);
@@ -101,8 +102,8 @@ int emitter_set_rings(struct emitter *e, int64_t start_udeg, int64_t stop_udeg, 
     if (first > last)
         return sh_fail(
             err, SH_EINPUT,
-            "no ring lies from %.10g to %.10g deg; allowed are limits around one, such as %.10g or %.10g deg, "
-            "or twice the same: a circle",
+            "no ring lies from %.10g to %.10g deg; allowed are limits around a ring, such as %.10g or %.10g deg, or "
+            "two equal limits: a circle",
             1e-6 * (double)start_udeg, 1e-6 * (double)stop_udeg, 180.0 * (double)last / (double)gaps - 90.0,
             180.0 * (double)first / (double)gaps - 90.0);
     e->first_ring = (uint32_t)first;

@@ -79,7 +79,7 @@ static int check_size(const char *file, uint32_t width, uint32_t height, struct 
 
 static int fail_read(const char *file, const char *why, struct sh_err *err)
 {
-    return sh_fail(err, SH_EINPUT, "%s: no image that can be read (%s); allowed are PNG, JPEG, TGA, BMP and WebP", file,
+    return sh_fail(err, SH_EINPUT, "%s: the image can't be read (%s); allowed are PNG, JPEG, TGA, BMP and WebP", file,
                    why);
 }
 
@@ -253,8 +253,8 @@ static int decode_webp(const struct texture_source *source, const uint8_t *bytes
 {
     WebPBitstreamFeatures is;
     if (WebPGetFeatures(bytes, n_bytes, &is) != VP8_STATUS_OK)
-        return fail_read(source->file, "WebP without a whole header", err);
-    if (is.has_animation) return fail_read(source->file, "WebP that moves", err);
+        return fail_read(source->file, "its WebP header is incomplete", err);
+    if (is.has_animation) return fail_read(source->file, "WebP with an animation", err);
     int rc = check_size(source->file, (uint32_t)is.width, (uint32_t)is.height, err);
     if (rc != SH_OK) return rc;
     const size_t row = 4 * (size_t)is.width, size = row * (size_t)is.height;
@@ -265,7 +265,7 @@ static int decode_webp(const struct texture_source *source, const uint8_t *bytes
     image->rgba = counted_alloc(size);
     if (image->rgba == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory", source->file);
     if (WebPDecodeRGBAInto(bytes, n_bytes, image->rgba, size, (int)row) != NULL) return SH_OK;
-    return fail_read(source->file, "WebP that is damaged or cut off", err);
+    return fail_read(source->file, "the WebP data are damaged or cut off", err);
 }
 
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
@@ -294,7 +294,7 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
     if (source->alpha_only && !image->has_alpha) return SH_OK;
     image->rgba = load(bytes, n_bytes, &width, &height, &channels);
     if (image->rgba == NULL && ran_out)
-        return sh_fail(err, SH_EINPUT, "%s: decoding it takes more than %d MiB of memory, and no more is allowed", file,
+        return sh_fail(err, SH_EINPUT, "%s: needs more than the allowed %d MiB of memory to decode", file,
                        TEXTURE_MAX_MEMORY >> 20);
     if (image->rgba == NULL) return fail_read(file, stbi_failure_reason(), err);
     drop_unused_alpha(bytes, image);

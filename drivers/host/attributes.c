@@ -29,7 +29,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
     int rc = host_check_last(sh, frame, SCANHEAD_ATTRIBUTES);
     if (rc != 0) return rc;
     if (!is_of_points(sh, frame, 1))
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: attributes of points that were lost", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the points of these attributes were lost", sh->source.name);
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;
     if (n > max) n = max;
@@ -48,7 +48,7 @@ int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, ui
     int rc = host_check_last(sh, frame, SCANHEAD_COLOURS);
     if (rc != 0) return rc;
     if (!is_of_points(sh, frame, scanhead_has_attributes(sh) == 1 ? 2 : 1))
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: colours of points that were lost", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the points of these colours were lost", sh->source.name);
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;
     if (n > max) n = max;
@@ -64,9 +64,9 @@ int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, s
 {
     struct line_end wire;
     if (frame->type != SCANHEAD_LINE_END || frame->payload == NULL)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a line end frame");
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "this is not a line end frame");
     if (native_decode_line_end(frame->payload, frame->payload_len, &wire) != 0)
-        return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: a line's end that is too short", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: a line end frame is too short", sh->source.name);
     *end = (struct scanhead_line_end){.scan_frame = wire.frame,
                                       .scan_line = wire.line,
                                       .pulse0 = wire.pulse0,

@@ -116,7 +116,8 @@ static int check_front(struct host_source *source, struct sh_err *err)
         const int item = pcapng_read(&c->reader, c->buf + at, c->end - at, &packet, &used, &why);
         if (item < 0) return sh_fail(err, SH_EFORMAT, "%s: %s", source->name, why.text);
         if (item == PCAPNG_MORE)
-            return sh_fail(err, SH_EFORMAT, "%s: no pcapng: no interface is described at its beginning", source->name);
+            return sh_fail(err, SH_EFORMAT, "%s: not a pcapng file: no interface is described at its beginning",
+                           source->name);
         at += used;
     }
     const uint16_t link = c->reader.interface[0].link;

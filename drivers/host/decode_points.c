@@ -179,7 +179,7 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
     int rc = host_check_last(sh, frame, SCANHEAD_POINTS);
     if (rc != 0) return rc;
     if (!sh->have_descriptor || !sh->have_anchor)
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: points before the descriptor and the anchor of their scan",
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: points came before the descriptor and the anchor of their scan",
                        sh->source.name);
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;

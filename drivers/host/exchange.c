@@ -129,7 +129,7 @@ static int check_command(struct scanhead *sh, const char *command, size_t len)
     if (sh->source.is_file)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: a recording takes no commands", sh->source.name);
     if (sh->stuck)
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: half a command went out before; open the head again",
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: an earlier command was sent only in part; open the head again",
                        sh->source.name);
     int blank = 1, printable = 1;
     for (size_t i = 0; i < len; i++) {

@@ -69,7 +69,9 @@ int scanhead_reattach(struct scanhead *sh, int timeout_ms)
 {
     char name[sizeof sh->source.name];
     if (sh->source.is_file || strncmp(sh->source.name, "fd:", 3) == 0)
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: nothing that could come back", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_ESTATE,
+                       "%s: this source can't be reattached; allowed are usb, tty:PATH and tcp:HOST:PORT",
+                       sh->source.name);
     if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
     sh->source.ops = NULL;
     sh->ended = 1;
@@ -234,7 +236,7 @@ int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enu
         [SCANHEAD_COLOURS] = "colours",
     };
     if (frame->type == (int)type && frame->payload != NULL && frame->payload == sh->payload) return 0;
-    return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the %s frame that scanhead_next returned last", name[type]);
+    return sh_fail(&sh->err, SCANHEAD_EINPUT, "this is not the %s frame that scanhead_next returned last", name[type]);
 }
 
 int host_gone(struct scanhead *sh)
@@ -244,7 +246,7 @@ int host_gone(struct scanhead *sh)
                        "%s: the USB bus was reset: the head is still plugged in, and its session is over",
                        sh->source.name);
     if (sh->lost)
-        return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged, or answers no more", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged, or no longer answers", sh->source.name);
     return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",
                    sh->source.name);
 }
@@ -260,7 +262,7 @@ static int closed(struct scanhead *sh)
     const struct native_stats *s = &sh->parser.stats;
     host_note_closed(sh);
     if (s->bytes > 0 && s->frames == 0 && s->texts == 0)
-        return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: not one frame in %llu bytes: not a scan head's stream",
+        return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: no frame in %llu bytes: this is not a scan head's stream",
                        sh->source.name, (unsigned long long)s->bytes);
     return host_gone(sh);
 }
@@ -285,7 +287,7 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
         if (deadline_ns == 0)
             deadline_ns = host_deadline_ns(timeout_ms);
         else if (deadline_ns < host_deadline_ns(0) && timeout_ms != 0)
-            return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no frame in time", sh->source.name);
+            return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no frame came within the time limit", sh->source.name);
         int rc = host_fill(sh, deadline_ns);
         if (rc != 0) return rc;
     }

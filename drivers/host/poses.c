@@ -102,8 +102,8 @@ int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
     struct leg leg;
     memset(pose, 0, sizeof *pose);
     if (!find(sh->poses, t_ns, &a, &b))
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: no pose of the head at %.9f s of the scan", sh->source.name,
-                       1e-9 * (double)t_ns);
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: there is no pose of the head at %.9f s of the scan",
+                       sh->source.name, 1e-9 * (double)t_ns);
     set_leg(&leg, a, b);
     double f = fraction(&leg, t_ns), s = sin(0.5 * f * leg.angle_rad);
     const double turn[4] = {cos(0.5 * f * leg.angle_rad), s * leg.axis[0], s * leg.axis[1], s * leg.axis[2]};
@@ -184,8 +184,8 @@ static int to_scene_moving(struct scanhead *sh, struct scanhead_point *points, u
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame)
 {
     if (!sh->have_descriptor || !sh->have_anchor || sh->descriptor.layout != NATIVE_POLAR)
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: only points of the polar layout can be taken to the scene frame",
-                       sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_ESTATE,
+                       "%s: only points of the polar layout can be converted to the scene frame", sh->source.name);
     if (sh->anchor.moving & NATIVE_MOVING) return to_scene_moving(sh, points, n, frame);
     for (uint32_t i = 0; i < n; i++) {
         const double v[3] = {points[i].x, points[i].y, points[i].z};

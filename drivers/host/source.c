@@ -68,7 +68,8 @@ static int split_address(const char *address, char host[256], char port[8], stru
     size_t digits = bad ? 0 : strspn(colon + 1, "0123456789");
     if (bad || digits < 1 || digits > 5 || colon[1 + digits] != 0 || atoi(colon + 1) < 1 || atoi(colon + 1) > 65535)
         return sh_fail(err, SH_EINPUT,
-                       "tcp:%s: not an address; write tcp:HOST:PORT or tcp:[IPV6]:PORT, port 1 to 65535", address);
+                       "tcp:%s: not an address; allowed are tcp:HOST:PORT or tcp:[IPV6]:PORT, port 1 to 65535",
+                       address);
     memcpy(host, begin, (size_t)(end - begin));
     host[end - begin] = 0;
     memcpy(port, colon + 1, digits + 1);

@@ -8,8 +8,8 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/host/usb_inside.h"
 
-#define RULE                                                                                                 \
-    "no permission; the udev rule gives it: `sudo make install`, or copy drivers/host/70-scanhead.rules to " \
+#define RULE                                                                                                   \
+    "no permission; a udev rule gives it: run `sudo make install`, or copy drivers/host/70-scanhead.rules to " \
     "/etc/udev/rules.d; then `sudo udevadm control --reload`, and plug the head in again"
 
 /* "1209:" or "1209" -> number; NULL when it isn't one to four hexadecimal digits. */
@@ -33,8 +33,10 @@ int host_usb_parse(const char *source, struct usb_wanted *wanted, struct sh_err 
         return SH_OK;
     }
     if (p != NULL && *p == 0 && wanted->pid >= 0) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: not a USB head; write usb, usb:VID:PID or usb:VID:PID:SERIAL, ids as lsusb has them", source);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: not a USB head; allowed are usb, usb:VID:PID and usb:VID:PID:SERIAL, with the ids that lsusb shows",
+        source);
 }
 
 static int take_endpoints(const struct libusb_interface_descriptor *d, struct usb_interface *out)
@@ -152,7 +154,7 @@ int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wante
     if (s.error == LIBUSB_ERROR_ACCESS) return sh_fail(err, SH_EPERM, "%s: the head %s: " RULE, asked, s.refused);
     if (s.error != 0)
         return sh_fail(err, SH_EIO, "%s: cannot open the head %s: %s", asked, s.refused, libusb_strerror(s.error));
-    return sh_fail(err, SH_ELOST, "%s: no such head on USB; scanhead list shows those there are", asked);
+    return sh_fail(err, SH_ELOST, "%s: no such head on USB; scanhead list shows the heads", asked);
 }
 
 static void describe(libusb_device *device, const struct libusb_device_descriptor *d, struct scanhead_usb_head *head)

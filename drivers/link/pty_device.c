@@ -89,7 +89,7 @@ static int link_look(const char *path, const char *slave, struct sh_err *err)
     if (strcmp(text, slave) == 0 || stat(path, &target) != 0 || is_left_over(text, &self, &target)) return 0;
     return link_refuse(path,
                        S_ISCHR(target.st_mode) ? "leads to a terminal in use by another program"
-                                               : "leads to something that is not a terminal of ours",
+                                               : "leads to something that is not a terminal of this program",
                        err);
 }
 

@@ -114,20 +114,23 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
     const char *host = host_of(spec);
     const int named = spec->interface[0] != '\0', to_all = to->sa_family == AF_INET && ipv4_of(to) == INADDR_BROADCAST;
     if (is_multicast(to) && !named)
-        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: multicast; required is interface, where it goes out", host,
-                       spec->port);
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: multicast needs the key interface: the interface that sends it",
+                       host, spec->port);
     int rc = find_network(named ? spec->interface : NULL, to, net, err);
     if (rc != SH_OK) return rc;
     if (named && !net->found)
-        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: there is no interface %s with such an address", host,
+        return sh_fail(err, SH_EINPUT,
+                       "link udp:%s:%d: interface %s doesn't exist, or has no address of the receiver's family", host,
                        spec->port, spec->interface);
     *broadcast = to_all || (net->has_broadcast && ipv4_of(to) == net->broadcast);
     if (*broadcast && !named)
-        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: a broadcast; required is interface, where it goes out", host,
+        return sh_fail(err, SH_EINPUT,
+                       "link udp:%s:%d: a broadcast needs the key interface: the interface that sends it", host,
                        spec->port);
     if (*broadcast && !net->has_broadcast)
-        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: interface %s has no broadcast; allowed one that has", host,
-                       spec->port, spec->interface);
+        return sh_fail(err, SH_EINPUT,
+                       "link udp:%s:%d: interface %s has no broadcast address; allowed is an interface that has one",
+                       host, spec->port, spec->interface);
     if (to_all) ((struct sockaddr_in *)(void *)to)->sin_addr.s_addr = net->broadcast;
     return SH_OK;
 }
@@ -244,9 +247,10 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
     *port_of(from) = 0;
     setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &zero, sizeof zero);
     if (bind(fd, (struct sockaddr *)from, len) != 0) return -1;
-    snprintf(notice, 200,
-             "its packets don't come from port %d: %s; a source of its own has that port, source_port: 0 is silent",
-             spec->source_port, own ? "its receiver has that address and port" : "another program has it for itself");
+    snprintf(
+        notice, 200,
+        "port %d can't be used as the source: %s; set source to another address, or source_port: 0 to hide this notice",
+        spec->source_port, own ? "the receiver has the same address and port" : "another program uses it exclusively");
     return 0;
 }
 
@@ -294,7 +298,7 @@ static int udp_open(const struct link_spec *spec, void **link, struct sh_err *er
         source_text(spec, from, sizeof from);
         rc = sh_fail(
             err, socket_error_code(why), "link udp:%s:%d%s: %s%s", host_of(spec), spec->port, from, strerror(why),
-            why == EADDRNOTAVAIL ? "; allowed is a numeric address of this machine, of the receiver's family"
+            why == EADDRNOTAVAIL ? "; allowed is a numeric address of this machine, IPv4 or IPv6 as the receiver's"
             : why == EADDRINUSE  ? "; a receiver on this machine with that port must share it (SO_REUSEADDR), and "
                                    "have another address than the source"
                                  : "");

@@ -57,9 +57,9 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
     self->ops = usb_backend_ops_get(backend.type);
     const struct usb_look *look = usb_look_get((enum usb_look_id)spec->look);
     if (look != NULL) self->n = look->n_sessions;
-    int rc = look != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such look");
+    int rc = look != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such USB identity");
     if (rc == SH_OK)
-        rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
+        rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build does not have that back end");
     if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, spec->whose, &self->claims, err);
     if (rc == SH_OK && spec->own_serial && !look->has_serial) id.serial[0] = '\0';
     if (rc == SH_OK) rc = scanhead_usb_create(look, &id, &self->head, err);

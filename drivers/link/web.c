@@ -91,7 +91,8 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
         if (web->context != NULL) web_lws.lws_context_destroy(web->context);
         if (web->reserve_fd >= 0) close(web->reserve_fd);
         free(web);
-        return sh_fail(err, SH_ENOMEM, "link web:%s:%d: libwebsockets has no memory, or no descriptors", host,
+        return sh_fail(err, SH_ENOMEM,
+                       "link web:%s:%d: libwebsockets has too little memory or too few file descriptors", host,
                        spec->port);
     }
     *link = web;
@@ -131,8 +132,8 @@ static int turn_away(struct web_link *web, struct lws *wsi)
 {
     unsigned char why[80];
     int n = web->n_sessions == 1
-                ? snprintf((char *)why, sizeof why, "the only place of this link is taken")
-                : snprintf((char *)why, sizeof why, "all %d places of this link are taken", web->n_sessions);
+                ? snprintf((char *)why, sizeof why, "the only session of this link is taken")
+                : snprintf((char *)why, sizeof why, "all %d sessions of this link are taken", web->n_sessions);
     web_lws.lws_close_reason(wsi, (enum lws_close_status)WEB_TRY_LATER, why, (size_t)n);
     return -1;
 }
@@ -176,12 +177,12 @@ static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, siz
 {
     struct web_session *s = conn->session;
     if (web_lws.lws_frame_is_binary(wsi))
-        return close_for(conn, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "commands are text");
+        return close_for(conn, LWS_CLOSE_STATUS_UNACCEPTABLE_OPCODE, "a command must be a text message");
     if (web_lws.lws_is_first_fragment(wsi)) s->message_len = 0;
     s->message_len += len;
     if (s->message_len + web_lws.lws_remaining_packet_payload(wsi) > WEB_MAX_MESSAGE ||
         len + 1 > WEB_IN_ROOM - s->in_len)
-        return close_for(conn, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message has at most 4096 bytes");
+        return close_for(conn, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message must have at most 4096 bytes");
     memcpy(s->in + s->in_len, in, len);
     s->in_len += len;
     if (web_lws.lws_is_final_fragment(wsi) && s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';

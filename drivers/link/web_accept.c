@@ -81,7 +81,7 @@ static void make_room(struct web_link *web, struct web_conn *conn)
 {
     if (conn->place.phase == WEB_ASKING || conn->place.phase == WEB_ANSWERING) web_refused(web, conn->peer);
     if (conn->place.phase == WEB_ASKING && conn->n_seen > 0)
-        say(web_lws.lws_get_socket_fd(conn->wsi), 408, "others wait; a request comes whole, and at once", 0);
+        say(web_lws.lws_get_socket_fd(conn->wsi), 408, "other clients wait; send the whole request at once", 0);
     web_lws.lws_set_opaque_user_data(conn->wsi, NULL);
     web_lws.lws_set_timeout(conn->wsi, PENDING_TIMEOUT_SHUTDOWN_FLUSH, LWS_TO_KILL_ASYNC);
     web_conn_end(conn);
@@ -157,7 +157,8 @@ static int hand_over(struct web_link *web, struct web_conn *conn)
 static int judge(struct web_link *web, struct web_conn *conn, const char *request, size_t begin, int result)
 {
     const int fd = web_lws.lws_get_socket_fd(conn->wsi);
-    const char *words = result == 505 ? "HTTP/1.0 and 1.1 are spoken here" : "this is not a request of HTTP/1.1";
+    const char *words =
+        result == 505 ? "only HTTP/1.0 and HTTP/1.1 are supported" : "this is not a request of HTTP/1.1";
     if (result == HTTP_SCAN_WHOLE) {
         char taken[WEB_MAX_REQUEST];
         const size_t len = begin + conn->scan.at;
@@ -165,7 +166,7 @@ static int judge(struct web_link *web, struct web_conn *conn, const char *reques
         if (result == 0) return recv(fd, taken, len, 0) == (ssize_t)len ? hand_over(web, conn) : -1;
     } else if (result == HTTP_SCAN_MORE) {
         result = 413;
-        words = "a request has at most 8192 bytes here";
+        words = "a request must have at most 8192 bytes";
     }
     if (result == WEB_FOREIGN) return -1;
     say(fd, result, words, conn->request.head_only);
@@ -195,7 +196,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
 static int give_up(struct web_conn *conn)
 {
     if (conn->place.phase != WEB_ASKING || conn->n_seen == 0) return -1;
-    say(web_lws.lws_get_socket_fd(conn->wsi), 408, "a whole request comes within 20 s", 0);
+    say(web_lws.lws_get_socket_fd(conn->wsi), 408, "a request must be complete within 20 s", 0);
     return linger(conn);
 }
 

@@ -82,7 +82,7 @@ int web_http_begin(struct web_link *web, struct web_conn *conn)
         conn->len = page.len;
         return answer(conn, 200, page.type);
     }
-    if (asked->query_long) return say(conn, 400, "what follows the ? has more than 1,023 bytes");
+    if (asked->query_long) return say(conn, 400, "the query after ? has more than 1023 bytes");
     int rc = SH_EINPUT;
     if (web->source != NULL) rc = web->source->get(web->source->ctx, asked->path, asked->query, &body, &err);
     if (rc == SH_EINPUT && err.text[0] == '\0') return say(conn, 404, "there is nothing at this path");

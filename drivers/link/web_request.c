@@ -100,11 +100,11 @@ static int is_key(struct http_text key)
 /* RFC 6455 4.2.1. */
 static int read_upgrade(const struct fields *f, struct web_request *out, const char **words)
 {
-    *words = "this is a WebSocket of version 13, subprotocol scanhead-native-1";
+    *words = "/ws takes only a WebSocket of version 13, subprotocol scanhead-native-1";
     if (!f->is_upgrade || !http_list_has(f->upgrade, "websocket") || !http_text_is(f->version, "13")) return 426;
-    *words = "Sec-WebSocket-Key has 16 bytes as base64";
+    *words = "Sec-WebSocket-Key must be 16 bytes as base64";
     if (!is_key(f->key)) return 400;
-    *words = "the subprotocol is scanhead-native-1, or none";
+    *words = "the subprotocol must be scanhead-native-1, or not given";
     if (f->has_protocol && !http_list_has(f->protocol, "scanhead-native-1")) return 400;
     snprintf(out->key, sizeof out->key, "%.*s", (int)f->key.len, f->key.s);
     out->names_protocol = f->has_protocol;
@@ -143,17 +143,17 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
     if (status != 0) return status;
     http_split_target(line.target, &target);
     out->head_only = http_text_is(line.method, "HEAD");
-    *words = "a request has one Host: the address that scanhead printed";
+    *words = "a request must have one Host: the address that scanhead printed";
     if ((status = check_asker(&f, line.minor, target.place, &place)) != 0) return status;
     *words = "only GET and HEAD are answered; commands go over the WebSocket at /ws";
     if (!out->head_only && !http_text_is(line.method, "GET")) return 405;
-    *words = "this is not the host that was asked for; use the address that scanhead printed";
+    *words = "the Host of this request is not this head; use the address that scanhead printed";
     if (!is_own_host(web, &place)) return 421;
-    *words = "of expectations, 100-continue alone is known";
+    *words = "only Expect: 100-continue is supported";
     if (f.expects_other) return 417;
-    *words = "a request has no content here";
+    *words = "a request must not have content here";
     if (f.has_coding || f.length > 0) return f.has_coding && f.n_length > 0 ? 400 : 413;
-    *words = "a path begins with /, and %XX in it is a byte in hexadecimal, but not 0";
+    *words = "a path must begin with /, and %XX in it must be a byte in hexadecimal, but not 0";
     if (target.path.len == 0 || target.path.s[0] != '/') return 400;
     if (decode(target.path, out->path, sizeof out->path) == 400) return 400;
     const int query = decode(target.query, out->query, sizeof out->query);

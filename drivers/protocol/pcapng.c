@@ -160,7 +160,7 @@ static int64_t to_ns(uint64_t time, int resolution)
 static int read_section(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct sh_err *err)
 {
     if (len < SECTION_LEN) return fail(reader, err, "a section's block is too short");
-    if (le_get16(block + 12) != 1) return fail(reader, err, "not of version 1 of pcapng");
+    if (le_get16(block + 12) != 1) return fail(reader, err, "its version of pcapng is not 1");
     reader->in_section = 1;
     reader->n_interfaces = 0;
     return PCAPNG_OTHER;
@@ -219,10 +219,12 @@ static int read_simple(struct pcapng_reader *reader, const uint8_t *block, size_
 static const char *check_front(const struct pcapng_reader *reader, const uint8_t *bytes, size_t len)
 {
     if (le_get32(bytes) == BLOCK_SECTION) {
-        if (len >= 12 && le_get32(bytes + 8) == 0x4d3c2b1a) return "a section of big-endian numbers, which is not read";
-        if (len >= 12 && le_get32(bytes + 8) != BYTE_ORDER_MAGIC) return "no pcapng: the mark of byte order is wrong";
+        if (len >= 12 && le_get32(bytes + 8) == 0x4d3c2b1a)
+            return "its numbers are big-endian; allowed are little-endian ones";
+        if (len >= 12 && le_get32(bytes + 8) != BYTE_ORDER_MAGIC)
+            return "not a pcapng file: its byte-order mark is wrong";
     } else if (!reader->in_section) {
-        return "no pcapng: it does not begin with a section";
+        return "not a pcapng file: it does not begin with a section";
     }
     return NULL;
 }

@@ -67,7 +67,7 @@ static int is_scanning(const struct protocol_spec *spec)
 static int set_laser(const struct posted *p, const char *value, int apply)
 {
     int on;
-    if (!read_switch(value, &on)) return refuse(p, 400, "laser: on or off");
+    if (!read_switch(value, &on)) return refuse(p, 400, "laser: allowed are on and off");
     if (!apply || is_scanning(p->spec) == on) return 200;
     return command(p, on ? "SCAN:START" : "SCAN:STOP");
 }
@@ -84,7 +84,7 @@ static int set_returns(const struct posted *p, const char *value, int apply)
         snprintf(line, sizeof line, "SCAN:ECHOES %s", returns[i].word);
         return apply ? command(p, line) : 200;
     }
-    return refuse(p, 400, "returns: Strongest, Last or Dual");
+    return refuse(p, 400, "returns: allowed are Strongest, Last and Dual");
 }
 
 /* The head takes turns per second in steps of 1e-6 Hz. A speed that 3 does not divide is rounded to that step. */
@@ -93,7 +93,7 @@ static int set_rpm(const struct posted *p, const char *value, int apply)
     char line[40];
     long rpm;
     if (!read_number(value, &rpm) || (rpm != 0 && (rpm < 300 || rpm > 1200)))
-        return refuse(p, 400, "rpm: a whole number, 300 to 1200; 0: the motor stops");
+        return refuse(p, 400, "rpm: allowed are whole numbers from 300 to 1200, and 0: the motor stops");
     if (!apply) return 200;
     if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
     const long uhz = (rpm * 1000000 + 30) / 60;
@@ -104,60 +104,61 @@ static int set_rpm(const struct posted *p, const char *value, int apply)
 static int set_fov(const struct posted *p, const char *value, long whole, const char *why)
 {
     long deg;
-    if (!read_number(value, &deg) || deg > 359) return refuse(p, 400, "start, end: a whole number, 0 to 359 degrees");
+    if (!read_number(value, &deg) || deg > 359)
+        return refuse(p, 400, "start, end: allowed are whole numbers from 0 to 359 degrees");
     return deg == whole ? 200 : refuse(p, 409, why);
 }
 
 static int set_fov_start(const struct posted *p, const char *value, int apply)
 {
     (void)apply;
-    return set_fov(p, value, 0, "start: 0 alone; this head sends the whole turn");
+    return set_fov(p, value, 0, "start: allowed is 0; this head sends the whole turn");
 }
 
 static int set_fov_end(const struct posted *p, const char *value, int apply)
 {
     (void)apply;
-    return set_fov(p, value, 359, "end: 359 alone; this head sends the whole turn");
+    return set_fov(p, value, 359, "end: allowed is 359; this head sends the whole turn");
 }
 
 static int set_address(const struct posted *p, const char *value, int apply)
 {
     (void)apply;
     if (strcmp(value, velodyne_host_address(p->spec)) == 0) return 200;
-    return refuse(p, 409, "addr: addresses are those of the head's configuration (links)");
+    return refuse(p, 409, "addr: can't be changed here; the head's configuration sets it (links)");
 }
 
 static int set_data_port(const struct posted *p, const char *value, int apply)
 {
     long port;
     (void)apply;
-    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "dport: 1 to 65535");
+    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "dport: allowed are 1 to 65535");
     if (port == velodyne_host_port(p->spec)) return 200;
-    return refuse(p, 409, "dport: ports are those of the head's configuration (links)");
+    return refuse(p, 409, "dport: can't be changed here; the head's configuration sets it (links)");
 }
 
 static int set_position_port(const struct posted *p, const char *value, int apply)
 {
     long port;
     (void)apply;
-    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "tport: 1 to 65535");
+    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "tport: allowed are 1 to 65535");
     if (port == VELODYNE_POSITION_PORT) return 200;
-    return refuse(p, 409, "tport: ports are those of the head's configuration (links)");
+    return refuse(p, 409, "tport: can't be changed here; the head's configuration sets it (links)");
 }
 
 static int set_network(const struct posted *p, const char *value, int apply)
 {
     (void)value;
     (void)apply;
-    return refuse(p, 409, "the head's own address is that of its configuration (links)");
+    return refuse(p, 409, "the head's own address can't be changed here; its configuration sets it (links)");
 }
 
 static int set_phase_lock(const struct posted *p, const char *value, int apply)
 {
     int on;
     (void)apply;
-    if (!read_switch(value, &on)) return refuse(p, 400, "enabled: on or off");
-    return on ? refuse(p, 409, "enabled: off alone; this head has no phase lock") : 200;
+    if (!read_switch(value, &on)) return refuse(p, 400, "enabled: allowed are on and off");
+    return on ? refuse(p, 409, "enabled: allowed is off; this head has no phase lock") : 200;
 }
 
 /* Without a phase lock it has no effect; but what the device doesn't take is refused. */
@@ -179,7 +180,7 @@ static int save(const struct posted *p, const char *value, int apply)
 /* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
 static int reset(const struct posted *p, const char *value, int apply)
 {
-    if (strcmp(value, "reset_system") != 0) return refuse(p, 400, "data: reset_system");
+    if (strcmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
     if (!apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
@@ -271,7 +272,7 @@ static int read_form(const struct posted *p, const char *path, char *form, size_
         int status = read_pair(p, path, form + at, end - at, &pairs[n]);
         if (status != 200) return -status;
         for (int i = 0; i < n; i++)
-            if (pairs[i].setting == pairs[n].setting) return -refuse(p, 400, "a key stands twice");
+            if (pairs[i].setting == pairs[n].setting) return -refuse(p, 400, "a key is given twice");
         n++;
     }
     return n != 0 ? n : -refuse(p, 400, "the body is not a form: key=value&key=value");

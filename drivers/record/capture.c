@@ -14,11 +14,14 @@ static int check_left(const char *path, struct sh_err *err)
     char *part;
     if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", path);
     const long long len = newfile_left_len(part);
-    const int rc = len == 0 ? SH_OK
-                            : sh_fail(err, SH_EINPUT,
-                                      "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s "
-                                      "makes a file of them; or remove it",
-                                      part, len, path);
+    const int rc =
+        len == 0
+            ? SH_OK
+            : sh_fail(
+                  err, SH_EINPUT,
+                  "%s: an earlier recording left %lld bytes there; scanhead record --repair %s makes a complete file "
+                  "of them; or remove it",
+                  part, len, path);
     free(part);
     return rc;
 }

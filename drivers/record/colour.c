@@ -13,21 +13,20 @@ static const double EARTH_M = 6371000;
 int colour_check(enum colour_mode mode, const struct track *t, struct sh_err *err)
 {
     if (mode == COLOUR_FRAME && !t->info.moving && !t->info.stop)
-        return sh_fail(
-            err, SH_EFORMAT,
-            "%s: colour by frame, but the head is on no trajectory and at no stop of one: there are no frames",
-            t->path);
-    if (mode == COLOUR_RANGE && t->info.moving && t->info.geo)
-        return sh_fail(
-            err, SH_EFORMAT,
-            "%s: colour by range, but points of the geo layout do not say how far a head that moves was; allowed "
-            "output.colour: range, with limits, or output.layout: polar",
-            t->path);
-    if (mode == COLOUR_HEIGHT && t->info.moving && t->crs == NATIVE_CRS_ECEF)
         return sh_fail(err, SH_EFORMAT,
-                       "%s: colour by height, but of a head that moves ECEF says no heights; allowed output.colour: "
-                       "height, with limits, or another output.crs",
+                       "%s: colour by frame, but the head is on no trajectory, so points have no frame scalar",
                        t->path);
+    if (mode == COLOUR_RANGE && t->info.moving && t->info.geo)
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: colour by range, but in the geo layout the ranges of a moving head are not known; allowed "
+                       "output.colour: range, with limits, or output.layout: polar",
+                       t->path);
+    if (mode == COLOUR_HEIGHT && t->info.moving && t->crs == NATIVE_CRS_ECEF)
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: colour by height, but in ECEF the heights of a moving head are not known; allowed output.colour: "
+            "height, with limits, or another output.crs",
+            t->path);
     return 0;
 }
 

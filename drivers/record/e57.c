@@ -127,7 +127,7 @@ static int put_xyz(struct e57 *e, const double p[3], struct sh_err *err)
         if (!(fabs(counts) <= INT32_MAX))
             return sh_fail(
                 err, SH_EFORMAT,
-                "%s: a point at (%.3f %.3f %.3f) from the head is beyond the %.0f m of 32 bits in steps of %g "
+                "%s: a point at (%.3f %.3f %.3f) from the head is beyond the %.0f m that 32 bits hold in steps of %g "
                 "m; give the head a coarser output.scale_m",
                 e->base.file.path, p[0], p[1], p[2], 2147483647 * s->scale_m, s->scale_m);
         n[i] = (int32_t)counts;

@@ -78,7 +78,8 @@ static int get(struct left *l, uint64_t logical, void *to, size_t len, struct sh
 
 static int fail_damaged(const struct left *l, struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT, "%s: at byte %" PRIu64 " is no packet of points as this file has them",
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: at byte %" PRIu64 " there is no packet of points in the form that this file uses",
                    l->repair->path, e57_physical(l->end));
 }
 
@@ -219,8 +220,8 @@ static int check_ours(struct left *l, struct sh_err *err)
     if (rc < 0 || (rc > 0 && le_get64(header + 24) == e57_physical(l->end))) return rc < 0 ? rc : SH_OK;
     return sh_fail(
         err, SH_EFORMAT,
-        "%s: is no E57 file of this program, or of an older release; its pages are right, its points are not "
-        "counted, and it is not touched",
+        "%s: was written by another program or by an older release; its pages have correct checksums, its points are "
+        "not counted; it is unchanged",
         l->repair->path);
 }
 
@@ -234,8 +235,8 @@ static int repair_left(struct left *l, struct sh_err *err)
     rc = take_scans(l, err);
     if (rc < 0) return rc;
     if (l->facts.n_scans == 0 && !r->was_whole)
-        return sh_fail(err, SH_EFORMAT,
-                       "%s: is no E57 file of this program, or too little of one: no scan begins in it", r->path);
+        return sh_fail(err, SH_EFORMAT, "%s: is not an E57 file of scanhead, or is too short: no scan begins in it",
+                       r->path);
     for (uint32_t i = 0; i < l->facts.n_scans; i++)
         r->n_kept += l->facts.scan[i].n_records;
     r->unit = l->facts.empty_shots ? "points and empty shots" : "points";

@@ -115,10 +115,11 @@ static int las_fits(const char *path, const struct recorder_options *options, co
     for (int i = 0; i < 3; i++)
         apart_m = fmax(apart_m, fabs(scan->place_m[i] - first->place_m[i]));
     if (scan->moves || scan->in_degrees || apart_m <= most_m + scan->range_max_m) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: it is %.0f m from station %u, and LAS holds %.0f m in steps of %g m: give the head a coarser "
-                   "output.scale_m, or each station its own file (--split)",
-                   path, apart_m, first->station, most_m, first->scale_m);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: the station is %.0f m from station %u, and LAS holds %.0f m in steps of %g m: give the head a coarser "
+        "output.scale_m, or each station its own file (--split)",
+        path, apart_m, first->station, most_m, first->scale_m);
 }
 
 static int too_far(const struct las *las, const double p[3], struct sh_err *err)
@@ -172,7 +173,7 @@ static int set_time(const struct las *las, double *time_s, int i, struct sh_err 
 {
     *time_s = (double)las->base.track.point[i].t_ns / 1e9;
     if (las->facts.gps_time && !has_time(&las->base.track, i, time_s))
-        return sh_fail(err, SH_EFORMAT, "%s: the head has ceased to say the time; a LAS file holds one kind of time",
+        return sh_fail(err, SH_EFORMAT, "%s: the head no longer reports the time; a LAS file holds one kind of time",
                        las->base.file.path);
     return 0;
 }
@@ -278,17 +279,19 @@ static int las_finish(void *rec, struct sh_err *err)
     las->facts.incomplete = 0;
     if (rc == 0) rc = write_front(las, err);
     if (rc != 0) return rc;
-    recorder_report(rec, las->n_empty, "shots without echo left out, for which LAS has no place");
-    recorder_report(rec, las->n_beyond_returns, "echoes left out: the sixth and later ones, of which LAS 1.2 has none");
-    recorder_report(rec, las->n_returns_cut, "points with more echoes than LAS 1.2 counts; it says 5");
+    recorder_report(rec, las->n_empty, "shots without echo left out; LAS has no place for them");
+    recorder_report(rec, las->n_beyond_returns,
+                    "echoes left out: the sixth and later ones of a pulse; LAS 1.2 holds five");
+    recorder_report(rec, las->n_returns_cut,
+                    "points of pulses with more than 5 echoes; LAS 1.2 counts up to 5, so 5 is written");
     if (las->facts.minor == 2 && las->facts.n_points != 0)
         sh_warn(las->base.options.report, "%s: LAS 1.2 has no place for labels and scan angles%s; they are left out",
                 las->base.file.path, las->base.track.has_attributes ? ", amplitude and width" : "");
     recorder_report(rec, las->n_no_angle,
-                    "points without a scan angle (0 is written): the scan's pose is beyond any number");
+                    "points without a scan angle (0 is written): the scan's pose is infinite or NaN");
     if (las->time_came_late)
         sh_warn(las->base.options.report,
-                "%s: times count from the scan's start: what the head said of its clock was lost before the first "
+                "%s: times count from the scan's start: the head's messages about its clock were lost before the first "
                 "points",
                 las->base.file.path);
     return 0;

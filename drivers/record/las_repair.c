@@ -65,7 +65,8 @@ static int make_whole(struct repair *repair, uint8_t *header, struct records *r,
     const size_t len = r->facts.minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
     const uint64_t end = front_len + r->facts.n_points * r->len;
     if (r->facts.minor == 2 && r->facts.n_points > UINT32_MAX)
-        return sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; it is not touched", repair->path);
+        return sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; the file is unchanged",
+                       repair->path);
     memcpy(renewed, header, len);
     las_put_counts(&r->facts, renewed);
     repair->was_whole = end == repair->len && memcmp(renewed, header, len) == 0;

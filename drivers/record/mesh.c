@@ -33,14 +33,16 @@ static int check_points(const char *path, double n, struct sh_err *err)
     const double each = BYTES_A_POINT + (mesh_is_float(path) ? BYTES_OF_EXPORTER : 0);
     const double bytes = n * each, there = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     if (n > MESH_MAX_VERTICES)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: up to %.0f points; a mesh holds %d: scan fewer stations, more coarsely, or with --split",
-                       path, n, MESH_MAX_VERTICES);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: up to %.0f points; a mesh holds up to %d: scan fewer stations, more coarsely, or with --split", path,
+            n, MESH_MAX_VERTICES);
     if (there > 0 && bytes > there)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and there are %.1f GiB: scan fewer "
-                       "stations, more coarsely, or with --split",
-                       path, n, bytes / GIB, there / GIB);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and %.1f GiB are available: scan fewer "
+            "stations, more coarsely, or with --split",
+            path, n, bytes / GIB, there / GIB);
     return SH_OK;
 }
 
@@ -197,10 +199,11 @@ static int check_uri(const struct mesh_recorder *m, struct sh_err *err)
     const char *path = m->base.file.path, *slash = strrchr(path, '/'), *ending = m->base.ops->ending;
     const char *c = strpbrk(slash != NULL ? slash + 1 : path, "%#?:\\");
     if (strcmp(ending, ".gltf") != 0 || c == NULL) return SH_OK; /* .glb holds all */
-    return sh_fail(err, SH_EINPUT,
-                   "%s: %s names the files beside it as URIs, where %c means something else; allowed are names without "
-                   "%% # ? : \\",
-                   path, ending, *c);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: %s refers to its other files by URIs, where %c has a special meaning; allowed are names without %% # ? : "
+        "\\",
+        path, ending, *c);
 }
 
 static int mesh_begin(void *rec, struct sh_err *err)
@@ -285,7 +288,7 @@ static void report(const struct mesh_recorder *m)
 {
     const struct recorder *r = &m->base;
     char what[160];
-    if (m->n_faces == 0) sh_warn(r->options.report, "%s: there is no triangle in it", r->file.path);
+    if (m->n_faces == 0) sh_warn(r->options.report, "%s: it has no triangles", r->file.path);
     if (m->n_edges > 0) {
         snprintf(what, sizeof what,
                  "triangles left out, with an edge over %g times their scan's mean edge, %.4g m (--long-edge)",
@@ -293,12 +296,12 @@ static void report(const struct mesh_recorder *m)
         recorder_report(r, m->n_long, what);
     }
     recorder_report(r, m->n_flat, "triangles left out that have no area or are seen edge-on");
-    recorder_report(r, m->n_loose, "points left out that are in no triangle");
-    recorder_report(r, m->n_later, "echoes left out; a mesh has the first of a shot");
+    recorder_report(r, m->n_loose, "points left out that belong to no triangle");
+    recorder_report(r, m->n_later, "echoes left out; a mesh holds the first of a shot");
     recorder_report(r, m->n_lost, "points left out whose pose was lost");
-    recorder_report(r, m->n_split, "meshes begun within a scan, since its lines went back");
+    recorder_report(r, m->n_split, "additional meshes begun within a scan, since its line numbers went back");
     if (m->every > 1) {
-        snprintf(what, sizeof what, "lines and rows are one of the texture's, which has up to %d a side",
+        snprintf(what, sizeof what, "lines and rows share one texel, since a texture has up to %d texels a side",
                  MESH_TEXTURE_SIDE);
         recorder_report(r, m->every, what);
     }
@@ -311,7 +314,7 @@ static int mesh_finish(void *rec, struct sh_err *err)
     if (rc != SH_OK) return rc;
     outfile_yield(&m->base.file); /* its place was kept until now */
     if (m->n_faces == 0 && !mesh_takes_points(m->base.file.path))
-        return sh_fail(err, SH_EINPUT, "%s: there is no triangle in this scan, and %s can't be empty",
+        return sh_fail(err, SH_EINPUT, "%s: this scan has no triangles, and a %s file can't be empty",
                        m->base.file.path, m->base.ops->ending);
     rc = mesh_recorder_write(m, err);
     if (rc == SH_OK) report(m);

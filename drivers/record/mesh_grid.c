@@ -17,22 +17,25 @@ int mesh_grid_check(const struct track *t, struct sh_err *err)
 {
     const int kind = t->emitter.kind;
     if (kind == SCANHEAD_EMIT_BEAMS || kind == SCANHEAD_EMIT_DIRECTIONS)
-        return sh_fail(err, SH_EFORMAT,
-                       "%s: a mesh needs rows and columns, and this head fires %s; allowed .ply (without --mesh and "
-                       "--sparse) .las .e57 .shs",
-                       t->path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: a mesh needs rows and columns, but this head fires %s; allowed are .ply (without --mesh and "
+            "--sparse) .las .e57 .shs",
+            t->path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
     const int is_flat = kind == SCANHEAD_EMIT_PLANAR || (kind == SCANHEAD_EMIT_LINE && !(t->info.pan_deg_s > 0)) ||
                         (kind == SCANHEAD_EMIT_SPHERE && t->emitter.rings <= 1);
     if (!t->info.moving && is_flat)
         return sh_fail(
             err, SH_EFORMAT,
-            "%s: a mesh needs a surface, and all lines of this head are one: it neither pans nor moves, nor has it several rings; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
+            "%s: a mesh needs a surface, but this head scans a single line: it neither pans nor moves, and has one "
+            "ring; allowed are .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
             t->path);
     if (t->info.moving && t->info.geo && t->info.crs != NATIVE_CRS_LOCAL)
-        return sh_fail(err, SH_EFORMAT,
-                       "%s: a mesh faces the head, and where a moving head was is known in the scene's frame alone; "
-                       "allowed output.crs: local, or output.layout: polar",
-                       t->path);
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: a mesh faces the head, but the places of a moving head are known only in the scene's frame; allowed "
+            "output.crs: local, or output.layout: polar",
+            t->path);
     return SH_OK;
 }
 

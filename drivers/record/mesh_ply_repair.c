@@ -66,7 +66,7 @@ int mesh_ply_repair(struct repair *r, struct sh_err *err)
     if (!is_all)
         return sh_fail(err, SH_EFORMAT,
                        "%s: is a mesh of %" PRIu64 " points and %" PRIu64
-                       " triangles, and not all of them are there; it is written in one piece, and nothing is kept",
+                       " triangles, but some are missing; it is written in one piece, so nothing can be kept",
                        r->path, m.n[0], m.n[1]);
     r->unit = "points";
     r->n_kept = m.n[0];

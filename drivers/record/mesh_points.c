@@ -28,7 +28,7 @@ static int grow_all(struct mesh_points *p, struct sh_err *err)
         p->room = n;
         return SH_OK;
     }
-    return sh_fail(err, SH_ENOMEM, "no memory for more than %u points, all of which a mesh holds", p->n);
+    return sh_fail(err, SH_ENOMEM, "no memory for more than %u points; a mesh keeps all its points in memory", p->n);
 }
 
 static void put(struct mesh_points *p, uint32_t i, const struct mesh_point *point)

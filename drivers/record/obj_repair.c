@@ -9,7 +9,7 @@
 #include <string.h>
 
 enum { LINE_MOST = 512 };
-static const char INCOMPLETE[] = "# incomplete: the recorder came to no end; what should follow may be missing\n";
+static const char INCOMPLETE[] = "# incomplete: the recording was not completed; data may be missing after this\n";
 
 struct obj_lines {
     uint64_t n_vertices, n_objects;

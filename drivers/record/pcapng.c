@@ -51,7 +51,7 @@ static void count_packet(struct packets *p, const struct pcapng_packet *packet)
 
 /* A block of statistics of the first interface, without any: only with a comment. */
 enum { BLOCK_STATISTICS = 5, OPTION_COMMENT = 1, NOTE_HEAD = 20 };
-static const char NOTE[] = "incomplete: the recorder came to no end; what should follow may be missing";
+static const char NOTE[] = "incomplete: the recording was not completed; data may be missing after this";
 enum { NOTE_TEXT = sizeof NOTE - 1, NOTE_LEN = NOTE_HEAD + 4 + (NOTE_TEXT + 3) / 4 * 4 + 4 + 4 };
 
 static void put_note(uint8_t note[NOTE_LEN])

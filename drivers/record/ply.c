@@ -50,7 +50,7 @@ static int make_header(struct ply *ply, int incomplete, char **text, size_t *len
     const int rc = ply_header_make(&ply->facts, ply->header_len, text, len, &n_left_out, err);
     if (rc == 0 && !incomplete)
         recorder_report(&ply->base, n_left_out,
-                        "names of surfaces and heads left out, for which the header has no room");
+                        "names of surfaces and heads left out; the header has no room for them");
     return rc;
 }
 

@@ -252,7 +252,7 @@ static int make_whole(struct repair *r, const struct ply_header *h, const struct
     char *text = renew(h, p->n, 1);
     if (text == NULL) text = renew(h, p->n, 0);
     if (text == NULL)
-        return sh_fail(err, SH_EFORMAT, "%s: its header has no room for another number of points; it is not touched",
+        return sh_fail(err, SH_EFORMAT, "%s: its header has no room for another number of points; it is unchanged",
                        r->path);
     int rc = repair_cut(r, end, err);
     if (rc == SH_OK) rc = repair_write(r, 0, text, h->len, err);
@@ -270,7 +270,8 @@ int ply_repair(struct repair *r, struct sh_err *err)
     if (rc == SH_OK && h.is_mesh) {
         rc = recorder_mesh_ply.repair != NULL
                  ? recorder_mesh_ply.repair(r, err)
-                 : sh_fail(err, SH_EFORMAT, "%s: a mesh is written in one piece at its end", r->path);
+                 : sh_fail(err, SH_EFORMAT,
+                           "%s: a mesh is written in one piece at its end; nothing of this file can be kept", r->path);
     } else if (rc == SH_OK) {
         rc = read_points(r, &h, &p, &end, err);
         r->unit = "points";

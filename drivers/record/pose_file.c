@@ -129,7 +129,7 @@ static int pose_file_finish(void *rec, struct sh_err *err)
 
 /* ---- repair */
 
-static const char INCOMPLETE[] = "# incomplete: the recorder came to no end; what should follow may be missing\n";
+static const char INCOMPLETE[] = "# incomplete: the recording was not completed; data may be missing after this\n";
 
 struct rows {
     int titled, n_columns;

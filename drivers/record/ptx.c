@@ -90,7 +90,7 @@ static int ptx_scan(void *rec, struct sh_err *err)
     const int kind = ptx->base.track.emitter.kind;
     if (kind == SCANHEAD_EMIT_BEAMS || kind == SCANHEAD_EMIT_DIRECTIONS)
         return sh_fail(err, SH_EFORMAT,
-                       "%s: a PTX grid has rows and columns, and this head fires %s; allowed .ply .las .e57 .shs",
+                       "%s: a PTX grid has rows and columns, but this head fires %s; allowed are .ply .las .e57 .shs",
                        ptx->base.track.path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
     int rc = end_scan(ptx, err);
     ptx->pose = ptx->base.track.pose;
@@ -169,9 +169,8 @@ static int ptx_finish(void *rec, struct sh_err *err)
     if (rc != 0) return rc;
     recorder_report(rec, ptx->n_left_out, "echoes left out; a PTX grid holds the first of a shot");
     recorder_report(rec, ptx->n_too_bright, "echoes brighter than a white target, which PTX writes as 1");
-    recorder_report(
-        rec, ptx->n_split,
-        "grids begun within a scan: so many lines or pulses are missing before them that they are not filled up");
+    recorder_report(rec, ptx->n_split,
+                    "additional grids begun within a scan, since too many lines or pulses were missing to fill up");
     recorder_report(rec, ptx->n_padded, "places of the grid without a shot, filled like shots without echo");
     return 0;
 }

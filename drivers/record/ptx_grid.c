@@ -141,7 +141,7 @@ int ptx_grid_drain(struct ptx_grid *grid,
         if (rc == 0) rc = fn(ctx, column, n_rows, err);
     }
     if (rc == 0 && left > 0)
-        rc = sh_fail(err, SH_EFORMAT, "%s: lines of a scan went back; %llu echoes have no place", grid->path,
+        rc = sh_fail(err, SH_EFORMAT, "%s: line numbers went back within a scan; %llu echoes are left out", grid->path,
                      (unsigned long long)left);
     free(column);
     grid->n_shots = grid->n_cells = 0;
@@ -158,7 +158,7 @@ int ptx_grid_clear(struct ptx_grid *grid, struct sh_err *err)
 
 static int fail_damaged(const struct ptx_grid *grid, uint64_t cell, struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT, "%s: is damaged at byte %" PRIu64 ", in the middle; a repair can only cut its end",
+    return sh_fail(err, SH_EFORMAT, "%s: is damaged at byte %" PRIu64 ", before its end; a repair can only cut the end",
                    grid->path, sizeof(struct ptx_head) + cell * sizeof(struct ptx_cell));
 }
 

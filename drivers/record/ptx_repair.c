@@ -129,8 +129,9 @@ static int set_columns(const struct repair *r, const struct place *p, uint64_t c
     char text[32];
     const int len = (int)p->columns_len, n = snprintf(text, sizeof text, "%-*" PRIu64, len, columns);
     if (n != len)
-        return sh_fail(err, SH_EFORMAT, "%s: the number of columns at byte %" PRIu64 " has no place for %" PRIu64,
-                       r->path, p->grid_at, columns);
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: the field of the number of columns at byte %" PRIu64 " is too short for %" PRIu64, r->path,
+                       p->grid_at, columns);
     return repair_write(r, p->grid_at, text, (size_t)n, err);
 }
 
@@ -138,10 +139,11 @@ static int set_columns(const struct repair *r, const struct place *p, uint64_t c
 static int check_ours(const struct repair *r, const struct place *p, struct sh_err *err)
 {
     if (!repair_is_part(r))
-        return sh_fail(err, SH_EFORMAT,
-                       "%s: is not whole, or has more than its grids, and nothing in it tells that scanhead wrote it; "
-                       "only a part that a recorder left is changed: call it %s.part if it is one",
-                       r->path, r->path);
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: is incomplete or has more than its grids, and it has no mark of scanhead; only .part files are "
+            "changed: rename it to %s.part if scanhead wrote it",
+            r->path, r->path);
     if (p->header < HEADER_LINES || p->rows <= PTX_ROWS_MAX) return SH_OK;
     return sh_fail(err, SH_EFORMAT, "%s: the grid at byte %" PRIu64 " has %" PRIu64 " rows; a recorder writes up to %d",
                    r->path, p->grid_at, p->rows, PTX_ROWS_MAX);
@@ -188,10 +190,11 @@ static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_he
     p->n_grids++;
     if (rc == SH_OK) rc = sync_file(r, err);
     if (rc != SH_EIO) return rc;
-    return sh_fail(err, rc,
-                   "%s: cannot be written, with the grid that is in %s: its text needs as much room again; nothing is "
-                   "lost: make room, and begin again",
-                   r->path, grid->path);
+    return sh_fail(
+        err, rc,
+        "%s: cannot be written together with the grid in %s: the grid's text needs as much room again on the disk; "
+        "nothing is lost: free some room and repeat the command",
+        r->path, grid->path);
 }
 
 static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, struct sh_err *err)
@@ -207,11 +210,10 @@ static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, st
     rc = head.text_at <= r->len ? read_text(r, head.text_at, p, err) : SH_OK;
     if (rc != SH_OK) return rc;
     if (head.text_at > r->len || p->at != head.text_at || p->header != 0)
-        return sh_fail(err, SH_EFORMAT,
-                       "%s: goes on from byte %" PRIu64 " of a PTX file, where %s has no end of a grid", grid->path,
-                       head.text_at, r->path);
+        return sh_fail(err, SH_EFORMAT, "%s: continues a PTX file from byte %" PRIu64 ", but in %s no grid ends there",
+                       grid->path, head.text_at, r->path);
     if (grid->row_max - grid->row_min >= PTX_ROWS_MAX)
-        return sh_fail(err, SH_EFORMAT, "%s: has rows %u to %u; a grid has up to %d", grid->path, grid->row_min,
+        return sh_fail(err, SH_EFORMAT, "%s: has rows %u to %u; allowed are up to %d rows", grid->path, grid->row_min,
                        grid->row_max, PTX_ROWS_MAX);
     rc = put_grid(r, grid, &head, p, err);
     r->cut_bytes = cut;

@@ -11,7 +11,7 @@ enum {
 
 static int fail_huge(const struct ptx_text *t, const double p[3], struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format takes: %g %g %g", t->file->path,
+    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format allows: %g %g %g", t->file->path,
                    p[0], p[1], p[2]);
 }
 

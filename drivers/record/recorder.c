@@ -28,7 +28,7 @@ const struct recorder_ops *recorder_find(const char *path, struct sh_err *err)
         if (len > n && strcasecmp(path + len - n, recorders[i]->ending) == 0) return recorders[i];
         snprintf(known + strlen(known), sizeof known - strlen(known), " %s", recorders[i]->ending);
     }
-    sh_fail(err, SH_EINPUT, "%s: no recorder for this ending; known are%s", path, known);
+    sh_fail(err, SH_EINPUT, "%s: no recorder has this ending; allowed are%s", path, known);
     return NULL;
 }
 
@@ -111,8 +111,8 @@ int recorder_check_stop(const struct recorder *rec, struct sh_err *err)
 
 int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format takes: %g %g %g", rec->file.path,
-                   p[0], p[1], p[2]);
+    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format allows: %g %g %g",
+                   rec->file.path, p[0], p[1], p[2]);
 }
 
 static void report_losses(const struct recorder *rec)
@@ -123,7 +123,7 @@ static void report_losses(const struct recorder *rec)
                     "points left out that came before the descriptor and the anchor of their scan");
     recorder_report(rec, t->missing.n_without_pose, "points left out whose pose was lost");
     recorder_report(rec, t->missing.n_nowhere,
-                    "points left out whose coordinates are infinite or no numbers: the stream is broken");
+                    "points left out whose coordinates are infinite or NaN: the stream is broken");
     recorder_report(rec, t->missing.n_attributes_unheld,
                     "points whose amplitude and width are left out; this format has no place for them");
     recorder_report(rec, t->missing.n_without_attributes, "points without amplitude and width, which were lost");
@@ -145,7 +145,8 @@ static void say_left(const struct recorder *rec, const char *path)
     snprintf(part, sizeof part, "%s.part", path);
     if (newfile_left_len(part) > 0)
         sh_warn(rec->options.report,
-                "%s keeps what came to the disk: scanhead record --repair %s makes a whole file of it", part, path);
+                "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it",
+                part, path);
 }
 
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err)

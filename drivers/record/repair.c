@@ -35,7 +35,7 @@ int repair_read(const struct repair *r, uint64_t at, void *to, size_t len, struc
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0)
             return sh_fail(err, SH_EIO, "%s: cannot be read: %s", r->path,
-                           n < 0 ? strerror(errno) : "it became shorter");
+                           n < 0 ? strerror(errno) : "it got shorter while it was read");
         done += (size_t)n;
     }
     return SH_OK;
@@ -46,7 +46,7 @@ static int check_writable(const struct repair *r, struct sh_err *err)
 {
     if ((fcntl(r->fd, F_GETFL) & O_ACCMODE) != O_RDONLY) return SH_OK;
     return sh_fail(err, SH_EPERM,
-                   "%s: needs a repair, and may not be written to: allowed is a file of one's own, with one name",
+                   "%s: needs a repair, but is not writable; allowed is a file that you own and that has one hard link",
                    r->path);
 }
 
@@ -78,7 +78,7 @@ int repair_cut(struct repair *r, uint64_t end, struct sh_err *err)
 /* Between blocks. */
 static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
 {
-    sh_progress(r->report, "looking for what is whole", (double)at / (double)(r->len + 1));
+    sh_progress(r->report, "looking for complete data", (double)at / (double)(r->len + 1));
     return sh_check_stop(r->report, err);
 }
 
@@ -115,9 +115,11 @@ struct lines {
 
 int repair_fail_damaged(const struct repair *r, uint64_t at, struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT,
-                   "%s: is damaged at byte %llu, and goes on after that: no recorder has left it so; it is not touched",
-                   r->path, (unsigned long long)at);
+    return sh_fail(
+        err, SH_EFORMAT,
+        "%s: is damaged at byte %llu, with good data after it; an interrupted recording does not do that; the file is "
+        "unchanged",
+        r->path, (unsigned long long)at);
 }
 
 static int take_line(const struct repair *r, struct lines *l, const char *line, size_t len, uint64_t at,
@@ -179,22 +181,22 @@ int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struc
 void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)
 {
     if (repair_write(r, end, note, len, NULL) == SH_OK) return;
-    sh_warn(r->report, "%s: there is no room to say in it that it may be incomplete", r->path);
+    sh_warn(r->report, "%s: the disk has no room for the note that the file may be incomplete", r->path);
     if (ftruncate(r->fd, (off_t)end) != 0) return; /* the piece of a note is cut by the next repair */
 }
 
 int repair_fail_foreign(const struct repair *r, struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT,
-                   "%s: is not whole, or has more than is known here, and another program has written it; only what "
-                   "scanhead wrote is changed; it is not touched",
-                   r->path);
+    return sh_fail(
+        err, SH_EFORMAT,
+        "%s: is incomplete or has unknown contents, and was written by another program; only files of scanhead are "
+        "repaired; it is unchanged",
+        r->path);
 }
 
 int repair_fail_none(const struct repair *r, const char *format, struct sh_err *err)
 {
-    return sh_fail(err, SH_EFORMAT, "%s: is no %s, or too little of it came to the disk; it is not touched", r->path,
-                   format);
+    return sh_fail(err, SH_EFORMAT, "%s: is not a %s, or too short to tell; it is unchanged", r->path, format);
 }
 
 /* ---- the file */
@@ -216,10 +218,9 @@ static int choose(const char *path, struct repaired *d, struct sh_err *err)
     }
     d->was_left = named || is_there(d->part);
     if (!named && d->was_left && is_there(d->path))
-        return sh_fail(
-            err, SH_ESTATE,
-            "%s: it and %s are there; name %s to repair that one, which then keeps its name, or move %s away", d->path,
-            d->part, d->part, d->path);
+        return sh_fail(err, SH_ESTATE,
+                       "%s: both this file and %s exist; give %s to repair it (it keeps its name), or move %s away",
+                       d->path, d->part, d->part, d->path);
     return SH_OK;
 }
 
@@ -229,13 +230,14 @@ static int repair_open(struct repair *r, const struct recorder_ops *ops, struct 
     if (fstat(r->fd, &st) != 0) return sh_fail(err, SH_EIO, "%s: %s", r->path, strerror(errno));
     r->len = (uint64_t)st.st_size;
     if (ops->repair == NULL)
-        return sh_fail(err, SH_EFORMAT, "%s: %s is written in one piece at its end; of this one nothing can be kept",
+        return sh_fail(err, SH_EFORMAT, "%s: %s is written in one piece at its end; nothing of this file can be kept",
                        r->path, ops->ending);
     if (r->len == 0)
-        return sh_fail(err, SH_EFORMAT,
-                       "%s: is empty: nothing had come to the disk. Meshes, and files whose colours have no "
-                       "--colour-limits, are written when all scans are over",
-                       r->path);
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: is empty: nothing was written to the disk. Meshes, and files whose colours have no --colour-limits, "
+            "are written after the last scan",
+            r->path);
     return ops->repair(r, err);
 }
 

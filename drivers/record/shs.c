@@ -59,8 +59,8 @@ static int shs_repair(struct repair *r, struct sh_err *err)
     if (rc == SH_OK) {
         const uint64_t within = f->parser.stats.bad_bytes - (r->len - f->end);
         if (within != 0)
-            sh_warn(r->report, "%s: %llu bytes between frames are none; they stay, and readers pass over them", r->path,
-                    (unsigned long long)within);
+            sh_warn(r->report, "%s: %llu bytes between frames belong to no frame; they stay, and readers skip them",
+                    r->path, (unsigned long long)within);
         r->unit = "frames";
         r->n_kept = f->n;
         r->n_scans = f->scans.n_scans;

@@ -46,7 +46,8 @@ int station_pose_check(const struct station_pose *pose, const char *path, struct
     double q[4];
     station_pose_quaternion(pose, q);
     if (isfinite(s[0]) && isfinite(s[1]) && isfinite(s[2]) && isfinite(q[0] + q[1] + q[2] + q[3])) return SH_OK;
-    return sh_fail(err, SH_EFORMAT,
-                   "%s: the stream is broken: the pose of a scan, at (%g %g %g) and turned by (%g %g %g %g), is none",
-                   path, s[0], s[1], s[2], q[0], q[1], q[2], q[3]);
+    return sh_fail(
+        err, SH_EFORMAT,
+        "%s: the stream is broken: a scan's pose is infinite or NaN: position (%g %g %g), quaternion (%g %g %g %g)",
+        path, s[0], s[1], s[2], q[0], q[1], q[2], q[3]);
 }

@@ -29,21 +29,21 @@ static int check_info(struct track *t, struct sh_err *err)
     int crs = info->geo ? info->crs : NATIVE_CRS_LOCAL, epsg = info->geo ? info->epsg : 0;
     int geoid = info->geo && info->geoid_heights;
     if (t->begun && (t->crs != crs || t->epsg != epsg))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a file holds one CRS", t->path,
+        return sh_fail(err, SH_EFORMAT, "%s: the stream changed from EPSG %d to %d; a file holds one CRS", t->path,
                        t->epsg, epsg);
     if (t->begun && t->geoid_heights != geoid)
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a file holds one kind", t->path,
+        return sh_fail(err, SH_EFORMAT, "%s: the stream changed to other heights (%s); a file holds one kind", t->path,
                        geoid ? "geoid" : "ellipsoid");
     if (t->begun && (t->moving != info->moving || t->stops != info->stop))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a file holds one kind", t->path,
+        return sh_fail(err, SH_EFORMAT, "%s: the stream changed to a head that %s; a file holds one kind", t->path,
                        info->moving ? "moves"
                        : info->stop ? "stops on a trajectory"
                                     : "stands still");
     if (t->begun && t->ops->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went on %s attributes; a file holds one kind", t->path,
+        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s attributes; a file holds one kind", t->path,
                        t->has_attributes ? "without" : "with");
     if (t->begun && t->has_colours != will_have_colours(t))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went on %s colours; a file holds one kind", t->path,
+        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s colours; a file holds one kind", t->path,
                        t->has_colours ? "without" : "with");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
@@ -225,10 +225,10 @@ static int begin_scan(struct track *t, struct sh_err *err)
     t->n_scans++;
     t->state.new_scan = 0;
     if (t->ops->metres && t->crs == NATIVE_CRS_GEODETIC)
-        return sh_fail(
-            err, SH_EFORMAT,
-            "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or .las, .ply",
-            t->path);
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or "
+                       ".las, .ply",
+                       t->path);
     int rc = t->has_colours && t->colour.given ? colour_check(t->colour.scale.mode, t, err) : 0;
     if (rc != 0) return rc;
     return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;

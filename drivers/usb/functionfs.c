@@ -109,10 +109,11 @@ static void look_at_addresses(struct functionfs *self)
     if (!usb_device_model(self->device)->fixed_addresses || self->moved[0] != '\0') return;
     const uint8_t wanted = ffs_pipes_moved(&self->pipes, &given);
     if (wanted == 0) return;
-    snprintf(self->moved, sizeof self->moved,
-             "the controller %.40s has made endpoint %02x of %02x; clients that look for the device's own endpoints "
-             "don't find it: use backend usbip or usbredir",
-             self->gadget.udc, given, wanted);
+    snprintf(
+        self->moved, sizeof self->moved,
+        "the controller %.40s gives endpoint %02x in place of %02x; clients that look for the device's own endpoints "
+        "don't find it: use backend usbip or usbredir",
+        self->gadget.udc, given, wanted);
     self->moved_due = 1;
 }
 

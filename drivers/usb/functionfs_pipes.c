@@ -59,7 +59,7 @@ int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const str
     for (unsigned i = 0; i < gadget->part.n_rows && rc == SH_OK; i++)
         for (unsigned k = 0; k < gadget->row[i].n_endpoints && rc == SH_OK; k++) {
             if (pipes->n == FFS_MAX_PIPES) {
-                rc = sh_fail(err, SH_EINPUT, "functionfs: %d endpoints at most", FFS_MAX_PIPES);
+                rc = sh_fail(err, SH_EINPUT, "functionfs: too many endpoints; allowed are up to %d", FFS_MAX_PIPES);
                 break;
             }
             struct ffs_pipe *pipe = &pipes->pipe[pipes->n++];

@@ -113,7 +113,8 @@ static int take_part(struct gadget *gadget, const struct usb_model *model, struc
         const struct usb_function_row *from = &model->function[f];
         if (is_console(from)) {
             if (gadget->tty_number != -1 || f != 0)
-                return sh_fail(err, SH_EINPUT, "functionfs: a device has one console at most, and it comes first");
+                return sh_fail(err, SH_EINPUT,
+                               "functionfs: allowed is one console, before all other interfaces of the device");
             gadget->tty_number = 0;
             continue;
         }
@@ -124,7 +125,8 @@ static int take_part(struct gadget *gadget, const struct usb_model *model, struc
         for (unsigned i = from->first; i < (unsigned)from->first + from->count; i++) {
             gadget->interface[part->n_interfaces] = (uint8_t)i;
             if (usb_find_row(model, i, 1) != NULL)
-                return sh_fail(err, SH_EINPUT, "functionfs: the kernel's FunctionFS knows no alternate settings");
+                return sh_fail(err, SH_EINPUT,
+                               "functionfs: alternate settings are not supported by the kernel's FunctionFS");
             struct usb_interface_row *row = &gadget->row[part->n_rows++];
             *row = *usb_find_row(model, i, 0);
             row->number = part->n_interfaces++;
@@ -143,7 +145,7 @@ static int look_for_configfs(struct sh_err *err)
                        "/sys/kernel/config (as root)",
                        GADGETS);
     if (access(GADGETS, W_OK) != 0)
-        return sh_fail(err, SH_EPERM, "functionfs: %s: %s; gadgets are made by root", GADGETS, strerror(errno));
+        return sh_fail(err, SH_EPERM, "functionfs: %s: %s; only root may make gadgets", GADGETS, strerror(errno));
     return SH_OK;
 }
 

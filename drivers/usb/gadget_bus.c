@@ -41,7 +41,8 @@ static int bind_first_free(struct gadget *gadget, struct sh_err *err)
                        "functionfs: no USB device controller in %s: the machine has none, or its driver is not loaded "
                        "(dwc2 on a Raspberry Pi; dummy_hcd to try without one)",
                        CONTROLLERS);
-    return sh_fail(err, SH_EIO, "functionfs: none of %d device controllers takes the gadget: %s", n, strerror(error));
+    return sh_fail(err, SH_EIO, "functionfs: none of the %d device controllers accepts the gadget: %s", n,
+                   strerror(error));
 }
 
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err)
@@ -49,7 +50,8 @@ int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err)
     if (udc[0] == '\0') return bind_first_free(gadget, err);
     if (bind_to(gadget, udc) == 0) return SH_OK;
     if (errno == ENODEV || errno == ENOENT)
-        return sh_fail(err, SH_EINPUT, "functionfs: no device controller %s; %s lists what there is", udc, CONTROLLERS);
+        return sh_fail(err, SH_EINPUT, "functionfs: there is no device controller %s; %s lists the controllers", udc,
+                       CONTROLLERS);
     return sh_fail(err, SH_EIO, "functionfs: device controller %s: %s", udc, strerror(errno));
 }
 

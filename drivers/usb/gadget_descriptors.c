@@ -110,8 +110,8 @@ static int write_strings(const struct gadget *gadget, int ep0)
 int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err)
 {
     if (write_descriptors(gadget, ep0, id) != 0)
-        return sh_fail(err, SH_EIO, "functionfs: the kernel takes no such descriptors: %s", strerror(errno));
+        return sh_fail(err, SH_EIO, "functionfs: the kernel refuses the descriptors: %s", strerror(errno));
     if (write_strings(gadget, ep0) != 0)
-        return sh_fail(err, SH_EIO, "functionfs: the kernel takes no such strings: %s", strerror(errno));
+        return sh_fail(err, SH_EIO, "functionfs: the kernel refuses the strings: %s", strerror(errno));
     return SH_OK;
 }

@@ -121,7 +121,7 @@ static void on_interface(void *ctx, unsigned interface, int active)
 const char *scanhead_usb_cut(struct scanhead_usb *head)
 {
     static const char *const why[] = {
-        [USB_END_CONFIGURED] = "the host configured the device anew: sessions ended, the device stays plugged in",
+        [USB_END_CONFIGURED] = "the host configured the device again: sessions ended, the device stays plugged in",
         [USB_END_RESET] = "the host reset the bus: sessions ended, the device stays plugged in",
         [USB_END_UNPLUGGED] = "unplugged: sessions ended"};
     if (!head->cut_due) return NULL;

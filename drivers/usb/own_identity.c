@@ -81,9 +81,10 @@ int usb_own_identity(struct usb_identity *id, const char *whose, struct usb_clai
     if (error == 0) error = claim_lowest(name, &place, &claims->place);
     if (error == EADDRINUSE)
         return sh_fail(err, SH_EINPUT,
-                       "usb: %d heads on USB run on this machine; allowed %d: end one, or set links[].serial",
+                       "usb: %d heads on USB run on this machine; allowed are %d: end one, or set links[].serial",
                        USB_MAX_HEADS, USB_MAX_HEADS);
-    if (error != 0) return sh_fail(err, SH_EIO, "usb: no number for this head: %s", strerror(error));
+    if (error != 0)
+        return sh_fail(err, SH_EIO, "usb: no serial number can be chosen for this head: %s", strerror(error));
     put_serial(id, whose, place);
     return SH_OK;
 }

@@ -36,7 +36,7 @@ static void report(struct usb_retry *retry, const char *text, const char *why)
 int usb_retry_start(struct usb_retry *retry)
 {
     retry->reported = 0;
-    report(retry, "the host has detached the device, which plugs itself in again", "");
+    report(retry, "the host has detached the device; it will plug itself in again", "");
     return set_timer(retry, retry->pace_ms);
 }
 

@@ -318,7 +318,8 @@ static int check_model(const struct usb_model *model, struct sh_err *err)
             *of = (uint8_t)number;
         }
         if (i + 1 == model->n_rows && number + 1 != model->n_interfaces)
-            return sh_fail(err, SH_EINPUT, "usb: %u interfaces, and rows for %u", model->n_interfaces, number + 1);
+            return sh_fail(err, SH_EINPUT, "usb: the model has %u interfaces, but rows for %u", model->n_interfaces,
+                           number + 1);
     }
     if (model->n_interfaces == 0 || model->n_interfaces > USB_MAX_INTERFACES)
         return sh_fail(err, SH_EINPUT, "usb: %u interfaces; allowed 1 to %d", model->n_interfaces, USB_MAX_INTERFACES);

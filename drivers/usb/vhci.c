@@ -16,10 +16,10 @@ static int fail(const char *dir, const char *file, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "usbip: %s/%s is not there: load the module, modprobe vhci-hcd (as root)", dir,
                        file);
     if (errno == EACCES || errno == EPERM)
-        return sh_fail(err, SH_EPERM,
-                       "usbip: %s/%s: %s; run as root, or serve on a port and let root attach (usbip attach -r "
-                       "127.0.0.1 -b 1-1)",
-                       dir, file, strerror(errno));
+        return sh_fail(
+            err, SH_EPERM,
+            "usbip: %s/%s: %s; run as root, or serve on a port and attach as root (usbip attach -r 127.0.0.1 -b 1-1)",
+            dir, file, strerror(errno));
     return sh_fail(err, SH_EIO, "usbip: %s/%s: %s", dir, file, strerror(errno));
 }
 

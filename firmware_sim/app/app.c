@@ -120,8 +120,8 @@ static struct line_writer *messages; /* NULL: messages are printed at once */
 
 static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 {
-    snprintf(text, LINE_GAP_BYTES, "%s: %llu messages are missing here: nobody read them\n", app_program,
-             (unsigned long long)lost[LINE_PLAIN]);
+    snprintf(text, LINE_GAP_BYTES, "%s: %llu messages were dropped here: standard error was not read in time\n",
+             app_program, (unsigned long long)lost[LINE_PLAIN]);
 }
 
 int app_begin_messages(struct sh_err *err)
@@ -203,7 +203,7 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
 {
     if (crowded != 0)
         sh_warn(&app_report_stderr,
-                "%llu echoes left out, the weakest: their pulses had more than the head's max_echoes",
+                "%llu echoes left out, the weakest ones: their pulses had more echoes than the head's max_echoes",
                 (unsigned long long)crowded);
     if (unfit != 0)
         sh_warn(&app_report_stderr, "%llu echoes left out, too far from the anchor for the stream's integers",

@@ -104,7 +104,7 @@ static void print_target(const struct site *site, FILE *out)
     if (target->n_objects == 0) return;
     fprintf(out, "target    %u of %u triangles, %u of %u surfaces; the others %s\n", t->triangles, t->all_triangles,
             t->surfaces, t->all_surfaces,
-            target->others == OTHERS_HIDE ? "hide what is behind them and give no points" : "are left out");
+            target->others == OTHERS_HIDE ? "hide surfaces behind them and give no points" : "are left out");
 }
 
 /* Triangles of copies are counted with the others. */
@@ -224,13 +224,13 @@ static int print_section(const char *section)
 static const struct app_option OPTIONS[] = {
     OPTION_SET,
     {APP_FLAG, "scene", NULL, .at = offsetof(struct check_run, scene),
-     .help = "print what was read: objects with triangles, open edges, area, volume and colour, the 50 largest first; "
-             "their sum; those that are open, by name"},
+     .help = "print the objects of the scene: triangles, open edges, area, volume and colour, the 50 largest first; "
+             "their sum; the names of open objects"},
     {APP_TEXT, "scene-csv", "FILE", .at = offsetof(struct check_run, csv), .file = APP_WRITES,
-     .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output, and all "
-             "else goes to standard error"},
+     .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output, and all other output goes "
+             "to standard error then"},
     {APP_TEXT, "scenario", "FILE", .at = offsetof(struct check_run, in.scenario), .file = APP_READS,
-     .help = "with the faults of this file; a bare name is one of config/faults"},
+     .help = "also check the faults of this file; a bare name is one of config/faults"},
     {APP_PRINT, "example", NULL, .apply = print_example,
      .help = "print a configuration with all keys, each with its help and its default, that passes this check"},
     OPTION_END
@@ -240,18 +240,19 @@ static const struct app_option OPTIONS[] = {
 const struct app_command app_check = {
     .name = "check",
     .operand = {"CONFIG"},
-    .summary = "validate configuration, scene and links; nothing runs",
+    .summary = "validate configuration, scene and links without running the head",
     .options = OPTIONS,
     .opens_links = 1,
     .notes =
-        "Prints the scanners, the memory that the scene takes, and where it and each station stand, in every frame\n"
-        "that is known. Opens each link but files and closes it again, so that a taken port or a wrong path shows.\n"
-        "Of a wrong configuration all faults are shown, up to 20, each with its line.\n"
+        "Prints the scanners, the memory that the scene takes, and the places of the scene and of each station in\n"
+        "every known coordinate frame. Opens and closes each link except files, so a taken port or a wrong path "
+        "shows.\n"
+        "If the configuration is wrong, it shows all errors, up to 20, each with its line.\n"
         "\n"
         "--scene: an edge is open where only one triangle of the object has it, with corners at the same place, bit\n"
-        "for bit. A closed body has a volume, below 0 where its faces look inward. Where corners of one side lie in\n"
-        "the middle of edges of the other it is closed, too. In a turned one no edge is open, but faces beside each\n"
-        "other look to different sides.\n"
+        "for bit. A closed body has a volume, below 0 where its faces point inward. It also counts as closed where\n"
+        "corners of one side lie in the middle of edges of the other. A turned body has no open edge, but\n"
+        "neighbouring faces point to opposite sides.\n"
         "\n"
         "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
         "those of head profiles.\n"

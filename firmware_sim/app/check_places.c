@@ -30,7 +30,7 @@ void check_print_anchor(const struct site *site, FILE *out)
                                          [ANCHOR_GEOTIFF] = "geotiff"};
     const int of_station = cfg->scene.anchor.source == ANCHOR_NONE;
     if (!site->anchor.known) {
-        fputs("anchor    none: each station stands for itself, the scene's y axis is its true north\n", out);
+        fputs("anchor    none: each station has a place of its own, with the scene's y axis as its true north\n", out);
         return;
     }
     fprintf(out, "anchor    %s: ", of_station ? "station 1 of the configuration" : source[cfg->scene.anchor.source]);

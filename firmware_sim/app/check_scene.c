@@ -142,7 +142,7 @@ static void print_state(const struct part *p, enum scene_object_state state, FIL
         sh_keep_line(name);
         fprintf(out, "%-9s %s", state_words[state], name);
         if (state == SCENE_OBJECT_OPEN) fprintf(out, ", %" PRIu64 " open edges", o->n_open);
-        if (state == SCENE_OBJECT_TURNED) fputs(", neighbouring faces look to different sides", out);
+        if (state == SCENE_OBJECT_TURNED) fputs(", neighbouring faces point to opposite sides", out);
         putc('\n', out);
     }
     if (n > MAX_ROWS) fprintf(out, "%-9s and %u more; --scene-csv FILE has all\n", state_words[state], n - MAX_ROWS);
@@ -191,7 +191,7 @@ static void print_left_out(const struct parts *parts, FILE *out)
     }
     fprintf(out,
             "left out  %" PRIu64 " triangles without area, %" PRIu64 " points and lines; %" PRIu64
-            " names are cut to %d bytes\n",
+            " names shortened to %d bytes\n",
             all.zero_area, all.not_triangles, all.names_cut, SCENE_NAME_LEN - 1);
 }
 

@@ -59,14 +59,16 @@ const struct app_command app_list = {
     .summary = "head profiles, kinds of links, scenarios, and the heads that USB shows",
     .options = OPTIONS,
     .notes =
-        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n"
+        "Profiles are searched in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n"
         "\n"
-        "Of each profile: how its pulses are arranged, how wide its beam is and how its maker defines that, noise and\n"
-        "accuracy of its ranges, the protocols that speak for it, and its pulse rates. With each rate stand the pulses\n"
-        "that fall into the field of view, echoes per pulse, smallest range and reach. Last are the figures by grade:\n"
-        "from a data sheet, quoted, assumed (config/heads/README.md says what these mean).\n"
+        "For each profile it prints how its pulses are arranged, the width of its beam and how its maker defines it,\n"
+        "noise and accuracy of its ranges, the protocols that support it, and its pulse rates. With each rate it "
+        "prints\n"
+        "the pulses that fall into the field of view, echoes per pulse, smallest range and reach. Last are the "
+        "figures\n"
+        "by grade: from a data sheet, quoted, assumed (config/heads/README.md explains these).\n"
         "\n"
-        "Heads on USB are those with this project's interface. One that shows itself as another maker's device\n"
-        "(links[].protocol scip, cola) is not among them: it looks like a real one.\n",
+        "Heads on USB are those with this project's interface. A head with the USB identity of another maker's device\n"
+        "(links[].protocol scip, cola) is not among them.\n",
     .run = run,
 };

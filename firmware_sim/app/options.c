@@ -50,8 +50,8 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
     char *text = sets->text + sets->used;
     const size_t room = sizeof sets->text - sets->used, n = strlen(key) + strlen(value) + 2;
     if (n > room) {
-        fprintf(stderr, "%s: %s: too long; options that stand for a key have %zu characters in all\n", app_program, key,
-                sizeof sets->text);
+        fprintf(stderr, "%s: %s: the text is too long; all options that set keys share %zu characters\n", app_program,
+                key, sizeof sets->text);
         return APP_USAGE;
     }
     sets->used += (size_t)snprintf(text, room, "%s=%s", key, value) + 1;

@@ -68,7 +68,7 @@ static void print_left(const struct plan_option *left, uint32_t more)
     char method[40], why[sizeof left->why_not + 32];
     snprintf(method, sizeof method, "  not %s", left->method);
     snprintf(why, sizeof why, "%s", left->why_not);
-    if (more != 0) snprintf(why, sizeof why, "%s; the same goes for %u more", left->why_not, more);
+    if (more != 0) snprintf(why, sizeof why, "%s; the same applies to %u more", left->why_not, more);
     print_line("", method, figure, why);
 }
 
@@ -124,35 +124,37 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "Of each stage the cheapest method is used whose bounds hold. The bounds are plan.tolerance_m (RMS of the\n"
+    "For each stage the cheapest method is used whose error keeps the bounds. The bounds are plan.tolerance_m (RMS of "
+    "the\n"
     "ranges) and plan.echo_tolerance (share of the pulses with another number of echoes). beam.mode, optics.depth,\n"
     "cast.sight and output.georef force a method.\n"
     "\n"
     "Beam and optics are tried on some thousands of the head's own pulses in the scene, always the same ones. They\n"
-    "are compared with 1,027 sub-rays, or with the deepest way. The bounds are upper limits of what was found, from\n"
-    "up to four of the stations, for the settings at power-up. Each stage may use the whole tolerance; the stages\n"
-    "are not added up.\n"
+    "are compared with 1,027 sub-rays, or with the deepest path. The bounds are upper limits of the errors found,\n"
+    "from up to four of the stations, for the settings at power-up. Each stage may use the whole tolerance: their\n"
+    "errors are not added up.\n"
     "\n"
-    "sight is a map of what the station sees, made where the pulses of a scan pay for it; head.frames: 0 counts as\n"
-    "an hour. It changes no hit. Its cost is below 0: what it saves per pulse, making it included. Its map orders\n"
-    "surfaces in double where that costs next to nothing.\n"
+    "sight is a visibility map of the station, made where it saves more time than it takes; head.frames: 0 counts\n"
+    "as an hour. It changes no hit. Its cost is below 0: the time saved per pulse, with the time to make it. Its\n"
+    "map orders surfaces in double precision where that costs almost nothing.\n"
     "\n"
     "Where stations have scanners of their own, the plan is that of the scanner of head.station.\n"
     "\n"
     "georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the head's\n"
     "range_max_m. There is one row for all stations where they get the same method, else one row each.\n"
     "\n"
-    "A stage with the method none is left out: nothing in the configuration asks for it. Below each stage stand\n"
-    "the methods that were not chosen, each with its reason.\n"
+    "A stage with the method none is left out: nothing in the configuration asks for it. The lines below each\n"
+    "stage are the methods that were not chosen, each with its reason.\n"
     "\n"
     "The last row, total, is measured on this machine, now. Its cost is the processor time of one cast pulse in ns,\n"
-    "from its direction to its frame. It says how many pulses per second the processors (or loop.threads of them)\n"
-    "compute, and what share of that the configured rate needs. Pulses in the blind part of the sweep are not cast.\n"
+    "from its direction to its frame. It gives the pulses per second that the processors (or loop.threads of them)\n"
+    "compute, and the share of them that the configured rate needs. Pulses in the blind part of the sweep are not "
+    "cast.\n"
     "`run` warns above 80 %. No method is chosen by this row; only its figures differ from call to call.\n"
     "\n"
     "Other costs are in ns per pulse, beyond a single ray. They are rounded figures of `make chart` and\n"
-    "`make bench-beam` on one core with AVX2, to compare methods by. `make bench` measures what depends on the\n"
-    "scene.\n";
+    "`make bench-beam` on one core with AVX2, for comparing methods. `make bench` measures the part that depends\n"
+    "on the scene.\n";
 
 const struct app_command app_plan = {
     .name = "plan",

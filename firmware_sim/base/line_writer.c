@@ -271,8 +271,8 @@ int line_writer_close(struct line_writer *w, const char *last, struct sh_err *er
     pthread_mutex_unlock(&w->lock);
     if (is_stuck) {
         pthread_detach(thread); /* it can't be woken from its write; it frees the writer if that write ever ends */
-        return sh_fail(err, SH_EIO, "%s: %s: nothing was taken for %d s; %llu lines are missing", spec.what, spec.path,
-                       (int)(PATIENCE_NS / 1000000000), (unsigned long long)lost);
+        return sh_fail(err, SH_EIO, "%s: %s: its reader took no data for %d s; %llu lines are missing", spec.what,
+                       spec.path, (int)(PATIENCE_NS / 1000000000), (unsigned long long)lost);
     }
     pthread_join(thread, NULL);
     if (close(spec.fd) != 0 && error == 0) error = errno;

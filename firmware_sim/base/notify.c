@@ -26,9 +26,10 @@ static int read_address(const char *name, struct sockaddr_un *address, socklen_t
 {
     const size_t n = strlen(name);
     if ((name[0] != '/' && name[0] != '@') || n < 2 || n >= sizeof address->sun_path)
-        return sh_fail(err, SH_EINPUT,
-                       "NOTIFY_SOCKET=%s: no socket's name; allowed are a path from / and @NAME, 2 to %zu bytes", name,
-                       sizeof address->sun_path - 1);
+        return sh_fail(
+            err, SH_EINPUT,
+            "NOTIFY_SOCKET=%s: not the name of a socket; allowed are a path from / on and @NAME, 2 to %zu bytes", name,
+            sizeof address->sun_path - 1);
     *address = (struct sockaddr_un){.sun_family = AF_UNIX};
     memcpy(address->sun_path, name, n);
     *len = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + n + (name[0] == '/'));

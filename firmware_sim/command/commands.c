@@ -147,7 +147,7 @@ static int reply_time_of_day(struct command_call *call, const char *text)
 {
     if (text[0] == '\0')
         return command_fail(call, CMD_E_SETTINGS, "%s? %s", call->row->header,
-                            call->dev->recorded != NULL ? "is not possible: the recording does not say it"
+                            call->dev->recorded != NULL ? "is not possible: the recording does not have this value"
                                                         : "needs time.epoch in the configuration");
     return command_reply(call, "%s", text);
 }

@@ -50,8 +50,8 @@ static int take_number(struct command_call *call, int64_t *number)
 
 static int no_such(struct command_call *call, int64_t number)
 {
-    return command_fail(call, CMD_E_RANGE, "%s: there is no fault %u; FAULt:LIST? has those that there are",
-                        call->row->header, (uint32_t)number);
+    return command_fail(call, CMD_E_RANGE, "%s: there is no fault %u; FAULt:LIST? lists the faults", call->row->header,
+                        (uint32_t)number);
 }
 
 int command_fault_clear(struct command_call *call)

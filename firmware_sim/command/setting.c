@@ -208,7 +208,7 @@ static int check_known(struct command_call *call)
     if (read_value(call, &call->dev->settings) !=
         (setting->is_u32 ? (int64_t)COMMAND_NOT_RECORDED_U32 : COMMAND_NOT_RECORDED))
         return 0;
-    return command_fail(call, CMD_E_SETTINGS, "%s: the recording does not say it", call->row->header);
+    return command_fail(call, CMD_E_SETTINGS, "%s: the recording does not have this value", call->row->header);
 }
 
 int command_setting_query(struct command_call *call)

@@ -172,7 +172,7 @@ static int is_sphere(const struct command_device *dev)
 
 static const char *line_why_not(const struct command_device *dev)
 {
-    return dev->limits.emitter == EMITTER_DIRECTIONS ? "the head has a list of directions, and no step" : NULL;
+    return dev->limits.emitter == EMITTER_DIRECTIONS ? "the head has a list of directions, so no step" : NULL;
 }
 
 static const char *pan_why_not(const struct command_device *dev)

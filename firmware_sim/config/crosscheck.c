@@ -129,7 +129,7 @@ static void check_colour(struct cfg_reader *rd, struct config *cfg)
     if (o->colour == COLOUR_FRAME && cfg->platform.kind != PLATFORM_TRAJECTORY &&
         cfg->platform.kind != PLATFORM_STOPS && CFG_SOUND(rd, 0, "platform.kind"))
         cfg_fail_key(rd, "output.colour", 0,
-                     "frame, but there are no frames: platform.kind is %s; allowed with trajectory, stops",
+                     "frame, but points have no frame scalar: platform.kind is %s; allowed with trajectory, stops",
                      cfg_word(rd, "platform.kind", (int)cfg->platform.kind));
 }
 
@@ -209,10 +209,11 @@ static void check_beam(struct cfg_reader *rd, const struct config *cfg)
     else if (cfg->beam.mode == BEAM_ADAPTIVE && why != NULL && CFG_SOUND(rd, 0, "platform.kind"))
         cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto", why);
     else if (cfg_has_profile(rd) && has_footprint && p->pulse_width_ns < LEAST_PULSE_NS)
-        cfg_fail_key(rd, "beam.mode", 0,
-                     "pulse_width_ns of head profile %s is %.10g: too short to tell echoes of a footprint apart; "
-                     "allowed single, or a pulse_width_ns of at least %.10g",
-                     p->name, p->pulse_width_ns, LEAST_PULSE_NS);
+        cfg_fail_key(
+            rd, "beam.mode", 0,
+            "pulse_width_ns of head profile %s is %.10g: too short to separate echoes of a footprint; allowed single, "
+            "or a pulse_width_ns of at least %.10g",
+            p->name, p->pulse_width_ns, LEAST_PULSE_NS);
 }
 
 void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg)
@@ -239,18 +240,19 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
                      "2026-01-01T00:00:00Z",
                      cfg_word(rd, "links[].protocol", cfg->link[link].protocol));
     if (1000 % cfg->gnss.rate_hz != 0 || cfg->gnss.rate_hz == 8)
-        cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate it has; allowed 1, 2, 4, 5, 10 or 20 Hz",
+        cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate of the receiver; allowed 1, 2, 4, 5, 10 or 20 Hz",
                      cfg->gnss.rate_hz);
     if (cfg->gnss.quality == 3)
-        cfg_fail_key(rd, "gnss.quality", 0,
-                     "3 is no fix of position; allowed 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK "
-                     "float");
+        cfg_fail_key(
+            rd, "gnss.quality", 0,
+            "3 is not a fix of position; allowed 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float");
 }
 
 static void check_target(struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg_is_given(rd, "scene.target.others", 0) && cfg->scene.target.n_objects == 0)
-        cfg_fail_key(rd, "scene.target.others", 0, "but there are no scene.target.objects; allowed with objects");
+        cfg_fail_key(rd, "scene.target.others", 0,
+                     "given, but there are no scene.target.objects; allowed with objects");
     for (uint32_t i = 0; i < cfg->scene.target.n_objects; i++)
         if (cfg->scene.target.object[i][0] == '\0')
             cfg_fail_key(rd, "scene.target.objects[]", i, "empty; allowed a name, with * and ?");

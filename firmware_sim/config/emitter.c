@@ -41,7 +41,7 @@ static void check_owners(struct cfg_reader *rd, unsigned emitter)
         if (key->of == 0) continue;
         const int given = cfg_is_given(rd, key->path, 0), has = (key->of & emitter) != 0;
         if (given && !has)
-            cfg_fail_key(rd, key->path, 0, "no key of this emitter; allowed only with emitter: %s",
+            cfg_fail_key(rd, key->path, 0, "this emitter has no such key; allowed only with emitter: %s",
                          words_of(key->of, words, sizeof words));
         else if (!given && has && key->needed)
             cfg_fail_missing(rd, key->path, 0);
@@ -68,8 +68,7 @@ static void set_planar(struct cfg_reader *rd, struct config_profile *p)
         cfg_fail_key(rd, "last_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->last_step,
                      c->steps_per_turn, c->steps_per_turn - 1);
     else if (c->last_step == 0)
-        cfg_fail_key(rd, "last_step", 0,
-                     "0, so that no angle lies between the first step and the last; allowed 1 to %u",
+        cfg_fail_key(rd, "last_step", 0, "0, so no angle lies between the first and the last step; allowed 1 to %u",
                      c->steps_per_turn - 1);
     else if (c->first_step >= c->last_step)
         cfg_fail_key(rd, "first_step", 0, "%u, but last_step is %u; allowed 0 to %u", c->first_step, c->last_step,
@@ -103,7 +102,7 @@ static void set_beams(struct cfg_reader *rd, struct config_profile *p)
                                c->step_direction == TURN_CLOCKWISE ? 1 : -1, &why) != SH_OK)
         cfg_fail_key(rd, "beams", 0, "%s", why.text);
     else if (firing_ns * lines_max_hz > 1e9)
-        cfg_fail_key(rd, "firing_ns", 0, "%.15g ns are longer than a turn at lines_max_hz; allowed up to %.15g ns",
+        cfg_fail_key(rd, "firing_ns", 0, "%.15g ns is longer than a turn at lines_max_hz; allowed up to %.15g ns",
                      firing_ns, 1e9 / lines_max_hz);
     else if (1e9 * c->n_beams / firing_ns > PRR_MOST_HZ)
         cfg_fail_key(rd, "firing_ns", 0, "%u beam%s in %.15g ns make %.10g pulses/s; allowed up to %.10g", c->n_beams,
@@ -162,7 +161,7 @@ static void check_instrument(struct cfg_reader *rd, const struct config *cfg)
     for (size_t i = 0; i < CFG_LEN(of_mirror); i++)
         if (cfg_is_given(rd, of_mirror[i], 0))
             cfg_fail_key(rd, of_mirror[i], 0,
-                         "an error of a mirror, and head profile %s has emitter: %s; allowed with a line head",
+                         "an error of a mirror, but head profile %s has emitter: %s; allowed with a line head",
                          cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
 }
 

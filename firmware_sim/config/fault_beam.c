@@ -41,7 +41,7 @@ static void check_window(struct cfg_reader *rd, const struct config *cfg, uint32
     if (!cfg->signal.on && !is_noisy)
         cfg_fail_key(
             rd, "faults[].kind", i,
-            "window_soiled would change nothing: no signal is modelled, and ranges have no noise; allowed with "
+            "window_soiled would have no effect: no signal is modelled, and ranges have no noise; allowed with "
             "signal.model: on, or noise.range: on and noise.sigma_m above 0");
 }
 

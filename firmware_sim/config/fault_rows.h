@@ -7,29 +7,29 @@
 
     {"faults", .type = CFG_LIST, .min = 0, .max = FAULT_MAX, .offset = FAULT_LIST_AT(fault),
      .size = sizeof(struct fault), .count_offset = FAULT_LIST_AT(n),
-     .help = "What goes wrong on request, the same way each time. What was done is in the file of "
-             "--truth, and in the journal."},
+     .help = "Faults to inject, the same way each time. The record is in the file of --truth, and in the journal."},
     {"faults[]", .type = CFG_MAP, .help = "A fault. Keys that its kind doesn't have are refused."},
     {FAULT(kind), CFG_ENUM, .example = "drop", .names = fault_names,
      .help = "On the wire, at a frame: drop, duplicate, reorder, delay, jitter, truncate, flip, stall, split, merge, "
-             "garbage, disconnect, unplug, usb_reset, endpoint_stall, short_packets; at a reply: no_reply, late_reply, "
-             "wrong_reply, echo; at a connection: refuse, slow_enumeration, descriptor_length. The others are in the "
-             "head, and change what is measured."},
+             "garbage, disconnect, unplug, usb_reset, endpoint_stall, short_packets; at a reply: no_reply, "
+             "late_reply, wrong_reply, echo; at a connection: refuse, slow_enumeration, descriptor_length. All other "
+             "kinds are in the head, and change the measurement."},
     {FAULT(link), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_LINKS,
      .help = "Number of the link, in the order of links, from 1; 0: all links that can have the fault."},
     {FAULT(of), CFG_ENUM, .def = "stream", .names = (const char *const[]){"stream", "notices", NULL},
-     .help = "Which frames are counted, and hit. stream: those that are the same at any pace; notices: telemetry, events "
-             "and repetitions. Units of other protocols are all stream."},
+     .help = "Which stream frames are counted, and hit. stream: those that are the same at any pace; notices: "
+             "telemetry, events and repetitions. All units of other protocols count as stream."},
     {FAULT(at), CFG_COUNT, NULL, "0", 0, 1e15,
-     .help = "At this frame (reply, connection) alone, counted from 1 in each session (connections: on the link). 0: not "
-             "so; from, until and every say at which."},
+     .help = "At this frame (reply, connection) alone, counted from 1 in each session (connections: on the link). 0: "
+             "not used; from, until and every apply."},
     {FAULT(from), CFG_COUNT, NULL, "1", 1, 1e15, .help = "From this frame (reply, connection) on, counted in the same way."},
     {FAULT(until), CFG_COUNT, NULL, "0", 0, 1e15, .help = "Up to this frame (reply, connection), included; 0: without end."},
     {FAULT(every), CFG_COUNT, NULL, "1", 1, 1e15, .help = "At every n-th, beginning with `from`."},
-    {FAULT(probability), CFG_REAL, NULL, "1", 0, 1, .help = "By chance: the share of those that the other keys leave."},
+    {FAULT(probability), CFG_REAL, NULL, "1", 0, 1, .help = "Random choice: the share of the frames that the other "
+                                                            "keys select."},
     {FAULT(count), CFG_COUNT, NULL, "0", 0, 1e15,
-     .help = "At most so many times; 0: no limit. It counts in each session. At connections, and for disconnect, unplug, "
-             "usb_reset, endpoint_stall and short_packets, it counts on the link."},
+     .help = "Largest number of times; 0: no limit. It counts in each session. At connections, and for disconnect, "
+             "unplug, usb_reset, endpoint_stall and short_packets, it counts on the link."},
     {FAULT(from_pulse), CFG_COUNT, NULL, "0", 0, 1e17,
      .help = "From this pulse of a scan on, counted from 0. Then only frames of points are hit."},
     {FAULT(until_pulse), CFG_COUNT, NULL, "", 0, 1e17, .example = "1000000",
@@ -38,29 +38,31 @@
      .help = "From this device time on, since power-up (FAULt:ADD: since the command)."},
     {FAULT(until_s), CFG_REAL, "s", "0", 0, 1e8, .help = "Before this device time; 0: without end."},
     {FAULT(seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0,
-     .help = "Seed of its random numbers. They depend on its place in the list and on the link, too."},
+     .help = "Seed of its random numbers. They also depend on its place in the list and on the link."},
     {FAULT(n), CFG_COUNT, NULL, "0", 0, 1e9,
-     .help = "How many. duplicate: copies more, up to 100; reorder: frames that overtake it at most, up to 1000; truncate: "
-             "bytes that are missing, up to 1e6 (0: any number); flip: bits, up to 1000; split: writes, up to 64; merge: "
-             "frames, up to 64; garbage: bytes, up to 1024; short_packets: transfers, up to 1e6; descriptor_length: bytes "
-             "more, up to 1000; counters_high: counts below the wrap. 0 stands for 1; of split and merge for 2, of "
-             "garbage for 16."},
+     .help = "Number. duplicate: additional copies, up to 100; reorder: most frames that overtake it, up to 1000; "
+             "truncate: missing bytes, up to 1e6 (0: any number); flip: bits, up to 1000; split: writes, up to 64; "
+             "merge: frames, up to 64; garbage: bytes, up to 1024; short_packets: transfers, up to 1e6; "
+             "descriptor_length: additional bytes, up to 1000; counters_high: counts below the wrap. 0 stands for 1; "
+             "of split and merge for 2, of garbage for 16."},
     {FAULT(byte), CFG_COUNT, NULL, "", 0, 1e9, .example = "30",
-     .help = "flip: the bits are of this byte of the frame, counted from 0; when not given, of any."},
+     .help = "flip: byte of the frame whose bits are changed, counted from 0; when not given, any byte."},
     {FAULT(reseal), CFG_BOOL, .def = "off",
-     .help = "flip: the checksums are made right again, so that no reader can see it by them. Then only what is measured "
-             "is hit; of native frames the payload. Without reseal a datagram (udp) is not sent: its reader's system "
-             "would drop it."},
+     .help = "flip: the checksums are corrected afterwards, so that readers can't detect the fault by them. Then only "
+             "measured data are changed; in native frames the payload. Without reseal a datagram (udp) is not sent: "
+             "its reader's system would drop it."},
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
-     .help = "How long; jitter: at most. On the wire a time of the clock, in the head device time."},
+     .help = "Duration; jitter: the largest one. On the wire it is time of the clock, in the head device time."},
     {FAULT(factor), CFG_REAL, NULL, "0.5", 0.01, 2, .help = "mirror_slow: the mirror's speed is multiplied by it."},
     {FAULT(deg), CFG_REAL, "deg", "1", -180, 180,
-     .help = "pan_slip: the beam goes so much farther than the encoder; mirror_wobble: at most so much to either side."},
+     .help = "pan_slip: how much farther the beam goes than the encoder; mirror_wobble: largest deviation to either "
+             "side."},
     {FAULT(hz), CFG_REAL, "Hz", "10", 0.01, 1000, .help = "mirror_wobble: how often per second."},
     {FAULT(loss_db), CFG_REAL, "dB", "3", 0, 60,
      .help = "window_soiled: loss of optical power, both ways together."},
-    {FAULT(jump_s), CFG_REAL, "s", "1", -1e6, 1e6, .help = "clock_jump: the time of day goes forward by so much; below 0, back."},
-    {FAULT(ppm), CFG_REAL, "ppm", "100", -1e5, 1e5, .help = "clock_drift: the time of day gains so much."},
+    {FAULT(jump_s), CFG_REAL, "s", "1", -1e6, 1e6, .help = "clock_jump: how much the time of day goes forward; below "
+                                                           "0: back."},
+    {FAULT(ppm), CFG_REAL, "ppm", "100", -1e5, 1e5, .help = "clock_drift: how fast the time of day gains."},
 #undef FAULT
 #undef FAULT_MEMBER
 #undef FAULT_LIST_AT

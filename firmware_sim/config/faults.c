@@ -124,14 +124,16 @@ static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t 
                      "%s needs for_ms; allowed above 0 to 1e8 ms", name);
     if (f->at != 0 && (cfg_is_given(rd, "faults[].from", i) || cfg_is_given(rd, "faults[].until", i) ||
                        cfg_is_given(rd, "faults[].every", i)))
-        cfg_fail_key(rd, "faults[].at", i, "is one number alone; allowed without from, until and every");
+        cfg_fail_key(rd, "faults[].at", i, "is a single number; allowed only without from, until and every");
     if (f->until != 0 && f->until < f->from)
-        cfg_fail_key(rd, "faults[].until", i, "is before from, which is %llu; allowed that or more",
+        cfg_fail_key(rd, "faults[].until", i, "is before from, which is %llu; allowed is that number or more",
                      (unsigned long long)f->from);
     if (f->until_s > 0.0 && f->until_s <= f->from_s)
-        cfg_fail_key(rd, "faults[].until_s", i, "is not after from_s, which is %.10g s; allowed more", f->from_s);
+        cfg_fail_key(rd, "faults[].until_s", i, "is not after from_s, which is %.10g s; allowed is a later time",
+                     f->from_s);
     if (f->until_pulse < f->from_pulse)
-        cfg_fail_key(rd, "faults[].until_pulse", i, "is before from_pulse, which is %llu; allowed that or more",
+        cfg_fail_key(rd, "faults[].until_pulse", i,
+                     "is before from_pulse, which is %llu; allowed is that number or more",
                      (unsigned long long)f->from_pulse);
 }
 
@@ -197,7 +199,7 @@ int config_add_scenario(struct config *cfg, const char *name, struct config_faul
     config_name_scenarios(known, sizeof known);
     int code = SH_OK;
     if (!is_there)
-        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed a file, as a path, or %s", known);
+        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed the path of a file, or %s", known);
     else if (list == NULL)
         code = cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory");
     else

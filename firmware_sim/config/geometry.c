@@ -44,11 +44,11 @@ static void check_one(struct cfg_reader *rd, const struct config_profile *p, uin
     else if (!divides_all(&p->arrangement, g->steps_per_turn))
         cfg_fail_key(
             rd, "geometries[].steps_per_turn", i,
-            "%u; allowed what divides steps_per_turn, %u, into a whole number that divides first_step, last_step "
-            "and front_step, too",
+            "%u; steps_per_turn, %u, divided by it must be a whole number that also divides first_step, last_step and "
+            "front_step",
             g->steps_per_turn, p->arrangement.steps_per_turn);
     else if (stands_before(&p->arrangement, i))
-        cfg_fail_key(rd, "geometries[].lines_hz", i, "this geometry stands there before; allowed once");
+        cfg_fail_key(rd, "geometries[].lines_hz", i, "this geometry is given twice; allowed once");
 }
 
 void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *p)

@@ -54,30 +54,33 @@ static const struct cfg_key config_keys[] = {
     {"head.lines_hz", SETTING(lines_uhz), CFG_MICRO, "Hz", "@lines_max_hz", WITHIN("lines_min_hz", "lines_max_hz"),
      .help = "Lines per second, at most one per pulse. Turns per second of a planar or a spinning head."},
     {"head.pan_deg_s", SETTING(pan_udeg_s), CFG_MICRO, "deg/s", "@pan_max_deg_s", 0, 9e12, NULL, "pan_max_deg_s",
-     .help = "Pan speed. 0: the pan stands still, each line is a frame."},
+     .help = "Pan speed. 0: the pan stands still, and each line counts as a frame (a pan sweep)."},
     {"head.line_start_deg", SETTING(line_start_udeg), CFG_MICRO, "deg", "@fov_min_deg",
-     WITHIN("fov_min_deg", "fov_max_deg"), .help = "First line angle cast: 0 forward, 90 up, above 90 backward. Of a planar head: from its front step, in the "
-             "direction of its steps; of beams and spheres an azimuth, 0 to 360."},
+     WITHIN("fov_min_deg", "fov_max_deg"), .help = "First line angle cast: 0 forward, 90 up, above 90 backward. A "
+             "planar head counts it from its front step, in the direction of its steps. For beams and spheres it is "
+             "an azimuth, 0 to 360."},
     {"head.line_stop_deg", SETTING(line_stop_udeg), CFG_MICRO, "deg", "@fov_max_deg",
-     WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast; above the first one, but of a sphere: 350 to 10 goes across 0."},
+     WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast, above the first one. On a sphere it may be "
+             "below: 350 to 10 goes across 0."},
     {"head.step_deg", IN_CONFIG(head.step_udeg), CFG_MICRO, "deg", "", 0.01, 90, .example = "0.1",
-     .help = "sphere: from pulse to pulse and from ring to ring, in place of the profile's. Rounded to whole steps of a turn "
-             "and of half a turn, which is said. planar: one of the profile's geometries."},
+     .help = "sphere: angle from pulse to pulse and from ring to ring, in place of the profile's. It is rounded to "
+             "whole steps of a turn and of half a turn; a warning gives the rounded step. planar: one of the "
+             "profile's geometries."},
     {"head.ring_start_deg", IN_CONFIG(head.ring_start_udeg), CFG_MICRO, "deg", "-90", -90, 90,
-     .help = "sphere: elevation of the lowest ring. Rings outside of the limits are no lines and cost no time."},
+     .help = "sphere: elevation of the lowest ring. Rings outside of the limits are not scanned and take no time."},
     {"head.ring_stop_deg", IN_CONFIG(head.ring_stop_udeg), CFG_MICRO, "deg", "90", -90, 90,
-     .help = "sphere: elevation of the highest ring. As ring_start_deg: one ring, a circle, at just that elevation."},
+     .help = "sphere: elevation of the highest ring. If it equals ring_start_deg there is one ring, a circle."},
     {"head.pan_start_deg", SETTING(pan_start_udeg), CFG_MICRO, "deg", "@pan_min_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
     {KEY(head.range_min_m), CFG_REAL, "m", "@range_min_m", 0, 1e5,
      .allowed = "range_min_m to range_max_m of the head profile, in m",
-     .help = "Nothing nearer is an echo: such pulses are shots without echo. It holds at every pulse rate, where the "
-             "profile doesn't have a larger one."},
+     .help = "Pulses that hit something nearer are shots without echo. It applies at every pulse rate for which the "
+             "profile doesn't have a larger limit."},
     {KEY(head.range_max_m), CFG_REAL, "m", "@range_max_m", 0, 1e5,
      .allowed = "range_min_m to range_max_m of the head profile, in m",
-     .help = "Nothing farther is an echo, likewise. The descriptor on the wire has these limits."},
+     .help = "Pulses that hit something farther are shots without echo. The descriptor on the wire has these limits."},
     {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
      .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
@@ -86,12 +89,12 @@ static const struct cfg_key config_keys[] = {
     {KEY(head.ambiguity), CFG_ENUM, .def = "none",
      WORDS([DETECT_AMBIGUITY_NONE] = "none", [DETECT_FOLDED] = "folded", [DETECT_RESOLVED] = "resolved"),
      .help = "Echoes from beyond c / (2 prr_hz), which return after the next pulse. none: they have their true range; "
-             "folded: their range is less by whole zones; resolved: they have their true range, within mta_zones. "
+             "folded: their range is shorter by whole zones; resolved: they have their true range, within mta_zones. "
              "folded and resolved lose echoes that return within range_min_m after a pulse."},
     {KEY(head.mta_zones), CFG_COUNT, NULL, "8", 1, 1000,
-     .help = "resolved: zones of c / (2 prr_hz) that the head tells apart; nothing is seen beyond them."},
+     .help = "resolved: number of zones of c / (2 prr_hz) that the head can resolve; it detects nothing beyond them."},
     {KEY(head.name), CFG_TEXT, .def = "", .example = "north-gate", .flags = CFG_ASCII,
-     .help = "What its user calls the head, for protocols that can ask for it (cola: LocationName)."},
+     .help = "The user's name of the head, for protocols that can ask for it (cola: LocationName)."},
     {KEY(head.start), CFG_BOOL, .def = "off",
      .help = "on: `scanhead run` scans at once when the head has booted, as with --start."},
 
@@ -104,13 +107,13 @@ static const struct cfg_key config_keys[] = {
     {KEY(output.utm_zone), CFG_COUNT, NULL, "0", 0, 60,
      .help = "UTM zone, only with crs: utm; 0: by position, UPS near the poles."},
     {KEY(output.layout), CFG_ENUM, .def = "polar", WORDS([LINE_POLAR] = "polar", [LINE_GEO] = "geo"),
-     .help = "polar: range and encoders, as a head measures; geo: coordinates from the anchor."},
+     .help = "polar: range and encoder angles, as a head measures; geo: coordinates relative to the anchor."},
     {KEY(output.heights), CFG_ENUM, .def = "ellipsoid",
      WORDS([HEIGHTS_ELLIPSOID] = "ellipsoid", [HEIGHTS_GEOID] = "geoid", [HEIGHTS_AUTO] = "auto"),
      .help = "Heights of utm and geodetic points. geoid needs GeographicLib's data; auto uses them where they are "
              "installed."},
     {KEY(output.tolerance_m), CFG_REAL, "m", "", 1e-7, 1, .example = "1e-6",
-     .help = "What georeferencing may add to a point's error; the cheapest method that holds it is used. When not "
+     .help = "Largest error that georeferencing adds to a point; the cheapest method that keeps it is used. When not "
              "given: a thousandth of plan.tolerance_m, but at least 1e-7 m."},
     {KEY(output.georef), CFG_ENUM, .def = "auto",
      WORDS([GEOREF_AUTO] = "auto", [GEOREF_EXACT] = "exact", [GEOREF_ORDER1] = "order1", [GEOREF_ORDER2] = "order2",
@@ -123,23 +126,23 @@ static const struct cfg_key config_keys[] = {
      WORDS([COLOUR_NONE] = "none", [COLOUR_SOLID] = "solid", [COLOUR_RANGE] = "range", [COLOUR_HEIGHT] = "height",
            [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label", [COLOUR_FRAME] = "frame",
            [COLOUR_TEXTURE] = "texture"),
-     .help = "Colours of points. Other than none: each points frame is followed by one of 3 bytes a point; recordings "
-             "have them. range, height, frame (of a trajectory): blue, green, yellow, red between two limits; "
-             "reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit, where "
-             "there is none the mesh's colour, or else grey."},
+     .help = "Colours of points. With any value but none each points frame is followed by one with 3 bytes a point; "
+             "recordings have them. range, height, frame (of a trajectory): blue, green, yellow, red between two "
+             "limits; reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit; "
+             "without a texture the mesh's colour, without a colour grey."},
     {KEY(output.colour_rgb), CFG_VEC3, NULL, "[255, 255, 255]", 0, 255,
      .help = "The colour of colour: solid: red, green and blue, whole numbers."},
     {KEY(output.colour_limits), CFG_PAIR, NULL, "", -1e9, 1e9, .example = "[0, 30]",
      .help = "Limits of colour: range (m), height (m, z of the scene's frame) or frame. Not given: a stream takes the "
-             "head's range limits, the scene's lowest and highest point, the first and last frame of the trajectory; a "
-             "recording the smallest and largest figure in it."},
+             "head's range limits, the scene's lowest and highest point, the first and last frame of the trajectory; "
+             "a recording the smallest and largest value in it."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
      .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
-             "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as "
-             "much."},
+             "bits, a coordinate into 31. automatic: 1e-6 m for ranges up to 4294 m (geo: 2147 m), ten times as much "
+             "for each tenfold range."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
-     .help = "Where the head can be reached; none is needed to record off line."},
+     .help = "Links by which clients reach the head; recording off line needs none."},
     {"links[]", .type = CFG_MAP, .help = "A link."},
     {LINK(type), CFG_ENUM, .example = "tcp",
      WORDS([LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb",
@@ -149,41 +152,34 @@ static const struct cfg_key config_keys[] = {
      WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", [PROTOCOL_SCIP] = "scip", [PROTOCOL_COLA] = "cola",
            [PROTOCOL_VELODYNE] = "velodyne", [PROTOCOL_VELODYNE_POSITION] = "velodyne-position",
            [PROTOCOL_VELODYNE_HTTP] = "velodyne-http"),
-     .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in; scip: as a "
-             "Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, velodyne-position: position "
-             "packets, velodyne-http: settings, as a VLP-16."},
+     .help = "native: the head's own stream and commands; nmea: the GNSS receiver, which sends NMEA 0183 and takes no "
+             "commands; scip: as a Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, "
+             "velodyne-position: position packets, velodyne-http: settings, as a VLP-16."},
     {LINK(path), CFG_PATH, .def = "", .flags = CFG_WRITTEN, .example = "port",
      .of = CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_USB), .of_backend = CFG_KIND(USB_BACKEND_USBREDIR),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
      .of = NETWORK, .of_backend = SOCKETS,
-     .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 when "
+     .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 "
+             "when "
              "not given."},
     {LINK(port), CFG_COUNT, NULL, "0", 0, 65535,
      .of = NETWORK, .of_backend = SOCKETS,
-     .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
+     .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's "
+             "(required)."},
     {LINK(interface), CFG_TEXT, .def = "", .example = "eth1", .of = CFG_KIND(LINK_UDP),
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
-             "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still say where packets to other addresses go: "
-             "to bind a socket to an interface takes a privilege."},
-    {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP),
-     .help = "udp: numeric address of this machine that packets come from, so that receivers tell heads apart. When not "
-             "given: the interface's, or as the system chooses; but the address after the receiver's where that is on "
-             "the loopback and has the source's port."},
-    {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP),
-     .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position "
-             "8308, as the device's, or another with a warning where these can't be had; but without source and interface "
-             "the system chooses for a receiver on this machine. One that listens on the same port at all addresses "
-             "must share it (SO_REUSEADDR)."},
-    {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4", .of = CFG_KIND(LINK_UDP),
-     .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the system's."},
+ "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still say where "
+ "packets to other addresses go: binding a socket to an interface needs a privilege."}, {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP), .help = "udp: numeric address of this machine that packets come from, so that receivers can distinguish heads. When not given: the interface's, or as the system chooses; but the address after the receiver's where that is on the loopback and has the source's port."}, {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP), .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position 8308, as the device's, or another with a warning where these are taken; but without source and interface the system chooses for a receiver on this machine. One that listens on the same port at all addresses must share it (SO_REUSEADDR)."}, {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4", .of = CFG_KIND(LINK_UDP),
+     .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the "
+             "system's."},
     {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, .of = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_WEB),
      .help = "tcp, web: clients at a time; scip, when not given: 1."},
     {LINK(waits), CFG_ENUM, .def = "by-type",
      WORDS([LINK_WAITS_BY_TYPE] = "by-type", [LINK_WAITS_YES] = "yes", [LINK_WAITS_NO] = "no"),
-     .help = "Whether a reader that can't follow holds back the paces fast and step; no: it loses frames, as in real "
-             "time. by-type: those of web links lose, all others hold back."},
+     .help = "Whether a slow reader holds back the head in the paces fast and step. yes: it does; no: it loses "
+             "frames, as in real time; by-type: readers of web links lose frames, all others hold back."},
     {LINK(backend), CFG_ENUM, .def = "usbip",
      WORDS([USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs"),
      .of = CFG_KIND(LINK_USB),
@@ -205,9 +201,18 @@ static const struct cfg_key config_keys[] = {
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
-    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB),
-     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
-             "are this head's own on this machine; with scip none, as the device. Only the USB device has them, not *IDN?."},
+ {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB), .help = "usb: serial number. "
+                                                                                              "When not given: "
+                                                                                              "head.serial where that "
+                                                                                              "is given, else "
+                                                                                              "SIM-0001 and eight "
+                                                                                              "digits that identify "
+                                                                                              "this head on this "
+                                                                                              "machine; with scip "
+                                                                                              "none, as the real "
+                                                                                              "device. Only the USB "
+                                                                                              "device has these "
+                                                                                              "digits, not *IDN?."},
 
 #include "firmware_sim/config/measurement_rows.h"
 
@@ -219,9 +224,9 @@ static const struct cfg_key config_keys[] = {
     {KEY(loop.ahead_ms), CFG_REAL, "ms", "64", 2, 90,
      .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam."},
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,
-     .help = "How much of the stream is kept for a link whose reader is slow."},
+     .help = "How much of the stream is stored for a link whose reader is slow."},
     {KEY(loop.late_ms), CFG_REAL, "ms", "100", 0, 10000,
-     .help = "Blocks that are later than this are not sent: their pulses are lost, counted and announced."},
+     .help = "Blocks of points that are later than this are not sent: their pulses are lost, counted and announced."},
     {KEY(loop.threads), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_THREADS, .help = "Casting threads; 0: one per processor."},
     {KEY(loop.pace), CFG_ENUM, .def = "realtime",
      WORDS([PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"),
@@ -232,11 +237,12 @@ static const struct cfg_key config_keys[] = {
     {KEY(time.epoch), CFG_TEXT, .def = "none",
      .allowed = "none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
      .help = "Time of power-up: a date (UTC), or utc or tai for the system's clock at that moment; none: the head "
-             "doesn't know the time."},
+             "doesn't know the time of day."},
     {KEY(time.offset_s), CFG_REAL, "s", "0", -1e6, 1e6,
-     .help = "The head's clock is ahead of the true time by this. It shows in UTC, GPS time and PPS of the head, not "
-             "in those of the receiver."},
-    {KEY(time.drift_ppm), CFG_REAL, "ppm", "0", -1000, 1000, .help = "The head's clock gains this, from power-up."},
+     .help = "The head's clock is ahead of the true time by this much. It shows in UTC, GPS time and PPS of the head, "
+             "not in those of the receiver."},
+    {KEY(time.drift_ppm), CFG_REAL, "ppm", "0", -1000, 1000, .help = "The head's clock runs fast by this, from "
+                                                                     "power-up."},
     {KEY(time.jump_s), CFG_REAL, "s", "0", -1e6, 1e6, .help = "The head's clock jumps ahead by this, once."},
     {KEY(time.jump_at_s), CFG_REAL, "s", "0", 0, 1e8, .help = "Time of the jump, after power-up."},
 
@@ -244,7 +250,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(gnss.rate_hz), CFG_COUNT, "Hz", "1", 1, 20, .allowed = "1, 2, 4, 5, 10 or 20 Hz",
      .help = "Positions per second."},
     {KEY(gnss.talker), CFG_ENUM, .def = "GN", WORDS([TALKER_GN] = "GN", [TALKER_GP] = "GP"),
-     .help = "First letters of its sentences."},
+     .help = "First letters (talker) of its sentences."},
     {KEY(gnss.quality), CFG_COUNT, NULL, "1", 0, 5,
      .allowed = "0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float",
      .help = "Quality of the fix, as in GGA."},
@@ -254,9 +260,10 @@ static const struct cfg_key config_keys[] = {
      .help = "One sigma of the noise east, north and up, independent from position to position; reproducible by "
              "noise.seed. 0: exact."},
     {KEY(gnss.lever_arm_m), CFG_VEC3, "m", "[0, 0, 0]", -100, 100,
-     .help = "The antenna from the head's origin, in the head's frame: right, forward, up."},
+     .help = "Position of the antenna relative to the head's origin, in the head's coordinate frame: right, forward, "
+             "up."},
     {KEY(gnss.geoid_separation_m), CFG_REAL, "m", "0", -120, 120,
-     .help = "Height of the geoid above the ellipsoid: altitude in GGA is the ellipsoidal height less this."},
+     .help = "Height of the geoid above the ellipsoid: altitude in GGA is the ellipsoidal height minus this."},
 
 #include "firmware_sim/config/fault_rows.h"
 };

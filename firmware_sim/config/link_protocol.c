@@ -111,8 +111,8 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
     place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,
-                     "%s can't speak for head profile %s%s, whose emitter is %s; allowed emitters: %s", ops->name,
-                     cfg->profile.name, where, emitter_names[emitter->kind], allowed);
+                     "protocol %s does not support head profile %s%s, whose emitter is %s; allowed emitters: %s",
+                     ops->name, cfg->profile.name, where, emitter_names[emitter->kind], allowed);
     else
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
@@ -137,7 +137,7 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
         return;
     }
     if (!is_spoken_on(link)) {
-        cfg_fail_key(rd, PROTOCOL_KEY, i, "%s is not spoken on a %s link; allowed %s", ops->name,
+        cfg_fail_key(rd, PROTOCOL_KEY, i, "protocol %s is not available on a %s link; allowed %s", ops->name,
                      cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
         return;
     }

@@ -13,38 +13,39 @@
              "apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
-     .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
+     .help = "Which echoes of a pulse are sent. Echoes of glass and of surfaces behind it are among them."},
 
-    {"cast", .type = CFG_MAP, .help = "How a ray finds what it meets."},
+    {"cast", .type = CFG_MAP, .help = "How rays find the surfaces that they hit."},
     {KEY(cast.sight), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
-     .help = "on: before a scan the head maps what its station sees of each direction, and looks rays up in that. Only "
-             "where head and beam stand still, and no texture cuts holes. Hits are the same, to the last bit. off: the "
-             "BVH is asked for each ray. auto: on where the scan's pulses pay for the map, as `scanhead plan` says."},
+     .help = "on: before a scan the head makes a visibility map of its station and looks rays up in it. This works "
+             "only where head and beam stand still, and no texture cuts holes. Hits are the same, to the last bit. "
+             "off: each ray goes to the BVH. auto: on where the map saves more time than it takes, as `scanhead plan` "
+             "says."},
     {KEY(cast.sight_mib), CFG_REAL, "MiB", "64", 1, 65536,
-     .help = "Memory that the maps of all stations may take together, also while they are made. Directions that don't "
-             "fit are left to the BVH."},
+     .help = "Memory that the maps of all stations may take together, also while they are made. Rays in directions "
+             "that don't fit go to the BVH."},
 
     {"coverage", .type = CFG_MAP, .help = "How `scanhead coverage` cuts the scene's surface."},
     {KEY(coverage.cell_m), CFG_REAL, "m", "0.25", 1e-4, 1e4,
-     .help = "Size of a cell. A cell is seen where a pulse meets it, so it should be several times as wide as the points "
-             "are apart."},
+     .help = "Size of a cell. A cell is seen where a pulse hits it, so it should be several times as wide as the "
+             "distance between points."},
     {KEY(coverage.memory_mib), CFG_REAL, "MiB", "2048", 1, 1048576,
-     .help = "Memory that cells, or a mesh of them, may take. Cells too small for that are refused."},
+     .help = "Memory that cells, or a mesh of them, may take. Cells that need more are refused."},
 
     {"plan", .type = CFG_MAP,
-     .help = "Tolerances. Each stage uses the cheapest method that holds them (`scanhead plan`)."},
+     .help = "Tolerances. Each stage uses the cheapest method that keeps them (`scanhead plan`)."},
     {"plan.tolerance_m", IN_CONFIG(plan.range_m), CFG_REAL, "m", "1e-3", 1e-6, 1,
-     .help = "RMS error of the echo ranges, against a footprint of 1,000 sub-rays."},
+     .help = "RMS error of the echo ranges, compared with a footprint of 1,000 sub-rays."},
     {"plan.echo_tolerance", IN_CONFIG(plan.echo_share), CFG_REAL, NULL, "1e-3", 1e-4, 1,
      .help = "Share of the pulses that may have another number of echoes than with 1,000 sub-rays. The plan's sample "
-             "is too small to show less than 1e-3."},
+             "is too small to show smaller shares than 1e-3."},
 
     {"noise", .type = CFG_MAP, .help = "Noise of the measurement."},
     {KEY(noise.range), CFG_ENUM, .def = "off",
      WORDS([RANGE_NOISE_OFF] = "off", [RANGE_NOISE_ON] = "on", [RANGE_NOISE_SIGNAL] = "signal"),
-     .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that figure holds at "
-             "range_sigma_at_m, and noise grows as the signal fades (signal.model: on); off: exact ranges."},
+     .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that value applies at "
+             "range_sigma_at_m, and noise grows as the signal gets weaker (signal.model: on); off: exact ranges."},
     {KEY(noise.sigma_m), CFG_REAL, "m", "@range_sigma_m", 0, 10,
      .help = "One sigma of the range noise, its fixed part, in place of the profile's range_sigma_m. With a signal model "
              "at least the profile's range_sigma_floor_m."},
@@ -57,33 +58,34 @@
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
     {KEY(noise.ball.distance_1_m), CFG_REAL, "1/m", "0", 0, 100,
      .help = "The radius grows by this share of itself per metre of range."},
-    {KEY(noise.ball.factor), CFG_VEC3, NULL, "[1, 1, 1]", 0, 1000, .help = "Stretches the ball along its axes."},
+    {KEY(noise.ball.factor), CFG_VEC3, NULL, "[1, 1, 1]", 0, 1000, .help = "Factors that stretch the ball along its "
+                                                                           "axes."},
     {"noise.ball.axes", IN_CONFIG(noise.ball.local), CFG_ENUM, .def = "scene", WORDS("scene", "beam"),
-     .help = "Its axes: x, y, z of the scene; or of the beam: along it, to the right, up."},
+     .help = "Axes of the ball: x, y, z of the scene; or of the beam: along it, to the right, up."},
     {KEY(noise.ball.seed), CFG_COUNT, NULL, "", 0, 18446744073709551615.0, .example = "1",
      .help = "Seed of the ball's random numbers; noise.seed when not given."},
 
-    {"signal", .type = CFG_MAP, .help = "What comes back: amplitude, reflectance, detection threshold."},
+    {"signal", .type = CFG_MAP, .help = "The returned signal: amplitude, reflectance, detection threshold."},
     {"signal.model", IN_CONFIG(signal.on), CFG_BOOL, .def = "off",
-     .help = "on: amplitude by the range equation, reflectance in the points, and targets vanish beyond the reaches of "
-             "the profile; off: each hit within the largest range is an echo, without reflectance."},
+     .help = "on: amplitude by the range equation, reflectance in the points, and targets beyond the profile's "
+             "reaches are not detected; off: each hit within the largest range is an echo, without reflectance."},
     {"signal.detection", IN_CONFIG(signal.sharp), CFG_ENUM, .def = "noisy", WORDS("noisy", "sharp"),
-     .help = "noisy: by chance near the threshold, half of the pulses at the profile's reach; sharp: all up to the "
-             "reach, none beyond."},
+     .help = "noisy: detection is random near the threshold, half of the pulses at the profile's reach; sharp: all "
+             "pulses up to the reach, none beyond."},
     {KEY(signal.reflectance), CFG_REAL, NULL, "0.5", 0, 1,
      .help = "Reflectance of surfaces that have no texture or colour in the mesh and no reflectance in surfaces."},
     {KEY(signal.visibility_m), CFG_REAL, "m", "0", 0, 1e6,
-     .help = "Visibility of the air, for its extinction at the profile's wavelength; 0: as the profile's reaches have "
-             "it."},
+     .help = "Visibility of the air, for its extinction at the profile's wavelength; 0: the visibility of the "
+             "profile's reaches."},
     {KEY(signal.extinction_1_km), CFG_REAL, "1/km", "", 0, 1000, .example = "0.5",
      .help = "Extinction of the air (absorption and scattering), in place of visibility_m."},
 
     {"surfaces", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_SURFACES, LIST_OF(surface, n_surfaces),
-     .help = "Properties of surfaces, by name. The first entry that fits counts; what it leaves out is as without an "
-             "entry."},
+     .help = "Properties of surfaces, by name. The first entry that fits counts; members that it leaves out have "
+             "their defaults."},
     {"surfaces[]", .type = CFG_MAP, .help = "An entry."},
-    {RULE(material), CFG_TEXT, .def = "*", .help = "Material's name; * and ? stand for others, as in a shell."},
-    {RULE(object), CFG_TEXT, .def = "*", .help = "Object's name, in the same way."},
+    {RULE(material), CFG_TEXT, .def = "*", .help = "Material's name; * and ? are wildcards, as in a shell."},
+    {RULE(object), CFG_TEXT, .def = "*", .help = "Object's name, with the same wildcards."},
     {SURFACE(reflectance), CFG_REAL, NULL, "", 0, 1, .example = "0.4",
      .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture or colour."},
     {SURFACE(specular), CFG_REAL, NULL, "", 0, 1, .example = "0.1", .help = "Share that is reflected in a lobe."},
@@ -93,23 +95,24 @@
      .help = "Retro-reflector: its signal is that of a white target times this, at any incidence; foils have 100 to "
              "1000."},
     {SURFACE(glass), CFG_REAL, NULL, "", 0, 1, .example = "0.9",
-     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes. It counts "
-             "on the way there and back: beyond two surfaces (a pane) of 0.9 an echo has 0.9^4 of its power."},
+     .help = "Share of the power that passes through each surface. Both the pane and the surface behind it give "
+             "echoes. The share counts on the way there and back: behind two surfaces (a pane) of 0.9 an echo has "
+             "0.9^4 of its power."},
     {SURFACE(mirror), CFG_REAL, NULL, "", 0, 1, .example = "0.9",
-     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own. It counts on the way "
-             "there and back: in a mirror of 0.9 an echo has 0.81 of its power."},
+     .help = "Share of the power that is mirrored. It gives ghost points, which have labels of their own. The share "
+             "counts on the way there and back: in a mirror of 0.9 an echo has 0.81 of its power."},
 
-    {"optics", .type = CFG_MAP, .help = "Pulses that meet glass or a mirror."},
+    {"optics", .type = CFG_MAP, .help = "Pulses that hit glass or a mirror."},
     {KEY(optics.depth), CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH,
      .help = "Largest number of such surfaces on the way of a pulse; 0: glass and mirrors are like other surfaces. "
              "When not given: as many as `scanhead plan` finds necessary."},
 
     {"instrument", .type = CFG_MAP,
-     .help = "Errors of the head's geometry (core/instrument.h). The beam goes where the mechanics point; points are "
-             "computed as if there were no errors."},
+     .help = "Errors of the head's geometry (core/instrument.h). The beam follows the mechanics with these errors; "
+             "points are computed as if there were no errors."},
 #define ANGLE(name, text) {KEY(instrument.name), CFG_REAL, "deg", "0", -10, 10, .help = text}
     ANGLE(collimation_deg, "The beam leaves the plane across the mirror's axis, to the right."),
-    ANGLE(trunnion_deg, "The mirror's axis is not level: its right end is lower by this."),
+    ANGLE(trunnion_deg, "The mirror's axis is not level: its right end is lower by this angle."),
     {KEY(instrument.transit_offset_m), CFG_REAL, "m", "0", -1, 1,
      .help = "The mirror's axis passes this far ahead of the pan's axis."},
     {KEY(instrument.mirror_offset_m), CFG_REAL, "m", "0", -1, 1,

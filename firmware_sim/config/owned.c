@@ -47,12 +47,11 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     if (has_path && (has_port || has_address))
         cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
     else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
-        cfg_fail_key(rd, "links[].attach", i,
-                     "a device that is attached here listens nowhere; allowed without port and address");
+        cfg_fail_key(rd, "links[].attach", i, "an attached device does not listen; allowed without port and address");
     else if (is_redir && !has_path && !has_port)
         cfg_fail_key(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
     else if (is_redir && link->attach && !has_path && link->port == 0)
-        cfg_fail_key(rd, "links[].port", i, "0, and the head is to connect to it; allowed 1 to 65535");
+        cfg_fail_key(rd, "links[].port", i, "0, but the head must connect to this port; allowed 1 to 65535");
 }
 
 static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
@@ -72,7 +71,7 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
     if (!check_owned(rd, "links[]", &(struct owner){0, (int)link->type, i, owner, has[link->type]})) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
-        cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
+        cfg_fail_key(rd, "links[].path", i, "missing; a file link requires the path of the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
         if (strcmp(cfg->link[k].path, link->path) == 0)
             cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);

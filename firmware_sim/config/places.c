@@ -79,14 +79,14 @@ static int find_form(struct cfg_reader *rd, struct config_station *station, uint
         if (first != NULL && station->place != form_keys[k].place)
             return cfg_fail_key(
                 rd, form_keys[k].path, i,
-                "together with %s; allowed one of lat_deg with lon_deg, easting_m with northing_m, ecef_m",
+                "given together with %s; allowed one of lat_deg with lon_deg, easting_m with northing_m, ecef_m",
                 strrchr(first, '.') + 1);
         first = form_keys[k].path;
         station->place = form_keys[k].place;
     }
     if (!cfg_is_given(rd, "stations[].height_m", i)) return SH_OK;
     if (station->place == PLACE_ECEF)
-        return cfg_fail_key(rd, "stations[].height_m", i, "ecef_m says the height, too; allowed one of them");
+        return cfg_fail_key(rd, "stations[].height_m", i, "ecef_m also gives the height; allowed one of them");
     if (station->place == PLACE_NONE) station->place = PLACE_GEODETIC;
     return SH_OK;
 }
@@ -127,13 +127,12 @@ static int check_station(struct cfg_reader *rd, const struct config *cfg, struct
     if (code != SH_OK || !CFG_SOUND(rd, i, "stations[]", "scene.anchor.source")) return code;
     if (!station->has_position && (!anchored || nowhere))
         return fail_required(rd, "stations[].position_m", i,
-                             anchored ? "no place on the Earth is given either"
-                                      : "there is no scene.anchor to find it");
+                             anchored ? "no place on the Earth is given" : "there is no scene.anchor to compute it");
     if (anchored && station->has_position && !nowhere)
         return cfg_fail_key(
             rd, "stations[].position_m", i,
-            "together with a place on the Earth, and scene.anchor gives one from the other; allowed one "
-            "of them");
+            "given together with a place on the Earth, but scene.anchor computes one from the other; allowed one of "
+            "them");
     if (anchored || !nowhere) return SH_OK;
     if (cfg->output.crs != GEOREF_LOCAL)
         return fail_required(rd, "stations[].lat_deg", i, "output.crs is not local and there is no scene.anchor");

@@ -41,13 +41,13 @@ static void check_stops(struct cfg_reader *rd, const struct config *cfg)
     const struct config_platform *p = &cfg->platform;
     if (!(p->step_s > 0.0) && CFG_SOUND(rd, 0, "platform.step_s"))
         cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
-                     "stops need the time from each to the next, platform.step_s; allowed above 0, up to 1e9 s");
+                     "stops need platform.step_s, the time from each stop to the next; allowed above 0, up to 1e9 s");
     if (has_trajectory(p)) {
         if (cfg->n_stations > 1)
             cfg_fail_key(
                 rd, "stations", 0,
-                "%u of them, but platform.kind is stops, which are the stations; allowed one, which says where "
-                "on the Earth the scene lies",
+                "%u stations, but with platform.kind: stops the stops are the stations; allowed one station, which "
+                "gives the place of the scene on the Earth",
                 cfg->n_stations);
         return;
     }
@@ -79,7 +79,7 @@ void cfg_check_platform(struct cfg_reader *rd, struct config *cfg)
     const struct config_platform *p = &cfg->platform;
     if (!CFG_SOUND(rd, 0, "platform.kind") || !cfg_check_platform_keys(rd, p)) return;
     if (p->kind == PLATFORM_LIVE && cfg->loop.pace == PACE_FAST)
-        cfg_fail_key(rd, "loop.pace", 0, "the poses of a live platform come in real time; allowed realtime, step");
+        cfg_fail_key(rd, "loop.pace", 0, "a live platform gets its poses in real time; allowed realtime, step");
     if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return;
     const int both = p->file[0] != '\0' && p->waypoints[0] != '\0', none = !has_trajectory(p);
     if ((both || (none && p->kind == PLATFORM_TRAJECTORY)) && CFG_SOUND(rd, 0, "platform.file", "platform.waypoints"))

@@ -111,7 +111,7 @@ static void check_order(struct cfg_reader *rd, const char *low_key, double low, 
                         int strictly)
 {
     if (low < high || (low == high && !strictly) || !CFG_SOUND(rd, 0, low_key, high_key)) return;
-    cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", low, strictly ? "below" : "at most", high);
+    cfg_fail_key(rd, low_key, 0, "%.15g is too large; allowed %s %.15g", low, strictly ? "below" : "at most", high);
 }
 
 static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
@@ -167,11 +167,12 @@ static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
     size_t stem = strlen(base) - 5;
     if (stem >= sizeof profile->name)
         return cfg_fail_file(rd, SH_EINPUT, 0,
-                             "the file's name is the profile's; allowed up to %zu characters and .yaml",
+                             "the file's name is the name of the profile; allowed up to %zu characters and .yaml",
                              sizeof profile->name - 1);
     for (size_t i = 0; i < stem; i++)
         if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)
-            return cfg_fail_file(rd, SH_EINPUT, 0, "the file's name is the profile's; allowed printable ASCII");
+            return cfg_fail_file(rd, SH_EINPUT, 0,
+                                 "the file's name is the name of the profile; allowed printable ASCII");
     memcpy(profile->name, base, stem);
     return SH_OK;
 }

@@ -58,10 +58,10 @@ static void check_ends(struct cfg_reader *rd, const struct config_profile *p)
 {
     const int64_t first = p->program[0].prr_uhz, last = p->program[p->n_programs - 1].prr_uhz;
     if (first > p->prr_min_uhz)
-        cfg_fail_key(rd, "prr_min_hz", 0, "%.15g is none of the programs' rates; allowed %.15g, their slowest",
+        cfg_fail_key(rd, "prr_min_hz", 0, "%.15g is not a rate of a program; allowed %.15g, the slowest one",
                      from_micro(p->prr_min_uhz), from_micro(first));
     if (last < p->prr_max_uhz)
-        cfg_fail_key(rd, "prr_max_hz", 0, "%.15g is none of the programs' rates; allowed %.15g, their fastest",
+        cfg_fail_key(rd, "prr_max_hz", 0, "%.15g is not a rate of a program; allowed %.15g, the fastest one",
                      from_micro(p->prr_max_uhz), from_micro(last));
 }
 
@@ -97,8 +97,8 @@ static void check_reach(struct cfg_reader *rd, const struct config_profile *p, u
     const struct config_program *program = &p->program[i];
     if (program->reach_90_m == 0.0) {
         if (others_have || program->reach_20_m > 0.0)
-            cfg_fail_key(rd, "programs[].reach_90_m", i, "missing; required, as %s; allowed 0.1 to %.10g m",
-                         others_have ? "other programs have it" : "there is a reach_20_m", p->range_max_m);
+            cfg_fail_key(rd, "programs[].reach_90_m", i, "missing; required, since %s; allowed 0.1 to %.10g m",
+                         others_have ? "other programs have this key" : "there is a reach_20_m", p->range_max_m);
         return;
     }
     if (program->reach_90_m > p->range_max_m && CFG_SOUND(rd, 0, "range_max_m"))
@@ -115,10 +115,11 @@ static void check_used(struct cfg_reader *rd, const struct config_profile *p, ui
     if (said_hz == 0.0 || !CFG_SOUND(rd, 0, "fov_min_deg", "fov_max_deg", "facets", "optical_gain")) return;
     const double share = cfg_used_share(p), used_hz = share * rate_hz;
     if (fabs(said_hz - used_hz) > USED_WITHIN * used_hz)
-        cfg_fail_key(rd, "programs[].used_hz", i,
-                     "%.10g is not what the field of view leaves of %.10g Hz; allowed %.6g to %.6g Hz, 2 %% about %.4g "
-                     "of it",
-                     said_hz, rate_hz, (1.0 - USED_WITHIN) * used_hz, (1.0 + USED_WITHIN) * used_hz, share);
+        cfg_fail_key(
+            rd, "programs[].used_hz", i,
+            "%.10g is not the part of %.10g Hz that falls into the field of view; allowed %.6g to %.6g Hz, 2 %% about "
+            "%.4g of it",
+            said_hz, rate_hz, (1.0 - USED_WITHIN) * used_hz, (1.0 + USED_WITHIN) * used_hz, share);
 }
 
 static void check_limits(struct cfg_reader *rd, const struct config_profile *p, uint32_t i)
@@ -203,6 +204,6 @@ void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg)
         const size_t used = strlen(rates);
         snprintf(rates + used, sizeof rates - used, "%s%.15g", i > 0 ? ", " : "", from_micro(p->program[i].prr_uhz));
     }
-    cfg_fail_key(rd, "head.prr_hz", 0, "%.15g is no pulse rate of head profile %s; allowed %s Hz", from_micro(rate),
+    cfg_fail_key(rd, "head.prr_hz", 0, "%.15g is not a pulse rate of head profile %s; allowed %s Hz", from_micro(rate),
                  p->name, rates);
 }

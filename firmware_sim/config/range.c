@@ -26,7 +26,7 @@ static void limit_program(struct cfg_reader *rd, const struct config *cfg, struc
     if (program->range_min_m < program->range_max_m) return;
     const int is_min = cfg_is_given(rd, "head.range_min_m", 0) && cfg->head.range_min_m >= most_m;
     cfg_fail_key(rd, is_min ? "head.range_min_m" : "head.range_max_m", 0,
-                 "%.10g: nothing is left of the %.10g to %.10g m that the head sees at %.15g Hz; allowed %s %.10g m",
+                 "%.10g excludes all of the %.10g to %.10g m that the head measures at %.15g Hz; allowed %s %.10g m",
                  is_min ? cfg->head.range_min_m : cfg->head.range_max_m, least_m, most_m,
                  1e-6 * (double)program->prr_uhz, is_min ? "below" : "above", is_min ? most_m : least_m);
 }
@@ -47,10 +47,10 @@ void cfg_limit_range(struct cfg_reader *rd, struct config *cfg)
     if (!min_fits || !max_fits) return;
     if (!config_limits_range(cfg)) return;
     if (head->range_min_m >= head->range_max_m) {
-        cfg_fail_key(rd, cfg_is_given(rd, "head.range_max_m", 0) ? "head.range_max_m" : "head.range_min_m", 0,
-                     "the head sees from %.10g to %.10g m; allowed a range_min_m below %.10g, or a range_max_m above "
-                     "%.10g",
-                     head->range_min_m, head->range_max_m, head->range_max_m, head->range_min_m);
+        cfg_fail_key(
+            rd, cfg_is_given(rd, "head.range_max_m", 0) ? "head.range_max_m" : "head.range_min_m", 0,
+            "the head measures from %.10g to %.10g m; allowed a range_min_m below %.10g, or a range_max_m above %.10g",
+            head->range_min_m, head->range_max_m, head->range_max_m, head->range_min_m);
         return;
     }
     for (uint32_t i = 0; i < p->n_programs; i++)

@@ -105,9 +105,11 @@ const char *config_keys_intro(enum config_keys keys)
         return "Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in stations[0].name=gate; the\n"
                "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a unit.\n"
                "Relative paths start at the file they stand in; in --set, at the working directory.\n";
-    return "Head profile, heads/NAME.yaml. maker and model are texts; each figure is written { value: V, from: GRADE }.\n"
-           "GRADE is data sheet (a source names it, or two sources agree), quoted (a source says so without naming\n"
-           "it), or assumed. source: TEXT and note: TEXT may follow, for who reads the file.\n";
+    return "Head profile, heads/NAME.yaml. maker and model are texts; each figure is written { value: V, from: GRADE "
+           "}.\n"
+           "GRADE is data sheet (it is in a named source, or two sources agree), quoted (a source gives it without "
+           "naming\n"
+           "its own), or assumed. source: TEXT and note: TEXT may follow, for readers of the file.\n";
 }
 
 static void print_profile_keys(FILE *out)

@@ -25,11 +25,11 @@ static void check_tripod(struct cfg_reader *rd, const struct config *cfg, struct
         cfg_fail_missing(rd, "stations[].tripod.leg_m", i);
     else if (t->legs && t->leg_diameter_m >= 0.5 * t->leg_m)
         cfg_fail_key(rd, "stations[].tripod.leg_diameter_m", i,
-                     "%.10g m, and a leg is %.10g m long; allowed below half of that, %.10g m", t->leg_diameter_m,
-                     t->leg_m, 0.5 * t->leg_m);
+                     "%.10g m, but a leg is %.10g m long; allowed is less than half of that, %.10g m",
+                     t->leg_diameter_m, t->leg_m, 0.5 * t->leg_m);
     if (config_head_moves(&cfg->platform) && CFG_SOUND(rd, 0, "platform.kind"))
         cfg_fail_key(rd, "stations[].tripod", i,
-                     "a tripod stands, and platform.kind is %s; allowed with static and stops",
+                     "a tripod must stand still, but platform.kind is %s; allowed with static and stops",
                      cfg_word(rd, "platform.kind", (int)cfg->platform.kind));
 }
 

@@ -35,8 +35,8 @@ static int set_up_commands(struct device *device, struct sh_err *err)
                        cfg->head.serial, NATIVE_VERSION);
     if (len >= (int)sizeof device->idn)
         return sh_fail(err, SH_EINPUT,
-                       "%s: maker, model and head.serial are together too long for *IDN?; at most %zu bytes", cfg->file,
-                       sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
+                       "%s: maker, model and head.serial are together too long for *IDN?; allowed are %zu bytes",
+                       cfg->file, sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
     device->cmd.idn = device->idn;
     site_plan_text(device->site, device->plan, sizeof device->plan);
     device->cmd.plan = device->plan;

@@ -8,7 +8,7 @@
 const char *fault_desk_why_not(const struct fault *fault)
 {
     return fault_place_of(fault->kind) == FAULT_AT_MOMENT
-               ? "it is a fault in the head, and a recording has none; allowed are faults on the wire and of links"
+               ? "it is a fault in the head, but a recording has no head; allowed are faults on the wire and of links"
                : NULL;
 }
 

@@ -37,9 +37,10 @@ static void warn_expired(struct head_clock *clock)
     if (clock->tai0_ns < end_ns) return;
     utc_from_tai(&clock->table, end_ns, &end);
     utc_format(&end, 0, day);
-    snprintf(clock->warning, sizeof clock->warning,
-             "leap seconds are known up to %.10s only: UTC and GPS time may differ by one more since (renew tzdata)",
-             day);
+    snprintf(
+        clock->warning, sizeof clock->warning,
+        "leap seconds are known up to %.10s only: UTC and GPS time may differ by one more after that (update tzdata)",
+        day);
 }
 
 /* Computes the pieces from the i-th on from their changes. */
@@ -93,9 +94,10 @@ int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err 
 {
     if (clock->source == EPOCH_UTC) clock->tai0_ns = utc_tai_from_posix(&clock->table, clock_utc_ns(now_ns));
     if (clock->source == EPOCH_TAI && !clock_tai_ns(now_ns, &clock->tai0_ns))
-        return sh_fail(err, SH_ESTATE,
-                       "time.epoch: tai: the system does not know TAI (its offset is 0 s: no PTP or NTP has set it); "
-                       "utc goes by the table of leap seconds");
+        return sh_fail(
+            err, SH_ESTATE,
+            "time.epoch: tai: the system does not know TAI (its offset is 0 s: no PTP or NTP has set it); utc uses "
+            "the table of leap seconds");
     if (clock->source != EPOCH_NONE) warn_expired(clock);
     return SH_OK;
 }

@@ -142,10 +142,10 @@ static const char *parse_entry(const char *text, struct journal_entry *entry)
 {
     uint64_t t_ns, session;
     memset(entry, 0, sizeof *entry);
-    if (take_number(&text, UINT64_MAX, &entry->tick) != 0) return "no tick number and blank";
-    if (take_number(&text, INT64_MAX, &t_ns) != 0) return "no device time in ns and blank";
-    if (take_number(&text, UINT32_MAX, &session) != 0) return "no session number and blank";
-    if (!is_command_line(text)) return "no command of 1 to 256 printable characters";
+    if (take_number(&text, UINT64_MAX, &entry->tick) != 0) return "there must be a tick number and a blank";
+    if (take_number(&text, INT64_MAX, &t_ns) != 0) return "there must be a device time in ns and a blank";
+    if (take_number(&text, UINT32_MAX, &session) != 0) return "there must be a session number and a blank";
+    if (!is_command_line(text)) return "there must be a command of 1 to 256 printable characters";
     entry->t_ns = (int64_t)t_ns;
     entry->session = (uint32_t)session;
     memcpy(entry->line, text, strlen(text));
@@ -193,16 +193,17 @@ static int read_line(struct reader *reader, struct sh_err *err)
         reader->text[n++] = (char)c;
     }
     if (ferror(reader->file)) return sh_fail(err, SH_EIO, "journal: %s: %s", reader->path, strerror(errno));
-    return n == 0 ? 0 : fail_line(reader, err, "the last line is cut; end it or take it out");
+    return n == 0 ? 0 : fail_line(reader, err, "the last line is cut off; complete it or remove it");
 }
 
 static int add_entry(struct reader *reader, struct sh_err *err)
 {
     if (strncmp(reader->text, lost_line, sizeof lost_line - 1) == 0)
-        return fail_line(reader, err,
-                         "%.20s commands are missing here, which could not be written in time; a journal can be "
-                         "replayed only whole",
-                         reader->text + sizeof lost_line - 1);
+        return fail_line(
+            reader, err,
+            "%.20s commands are missing here, which could not be written in time; only a complete journal can be "
+            "replayed",
+            reader->text + sizeof lost_line - 1);
     if (reader->n == MAX_ENTRIES)
         return fail_line(reader, err, "too many commands; allowed up to %d in a journal", MAX_ENTRIES);
     if (!grow(&reader->entry, &reader->capacity, reader->n + 1, sizeof *reader->entry))
@@ -239,7 +240,7 @@ int journal_check_paths(const char *path, const char *replay, struct sh_err *err
     if (path == NULL || replay == NULL || stat(path, &out) != 0 || stat(replay, &in) != 0) return SH_OK;
     if (out.st_dev != in.st_dev || out.st_ino != in.st_ino) return SH_OK;
     return sh_fail(err, SH_EINPUT,
-                   "--journal %s: is the journal to replay, which it would overwrite; allowed another file", path);
+                   "--journal %s: is the journal to replay, and would be overwritten; allowed is another file", path);
 }
 
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err)

@@ -147,8 +147,8 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
     if (live->said_tick == 0 || work->tick - live->said_tick > device->tick_hz) {
         char text[96];
         snprintf(text, sizeof text,
-                 live->n == 0 ? "no pose yet: the head is taken to be at the station"
-                              : "no pose in time: the platform is taken to stand");
+                 live->n == 0 ? "no pose yet: the head is assumed to be at the station"
+                              : "no pose came in time: the platform is assumed to stand");
         device_push_event(&device->events, NATIVE_EV_POSE_LATE, n, 0, (uint64_t)since_ns, text);
     }
     live->said_tick = work->tick;

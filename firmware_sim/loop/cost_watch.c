@@ -58,10 +58,11 @@ static void warn(const struct cost_watch *watch, double ns)
 {
     char reason[128];
     site_cost_reason(watch->loop->site, reason, sizeof reason);
-    sh_warn(watch->loop->options.report,
-            "%s: a pulse takes %.3g us of processor time, more than ten times the %.3g us that are planned, and where "
-            "casting is the slowest stage the run is as much longer; %s",
-            watch->loop->cfg->file, 1e-3 * ns, 1e-3 * watch->figures.planned_ns, reason);
+    sh_warn(
+        watch->loop->options.report,
+        "%s: a pulse takes %.3g us of processor time, more than ten times the %.3g us that are planned, and the run "
+        "takes that much longer if casting is its slowest stage; %s",
+        watch->loop->cfg->file, 1e-3 * ns, 1e-3 * watch->figures.planned_ns, reason);
 }
 
 static void *watch_main(void *arg)

@@ -83,9 +83,7 @@ static void warn_open(const struct links *links, const struct link_spec *spec, c
         is_loopback(spec->address))
         return;
     pump_get_place(pump, &place);
-    sh_warn(links->report,
-            "link %s: other machines may reach it, and whoever does commands the head: there is no password",
-            place.endpoint);
+    sh_warn(links->report, "link %s: other machines can reach and command it: there is no password", place.endpoint);
 }
 
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)

@@ -59,10 +59,10 @@ static void take_line(struct pose_feed *feed, const char *line)
     if (line[strspn(line, " \t\r")] == '\0') return;
     if (parse_line(line, v) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
-        report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
+        report_bad(feed, "a pose is not of the form t_s x y z roll pitch heading");
     } else if (device_pose(feed->device, llround(1e9 * v[0]), v + 1) != 0) {
         char text[96];
-        snprintf(text, sizeof text, "a pose over %g m from the station, not after the last one, or over 1 h ahead",
+        snprintf(text, sizeof text, "a pose is over %g m from the station, not after the last pose, or over 1 h ahead",
                  feed->reach_m);
         report_bad(feed, text);
     }

@@ -125,7 +125,7 @@ static void fail_link(struct pump *pump, const char *why)
     int none = 0;
     pump->failed = 0;
     pump_get_place(pump, &place);
-    sh_warn(links->report, "link %s: %s; what follows is missing there", place.endpoint, why);
+    sh_warn(links->report, "link %s: %s; the rest of the stream is missing there", place.endpoint, why);
     if (atomic_compare_exchange_strong(&links->failed, &none, 1))
         sh_fail(&links->error, SH_EIO, "link %s: %s; it is cut short", place.endpoint, why);
 }
@@ -263,8 +263,9 @@ static void *pump_main(void *arg)
     }
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         if (pump->session[i].open && pump->session[i].unread > 0)
-            sh_warn(pump->links->report, "link %s: its reader has left %d bytes or more in the system, which are lost",
-                    pump->ops->name, pump->session[i].unread);
+            sh_warn(pump->links->report,
+                    "link %s: its reader did not read %d bytes or more from the system; they are lost", pump->ops->name,
+                    pump->session[i].unread);
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);
     }
     atomic_fetch_sub(&pump->links->n_busy, 1);

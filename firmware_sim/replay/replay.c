@@ -25,10 +25,10 @@ static int64_t tick_of(const struct replay *r, int64_t t_ns)
 
 static void fail(struct replay *r, const struct sh_err *err)
 {
-    if (!r->ends_then) sh_warn(r->options.report, "%s; nothing more is replayed of it", err->text);
+    if (!r->ends_then) sh_warn(r->options.report, "%s; the rest of it is not replayed", err->text);
     pthread_mutex_lock(&r->lock);
     if (r->failure.code == 0) r->failure = *err;
-    command_queue_push(&r->cmd.queue, CMD_E_PULSES, "nothing more of the recording can be replayed");
+    command_queue_push(&r->cmd.queue, CMD_E_PULSES, "the rest of the recording can not be replayed");
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -136,7 +136,7 @@ static void begin(struct replay *r, uint64_t tick)
     const int found = look(r);
     if (found <= 0) {
         stop(r, tick, 0);
-        sh_fail(&err, SH_EINPUT, "%s: no frame is in it from %.10g s on", r->options.path, r->options.from_s);
+        sh_fail(&err, SH_EINPUT, "%s: it has no frame from %.10g s on", r->options.path, r->options.from_s);
         if (found == 0) fail(r, &err);
         return;
     }

@@ -7,8 +7,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
-static const char RECORDED[] = "a recording is replayed, and its settings are as they were";
-static const char FIXED[] = "a recording is replayed, and its stations are where they were";
+static const char RECORDED[] = "a recording is replayed; its settings are fixed";
+static const char FIXED[] = "a recording is replayed; its stations are fixed";
 
 void replay_set_state(struct replay *r, uint64_t tick, enum head_state state)
 {

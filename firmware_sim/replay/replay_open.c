@@ -39,7 +39,7 @@ static int read_front(struct replay *r, struct sh_err *err)
     }
     if (got < 0) return got;
     if (r->front.len[0] == 0)
-        return sh_fail(err, SH_EFORMAT, "%s: no descriptor is in it: it is no recording of a head's stream",
+        return sh_fail(err, SH_EFORMAT, "%s: it has no descriptor: it is not a recording of a head's stream",
                        r->options.path);
     return recording_rewind(&r->recording, err);
 }
@@ -86,7 +86,7 @@ static int check_links(const struct config *cfg, struct sh_err *err)
         const struct protocol_ops *protocol = protocol_ops_get((enum protocol_id)cfg->link[i].protocol);
         if (protocol == NULL || protocol->passes_native) continue;
         return sh_fail(err, SH_EINPUT,
-                       "%s: links[%u].protocol %s: a recording is of the native protocol; allowed is native alone",
+                       "%s: links[%u].protocol %s: a recording has the native protocol; allowed is only native",
                        cfg->file, i, protocol->name);
     }
     return SH_OK;

@@ -27,7 +27,7 @@ struct terrain {
 
 static const char *named(const char *crs)
 {
-    return crs[0] != '\0' ? crs : "none of the EPSG registry";
+    return crs[0] != '\0' ? crs : "not in the EPSG registry";
 }
 
 static int add_raster(const struct config *cfg, const struct config_mesh *mesh, struct terrain *t, struct sh_err *err)
@@ -51,7 +51,8 @@ static int add_raster(const struct config *cfg, const struct config_mesh *mesh, 
     if (strcmp(g.crs, t->crs) != 0)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: scene.anchor: source geotiff, but the system of %s is %s, and that of %s is %s; allowed is one",
+            "%s: scene.anchor: source geotiff, but the system of %s is %s, and that of %s is %s; allowed is one "
+            "system for all",
             cfg->file, t->file, named(t->crs), mesh->file, named(g.crs));
     if (memcmp(mesh->offset_m, t->offset_m, sizeof mesh->offset_m) != 0)
         return sh_fail(err, SH_EINPUT,
@@ -77,8 +78,8 @@ static int find_terrain(const struct config *cfg, struct terrain *t, struct sh_e
     if (t->crs[0] != '\0') return SH_OK;
     return sh_fail(
         err, SH_EINPUT,
-        "%s: its system has no code of the EPSG registry, so nothing says where it is on the Earth; allowed: "
-        "gdal_edit.py -a_srs EPSG:CODE, gdalwarp -t_srs EPSG:CODE -dstnodata -9999, or a scene.anchor of another source",
+        "%s: its system has no EPSG code, so its place on the Earth is unknown; allowed: gdal_edit.py -a_srs "
+        "EPSG:CODE, gdalwarp -t_srs EPSG:CODE -dstnodata -9999, or a scene.anchor of another source",
         t->file);
 }
 
@@ -127,11 +128,11 @@ static void say(const struct config *cfg, const struct sh_report *report, const 
 {
     if (!cfg->scene.anchor.height_given && !t->above_ellipsoid)
         sh_warn(report,
-                "%s: its heights, which as a rule count from the sea, are taken as heights above the ellipsoid; "
-                "scene.anchor.height_m says how high above it their 0 is",
+                "%s: its heights, which mostly count from sea level, are taken as heights above the ellipsoid; "
+                "scene.anchor.height_m sets the height of their 0 above it",
                 t->file);
     if (at->accuracy_m > 0.1)
-        sh_warn(report, "%s: coordinates in %s are good to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);
+        sh_warn(report, "%s: coordinates in %s have errors up to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);
 }
 
 /* *worst_m: how far a corner is from its place. */
@@ -153,11 +154,10 @@ static void say_corners(const struct sh_report *report, const struct terrain *t,
     else
         snprintf(exact, sizeof exact, "a raster in UTM: gdalwarp -t_srs EPSG:%d -r bilinear -dstnodata -9999",
                  geotiff_utm_code(at->at.lat_deg, at->at.lon_deg));
-    sh_warn(
-        report,
-        "%s: the scene is tangent to the Earth at its middle, which puts its corners up to %.2g m from where %s has "
-        "them; exact is %s",
-        t->file, worst_m, t->crs, exact);
+    sh_warn(report,
+            "%s: the scene is tangent to the Earth at its middle, so the corners are wrong by up to %.2g m in %s; for "
+            "exact places use %s",
+            t->file, worst_m, t->crs, exact);
 }
 
 int anchor_by_geotiff(const struct config *cfg, const struct sh_report *report, struct geoframe *frame,

@@ -38,7 +38,7 @@ static const char *has_no_outlines(const struct site *site)
     int cutouts = site->scene->cutout != NULL, copies = site->scene->n_copies > 0;
     for (uint32_t i = 0; i < site->n_movers; i++)
         cutouts |= site->mover[i].scene->cutout != NULL;
-    return cutouts  ? "outlines of what textures cut out (scene.cutouts) are not known"
+    return cutouts  ? "outlines of holes that textures cut (scene.cutouts) are not known"
            : copies ? "outlines of copies (scene.meshes[].copies) are not known"
                     : NULL;
 }
@@ -166,7 +166,7 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     if (rc == SH_OK) rc = make_beams(&trial, 0, report, err);
     if (rc == SH_OK) rc = measure_beams(&trial, choice, option, report, err, &holds);
     if (rc == SH_OK && !holds)
-        sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
+        sh_warn(report, "%s: beam.mode: auto: no mode keeps plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
     plan_sample_free(trial.sample);
     return rc;
@@ -248,7 +248,7 @@ static int choose_optics(struct site *site, const struct sh_report *report, stru
     int forced = cfg->optics.depth_given ? (int)cfg->optics.depth : -1, rc = SH_OK;
     if (!site->detect.surfaces.has_optics) {
         plan_say(&site->plan.optics, "optics", "none", 0.0, 0.0,
-                 "no surface is of glass or a mirror: no pulse is cast twice");
+                 "no surface is glass or a mirror: no pulse needs a second ray");
         return SH_OK;
     }
     if (forced < 0 || site->measures) rc = open_trial(&trial, site, report, err);
@@ -260,11 +260,11 @@ static int choose_optics(struct site *site, const struct sh_report *report, stru
     uint32_t depth = site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);
     if (forced < 0 && holds && depth == 0)
         sh_warn(report,
-                "%s: plan.tolerance_m and plan.echo_tolerance allow to take glass and mirrors as other surfaces; "
-                "optics.depth has them followed",
+                "%s: plan.tolerance_m and plan.echo_tolerance allow glass and mirrors to be treated as other surfaces; "
+                "set optics.depth to follow them",
                 cfg->file);
     if (forced < 0 && !holds)
-        sh_warn(report, "%s: ways through glass and off mirrors are longer than the %u surfaces that are followed",
+        sh_warn(report, "%s: paths of pulses meet more glass and mirrors than the %u surfaces that are followed",
                 cfg->file, depth);
     return SH_OK;
 }

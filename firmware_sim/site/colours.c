@@ -33,20 +33,22 @@ static int load_textures(struct site *site, const struct sh_report *report, stru
     }
     if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
     if (failed > 0)
-        sh_warn(report,
-                "%s: output.colour: %u of %u surfaces have a texture that is not used: their colour counts, or "
-                "grey; the first: %s",
-                site->cfg->file, failed, n, first.text);
+        sh_warn(
+            report,
+            "%s: output.colour: %u of %u surfaces have a texture that is not used: their colour is used, or grey; the "
+            "first: %s",
+            site->cfg->file, failed, n, first.text);
     if (bare > 0)
         sh_warn(report,
                 "%s: output.colour: texture, but %u of %u surfaces have neither texture nor colour: their points "
                 "are grey",
                 site->cfg->file, bare, n);
     if (partly > 0)
-        sh_warn(report,
-                "%s: output.colour: texture, but %u of %u surfaces have colours at some of their corners only: points "
-                "of triangles without are grey",
-                site->cfg->file, partly, n);
+        sh_warn(
+            report,
+            "%s: output.colour: texture, but %u of %u surfaces have colours at only some of their corners: points of "
+            "triangles without colours are grey",
+            site->cfg->file, partly, n);
     return SH_OK;
 }
 

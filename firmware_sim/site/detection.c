@@ -87,10 +87,11 @@ static int set_up_textures(struct site *site, const uint8_t *said, const struct 
     }
     if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
     if (failed > 0)
-        sh_warn(report,
-                "%s: %u surfaces have a texture that is not used: their colour counts, or signal.reflectance; the "
-                "first: %s",
-                site->cfg->file, failed, first.text);
+        sh_warn(
+            report,
+            "%s: %u surfaces have a texture that is not used: their colour is used, or signal.reflectance; the first: "
+            "%s",
+            site->cfg->file, failed, first.text);
     return rc;
 }
 
@@ -117,14 +118,15 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
     if (rc == SH_OK && cfg->signal.on) rc = set_up_textures(site, is_said, report, err);
     free(is_said);
     if (rc == SH_OK && cfg->signal.on && unknown > 0)
-        sh_warn(report,
-                "%s: %u of %u surfaces have no reflectance, neither by the mesh's colour nor by surfaces: %g is taken "
-                "(signal.reflectance)",
-                cfg->file, unknown, site->n_surfaces, cfg->signal.reflectance);
+        sh_warn(
+            report,
+            "%s: %u of %u surfaces have no reflectance, neither from the mesh's colour nor from surfaces: %g is used "
+            "(signal.reflectance)",
+            cfg->file, unknown, site->n_surfaces, cfg->signal.reflectance);
     for (uint32_t i = 0; i < cfg->n_surfaces && rc == SH_OK; i++)
         if (fits[i] == 0)
-            sh_warn(report, "%s: surfaces[%u]: no surface of material \"%s\", object \"%s\" is left for it", cfg->file,
-                    i, cfg->surface[i].material, cfg->surface[i].object);
+            sh_warn(report, "%s: surfaces[%u]: no surface of material \"%s\", object \"%s\" remains for this entry",
+                    cfg->file, i, cfg->surface[i].material, cfg->surface[i].object);
     return rc;
 }
 
@@ -134,10 +136,11 @@ static int name_ghosts(struct site *site, struct sh_err *err)
     struct site_detect *d = &site->detect;
     uint32_t n = site->n_surfaces;
     if (2 * n > SCENE_MAX_SURFACES)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: surfaces: %u surfaces and a mirror: each needs a second label for its ghost; "
-                       "allowed up to %d",
-                       site->cfg->file, n, SCENE_MAX_SURFACES / 2);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: surfaces: %u surfaces and a mirror: each needs a second label for its ghost points; allowed are up "
+            "to %d surfaces",
+            site->cfg->file, n, SCENE_MAX_SURFACES / 2);
     struct scene_surface *ghost = calloc(n, sizeof *ghost);
     if (ghost == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the names of ghosts");
     for (uint32_t i = 0; i < n; i++) {

@@ -36,10 +36,11 @@ static void doubt_size(const struct site *site, const struct sh_report *report)
     for (int i = 0; i < 3; i++)
         size_m = fmax(size_m, site->scene->max_m[i] - site->scene->min_m[i]);
     if (size_m >= SMALL_M && size_m <= LARGE_M) return;
-    sh_warn(report,
-            "%s: the scene is %.3g m large, and the head sees from %g to %g m: is scene.meshes[].scale right? It is "
-            "in metres per unit, now %g",
-            cfg->file, size_m, program_of(site)->range_min_m, program_of(site)->range_max_m, cfg->scene.mesh[0].scale);
+    sh_warn(
+        report,
+        "%s: the scene is %.3g m large, but the head measures from %g to %g m: check scene.meshes[].scale, metres per "
+        "unit, now %g",
+        cfg->file, size_m, program_of(site)->range_min_m, program_of(site)->range_max_m, cfg->scene.mesh[0].scale);
 }
 
 /* Warns of lines without a pulse. Each line has the same window; unless the pulse rate is a multiple of the line rate,
@@ -74,12 +75,12 @@ static void doubt_step(const struct site *site, const struct sh_report *report)
     if (e->kind != EMITTER_SPHERE || emitter_sphere_is_exact(e)) return;
     const double asked_deg = 1e-6 * (double)e->asked_udeg;
     if (e->gaps == 0)
-        sh_warn(report, "%s: head.step_deg: %.9g deg does not divide 360 deg: used are %u steps of %.9g deg",
+        sh_warn(report, "%s: head.step_deg: %.9g deg does not divide 360 deg: %u steps of %.9g deg are used",
                 site->cfg->file, asked_deg, e->steps, 360.0 / e->steps);
     else
         sh_warn(
             report,
-            "%s: head.step_deg: %.9g deg does not divide 180 and 360 deg: used are %u steps of %.9g deg from ring to "
+            "%s: head.step_deg: %.9g deg does not divide 180 and 360 deg: %u steps of %.9g deg are used from ring to "
             "ring, and %u of %.9g deg along a ring",
             site->cfg->file, asked_deg, e->gaps, 180.0 / e->gaps, e->steps, 360.0 / e->steps);
 }
@@ -96,9 +97,11 @@ static void doubt_colours(const struct site *site, const struct sh_report *repor
 {
     const struct config *cfg = site->cfg;
     if (cfg->output.colour != COLOUR_REFLECTANCE || cfg->signal.on) return;
-    sh_warn(report,
-            "%s: output.colour: reflectance, but signal.model is off: no point has one, all have the colour for that",
-            cfg->file);
+    sh_warn(
+        report,
+        "%s: output.colour: reflectance, but signal.model is off: no point has a reflectance, so all have the colour "
+        "for a missing one",
+        cfg->file);
 }
 
 /* Warns of transparent surfaces without a rule. A file's transparency is for pictures; only the configuration says
@@ -111,9 +114,9 @@ static void doubt_clear(const struct site *site, const struct sh_report *report)
     for (uint32_t i = 0; i < n; i++)
         site_clear_add(&clear, site_surface(site, i), cfg->surface, cfg->n_surfaces);
     if (clear.n == 0) return;
-    const char *const left = clear.n_left_out == 0 ? "" : "; check --scene-csv FILE has all";
+    const char *const left = clear.n_left_out == 0 ? "" : "; check --scene-csv FILE lists all";
     sh_warn(report,
-            "%s: %u surface%s transparent by the file, and measured as solid; glass is what the configuration says: "
+            "%s: %u surface%s transparent in the file, but scanned as opaque; only the configuration makes glass: "
             "surfaces: [%s]%s",
             cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules[0] != '\0' ? clear.rules : "...", left);
 }
@@ -183,7 +186,7 @@ static int doubt_reach(const struct site *site, uint32_t i, const struct sh_repo
     for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
         rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
     if (rc == SH_OK && !reached)
-        sh_warn(report, "station %u %s at %.10g %.10g %.10g m: nothing within range_max_m, %g m", i + 1,
+        sh_warn(report, "station %u %s at %.10g %.10g %.10g m: no surface within range_max_m, %g m", i + 1,
                 site->station[i].station->name, p[0], p[1], p[2], reach_m);
     return rc;
 }
@@ -222,10 +225,11 @@ static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     const double up[3] = {level[2], level[5], level[8]}, down[3] = {-level[2], -level[5], -level[8]};
     const double above_m = bvh_ray(work, site->bvh, p, up);
     if (!isnan(above_m) && isnan(bvh_ray(work, site->bvh, p, down)))
-        sh_warn(report,
-                "station %u %s at %.10g %.10g %.10g m: no surface below it, and one %.3g m above it: is it under the "
-                "floor?",
-                i + 1, s->station->name, p[0], p[1], p[2], above_m);
+        sh_warn(
+            report,
+            "station %u %s at %.10g %.10g %.10g m: no surface below it, but one %.3g m above it: it may be under the "
+            "floor",
+            i + 1, s->station->name, p[0], p[1], p[2], above_m);
     return SH_OK;
 }
 
@@ -287,15 +291,16 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
     if (near > LOOKS / 2)
         sh_warn(
             report,
-            "station %u %s at %.10g %.10g %.10g m: of %d directions %d meet something nearer than range_min_m, %g m: "
-            "does it stand within something?",
+            "station %u %s at %.10g %.10g %.10g m: of %d directions %d hit something nearer than range_min_m, %g m: "
+            "the station may be inside an object",
             i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, near, program->range_min_m);
     if (seen >= EMPTY_SHARE * LOOKS) return;
-    sh_warn(report,
-            "station %u %s at %.10g %.10g %.10g m: the scan is mostly empty: of %d directions %d meet something from "
-            "%g to %g m away, %d something nearer, %d something farther",
-            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, seen, program->range_min_m, program->range_max_m,
-            near, far);
+    sh_warn(
+        report,
+        "station %u %s at %.10g %.10g %.10g m: the scan is mostly empty: of %d directions %d hit something from %g to "
+        "%g m away, %d something nearer, %d something farther",
+        i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, seen, program->range_min_m, program->range_max_m, near,
+        far);
 }
 
 /* Checks the views of stations. There is no check with moving meshes, which may fill a view, nor with a path, which

@@ -169,8 +169,8 @@ static void warn_of_coarse_counts(const struct site *site, const struct sh_repor
     if (site->cfg->output.scale_m > 0.0 || site->scale_m < 2.0 * FINEST_M) return;
     sh_warn(
         report,
-        "output.scale_m: a count on the wire is %g m, not %g: %s up to %.6g m have to fit into %d bits, at %g m those "
-        "up to %.0f m do",
+        "output.scale_m: a count on the wire is %g m, not %g: %s up to %.6g m must fit into %d bits, but at %g m only "
+        "those up to %.0f m do",
         site->scale_m, FINEST_M, polar ? "ranges" : "coordinates",
         longest_m(site) + (polar ? site_ball_m(site) : site->live_reach_m), polar ? 32 : 31, FINEST_M,
         FINEST_M * MOST_RANGE_COUNTS / (polar ? 1.0 : 2.0));
@@ -197,7 +197,7 @@ static int scale_all(struct site *site, const struct sh_report *report, struct s
             sh_warn(
                 report,
                 "station %s: a count of longitude is up to %.2g m, all others at most %g m: near a pole 360 degrees "
-                "have to fit into 31 bits",
+                "must fit into 31 bits",
                 site->station[i].station->name, most_m, site->scale_m);
     }
     return rc;
@@ -214,7 +214,7 @@ static int add_georef(struct site *site, struct site_station *s, const struct sh
     if (rc != SH_OK) return rc;
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
     if (epsg != first)
-        sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
+        sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points have no common system", cfg->file,
                 s->station->name, epsg, site->station[0].station->name, first);
     return plan_station(site, s, config_serves(cfg, (uint32_t)(s - site->station)) ? report : NULL, err);
 }

@@ -44,7 +44,8 @@ static int add_mover(struct site *site, uint32_t number, const struct scene_mesh
 {
     const struct config *cfg = site->cfg;
     if (site->n_movers == CAST_MAX_MOVERS)
-        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many that move; at most %d", cfg->file, CAST_MAX_MOVERS);
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many meshes move; allowed are %d", cfg->file,
+                       CAST_MAX_MOVERS);
     struct site_mover *m = &site->mover[site->n_movers++];
     m->mesh = &cfg->scene.mesh[number];
     m->number = number;
@@ -98,8 +99,7 @@ static int load_meshes(struct site *site, const struct scene_mesh_spec *spec, co
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         if (!config_mesh_moves(&cfg->scene.mesh[i])) standing[n++] = spec[i];
     if (n == 0)
-        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still",
-                       cfg->file);
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all meshes move; at least one must stand still", cfg->file);
     int rc = scene_load(standing, n, cfg->scene.tolerance_m, report, &site->scene, err);
     if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
     for (uint32_t i = 0; i < cfg->scene.n_meshes && rc == SH_OK; i++)
@@ -167,8 +167,8 @@ static int load_emitter(struct site *site, struct sh_err *err)
     int rc = emitter_read_directions(p->arrangement.directions, &site->direction, &n, err);
     if (rc != SH_OK) return rc;
     if (n != p->emitter.steps)
-        return sh_fail(err, SH_EINPUT, "%s: it had %u directions a moment ago, and now %u", p->arrangement.directions,
-                       p->emitter.steps, n);
+        return sh_fail(err, SH_EINPUT, "%s: the file had %u directions when it was first read, and now has %u",
+                       p->arrangement.directions, p->emitter.steps, n);
     emitter_set_directions(&site->emitter, site->direction, n);
     return SH_OK;
 }

@@ -51,14 +51,14 @@ static double ifc_height(const struct config *cfg, const struct sh_report *repor
 {
     if (cfg->scene.anchor.height_given) return cfg->scene.anchor.height_m;
     if (isnan(height_m))
-        sh_warn(report,
-                "%s: no %s: 0 m, taken as height above the ellipsoid; scene.anchor.height_m can give that height", file,
-                what);
-    else
-        sh_warn(report,
-                "%s: %s counts from the sea, taken as height above the ellipsoid; scene.anchor.height_m can give that "
-                "height",
+        sh_warn(report, "%s: no %s: 0 m above the ellipsoid is assumed; scene.anchor.height_m can set that height",
                 file, what);
+    else
+        sh_warn(
+            report,
+            "%s: %s counts from sea level, but is taken as height above the ellipsoid; scene.anchor.height_m can set "
+            "that height",
+            file, what);
     return isnan(height_m) ? 0.0 : height_m;
 }
 
@@ -74,10 +74,9 @@ static void compare_site(const struct sh_report *report, const char *file, const
     georef_geodetic_to_ecef(&(struct georef_place){map->at.lat_deg, map->at.lon_deg, 0.0}, b);
     const double apart_m = hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
     if (apart_m > SITE_FROM_MAP_M)
-        sh_warn(
-            report,
-            "%s: its IFCSITE is %.0f km from where its IFCMAPCONVERSION puts the model; the map conversion is taken",
-            file, 1e-3 * apart_m);
+        sh_warn(report,
+                "%s: its IFCSITE is %.0f km from the place that its IFCMAPCONVERSION gives; the map conversion is used",
+                file, 1e-3 * apart_m);
 }
 
 /* The model's origin is at the map conversion's place, and its x axis lies in the grid, which is turned from true north. */
@@ -92,7 +91,7 @@ static int anchor_by_map(const struct config *cfg, const struct sh_report *repor
     if (rc != SH_OK) return sh_fail(err, rc, "%s: IFCMAPCONVERSION: %s", mesh->file, why.text);
     compare_site(report, mesh->file, site, &place);
     if (place.accuracy_m > 0.1)
-        sh_warn(report, "%s: %s is known to %.2g m only on WGS 84", mesh->file, map->crs, place.accuracy_m);
+        sh_warn(report, "%s: %s has errors up to %.2g m on WGS 84", mesh->file, map->crs, place.accuracy_m);
     return geoframe_set_tangent(frame, mesh->offset_m, &place.at, angle_deg(map->x_axis_rad - place.convergence_rad),
                                 err);
 }

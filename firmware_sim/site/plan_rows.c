@@ -116,7 +116,7 @@ static void add_range(const struct site *site, struct site_plan *plan)
     if (!config_limits_range(site->cfg)) return;
     snprintf(method, sizeof method, "%.6g to %.6g m", head->range_min_m, head->range_max_m);
     snprintf(why, sizeof why,
-             "head.range_min_m, range_max_m: beyond them there is no echo; the profile has %.6g to %.6g m",
+             "head.range_min_m, range_max_m: there is no echo outside of them; the profile has %.6g to %.6g m",
              head->profile_min_m, head->profile_max_m);
     plan_say(&plan->row[plan->n++], "range", method, 0.0, 0.0, why);
 }

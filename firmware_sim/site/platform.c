@@ -78,9 +78,10 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
                        why.text);
     if (site->knot_error_m > TOLERANCE_M * 1.001)
-        sh_warn(report,
-                "the trajectory bends more than poses %g ms apart can follow: the head leaves it by up to %.2g m",
-                1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
+        sh_warn(
+            report,
+            "the trajectory bends more than poses %g ms apart can follow: the head deviates from it by up to %.2g m",
+            1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
     return rc;
 }
 

@@ -132,11 +132,12 @@ int site_rate_row(const struct site *site, struct plan_row *row, struct sh_err *
     if (isnan(rate.pulse_ns))
         snprintf(why, sizeof why, "no pulse of the configured sweep is cast");
     else
-        snprintf(why, sizeof why,
-                 "%u processor%s compute%s %.3g million pulses/s; the configured %.3g million/s, of which %.3g million "
-                 "are cast, need %.3g %% of that",
-                 rate.processors, rate.processors > 1 ? "s" : "", rate.processors > 1 ? "" : "s",
-                 1e3 * rate.processors / rate.pulse_ns, 1e-6 * rate.fired_hz, 1e-6 * rate.cast_hz, 100.0 * rate.share);
+        snprintf(
+            why, sizeof why,
+            "%u processor%s compute%s %.3g million pulses/s; the configuration has %.3g million/s; %.3g million of "
+            "them are cast and need %.3g %% of that",
+            rate.processors, rate.processors > 1 ? "s" : "", rate.processors > 1 ? "" : "s",
+            1e3 * rate.processors / rate.pulse_ns, 1e-6 * rate.fired_hz, 1e-6 * rate.cast_hz, 100.0 * rate.share);
     plan_say(row, "total", "measured", (double)NAN, rate.pulse_ns, why);
     row->echo_share = (double)NAN;
     return SH_OK;
@@ -148,10 +149,11 @@ int site_warn_rate(const struct site *site, const struct sh_report *report, stru
     if (site->cfg->loop.pace != PACE_REALTIME) return SH_OK;
     int rc = measure_rate(site, &rate, err);
     if (rc == SH_OK && rate.share > MOST_SHARE)
-        sh_warn(report,
-                "%s: head.prr_hz: %.3g million pulses/s to be cast need about %.0f %% of %u processors: pulses may be "
-                "lost; this machine computes up to %.3g million/s",
-                site->cfg->file, 1e-6 * rate.cast_hz, 100.0 * rate.share, rate.processors,
-                1e3 * rate.processors / rate.pulse_ns);
+        sh_warn(
+            report,
+            "%s: head.prr_hz: casting %.3g million pulses/s needs about %.0f %% of %u processors: pulses may be lost; "
+            "this machine computes up to %.3g million/s",
+            site->cfg->file, 1e-6 * rate.cast_hz, 100.0 * rate.share, rate.processors,
+            1e3 * rate.processors / rate.pulse_ns);
     return rc;
 }

@@ -108,7 +108,7 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
         free(s->sight_users);
     if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
     return rc == SH_OK ? rc
-                       : sh_fail(err, rc, "%s: station %u %s: %.300s; cast.sight: off does without", cfg->file,
+                       : sh_fail(err, rc, "%s: station %u %s: %.300s; cast.sight: off needs no map", cfg->file,
                                  station + 1, s->station->name, why.text);
 }
 
@@ -152,10 +152,11 @@ int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct
     for (uint32_t i = first; i - first < n; i++)
         served += config_serves(site->cfg, i) != 0;
     if (served > SITE_MAX_SIGHTS) {
-        sh_warn(report,
-                "%s: stations: a run makes no maps (cast.sight) for %u of them, allowed up to %d; rays ask the BVH, "
-                "with the same hits",
-                site->cfg->file, served, SITE_MAX_SIGHTS);
+        sh_warn(
+            report,
+            "%s: stations: a run makes no maps (cast.sight) for %u stations, allowed are up to %d; their rays go to "
+            "the BVH, with the same hits",
+            site->cfg->file, served, SITE_MAX_SIGHTS);
         return SH_OK;
     }
     for (uint32_t i = first; i - first < n && rc == SH_OK; i++)

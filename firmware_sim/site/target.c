@@ -76,7 +76,7 @@ static int fail_unknown(const struct site *site, uint32_t i, struct sh_err *err)
 {
     char near[3 * SCENE_NAME_LEN + 16];
     const char *pattern = site->cfg->scene.target.object[i];
-    const char *what = "near ones are";
+    const char *what = "similar ones are";
     list_near(site, pattern, NEAR_LETTERS, near, sizeof near);
     if (near[0] == '\0') {
         what = "as";
@@ -161,10 +161,10 @@ static int leave_out(struct site *site, const uint8_t *is_target, struct sh_err 
     for (uint32_t k = 0; k < n; k++)
         site->n_surfaces += site->mover[k].scene->n_surfaces;
     if (rc != SH_OK || site->scene->n_all > 0) return rc;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: scene.target.objects: nothing that stands still is among them; allowed with one that does, or "
-                   "others: hide",
-                   site->cfg->file);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: scene.target.objects: none of them stands still; allowed with an object that does, or with others: hide",
+        site->cfg->file);
 }
 
 int site_select_target(struct site *site, struct sh_err *err)

@@ -36,7 +36,7 @@ int site_name_legs(struct site *site, struct sh_err *err)
         legs |= cfg->station[i].tripod.given && cfg->station[i].tripod.legs;
     if (!legs) return SH_OK;
     if (site->n_surfaces == SCENE_MAX_SURFACES)
-        return sh_fail(err, SH_EINPUT, "%s: too many surfaces for one more, of tripods' legs; at most %d", cfg->file,
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces to add one for tripods' legs; allowed are %d", cfg->file,
                        SCENE_MAX_SURFACES);
     site->legs = calloc(1, sizeof *site->legs);
     if (site->legs == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the legs of tripods");
@@ -62,10 +62,11 @@ static int open_legs(const struct site *site, struct site_station *s, uint32_t i
     t->opening_rad = least_rad;
     if (isnan(t->head_m)) return SH_OK;
     if (!(t->height_m > 0.0))
-        return sh_fail(err, SH_EINPUT,
-                       "%s: stations[%u] (%s): tripod.head_above_m: %.6g m, and the head is %.6g m above the ground; "
-                       "allowed below that",
-                       site->cfg->file, i, s->station->name, t->from->head_above_m, t->head_m);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: stations[%u] (%s): tripod.head_above_m: %.6g m, but the head is %.6g m above the ground; allowed is "
+            "less than that",
+            site->cfg->file, i, s->station->name, t->from->head_above_m, t->head_m);
     t->gap_m = t->height_m - t->from->leg_m * cos(least_rad);
     if (t->gap_m > 0.0) return SH_OK;
     t->gap_m = 0.0;
@@ -77,7 +78,8 @@ static void warn(const struct site_station *s, uint32_t i, const struct sh_repor
 {
     const struct site_tripod *t = &s->tripod;
     if (isnan(t->head_m))
-        sh_warn(report, "station %u %s: tripod: no ground below it; its legs have their smallest opening, %g deg",
+        sh_warn(report,
+                "station %u %s: tripod: there is no ground below it, so its legs have their smallest opening, %g deg",
                 i + 1, s->station->name, t->from->opening_min_deg);
     else if (t->gap_m > 0.0)
         sh_warn(

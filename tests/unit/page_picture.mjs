@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The pure parts of the page's picture (drivers/link/web): the points that are held and their order, the camera, colours
-// and limits, picking, dragging, levels of detail, the scene's bytes. TAP on standard output.
+// It tests the pure parts of the page's picture (drivers/link/web): the stored points and their order, the camera,
+// colours and limits, picking, dragging, levels of detail, the scene's bytes. It prints TAP on standard output.
 import {Cloud, BLOCK, evenOrder, pointOf} from '../../drivers/link/web/cloud.js';
 import {Camera, FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
@@ -29,7 +29,7 @@ function throws(run, words) {
   throw new Error(`no error: ${words}`);
 }
 
-// n points; place(i) gives x, y, z.
+// Makes n points; place(i) gives x, y, z.
 function batch(n, place, {scan = 1, station = 1, pulse0 = 0} = {}) {
   const f64 = () => new Float64Array(n), f32 = () => new Float32Array(n);
   const b = {n, shots: n, scan, station, frame: 0, line: 0, pulse0, x: f64(), y: f64(), z: f64(), pulse: f64(), t: f32(), range: f32(),
@@ -51,7 +51,7 @@ test('the oldest points go, whole blocks, and not below the capacity', () => {
   const cloud = new Cloud({capacity: 100_000});
   for (let k = 0; k < 5; k++) cloud.add(batch(50_000, (i) => [k, i, 0], {pulse0: 50_000 * k}));
   same(cloud.total, 250_000, 'total');
-  same([cloud.gone, cloud.count], [131_072, 118_928], 'gone and count'); // blocks of 65,536: 250,000 - 2 * 65,536
+  same([cloud.gone, cloud.count], [131_072, 118_928], 'gone and count'); // two blocks of 65,536 are gone
   same(cloud.boundsOfAll.min[0], 0, 'bounds of all');
   same(cloud.bounds.min[0], 2, 'bounds of those held'); // the 131,073rd point is of the third batch
   cloud.clear();
@@ -104,7 +104,7 @@ test('far from the origin: floats of coordinates jump, the cloud\'s do not', () 
     ours = Math.max(ours, Math.abs(cloud.blocks[0].position[3 * i + 1] + cloud.origin[1] - y));
     naive = Math.max(naive, Math.abs(Math.fround(y) - y));
   }
-  near(ours, 0, 2 ** -24, 'ours'); // half an ulp of a float below 1 m
+  near(ours, 0, 2 ** -24, 'ours'); // it is half an ulp of a float below 1 m
   same(naive > 0.2, true, `naive: ${naive}`); // half an ulp of 5.6e6 is 0.25 m
 });
 
@@ -123,7 +123,7 @@ test('the eye in two floats: what it sees moves as it does', () => {
 });
 
 test('depth: a millimetre and a kilometre in one picture', () => {
-  const step = 2 ** -24; // of the depth buffer
+  const step = 2 ** -24; // it is that of the depth buffer
   same([depthOf(NEAR_M), depthOf(FAR_M)], [0, 1], 'ends');
   for (const [w, apart] of [[0.002, 2e-8], [1, 2e-6], [1000, 2e-3]]) {
     same(depthOf(w + apart) - depthOf(w) > step, true, `${apart} m at ${w} m`);
@@ -167,7 +167,7 @@ test('what a gesture holds stays under the pointer', () => {
 });
 
 test('a box is left out only where nothing of it is in sight', () => {
-  const c = camera(); // at y = -10, looking north
+  const c = camera(); // the eye is at y = -10, looking north
   const sees = (lo, hi) => c.sees(lo, hi, [0, 0, 0]);
   same([sees([-1, -1, -1], [1, 1, 1]), sees([-1, -30, -1], [1, -20, 1]), sees([50, -1, -1], [60, 1, 1]), sees([-99, -99, -99], [99, 99, 99])],
     [true, false, false, true], 'before, behind, beside, around');
@@ -175,9 +175,9 @@ test('a box is left out only where nothing of it is in sight', () => {
 
 test('picking: the nearer of two under the pointer, and none beside them', () => {
   const cloud = new Cloud();
-  cloud.add(batch(3, (i) => [[0, 20, 0], [0.01, 0, 0], [3, 0, 0]][i])); // 30 m, 10 m and 10 m away
+  cloud.add(batch(3, (i) => [[0, 20, 0], [0.01, 0, 0], [3, 0, 0]][i])); // they are 30 m, 10 m and 10 m away
   const c = camera();
-  same(nearest(cloud, c, 400, 300, 8).i, 1, 'the front one'); // 0.6 px beside the pointer
+  same(nearest(cloud, c, 400, 300, 8).i, 1, 'the front one'); // it is 0.6 px beside the pointer
   const third = c.project([3, 0, 0]);
   same(nearest(cloud, c, third.x + 2, third.y, 8).i, 2, 'at the side');
   same(nearest(cloud, c, third.x, third.y + 40, 8), null, 'nothing');
@@ -186,12 +186,12 @@ test('picking: the nearer of two under the pointer, and none beside them', () =>
 
 test('limits: robust, and the same while points come unless they miss much', () => {
   const values = Array.from({length: 1001}, (_, i) => i / 100).concat([1e6, -1e6]);
-  const [lo, hi] = robustLimits(values); // percentiles 0.1 and 9.9, and 2 % of their difference
+  const [lo, hi] = robustLimits(values); // these are percentiles 0.1 and 9.9, and 2 % of their difference
   near(lo, 0.1 - 0.196, 0.03, 'lo');
   near(hi, 9.9 + 0.196, 0.03, 'hi');
   same(robustLimits([]), null, 'of none');
   const [low, high] = robustLimits([2 - 5e-7, 2, 2 + 5e-7], 0.01);
-  near(low, 1.995, 1e-6, 'rounding is not shown: limits are apart as far as wanted'); // 2 -+ half of 0.01
+  near(low, 1.995, 1e-6, 'rounding is not shown: limits are apart as far as wanted'); // these are 2 -+ half of 0.01
   near(high, 2.005, 1e-6, 'its other end');
   same(widened([0, 10], [-0.5, 10.9]), [0, 10], 'within a tenth');
   same(widened([0, 10], [3, 15]), [0, 15], 'more');
@@ -209,7 +209,7 @@ test('colours: ends of a ramp, NaN, ticks, legend', () => {
   same([...valuesOf(cloud.blocks[0], 'reflectance', 0, 2)], [NONE, NONE].map(Math.fround), 'not modelled at all');
   same(ticks([-0.13, 3.31]).map((t) => t.text), ['0', '1', '2', '3'], 'ticks');
   same(ticks([0, 2]).map((t) => t.text), ['0.0', '0.5', '1.0', '1.5', '2.0'], 'ticks at both limits');
-  const echoes = {n: 4, echo: Uint8Array.from([0x11, 0x31, 0x32, 0x33])}; // count and number
+  const echoes = {n: 4, echo: Uint8Array.from([0x11, 0x31, 0x32, 0x33])}; // these are count and number
   same([...valuesOf(echoes, 'echo', 0, 4)], [0, 1, 2, 3], 'only echo, first, between, last');
   const legend = legendOf('height', {limits: [-1, 1], offset: 110});
   same([legend.from, legend.to, legend.unit, legend.stops.length], [109, 111, 'm', 17], 'height');
@@ -247,7 +247,7 @@ test('a station that is dragged tells where it is, once it is let go', () => {
   near(told[0].x, 1, 1e-9, 'x');
   near(told[0].y, 0.5, 1e-9, 'y');
   same([told[0].station, told[0].z, told[0].heading_deg, stations.pending], [4, 0, 10, true], 'the rest');
-  stations.set(stations.list); // refused: as before
+  stations.set(stations.list); // it is refused, so all is as before
   same(stations.placeOf(stations.list[0]).at, [0, 0, 0], 'back');
 });
 
@@ -288,14 +288,14 @@ test('a tripod: its feet stand on the ground, the first towards north', () => {
   // The head 1.6 m above the ground, 0.2 m of it above the tripod's top: legs of 1.8 m reach out sqrt(1.8^2 - 1.4^2).
   const {positions: p} = legsMesh({leg_m: 1.8, foot_radius_m: Math.sqrt(1.8 ** 2 - 1.4 ** 2), height_m: 1.4, head_above_m: 0.2});
   const of = (axis) => Array.from({length: p.length / 3}, (_, i) => p[3 * i + axis]);
-  near(Math.min(...of(2)), -1.6, 0.014, 'feet'); // half a leg's thickness at its end
+  near(Math.min(...of(2)), -1.6, 0.014, 'feet'); // this is half a leg's thickness at its end
   near(Math.max(...of(2)), -0.2, 0.024, 'top');
   near(Math.max(...of(1)), Math.sqrt(1.8 ** 2 - 1.4 ** 2), 0.014, 'the first foot');
 });
 
 test('the scene\'s bytes, good and bad; its edges', () => {
   const positions = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1];
-  const triangles = [0, 1, 2, 0, 2, 3, 0, 1, 4]; // a square of two, and one that stands on its side
+  const triangles = [0, 1, 2, 0, 2, 3, 0, 1, 4]; // it is a square of two, and one that stands on its side
   const make = (n = 40 + 60 + 36) => {
     const bytes = new ArrayBuffer(n), v = new DataView(bytes);
     [0x43534853, 1, 5, 3].forEach((u, i) => v.setUint32(4 * i, u, true));

@@ -113,8 +113,8 @@ static void check_points(struct cloud c)
         assert_int_equal(c.echo[i], POINT[i].echo);
     }
     assert_int_equal(n_warnings, 2);
-    assert_non_null(strstr(warnings, "element 'camera' (1 of it) ignored"));
-    assert_non_null(strstr(warnings, "element 'face' (1 of it) ignored"));
+    assert_non_null(strstr(warnings, "element 'camera' (1 of them) is not used"));
+    assert_non_null(strstr(warnings, "element 'face' (1 of them) is not used"));
     cloud_free(&c);
 }
 
@@ -186,7 +186,7 @@ static void malformed_files_are_refused(void **state)
         {"", "not a PLY file"},
         {"solid ply", "not a PLY file and not a LAS file"},
         {"ply2\n", "not a PLY file: the first line"},
-        {TEXT, "ends within the header"},
+        {TEXT, "ends in the header"},
         {TEXT "element face 0\nproperty list uchar int vertex_indices\nend_header\n", "no element vertex"},
         {TEXT "element vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
          "lacks one of the properties x, y, z"},
@@ -194,15 +194,15 @@ static void malformed_files_are_refused(void **state)
               "z\nend_header\n1 1 2 3\n",
          "lacks one of the properties x, y, z"},
         {TEXT "element vertex 0\n" XYZ "property int label\nproperty int label\nend_header\n", "twice: 'label'"},
-        {TEXT "element vertex 0\n" XYZ "element vertex 0\n" XYZ "end_header\n", "vertex is there twice"},
-        {TEXT "element vertex 100000000000000000\n" XYZ "end_header\n1 2 3\n", "100000000000000000 of element vertex"},
-        {TEXT "element vertex 3\n" XYZ "end_header\n1 2 3\n4 5 6\n", "3 of element vertex need"},
+        {TEXT "element vertex 0\n" XYZ "element vertex 0\n" XYZ "end_header\n", "vertex is given twice"},
+        {TEXT "element vertex 100000000000000000\n" XYZ "end_header\n1 2 3\n", "100000000000000000 elements vertex"},
+        {TEXT "element vertex 3\n" XYZ "end_header\n1 2 3\n4 5 6\n", "3 elements vertex need"},
         {TEXT "element vertex 2\n" XYZ "end_header\n1 2 3000000\n", "line 9: vertex 2 of 2: the file ends before it"},
         {TEXT "element vertex 1\n" XYZ "end_header\n1 2\n3\n", "line 8: vertex 1 of 1: a value is missing"},
         {TEXT "element vertex 1\n" XYZ "end_header\n1 2 3 4\n", "there are more values"},
         {TEXT "element vertex 1\n" XYZ "end_header\n1 2 3m\n", "not a number"},
-        {TEXT "element vertex 1\n" XYZ "end_header\n1 inf 3\n", "line 8: vertex 1 of 1: (1 inf 3) is no position"},
-        {TEXT "element vertex 1\n" XYZ "end_header\nnan nan 3\n", "(nan nan 3) is no position"},
+        {TEXT "element vertex 1\n" XYZ "end_header\n1 inf 3\n", "line 8: vertex 1 of 1: (1 inf 3) is not a position"},
+        {TEXT "element vertex 1\n" XYZ "end_header\nnan nan 3\n", "(nan nan 3) is not a position"},
         {TEXT "element vertex 1\n" XYZ "property int station\nend_header\n1 2 3 0\n", "station 0; allowed are whole"},
         {TEXT "element vertex 1\n" XYZ "property int station\nend_header\n1 2 3 65536\n", "from 1 to 65535"},
         {TEXT "element vertex 1\n" XYZ "property float label\nend_header\n1 2 3 0.5\n", "label 0.5; allowed"},
@@ -256,7 +256,7 @@ static void losses_of_the_file_are_told(void **state)
     struct cloud c = must_read("float.ply", b.data, b.n);
     assert_int_equal(n_warnings, 2);
     assert_non_null(strstr(warnings, "1 bytes after the last element"));
-    assert_non_null(strstr(warnings, "single precision, so good to 0.35 m only")); /* 5819725.5 * 6e-8 */
+    assert_non_null(strstr(warnings, "single precision, with errors up to 0.35 m")); /* 5819725.5 * 6e-8 */
     cloud_free(&c);
 }
 
@@ -273,7 +273,7 @@ static void test_degrees_as_float(void **state)
     PUT(&b, float, 179);
     PUT(&b, float, 100);
     struct cloud c = must_read("a.ply", b.data, b.n);
-    assert_non_null(strstr(warnings, "single precision, so good to 1.2 m only"));
+    assert_non_null(strstr(warnings, "single precision, with errors up to 1.2 m"));
     assert_true(fabs(c.count_m - 2.39) < 0.01);
     cloud_free(&c);
 }

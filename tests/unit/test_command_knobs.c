@@ -221,7 +221,7 @@ static void steps_of_fixed_patterns_are_readings(void **ctx)
     expect(&dev, "SCAN:STEP:LINE?", "0.3981312"); /* 360 * 20 * 55.296e-6 */
     refuse(&dev, "SCAN:STEP 0.4", CMD_E_SETTINGS, "allowed 0.3981312 as HEAD:LINes is 20");
     dev.limits.emitter = EMITTER_DIRECTIONS;
-    refuse(&dev, "SCAN:STEP?", CMD_E_SETTINGS, "the head has a list of directions, and no step");
+    refuse(&dev, "SCAN:STEP?", CMD_E_SETTINGS, "the head has a list of directions, so no step");
 }
 
 static int too_far(void *owner, const struct head_settings *settings, char *why, size_t len)

@@ -223,9 +223,9 @@ static void places_are_taken_in_each_form(void **state)
     assert_int_equal(load_edited(old, "  anchor: {source: ecef}\nstations:\n"
                                       "  - {position_m: [1, 2, 3], ecef_m: [6378137, 0, 0]}"),
                      SH_EINPUT);
-    assert_says("stations[0].position_m: together with a place on the Earth");
+    assert_says("stations[0].position_m: given together with a place on the Earth");
     assert_int_equal(load_edited(old, "  anchor: {source: ecef}\nstations:\n  - {heading_deg: 5}"), SH_EINPUT);
-    assert_says("stations[0].position_m: missing, and no place on the Earth is given either");
+    assert_says("stations[0].position_m: missing, and no place on the Earth is given");
 }
 
 static void seeds_follow_that_of_the_noise(void **state)

@@ -100,7 +100,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
          "too fine; allowed multiples of 0.001 ns"},
         {vlp, "firing_ns: { value: 55296,", "firing_ns: { value: 60000000,", "firing_ns",
          "longer than a turn at lines_max_hz; allowed up to 50000000 ns"},
-        {vlp, "offset_ns: 2304,", "offset_ns: 4608,", "beams", "beam 3 fires after 4608 ns, the one before it"},
+        {vlp, "offset_ns: 2304,", "offset_ns: 4608,", "beams", "beam 3 fires after 4608 ns, but the beam before it"},
         {vlp, "offset_ns: 0,", "offset_ns: 1,", "beams", "the first beam fires after 1 ns; allowed 0"},
         {vlp, "offset_ns: 0,", "offset_ns: -1,", "beams[0].offset_ns", "allowed a whole number"},
         {vlp, "elevation_deg: -15,", "elevation_deg: -91,", "beams[0].elevation_deg", "allowed -90 to 90 deg"},
@@ -136,7 +136,7 @@ static void settings_that_do_not_fit_are_refused(void **state)
          ":4: head.ring_stop_deg: the rings go from 1 to 0.5 deg; allowed a ring_start_deg of at most 0.5, or a "
          "ring_stop_deg of at least 1"},
         {"sphere", "  ring_start_deg: 0.1\n  ring_stop_deg: 0.9\n",
-         "no ring lies from 0.1 to 0.9 deg; allowed are limits around one, such as 0 or 1 deg"},
+         "no ring lies from 0.1 to 0.9 deg; allowed are limits around a ring, such as 0 or 1 deg"},
         {"sphere", "  line_start_deg: 90\n  line_stop_deg: 90\n",
          "the line goes from 90 to 90 deg; allowed a line_start_deg other than 90"},
         {"sphere", "  step_deg: 0.01\n  lines_hz: 278\n",
@@ -151,8 +151,9 @@ static void settings_that_do_not_fit_are_refused(void **state)
     const char *const sets[] = {"head.profile=sick-lms111", "head.lines_hz=25", "head.prr_hz=36000",
                                 "instrument.mirror_index_deg=0.1"};
     assert_int_equal(load_sets(sets, 4), SH_EINPUT);
-    assert_says("--set instrument.mirror_index_deg: an error of a mirror, and head profile sick-lms111 has emitter: "
-                "planar; allowed with a line head");
+    assert_says(
+        "--set instrument.mirror_index_deg: an error of a mirror, but head profile sick-lms111 has emitter: planar; "
+        "allowed with a line head");
 }
 
 /* ---- lists of directions */
@@ -182,9 +183,10 @@ static void lists_name_their_line(void **state)
     } wrong[] = {
         {"", "list.txt: no direction; allowed 1 to 1000000 rows"},
         {"# nothing\n", "no direction"},
-        {"0 1 0\n1 0\n", "list.txt, line 2: 2 numbers; allowed 3, x y z, in each row"},
-        {"0 1\n\n1 0 0\n", "list.txt, line 3: 3 numbers; allowed 2, azimuth and elevation in degrees, in each row"},
-        {"0\n", "list.txt, line 1: 1 number; allowed 3, x y z, or 2,"},
+        {"0 1 0\n1 0\n", "list.txt, line 2: a row with 2 numbers; allowed 3, x y z, in each row"},
+        {"0 1\n\n1 0 0\n",
+         "list.txt, line 3: a row with 3 numbers; allowed 2, azimuth and elevation in degrees, in each row"},
+        {"0\n", "list.txt, line 1: a row with 1 number; allowed 3, x y z, or 2,"},
         {"0 1 0 0\n", "list.txt, line 1: not a direction"},
         {"0 one 0\n", "list.txt, line 1: not a direction"},
         {"0 nan 0\n", "list.txt, line 1: not a direction"},
@@ -273,11 +275,10 @@ static void a_planar_head_has_its_geometries(void **state)
     static const char lms[] = "sick-lms111", list[] = "50 Hz at 0.5 deg, 25 Hz at 0.25 deg, 25 Hz at 0.5 deg";
     static const struct wrong wrong[] = {
         {lms, "lines_hz: 50,", "lines_hz: 51,", "geometries[0].lines_hz", "allowed 25 to 50 Hz"},
-        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn",
-         "700; allowed what divides"},
-        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "allowed what divides"},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn", "700; steps_per_turn, "},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "steps_per_turn, "},
         {lms, "front_step: { value: 540,", "front_step: { value: 541,", "geometries[0].steps_per_turn", "front_step"},
-        {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "stands there before"},
+        {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "is given twice"},
         {"velodyne-vlp16", "beams:\n", "geometries: []\nbeams:\n", "geometries", "allowed only with emitter: planar"},
     };
     expect_geometry("", 50, 720); /* the first one: what the device has from the factory */

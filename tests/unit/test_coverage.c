@@ -311,10 +311,10 @@ static void test_too_small(void **state)
     struct coverage_spec spec = {bvh, NULL, 0.001, 8.0, 1};
     assert_int_equal(coverage_create(&spec, NULL, &coverage, &err), SH_EINPUT);
     assert_null(coverage);
-    const char *says = strstr(err.text, "a cell of ");
+    const char *says = strstr(err.text, "a cell of at least ");
     if (says == NULL || strstr(err.text, "8 MiB are allowed") == NULL) fail_msg("%s", err.text);
     /* The limit in the text is allowed. */
-    assert_int_equal(sscanf(says, "a cell of %lf m", &allowed_m), 1);
+    assert_int_equal(sscanf(says, "a cell of at least %lf m", &allowed_m), 1);
     spec.cell_m = allowed_m;
     if (coverage_create(&spec, NULL, &coverage, &err) != 0) fail_msg("%s", err.text);
     coverage_free(coverage);

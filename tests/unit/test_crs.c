@@ -97,9 +97,9 @@ static void what_is_none_is_refused(void **state)
                {"local site grid", 0, "local site grid: no such"},
                {"EPSG:4326", 10, "EPSG:4326: not a projected"},
                {"EPSG:4978", 10, "not a projected"},
-               {"EPSG:32632", 1e12, "outside of where it is used"},
-               {"EPSG:2056", 684500, "outside of where it is used"}, /* a digit is missing */
-               {"EPSG:32632", NAN, "outside of where it is used"}};
+               {"EPSG:32632", 1e12, "outside of the system"},
+               {"EPSG:2056", 684500, "outside of the system"}, /* a digit is missing */
+               {"EPSG:32632", NAN, "outside of the system"}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct crs_place place;
         const int code = crs_locate(bad[i].name, bad[i].easting_m, 0.0, 0.0, &place, &err);

@@ -273,7 +273,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
     refused(good, 0, 1000, "0 beams; allowed 1 to 128");
     refused(good, 129, 1000, "129 beams");
     refused(late, 2, 100000, "the first beam fires after 5 ns; allowed 0");
-    refused(still, 2, 100000, "beam 2 fires after 0 ns, the one before it after 0 ns; allowed more");
+    refused(still, 2, 100000, "beam 2 fires after 0 ns, but the beam before it after 0 ns; allowed more");
     refused(back, 3, 100000, "beam 3 fires after 8 ns");
     refused(good, 2, 9000, "9 ns ends before its last firing; allowed more than 9 ns");
     struct emitter e;

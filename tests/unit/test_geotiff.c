@@ -204,7 +204,7 @@ static void holes(void **state)
     scene_free(s);
     for (int i = 0; i < 20; i++)
         value[i] = 255;
-    refuse_tif(&t, "no cell of 5 x 4 has a height");
+    refuse_tif(&t, "none of 5 x 4 cells has a height");
 }
 
 /* Feet come by the system, by keys, or by GDAL's word; scale and offset by GDAL. */
@@ -218,7 +218,7 @@ static void units(void **state)
         double unit, height, offset;
         const char *warning;
     } at[] = {
-        {{{3072, 2263}}, NULL, 1, 1, 0, "in feet, and the unit of its heights is not named"},
+        {{{3072, 2263}}, NULL, 1, 1, 0, "in feet, but its heights have no unit"},
         {{{3072, 2263}, {4096, 6360}}, NULL, 1, 1, 0, NULL}, /* NAVD88 height (ftUS) */
         {{{3072, 32632}, {4099, 9002}}, NULL, 0, 0.3048, 0, NULL},
         {{{3072, 32632}, {4096, 5703}}, NULL, 0, 1, 0, NULL},
@@ -232,7 +232,7 @@ static void units(void **state)
          0.5 * 0.3048,
          30.48,
          NULL},
-        {{{3072, 32767}}, NULL, 0, 1, 0, "neither its system nor its unit is named: metres are assumed"},
+        {{{3072, 32767}}, NULL, 0, 1, 0, "it names neither its system nor its unit: metres are assumed"},
     };
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
         struct tif t = tif_of(5, 4, heights);
@@ -263,7 +263,7 @@ static void odd_heights_are_doubted(void **state)
     value[7] = -9999;
     const struct tif t = tif_of(5, 4, value);
     struct scene *s = read_tif(&t);
-    assert_non_null(strstr(warnings, "from -9999 to 100 m; where -9999 means that there is none"));
+    assert_non_null(strstr(warnings, "from -9999 to 100 m; if -9999 marks cells without height"));
     scene_free(s);
     for (int i = 0; i < 20; i++)
         value[i] = 100.0; /* a plain */
@@ -281,7 +281,7 @@ static void what_is_left_out_is_said(void **state)
     t.scale[2] = 0.5;
     struct scene *s = read_tif(&t);
     assert_grid(s, 690001.0, 5335998.5, 2.0, -3.0, 1.0, 0.0);
-    assert_non_null(strstr(warnings, "scales the heights, which is not used"));
+    assert_non_null(strstr(warnings, "scales the heights; this is not used"));
     scene_free(s);
     t.key[3][0] = 4096;
     t.key[3][1] = 5773; /* with a system of the heights it is used, here and in GDAL */
@@ -297,7 +297,7 @@ static void what_is_left_out_is_said(void **state)
     t.key[2][0] = 2048;
     t.key[2][1] = 32767;
     s = read_tif(&t);
-    assert_non_null(strstr(warnings, "neither its system nor its unit is named"));
+    assert_non_null(strstr(warnings, "it names neither its system nor its unit"));
     assert_int_equal(n_warnings, 1);
     scene_free(s);
     const double matrix[16] = {2, 0, 0, 690000, 0, -3, 0, 5336000, 0, 0, 0.5, 7, 0, 0, 0, 1};
@@ -305,7 +305,7 @@ static void what_is_left_out_is_said(void **state)
     memcpy(t.matrix, matrix, sizeof matrix);
     s = read_tif(&t);
     assert_grid(s, 690001.0, 5335998.5, 2.0, -3.0, 1.0, 0.0);
-    if (n_warnings != 1 || strstr(warnings, "its ModelTransformation changes the heights, which is not used") == NULL)
+    if (n_warnings != 1 || strstr(warnings, "its ModelTransformation changes the heights; this is not used") == NULL)
         fail_msg("%s", warnings);
     scene_free(s);
     t.matrix[10] = 0.0; /* an offset alone */
@@ -328,9 +328,9 @@ static void what_is_left_out_is_said(void **state)
 static void what_is_refused(void **state)
 {
     (void)state;
-    WITH("no GeoTIFF: it doesn't say where its cells are", t.scale[0] = 0.0);
+    WITH("not a GeoTIFF: it doesn't say where its cells are", t.scale[0] = 0.0);
     WITH("no area", t.scale[1] = 0.0);
-    WITH("1 x 1 cells; terrain needs at least 2 x 2", t.width = t.height = 1);
+    WITH("1 x 1 cells; allowed are at least 2 x 2", t.width = t.height = 1);
     WITH("1 x 4 cells", t.width = 1);
     WITH("its cells are degrees (EPSG:4258); allowed are systems in metres or feet: gdalwarp -t_srs EPSG:32632",
          t.key[0][1] = 2;
@@ -347,7 +347,7 @@ static void what_is_refused(void **state)
     WITH("EPSG:4326: not a projected", t.key[2][1] = 4326);
     WITH("the unit of its cells is EPSG:9035", t.key[3][0] = 3076; t.key[3][1] = 9035);
     WITH("the unit of its heights is EPSG:9035", t.key[3][0] = 4099; t.key[3][1] = 9035);
-    WITH("EPSG:5715: not a system of heights that count upward", t.key[3][0] = 4096; t.key[3][1] = 5715);
+    WITH("EPSG:5715: not a vertical system with heights upward", t.key[3][0] = 4096; t.key[3][1] = 5715);
     WITH("the unit of its heights is 'parsec'; allowed are m, ft, US survey foot",
          t.metadata = "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">parsec</Item>");
     WITH("the scale of its heights is 'nan'; allowed are numbers, and no scale of 0",
@@ -361,7 +361,7 @@ static void what_is_refused(void **state)
     WITH("a picture (3 bands, PhotometricInterpretation 2), not heights", t.bands = 3; t.bits = 8; t.format = 1;
          t.photometric = PHOTOMETRIC_RGB);
     WITH("cells of 16 bits, SampleFormat 6", t.bits = 16; t.format = SAMPLEFORMAT_COMPLEXIEEEFP);
-    WITH("a mask says which cells have no height", t.with_mask = 1);
+    WITH("a mask marks the cells without height", t.with_mask = 1);
     WITH("its first image is a mask or a smaller copy", t.kind = FILETYPE_REDUCEDIMAGE);
     static char many[1 << 16];
     memset(many, ' ', sizeof many - 1);
@@ -387,7 +387,7 @@ static void what_is_beside_it(void **state)
     refuse_spec(&(struct scene_mesh_spec){.file = path, .scale = 1, .up = SCENE_UP_Y}, "allowed up: z, scale: 1");
     snprintf(mask, sizeof mask, "%s.msk", path);
     tif_write(mask, &t);
-    refuse_spec(&(struct scene_mesh_spec){.file = path, .scale = 1}, "a mask says which cells have no height");
+    refuse_spec(&(struct scene_mesh_spec){.file = path, .scale = 1}, "a mask marks the cells without height");
     unlink(mask);
     unlink(path);
 }

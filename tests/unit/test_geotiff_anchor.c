@@ -81,7 +81,7 @@ static void a_raster_in_utm_makes_the_scene_that_grid(void **state)
         ok(georef_locate_utm(32, 1, at_m, &want, &err));
         assert_true(apart_m(&want, &site->station[0].at.place) < 1e-6); /* the same calls */
         assert_non_null(strstr(warned, "are taken as heights above the ellipsoid; scene.anchor.height_m"));
-        assert_true((strstr(warned, "coordinates in EPSG:25832 are good to 1 m") != NULL) == (i == 1));
+        assert_true((strstr(warned, "coordinates in EPSG:25832 have errors up to 1 m") != NULL) == (i == 1));
         assert_null(strstr(warned, "tangent"));
     }
     write_tif("dtm.tif", 32733, 10.0, 260000.0, 6250000.0);
@@ -100,7 +100,7 @@ static void heights_above_an_ellipsoid_are_not_doubted(void **state)
     for (int i = 0; i < 2; i++) {
         write_tif_of("b.tif", 32632, code[i], 1.0, 690021.0, 5336000.0);
         ok(load(MESH("a.tif", "") ", " MESH("b.tif", ""), "", "{position_m: [690020, 5335990, 102]}"));
-        assert_int_equal(strstr(warned, "as a rule count from the sea") != NULL, i);
+        assert_int_equal(strstr(warned, "mostly count from sea level") != NULL, i);
     }
 }
 
@@ -141,8 +141,8 @@ static void another_grid_makes_it_tangent(void **state)
     ok(crs_locate("EPSG:2056", 2600050.0, 1200050.0, 50.0, &corner, &err));
     const double off_m = apart_m(&got, &corner.at);
     assert_true(off_m > 0.15 && off_m < 0.17);
-    snprintf(words, sizeof words, "corners up to %.2g m from where EPSG:2056 has them; exact is a raster in UTM",
-             off_m);
+    snprintf(words, sizeof words,
+             "corners are wrong by up to %.2g m in EPSG:2056; for exact places use a raster in UTM", off_m);
     if (strstr(warned, words) == NULL || strstr(warned, "gdalwarp -t_srs EPSG:32632") == NULL)
         fail_msg("'%s' in %s", words, warned);
 }
@@ -168,7 +168,7 @@ static void what_is_refused(void **state)
     write_in("floor.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     const struct {
         const char *meshes, *part;
-    } bad[] = {{MESH("dtm.tif", ""), "its system has no code of the EPSG registry"},
+    } bad[] = {{MESH("dtm.tif", ""), "its system has no EPSG code"},
                {MESH("floor.obj", ""), "source geotiff, but no mesh is a .tif file"},
                {"{file: far.tif, up: z, scale: 2}", "allowed up: z, scale: 1"},
                {"{file: far.tif, up: y, scale: 1}", "allowed up: z, scale: 1"},

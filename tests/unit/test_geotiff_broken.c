@@ -37,8 +37,8 @@ static void cut_off_anywhere(void **state)
     static uint8_t data[8192];
     const size_t n = pack(data);
     for (size_t cut = 0; cut < n; cut += cut < 16 ? 1 : (size_t)thorough(1, 11))
-        refuse("cut.tif", data, cut, cut < 8 ? "no TIFF" : "");
-    refuse("text.tif", "solid hall, or any other text", 29, "no TIFF by its first bytes");
+        refuse("cut.tif", data, cut, cut < 8 ? "not a TIFF" : "");
+    refuse("text.tif", "solid hall, or any other text", 29, "not a TIFF: its first bytes");
 }
 
 /* One byte in a hundred is changed, with a fixed seed. The result is terrain, or one line that names the file, and no
@@ -81,7 +81,8 @@ static void what_follows_is_broken(void **state)
     memset(data + at + 2 + 12 * tags, 0x7f, 4);
     const struct scene_mesh_spec spec = {.file = write_file("next.tif", data, n), .scale = 1};
     assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_OK);
-    if (n_warnings != 1 || strstr(warnings, "next.tif: only its first image is read; what follows is broken: ") == NULL)
+    if (n_warnings != 1 ||
+        strstr(warnings, "next.tif: only its first image is read; the data after it are broken: ") == NULL)
         fail_msg("%s", warnings);
     scene_free(s);
     unlink(path);

@@ -100,8 +100,8 @@ static void quantized_positions(void **state)
         const void *data;
         const char *scale, *normalized, *says;
         double within, error_m;
-    } tries[] = {{unit, "2,2,2", "true", "good to 3.1e-05 m only", 3.1e-5, 1.0 / 32767},
-                 {mm, "0.001,0.001,0.001", "false", "good to 0.0005 m only", 1e-15, 0.0005}};
+    } tries[] = {{unit, "2,2,2", "true", "errors up to 3.1e-05 m", 3.1e-5, 1.0 / 32767},
+                 {mm, "0.001,0.001,0.001", "false", "errors up to 0.0005 m", 1e-15, 0.0005}};
     for (int i = 0; i < 2; i++) {
         char rest[2048];
         gltf_quad();
@@ -213,7 +213,7 @@ static void nothing_is_read_beyond_the_file(void **state)
         {"\"bufferView\":0,\"componentType\":5126,\"count\":4294967294,\"type\":\"VEC3\"", "go beyond"},
         {"\"bufferView\":0,\"componentType\":5126,\"count\":-4,\"type\":\"VEC3\"", "not a whole number"},
         {"\"bufferView\":0,\"componentType\":5126,\"count\":3.5,\"type\":\"VEC3\"", "not a whole number"},
-        {"\"bufferView\":9,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"", "bufferViews[9] is not there"},
+        {"\"bufferView\":9,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"", "bufferViews[9] is missing"},
         {"\"bufferView\":0,\"componentType\":5124,\"count\":4,\"type\":\"VEC3\"", "componentType is 5124"},
         {"\"bufferView\":1,\"componentType\":5126,\"count\":4,\"type\":\"VEC2\"", "type is VEC2; allowed here is VEC3"},
         {"\"bufferView\":0,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"", "index 2 out of range; there are 2"},

@@ -24,8 +24,8 @@ static void required_and_unknown(void **state)
     struct scene *s = gltf_load("\"extensionsUsed\":[\"VENDOR_a\",\"KHR_materials_ior\",\"VENDOR_b\"]," ONE_NODE
                                 "\"materials\":[{}]," PLAIN_MESH);
     assert_int_equal(n_warnings, 1);
-    assert_non_null(strstr(warnings, "2 extensions are not known, and were not required: they are not read: VENDOR_a, "
-                                     "VENDOR_b"));
+    assert_non_null(
+        strstr(warnings, "2 extensions are unknown but not required; they are not read: VENDOR_a, VENDOR_b"));
     scene_free(s);
 }
 
@@ -49,18 +49,18 @@ static void transparency_is_kept(void **state)
         const char *material;
         float clear;
         const char *odd; /* the name in a warning; NULL: there is none */
-    } as[] = {{"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f, NULL},
-              {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
-              {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},
-              {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f, NULL},
-              {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 0.0f, NULL},
-              {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":1.5}}", 0.0f,
-               "1 value of materials left out, which the format doesn't allow; the first: materials[0]: transmissionF"},
-              {"\"alphaMode\":\"BLENDED\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f,
-               "materials[0]: alphaMode"},
-              {"\"alphaMode\":\"BLEND\",\"alphaCutoff\":-1,\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,-1]}",
-               0.0f,
-               "2 values of materials left out, which the format doesn't allow; the first: materials[0]: alphaCut"}};
+    } as[] = {
+        {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.75f, NULL},
+        {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
+        {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},
+        {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f, NULL},
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 0.0f, NULL},
+        {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":1.5}}", 0.0f,
+         "1 value of materials left out, since the format doesn't allow them; the first: materials[0]: transmissionF"},
+        {"\"alphaMode\":\"BLENDED\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f,
+         "materials[0]: alphaMode"},
+        {"\"alphaMode\":\"BLEND\",\"alphaCutoff\":-1,\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,-1]}", 0.0f,
+         "2 values of materials left out, since the format doesn't allow them; the first: materials[0]: alphaCut"}};
     for (size_t i = 0; i < sizeof as / sizeof as[0]; i++) {
         char rest[1024];
         gltf_quad();
@@ -97,11 +97,12 @@ static void images_that_are_not_read(void **state)
     static const char required[] = "\"extensionsRequired\":[\"KHR_texture_basisu\"],",
                       alone[] = "{\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}}",
                       beside[] = "{\"source\":1,\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}}",
-                      says[] = "1 textures are images by KHR_texture_basisu, which is not read";
+                      says[] = "1 textures are images of KHR_texture_basisu, which is not supported";
     struct scene *s;
     struct sh_err err = {0};
     assert_int_equal(load_images(required, alone, 1, &s, &err), SH_EINPUT);
-    if (strstr(err.text, "textures[0] is an image by KHR_texture_basisu, which is not read; allowed are PNG") == NULL)
+    if (strstr(err.text, "textures[0] is an image of KHR_texture_basisu, which is not supported; allowed are PNG") ==
+        NULL)
         fail_msg("%s", err.text);
     assert_int_equal(load_images(required, alone, 0, &s, &err), SH_OK);
     scene_free(s);
@@ -197,9 +198,10 @@ static void meshopt_is_unpacked(void **state)
     (void)state;
     try_packed("ATTRIBUTES", "", 0, NULL);
     try_packed("ATTRIBUTES", "", 7, "meshoptimizer can't decode it");
-    try_packed("TRIANGLES", "", 0, "meshopt has no TRIANGLES of 4 times 12 bytes");
+    try_packed("TRIANGLES", "", 0, "meshopt does not allow TRIANGLES with 4 elements of 12 bytes");
     try_packed("CURVES", "", 0, "meshopt's mode CURVES is not known");
-    try_packed("ATTRIBUTES", ",\"filter\":\"OCTAHEDRAL\"", 0, "meshopt has no ATTRIBUTES of 4 times 12 bytes");
+    try_packed("ATTRIBUTES", ",\"filter\":\"OCTAHEDRAL\"", 0,
+               "meshopt does not allow ATTRIBUTES with 4 elements of 12 bytes");
 }
 
 /* ---- placement of textures */
@@ -274,7 +276,7 @@ static void names_and_data_of_images(void **state)
     assert_memory_equal(s->texture[0].bytes, bytes, 4);
     scene_free(s);
     gltf_refuse(ONE_NODE A_MATERIAL "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"data:,AQ!\"}]," PLAIN_MESH,
-                "images[0].uri has data that are not base64");
+                "images[0].uri must have its data in base64");
 }
 
 int main(void)

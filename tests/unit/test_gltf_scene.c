@@ -44,7 +44,7 @@ static void order_and_scenes(void **state)
              MESH_AND_ACCESSORS);
     struct scene *s = gltf_load(rest);
     assert_int_equal(s->n_triangles, 2);
-    assert_non_null(strstr(warnings, "it has 2 scenes, and says of none that it is the default"));
+    assert_non_null(strstr(warnings, "it has 2 scenes and no default scene"));
     scene_free(s);
 }
 
@@ -96,14 +96,14 @@ static void trees_that_are_none(void **state)
     (void)state;
     refuse_tree("\"nodes\":[{\"children\":[1]},{\"mesh\":0,\"children\":[2]},{\"children\":[1]}]",
                 "nodes[1] is a child of nodes[0] and of nodes[2]; allowed is one parent");
-    refuse_tree("\"nodes\":[{\"children\":[0],\"mesh\":0}]", "nodes[0] is below itself");
+    refuse_tree("\"nodes\":[{\"children\":[0],\"mesh\":0}]", "nodes[0] is a child of itself");
     refuse_tree("\"nodes\":[{\"children\":[1],\"mesh\":0},{\"children\":[0]},{\"mesh\":0}]",
-                "nodes[0] is below itself");
-    refuse_tree("\"nodes\":[{\"children\":[7],\"mesh\":0}]", "nodes[0].children[0] is no node; there are 1");
+                "nodes[0] is a child of itself");
+    refuse_tree("\"nodes\":[{\"children\":[7],\"mesh\":0}]", "nodes[0].children[0] is not a node; there are 1");
     refuse_tree("\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"children\":[1]},{\"mesh\":0}]",
                 "scenes[0].nodes has nodes[1], which is a child of nodes[0]");
     refuse_tree("\"scenes\":[{\"nodes\":[0,0]}],\"nodes\":[{\"mesh\":0}]", "scenes[0].nodes has nodes[0] twice");
-    refuse_tree("\"nodes\":[{\"mesh\":3}]", "meshes[3] is not there: there are 1");
+    refuse_tree("\"nodes\":[{\"mesh\":3}]", "meshes[3] is missing: there are 1");
 }
 
 /* A wrong index is an error where a drawn node needs it, else a warning. Each names the first one. */
@@ -113,20 +113,20 @@ static void indices_of_nothing(void **state)
     static const struct {
         const char *old, *with, *says;
     } as[] = {
-        {"\"mesh\":0", "\"mesh\":0,\"camera\":4", "nodes[0].camera is 4, and there are 0 cameras"},
-        {"\"at\":1", "\"bufferView\":9", "images[0].bufferView is 9, and there are 3 bufferViews"},
-        {"\"tx\":1", "\"source\":1,\"sampler\":2", "textures[0].source is 1, and there are 1 images"},
+        {"\"mesh\":0", "\"mesh\":0,\"camera\":4", "nodes[0].camera is 4, but there are 0 cameras"},
+        {"\"at\":1", "\"bufferView\":9", "images[0].bufferView is 9, but there are 3 bufferViews"},
+        {"\"tx\":1", "\"source\":1,\"sampler\":2", "textures[0].source is 1, but there are 1 images"},
         {"\"mx\":1", "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":3}}",
-         "materials[0].pbrMetallicRoughness.baseColorTexture.index is 3, and there are 1 textures"},
+         "materials[0].pbrMetallicRoughness.baseColorTexture.index is 3, but there are 1 textures"},
         {"\"mx\":1", "\"extensions\":{\"KHR_materials_clearcoat\":{\"clearcoatTexture\":{\"index\":-1}}}",
-         "KHR_materials_clearcoat.clearcoatTex.index is -1, and there are 1 textures"},
-        {"\"sx\":1", "\"joints\":[0,1,5],\"inverseBindMatrices\":0", "skins[0].joints[2] is 5, and there are 2 nodes"},
-        {"\"px\":1", "\"material\":6", "meshes[1].primitives[0].material is 6, and there are 1 materials"},
+         "KHR_materials_clearcoat.clearcoatTex.index is -1, but there are 1 textures"},
+        {"\"sx\":1", "\"joints\":[0,1,5],\"inverseBindMatrices\":0", "skins[0].joints[2] is 5, but there are 2 nodes"},
+        {"\"px\":1", "\"material\":6", "meshes[1].primitives[0].material is 6, but there are 1 materials"},
         {"\"px\":1", "\"targets\":[{\"POSITION\":0},{\"NORMAL\":8}]",
-         "meshes[1].primitives[0].targets[1].NORMAL is 8, and there are 3 accessors"},
-        {"\"nx\":1", "\"mesh\":2,\"skin\":3", "2 indices name what is not there; the first: nodes[1].mesh is 2"},
+         "meshes[1].primitives[0].targets[1].NORMAL is 8, but there are 3 accessors"},
+        {"\"nx\":1", "\"mesh\":2,\"skin\":3", "2 indices name missing elements; the first: nodes[1].mesh is 2"},
         {"\"ex\":1", "\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"SCALE\":9}}",
-         "SCALE is 9, and there are 3 accessors"},
+         "SCALE is 9, but there are 3 accessors"},
     };
     static const char base[] =
         "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0},{\"nx\":1,\"extensions\":{\"ex\":1}}],"
@@ -143,13 +143,13 @@ static void indices_of_nothing(void **state)
         scene_free(s);
     }
     n_warnings = 0; /* there is the error, and no warning beside it */
-    refuse_tree("\"nodes\":[{\"mesh\":0,\"skin\":3}]", "skins[3] is not there: there are 0");
+    refuse_tree("\"nodes\":[{\"mesh\":0,\"skin\":3}]", "skins[3] is missing: there are 0");
     assert_int_equal(n_warnings, 0);
     gltf_quad();
     gltf_refuse("\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
                 "\"accessors\":[{\"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"sparse\":{\"count\":1,"
                 "\"indices\":{\"componentType\":5123},\"values\":{\"bufferView\":0}}}]",
-                "an index into bufferViews is missing where one is needed");
+                "an index into bufferViews is missing");
 }
 
 /* A chain as long as a file may make it does not use up the stack. */

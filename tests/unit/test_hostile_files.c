@@ -183,11 +183,11 @@ static int judge(int rc, const struct scene *s, const struct sh_err *err, const 
     static const struct {
         const char *says;
         enum outcome outcome;
-    } ends[] = {{"Assimp crashed on it (SIG", DIED},
-                {"ended without a word", DIED},
+    } ends[] = {{"Assimp crashed while it read the file (SIG", DIED},
+                {"ended without a message", DIED},
                 {"was killed (SIGKILL)", DIED},
-                {"has not read it within", TIME},
-                {"takes more than", MEMORY}};
+                {"did not read it within", TIME},
+                {"needs more than", MEMORY}};
     if (rc == SH_OK) return is_whole(s) ? LOADED : -1;
     size_t len = strlen(path);
     if (rc != SH_EINPUT || strncmp(err->text, path, len) != 0 || strlen(err->text) < len + 8) return -1;

@@ -219,7 +219,7 @@ static void too_many_products(void **state)
         fprintf(out, "#%u=IFCBUILDINGELEMENTPROXY('guid_of_copy_%05u',#5,'n',$,$,#1003,#1002,$,$);\n", 2000 + i, i);
     fputs(end, out);
     assert_int_equal(fclose(out), 0);
-    refuse("a.ifc", all, len, "65535 products with bodies, each of which is a surface at least");
+    refuse("a.ifc", all, len, "65535 products with bodies need at least a surface each");
     free(all);
 }
 

@@ -193,12 +193,12 @@ static void wrong_map_conversions_are_refused(void **state)
                {"1.,$,3.,$,$,0.001", "'a',$,$,$,$,$,$", "IFCMAPCONVERSION #20: Northings is missing"},
                {"1.,2.,3.,0.,0.,0.001", "'a',$,$,$,$,$,$", "an x axis without a direction"},
                {"1.,2.,3.,$,$,0.", "'a',$,$,$,$,$,$", "a Scale that is not above 0"},
-               {"1.,2.,3.,$,$,0.5", "'a',$,$,$,$,$,$", "no unit of maps fits its Scale"},
+               {"1.,2.,3.,$,$,0.5", "'a',$,$,$,$,$,$", "its Scale fits no unit of maps"},
                {"1.,2.,3.,$,$,7.", "'a',$,$,$,$,$,#22",
                 "line 19: IFCMAPCONVERSION #20: a Scale of 7 beside a MapUnit; allowed about 0.001,"},
                {"1.,2.,3.,$,$,0.001", "'a',$,$", "IFCPROJECTEDCRS #21: attributes are missing"},
-               {"1.,2.,3.,$,$,0.001", "$,$,$,$,$,$,$", "IFCPROJECTEDCRS #21: no name"},
-               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#4", "no unit of length"}};
+               {"1.,2.,3.,$,$,0.001", "$,$,$,$,$,$,$", "IFCPROJECTEDCRS #21: its name is missing"},
+               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#4", "not a unit of length"}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         int code = load_map(bad[i].map, bad[i].crs);
         if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
@@ -228,8 +228,8 @@ static void what_is_wrong_is_refused(void **state)
         {",$,$);\n#9", ",$);\n#9", "not the 14 attributes"},
         {"#10= IFCLOCALPLACEMENT($", "#10= IFCLOCALPLACEMENT(#6", "relative to another"},
         {"$,$,#10,$", "$,$,#99,$", "line 13: IFCSITE #8 refers to #99, but there is no such record"},
-        {"$,$,#10,$", "$,$,#12,$", "no reference to IFCLOCALPLACEMENT"},
-        {"$,$,#10,$", "$,$,10,$", "no reference to IFCLOCALPLACEMENT"},
+        {"$,$,#10,$", "$,$,#12,$", "a reference to IFCLOCALPLACEMENT"},
+        {"$,$,#10,$", "$,$,10,$", "a reference to IFCLOCALPLACEMENT"},
         {"#7= IFCCARTESIANPOINT((0.,0.,0.));", "#7= IFCCARTESIANPOINT((0.,1.,0.));", "WorldCoordinateSystem"},
         {"(1.,1.)", "(0.,0.)", "without a direction"},
         {"(1.,1.)", "(1.,x)", "not a number"},

@@ -174,7 +174,7 @@ static void names_have_an_end(void **state)
     memset(name, 'a', SCENE_NAME_LEN);
     assert_int_equal(read_result(bytes, n, &b, &err), SH_EINPUT);
     assert_string_equal(err.text,
-                        "some/a.dae: what Assimp gave back makes no sense: a name of surface 1; the file is broken");
+                        "some/a.dae: the reader's result is inconsistent: a name of surface 1; the file is broken");
     build_release(&b);
 }
 

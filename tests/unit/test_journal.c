@@ -117,24 +117,24 @@ static void malformed_lines_are_named(void **ctx)
     static const struct {
         const char *line, *why;
     } cases[] = {
-        {"x 0 1 a", "no tick"},
-        {"-1 0 1 a", "no tick"},
-        {"+1 0 1 a", "no tick"},
-        {" 1 0 1 a", "no tick"},
-        {"1", "no tick"},
-        {"18446744073709551616 0 1 a", "no tick"},
-        {"1.5 0 1 a", "no tick"},
-        {"1\t0\t1\ta", "no tick"},
-        {"1  0 1 a", "no device time"},
-        {"1 -5 1 a", "no device time"},
-        {"1 9223372036854775808 1 a", "no device time"},
-        {"1 1e3 1 a", "no device time"},
-        {"1 0 4294967296 a", "no session"},
-        {"1 0 one a", "no session"},
-        {"1 0 1", "no session"},
-        {"1 0 1 ", "no command"},
-        {"1 0 1 a\r", "no command"},
-        {"1 0 1 \x80", "no command"},
+        {"x 0 1 a", "a tick number"},
+        {"-1 0 1 a", "a tick number"},
+        {"+1 0 1 a", "a tick number"},
+        {" 1 0 1 a", "a tick number"},
+        {"1", "a tick number"},
+        {"18446744073709551616 0 1 a", "a tick number"},
+        {"1.5 0 1 a", "a tick number"},
+        {"1\t0\t1\ta", "a tick number"},
+        {"1  0 1 a", "a device time"},
+        {"1 -5 1 a", "a device time"},
+        {"1 9223372036854775808 1 a", "a device time"},
+        {"1 1e3 1 a", "a device time"},
+        {"1 0 4294967296 a", "a session number"},
+        {"1 0 one a", "a session number"},
+        {"1 0 1", "a session number"},
+        {"1 0 1 ", "a command of"},
+        {"1 0 1 a\r", "a command of"},
+        {"1 0 1 \x80", "a command of"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char text[256], place[128];
@@ -177,7 +177,7 @@ static void what_is_no_journal_is_refused(void **ctx)
     const int at = snprintf(line, sizeof line, "# scanhead journal 1\n1 0 1 ");
     memset(line + at, 'x', COMMAND_MAX_LINE + 1);
     line[at + COMMAND_MAX_LINE + 1] = '\n';
-    expect_unreadable(line, (size_t)at + COMMAND_MAX_LINE + 2, ":2: no command");
+    expect_unreadable(line, (size_t)at + COMMAND_MAX_LINE + 2, ":2: there must be a command");
     struct sh_err err = {0};
     struct journal_entry *out;
     size_t n;

@@ -262,7 +262,7 @@ static void check_12(int colour)
     for (int i = 0; i < 3 && colour; i++)
         assert_int_equal(rig_uint(p + 28 + 2 * i, 2), 150 * 257);
     assert_non_null(strstr(rig_notes, "1 echoes left out: the sixth"));
-    assert_non_null(strstr(rig_notes, "5 points with more echoes than LAS 1.2 counts"));
+    assert_non_null(strstr(rig_notes, "5 points of pulses with more than 5 echoes"));
     assert_non_null(strstr(rig_notes, "LAS 1.2 has no place for labels and scan angles; they are left out"));
 }
 

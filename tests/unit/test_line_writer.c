@@ -164,7 +164,7 @@ static void the_end_does_not_wait_for_ever(void **state)
     const unsigned n_put = fill(writer, fd[1]);
     assert_int_equal(line_writer_close(writer, "end\n", &err), SH_EIO);
     char want[100];
-    snprintf(want, sizeof want, "test: the file: nothing was taken for 2 s; %llu lines are missing",
+    snprintf(want, sizeof want, "test: the file: its reader took no data for 2 s; %llu lines are missing",
              (unsigned long long)lost);
     assert_string_equal(err.text, want);
     assert_int_equal(fcntl(fd[0], F_SETFL, O_NONBLOCK), 0);

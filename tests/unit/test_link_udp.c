@@ -147,11 +147,11 @@ static void where_packets_may_go(void **state)
         {"127.0.0.1", "", 0, "udp:127.0.0.1:0: allowed ports are 1 to 65535"},
         {"127.0.0.1", "", 65536, "allowed ports are 1 to 65535"},
         {"300.1.1.1", "", 2368, "udp:300.1.1.1:2368: no such address"},
-        {"239.1.2.3", "", 2368, "udp:239.1.2.3:2368: multicast; required is interface"},
+        {"239.1.2.3", "", 2368, "udp:239.1.2.3:2368: multicast needs the key interface"},
         {"ff02::1", "", 2368, "multicast"},
-        {"255.255.255.255", "", 2368, "a broadcast; required is interface"},
+        {"255.255.255.255", "", 2368, "a broadcast needs the key interface"},
         {"255.255.255.255", "lo", 2368, "interface lo has no broadcast"},
-        {"127.0.0.1", "no-such-if", 2368, "there is no interface no-such-if"},
+        {"127.0.0.1", "no-such-if", 2368, "interface no-such-if doesn't exist"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct link_spec spec = {.type = LINK_UDP, .port = cases[i].port};

@@ -68,7 +68,7 @@ static void test_requests(void **state)
     memset(long_field + 8, 'a', 8200);
     strcpy(long_field + 8208, "\r\n");
     assert_int_equal(web_ask(&bench, place, "GET /", long_field, &body, &len), 413);
-    assert_string_equal(body, "a request has at most 8192 bytes here\n");
+    assert_string_equal(body, "a request must have at most 8192 bytes\n");
     assert_int_equal(web_status_of(&bench, place, "GET /", "Upgrade: h2c\r\nConnection: Upgrade\r\n"), 200);
     bench_close(&bench);
 }

@@ -62,7 +62,7 @@ static void check_accepted(const char *mesh, const char *tolerance, const char *
     struct site *site;
     struct sh_err err;
     if (load_hall(mesh, tolerance, more, &cfg, &site, &err) != SH_OK) fail_msg("%s", err.text);
-    if (strstr(warnings, "in single precision, so good to 1.9e-06 m only: coordinates go up to 31\n") == NULL)
+    if (strstr(warnings, "read in single precision, with errors up to 1.9e-06 m: coordinates go up to 31\n") == NULL)
         fail_msg("warnings: %s", warnings);
     assert_true(fabs(site->scene->error_m - 1.9e-6) < 1e-12);
     if (load_site == site_load_plan) {

@@ -214,7 +214,7 @@ static void points_alone(void **state)
     assert_int_equal(len, strlen(text) == len ? len : (size_t)(strstr(text, "end_header\n") + 11 - text) + 2 * 27);
     free(text);
     drop("a.ply");
-    write_refused("a.glb", &mesh, ".glb holds meshes, and there is no face; allowed for points are .ply .obj");
+    write_refused("a.glb", &mesh, ".glb holds meshes, but there are no faces; allowed for points are .ply .obj");
     assert_true(mesh_takes_points("x.ply") && mesh_takes_points("x.obj") && !mesh_takes_points("x.fbx"));
 }
 
@@ -226,8 +226,8 @@ static void what_is_refused(void **state)
     const struct mesh_part bad[2] = {{"a", 3, 2, NULL, NULL}, {"b", 4, 2, NULL, NULL}}; /* face 2 uses vertex 3 */
     const struct mesh_part few[1] = {{"a", 4, 2, NULL, NULL}};
     struct mesh mesh = {.n_vertices = 1, .xyz_m = broken};
-    write_refused("a.stl", &mesh, "no mesh has this ending; known are .ply .obj .gltf .glb .fbx");
-    write_refused("ply", &mesh, "no mesh has this ending");
+    write_refused("a.stl", &mesh, "no mesh format has this ending; allowed are .ply .obj .gltf .glb .fbx");
+    write_refused("ply", &mesh, "no mesh format has this ending");
     assert_true(!mesh_has_format("a.stl") && mesh_has_format("a.PLY"));
     write_refused("a.ply", &mesh, "vertex 1 of 1 is not finite: 1 nan 2");
     mesh = sheet();
@@ -240,12 +240,12 @@ static void what_is_refused(void **state)
     write_refused("a.obj", &mesh, "face 2 uses vertex 3; allowed are 0 to 2");
     mesh.part = few;
     mesh.n_parts = 1;
-    write_refused("a.obj", &mesh, "its parts are not all of its 7 vertices and 4 faces");
+    write_refused("a.obj", &mesh, "its parts do not add up to its 7 vertices and 4 faces");
     mesh = sheet();
     mesh.n_parts = 0;
     mesh.texture = "a.png";
     mesh.uv = NULL;
-    write_refused("a.glb", &mesh, "a texture without texture coordinates");
+    write_refused("a.glb", &mesh, "it has a texture but no texture coordinates");
 }
 
 /* Half a step of float at 5.4e6 m is 0.25 m: 5.4e6 lies between 2^22 and 2^23, where floats are 2^-1 apart. The bound
@@ -260,7 +260,7 @@ static void floats_that_are_too_coarse(void **state)
         far[i][1] += 5.4e6;
     mesh.xyz_m = (const double(*)[3])far;
     write_refused("a.glb", &mesh,
-                  "moves those of 5400004 m by up to 0.32 m; allowed for a mesh of 12.79 m are 1.3e-05 m");
+                  "moves coordinates of 5400004 m by up to 0.32 m; allowed for a mesh of 12.79 m are 1.3e-05 m");
     write_refused("a.fbx", &mesh, "write .ply or .obj, or keep coordinates near 0");
     write_ok("a.ply", &mesh);
     drop("a.ply");

@@ -58,7 +58,8 @@ static void the_largest_step_is_said(void **state)
         }
         if (rig_record(rig_path("a.obj"), (struct recorder_options){.long_edge = 0}, RIG_KEEP, &err) != SH_OK)
             fail_msg("%s", err.text);
-        const char *said = strstr(rig_notes, "2 lines and rows are one of the texture's, which has up to 16384 a side");
+        const char *said =
+            strstr(rig_notes, "2 lines and rows share one texel, since a texture has up to 16384 texels a side");
         if ((said != NULL) != (i < 3)) fail_msg("%u and %u rows: %s", rows[i][0], rows[i][1], rig_notes);
         static const char *const files[] = {"a.obj", "a.mtl", "a.1.png", "a.2.png"};
         for (int k = 0; k < 4; k++)

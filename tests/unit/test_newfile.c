@@ -106,10 +106,10 @@ static void test_links(void **state)
     expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "symbolic link to");
     unlink(part);
     assert_int_equal(link(other, path), 0);
-    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "2 names (hard links)");
+    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "2 hard links");
     unlink(path);
     assert_int_equal(link(other, part), 0);
-    expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "2 names (hard links)");
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "2 hard links");
     unlink(part);
     /* A link that leads nowhere makes no file there. */
     assert_int_equal(symlink("nowhere", path), 0);
@@ -162,7 +162,7 @@ static void test_kinds(void **state)
     assert_int_equal(mkfifo(path, 0600), 0);
     expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a FIFO");
     expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path,
-                 "FIFO that nobody reads"); /* and did not wait for a reader */
+                 "FIFO without a reader"); /* and did not wait for a reader */
     assert_int_equal(kind_of(path), S_IFIFO);
     unlink(path);
     assert_int_equal(mkfifo(part, 0600), 0);
@@ -322,7 +322,7 @@ static void test_append(void **state)
     close(fd);
     expect_text(path, "onetwo");
     assert_int_equal(link(path, other), 0);
-    expect_error(newfile_append(path, &fd, &err), SH_EINPUT, path, "2 names (hard links)");
+    expect_error(newfile_append(path, &fd, &err), SH_EINPUT, path, "2 hard links");
     unlink(path);
     assert_int_equal(symlink(other, path), 0);
     expect_error(newfile_append(path, &fd, &err), SH_EINPUT, path, "symbolic link to");

@@ -58,9 +58,9 @@ static void files_are_apart(void **state)
 {
     (void)state;
     assert_int_equal(check("lossy-udp", "a", "a"), SH_EINPUT); /* not there yet */
-    assert_string_equal(err.text, "--truth a: is the file of --stats, too; allowed another file");
+    assert_string_equal(err.text, "--truth a: --stats writes the same file; name another one");
     assert_int_equal(check("lossy-udp", "a", "./a"), SH_EINPUT); /* two names of what is not there yet */
-    assert_string_equal(err.text, "--truth ./a: is the file of --stats, too; allowed another file");
+    assert_string_equal(err.text, "--truth ./a: --stats writes the same file; name another one");
     char whole[sizeof folder + 8];
     snprintf(whole, sizeof whole, "%s/a", folder);
     assert_int_equal(check("lossy-udp", "sub/../a", whole), SH_OK); /* no such folder: can't be made */
@@ -74,9 +74,9 @@ static void files_are_apart(void **state)
     write_text("run.yaml", "");
     assert_int_equal(check(NULL, "a", "./a"), SH_EINPUT);
     assert_int_equal(check(NULL, NULL, "./run.yaml"), SH_EINPUT);
-    assert_string_equal(err.text,
-                        "--truth ./run.yaml: is the file of the operand run.yaml, which is read, and would be "
-                        "overwritten; allowed another file");
+    assert_string_equal(
+        err.text,
+        "--truth ./run.yaml: is also read as the operand run.yaml, and would be overwritten; name another file");
     assert_int_equal(check("a", "./a", NULL), SH_EINPUT);
     assert_int_equal(link("a", "b"), 0);
     assert_int_equal(check("a", "b", NULL), SH_EINPUT);
@@ -125,9 +125,9 @@ static void files_of_a_mesh(void **state)
     add(&in, NULL, "m.obj", APP_READS);
     add(&in, "output", "./m.png", APP_WRITES);
     assert_int_equal(app_check_files(&in, NULL, &err), SH_EINPUT);
-    assert_string_equal(err.text,
-                        "--output ./m.png: is the file of m.png, named in the operand m.obj, which is read, and "
-                        "would be overwritten; allowed another file");
+    assert_string_equal(
+        err.text, "--output ./m.png: is also read as m.png, named in the operand m.obj, and would be overwritten; "
+                  "name another file");
     unlink("m.png");
     assert_int_equal(app_check_files(&in, NULL, &err), SH_OK); /* it isn't there */
     unlink("m.obj");

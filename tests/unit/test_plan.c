@@ -93,7 +93,7 @@ static void test_what_cannot_be_had(void **state)
     struct plan_row row;
     struct plan_option some[2] = {{"e", (double)NAN, (double)NAN, 0.0, ""}, {"f", 0.0, 0.0, 0.0, "the head moves"}};
     assert_int_equal(choose(&row, "beam", some, 2, -1, ""), 0);
-    expect(&row, "e", 0, "the only one that can be had; its error is not known");
+    expect(&row, "e", 0, "the only possible one; its error is not known");
     expect_left(&row, 0, "f", "the head moves");
     assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
 }
@@ -104,7 +104,7 @@ static void test_cast(void **state)
     (void)state;
     struct plan_row row;
     plan_cast(8, &row);
-    expect(&row, "packets of 8, in double", 0, "in double, wherever rays begin");
+    expect(&row, "packets of 8, in double", 0, "in double, for any origin of rays");
     assert_true(row.error_m == 1e-6 && row.cost_ns == 0.0 && row.n_left == 0);
 }
 

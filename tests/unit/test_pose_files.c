@@ -82,8 +82,8 @@ static void test_csv_errors(void **state)
         const char *text, *where, *what;
     } wrong[] = {
         {"", ":", "empty"},
-        {"t_s,x_m,y_m\n0,1,2\n", "line 1", "columns have to be"},
-        {"t_s,x_m,y_m,z_m,heading_deg,qw\n", "line 1", "columns have to be"},
+        {"t_s,x_m,y_m\n0,1,2\n", "line 1", "columns must be"},
+        {"t_s,x_m,y_m,z_m,heading_deg,qw\n", "line 1", "columns must be"},
         {"t_s,x_m,y_m,z_m,heading\n", "line 1", "\"heading\" is unknown; allowed t_s"},
         {"t_s,t_s\n", "line 1", "twice"},
         {NAMES, ":", "no samples"},
@@ -213,7 +213,7 @@ static void test_slow_waypoints(void **state)
     write_file(text);
     assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, path));
-    assert_non_null(strstr(err.text, "allowed 10000000"));
+    assert_non_null(strstr(err.text, "allowed are 10000000"));
     FILE *f = fopen(path, "w");
     assert_non_null(f);
     fputs("x_m,y_m,z_m,speed_m_s,pause_s\n", f);

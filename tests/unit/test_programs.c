@@ -108,15 +108,14 @@ static void tables_that_do_not_fit_are_refused(void **state)
         {"prr_hz: { value: 400000,", "prr_hz: { value: 100000,", 23, "programs[1].prr_hz", "allowed above 100000 Hz"},
         {"prr_hz: { value: 400000,", "prr_hz: { value: 500000,", 23, "programs[1].prr_hz",
          "outside of prr_min_hz and prr_max_hz; allowed 100000 to 400000 Hz"},
-        {"prr_hz: { value: 400000,", "prr_hz: { value: 300000,", 4, "prr_max_hz", "allowed 300000, their fastest"},
-        {"prr_min_hz: { value: 100000,", "prr_min_hz: { value: 90000,", 3, "prr_min_hz",
-         "allowed 100000, their slowest"},
+        {"prr_hz: { value: 400000,", "prr_hz: { value: 300000,", 4, "prr_max_hz", "allowed 300000, the fastest"},
+        {"prr_min_hz: { value: 100000,", "prr_min_hz: { value: 90000,", 3, "prr_min_hz", "allowed 100000, the slowest"},
         {"  - prr_hz: { value: 400000, from: quoted }\n", "  - max_echoes: { value: 2, from: quoted }\n", 23,
          "programs[1].prr_hz", "missing"},
         {"reach_90_m: { value: 600,", "reach_90_m: { value: 601,", 19, "programs[0].reach_90_m",
          "601 m is beyond range_max_m; allowed up to 600 m"},
         {"    reach_90_m: { value: 200, from: assumed }\n", "", 23, "programs[1].reach_90_m",
-         "missing; required, as other programs have it"},
+         "missing; required, since other programs have this key"},
         {"reach_20_m: { value: 300,", "reach_20_m: { value: 600,", 20, "programs[0].reach_20_m", "allowed below 600 m"},
         /* sqrt(0.9 / 0.2) = 2.121: 600 m on 90 % are 283 m on 20 % in clear air, more in haze; 10 % are rounding */
         {"reach_20_m: { value: 300,", "reach_20_m: { value: 265,", 19, "programs[0].reach_90_m",
@@ -177,7 +176,7 @@ static void only_rates_of_programs_are_taken(void **state)
         assert_int_equal(load_head("maker", "maker", setting), SH_EINPUT);
         assert_int_equal(faults.n, 1);
         assert_says(":3: head.prr_hz: ");
-        assert_says(" is no pulse rate of head profile mine; allowed 100000, 400000 Hz");
+        assert_says(" is not a pulse rate of head profile mine; allowed 100000, 400000 Hz");
     }
 }
 

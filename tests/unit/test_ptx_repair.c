@@ -321,8 +321,8 @@ static void check_refused(const char *text, const void *grid, size_t grid_len, c
 static void test_refused(void **state)
 {
     (void)state;
-    check_refused("", NULL, 0, "is no PTX grid");
-    check_refused("ply\nformat ascii 1.0\n", NULL, 0, "is no PTX grid");
+    check_refused("", NULL, 0, "is not a PTX grid");
+    check_refused("ply\nformat ascii 1.0\n", NULL, 0, "is not a PTX grid");
     check_refused("2\n1\n" POSE "1 2 3 1\nhello\n4 5 6 1\n", NULL, 0, "damaged");
     check_refused("18446744073709551615\n1\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
     check_refused("1\n0\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
@@ -333,7 +333,7 @@ static void test_refused(void **state)
     memcpy(grid, s->grid, s->grid_len);
     grid[HEAD_LEN + 3 * CELL_LEN + 5] ^= 1;
     check_refused((char *)s->text, grid, s->grid_len, "damaged");
-    check_refused("1\n1\n" POSE "1 2 3 1\n", s->grid, s->grid_len, "has no end of a grid"); /* of another recording */
+    check_refused("1\n1\n" POSE "1 2 3 1\n", s->grid, s->grid_len, "no grid ends there"); /* of another recording */
     free(grid);
     remove_state();
 }

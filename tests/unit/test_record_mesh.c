@@ -152,8 +152,8 @@ static void a_step_as_ply(void **state)
     has(text, "property double scalar_range\n");
     has(text, "element vertex 0\n");
     has(text, "element face 0\n");
-    has(rig_notes, "there is no triangle in it");
-    has(rig_notes, "12 points left out that are in no triangle");
+    has(rig_notes, "it has no triangles");
+    has(rig_notes, "12 points left out that belong to no triangle");
     free(text);
 }
 
@@ -297,9 +297,9 @@ static void later_echoes_and_lines_that_go_back(void **state)
     record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 0});
     char *text = text_of("a.ply");
     has(text, "element face 14\n"); /* a cell, and the step */
-    has(rig_notes, "2 echoes left out; a mesh has the first of a shot\n");
-    has(rig_notes, "1 meshes begun within a scan, since its lines went back\n");
-    has(rig_notes, "2 points left out that are in no triangle\n"); /* behind the empty shots */
+    has(rig_notes, "2 echoes left out; a mesh holds the first of a shot\n");
+    has(rig_notes, "1 additional meshes begun within a scan, since its line numbers went back\n");
+    has(rig_notes, "2 points left out that belong to no triangle\n"); /* behind the empty shots */
     free(text);
 }
 
@@ -329,7 +329,8 @@ static void what_can_be_no_mesh(void **state)
     put_descriptor(&d);
     rig_anchor(&a);
     put_step(0);
-    refused("a.glb", mesh, SH_EINPUT, ".glb holds coordinates as float, which moves those of 5000100 m by up to 0.3 m");
+    refused("a.glb", mesh, SH_EINPUT,
+            ".glb holds coordinates as float, which moves coordinates of 5000100 m by up to 0.3 m");
 
     d.frames = 10000000; /* 10^7 turns of 11 lines of a tenth of 1001 pulses */
     a = anchor_of(1);
@@ -337,7 +338,7 @@ static void what_can_be_no_mesh(void **state)
     put_descriptor(&d);
     rig_anchor(&a);
     put_step(0);
-    refused("a.ply", mesh, SH_EINPUT, "up to 11011000000 points; a mesh holds 2147483647");
+    refused("a.ply", mesh, SH_EINPUT, "up to 11011000000 points; a mesh holds up to 2147483647");
 
     d.frames = 100000;
     d.prr_uhz = 10000000000;
@@ -346,7 +347,7 @@ static void what_can_be_no_mesh(void **state)
     rig_anchor(&a);
     put_step(0);
     if (sysconf(_SC_PHYS_PAGES) * (sysconf(_SC_PAGESIZE) >> 20) < 170000)
-        refused("a.ply", mesh, SH_EINPUT, "takes 174.2 GiB of memory, and there are");
+        refused("a.ply", mesh, SH_EINPUT, "takes 174.2 GiB of memory, and ");
     else
         rig_record(rig_path("a.ply"), mesh, 0, &err);
 
@@ -378,13 +379,13 @@ static void what_can_be_no_mesh(void **state)
     refused("a.obj", mesh, SH_EINPUT, "a.mtl: is a symbolic link");
     remove_file("a.mtl");
 
-    refused("a#b.gltf", mesh, SH_EINPUT, "as URIs, where # means something else");
-    refused("a%b.gltf", mesh, SH_EINPUT, "as URIs, where % means something else");
+    refused("a#b.gltf", mesh, SH_EINPUT, "by URIs, where # has a special meaning");
+    refused("a%b.gltf", mesh, SH_EINPUT, "by URIs, where % has a special meaning");
 
     rig_begin();
     begin_scan(1, 1);
     put_step(0);
-    refused("a.fbx", (struct recorder_options){.long_edge = 1}, SH_EINPUT, "there is no triangle in this scan");
+    refused("a.fbx", (struct recorder_options){.long_edge = 1}, SH_EINPUT, "this scan has no triangles");
 }
 
 int main(void)

@@ -90,7 +90,7 @@ static void test_other_kinds(void **state)
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
     struct native_anchor b = a;
     b.heights = NATIVE_HEIGHTS_GEOID;
-    expect_refused(&a, &b, "the stream went to other heights (geoid)");
+    expect_refused(&a, &b, "the stream changed to other heights (geoid)");
     b = a;
     b.moving = NATIVE_MOVING;
     expect_refused(&a, &b, "a head that moves");

@@ -286,7 +286,7 @@ static void test_order_is_said(void **state)
     result.stream.repeated = 3;
     result.stream.late = 2;
     assert_int_equal(recording_describe_order(&result, text, sizeof text), 1);
-    assert_string_equal(text, "3 frames came twice (taken once), 2 frames came after newer ones (lost)");
+    assert_string_equal(text, "3 frames came twice (used once), 2 frames came after newer ones (lost)");
     struct sh_err err = {0};
     /* A broken frame whose copy came is not lost; those at the ends of a stream are. */
     result.stream = (struct scanhead_stats){.bad_payload = 5};

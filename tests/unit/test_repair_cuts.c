@@ -50,7 +50,7 @@ static size_t begin_of(const struct bytes *b)
 static size_t end_of(const struct bytes *b)
 {
     const uint8_t *mark = memmem(b->data, b->len, "# incomplete", 12);
-    const uint8_t *note = memmem(b->data, b->len, "incomplete: the recorder", 24); /* of a capture: its block */
+    const uint8_t *note = memmem(b->data, b->len, "incomplete: the recording", 25); /* of a capture: its block */
     if (mark != NULL) return (size_t)(mark - b->data);
     return note != NULL && rig_uint(b->data, 4) == 0x0a0d0d0a ? (size_t)(note - b->data) - 24 : b->len;
 }

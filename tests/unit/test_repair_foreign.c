@@ -64,7 +64,7 @@ static void test_whole_elsewhere(void **state)
                       more[] = PCAPNG_SECTION PCAPNG_INTERFACE "\x06\0\0\0";
     assert_int_equal(repair_untouched("f.pcapng", capture, sizeof capture - 1), SH_OK);
     assert_int_equal(repair_untouched("f.pcapng", more, sizeof more - 1), SH_EFORMAT);
-    assert_non_null(strstr(repair_err.text, "another program has written it"));
+    assert_non_null(strstr(repair_err.text, "was written by another program"));
 }
 
 /* A grid of absurd size is not filled up. */

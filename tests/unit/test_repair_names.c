@@ -72,7 +72,7 @@ static void test_not_ours(void **state)
     repair_free(&file);
     assert_int_equal(truncate(repair_path, (off_t)repair_whole[REPAIR_LAS].len - 1), 0);
     assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EPERM);
-    assert_non_null(strstr(repair_err.text, "needs a repair, and may not be written to"));
+    assert_non_null(strstr(repair_err.text, "needs a repair, but is not writable"));
     assert_int_equal(unlink(other), 0);
     assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
     assert_true(!file.was_whole && file.n_kept == REPAIR_POINTS - 1);

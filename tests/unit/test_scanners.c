@@ -156,7 +156,7 @@ static void wrong_ones_are_refused(void **state)
         {"{surfaces: [{glass: 2}]}", 7, "stations[1].scanner.surfaces[0].glass: \"2\" is out of range; allowed 0 to 1"},
         {"{noise: {range: signal}}", 7, "stations[1].scanner.noise.range: signal, but no signal is modelled"},
         /* One of two contradicting keys is the file's. */
-        {"{head: {prr_hz: 123}}", 7, "stations[1].scanner.head.prr_hz: 123 is no pulse rate of head profile"},
+        {"{head: {prr_hz: 123}}", 7, "stations[1].scanner.head.prr_hz: 123 is not a pulse rate of head profile"},
         {"{signal: {visibility_m: 9, extinction_1_km: 1}}", 7,
          "stations[1].scanner.signal.extinction_1_km: given togeth"},
     };

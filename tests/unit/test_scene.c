@@ -127,8 +127,8 @@ static void malformed_files_are_refused(void **state)
         {"a.obj", "", "no triangles"},
         {"a.obj", TRI, "no triangles"},
         {"a.obj", TRI "f 1 1 2\n", "1 without area"},
-        {"a.obj", "v 0 0\n", "line 1: v takes 3 to 8 numbers, found the end of the line"},
-        {"a.obj", "v 0 0 zero\n", "line 1: v takes 3 to 8 numbers, found 'zero'"},
+        {"a.obj", "v 0 0\n", "line 1: v must have 3 to 8 numbers, found the end of the line"},
+        {"a.obj", "v 0 0 zero\n", "line 1: v must have 3 to 8 numbers, found 'zero'"},
         {"a.obj", "v 0 0 1.2.3\n", "found '1.2.3'"},
         {"a.obj", "v 0 0 1e\n", "found '1e'"},
         {"a.obj", "v 0,5 0 0\n", "found '0,5'"},
@@ -146,11 +146,11 @@ static void malformed_files_are_refused(void **state)
         {"a.obj", TRI "f\n", "found the end of the line"},
         {"a.ply", "", "not a PLY file"},
         {"a.ply", "plyx\n", "not a PLY file"},
-        {"a.ply", HEAD, "ends within the header"},
-        {"a.ply", "ply\nformat ascii 2.0\n", "line 2: format version has to be 1.0, not '2.0'"},
+        {"a.ply", HEAD, "ends in the header"},
+        {"a.ply", "ply\nformat ascii 2.0\n", "line 2: the format version must be 1.0, not '2.0'"},
         {"a.ply", "ply\nformat text 1.0\n", "not 'text'"},
         {"a.ply", "ply\nelement vertex 0\n" XYZ "end_header\n", "no format"},
-        {"a.ply", HEAD "element vertex -3\n", "line 3: element takes a name and a count"},
+        {"a.ply", HEAD "element vertex -3\n", "line 3: an element must have a name and a count"},
         {"a.ply", HEAD "property float x\n", "property before any element"},
         {"a.ply", HEAD "element vertex 3\nproperty real x\n", "unknown property type 'real'"},
         {"a.ply", HEAD "element vertex 3\nproperty list float int x\n", "count can't be of type 'float'"},
@@ -160,7 +160,7 @@ static void malformed_files_are_refused(void **state)
         {"a.ply", HEAD "element vertex 1\n" XYZ "end_header\n0 0 0\n", "points are not a mesh"},
         {"a.ply", HEAD "element vertex 1\n" XYZ "element face 1\nproperty int a\nend_header\n", "lacks the list"},
         {"a.ply", HEAD "element vertex 999999999999\n" XYZ "element face 1\n" FACE "end_header\n0 0 0\n",
-         "999999999999 of element vertex need 6 bytes or more each; 7 are left"},
+         "999999999999 elements vertex need at least 6 bytes each, but 7 bytes are left in the file"},
         {"a.ply", PLY "0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n", "line 12: vertex 3 (0 nan 0) is not finite"},
         {"a.ply", PLY "0 0 0\n1 0 0\n0 1\n3 0 1 2\n", "line 12: vertex 3 of 3: a value is missing"},
         {"a.ply", PLY "0 0 0\n1 0 0\n0 1 0 0\n3 0 1 2\n", "line 12: vertex 3 of 3: there are more values"},
@@ -189,7 +189,7 @@ static void a_huge_list_is_refused(void **state)
     memset(data + n + 12, 0xff, 4);
     memset(data + n + 16, 0, 8);
     char expected[64];
-    sprintf(expected, "face 1 of 1, byte %zu: the file ends within it", n + 24);
+    sprintf(expected, "face 1 of 1, byte %zu: the file ends in it", n + 24);
     refuse("huge.ply", data, n + 24, expected);
 }
 

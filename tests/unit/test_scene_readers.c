@@ -212,7 +212,7 @@ static void ply_is_read_exactly(void **state)
         size_t n = make_binary_ply(data, big);
         check_utm_scene(load(write_file("utm.ply", data, n)));
         unlink(path);
-        assert_non_null(strstr(warnings, "element 'camera' (1 of it) ignored"));
+        assert_non_null(strstr(warnings, "element 'camera' (1 of them) is not used"));
         /* Cut anywhere, it is refused. */
         for (size_t cut = 0; cut < n; cut += SANITIZED ? 91 : 13)
             refuse("cut.ply", data, cut, "");
@@ -249,7 +249,7 @@ static void ply_in_float_warns(void **state)
     memcpy(data + n + sizeof v, "\3\0\1\2", 4);
     struct scene *s = load(write_file("float.ply", data, n + sizeof v + 4));
     unlink(path);
-    assert_non_null(strstr(warnings, "single precision, so good to 0.35 m only")); /* 5.8e6 * 6e-8 */
+    assert_non_null(strstr(warnings, "single precision, with errors up to 0.35 m")); /* 5.8e6 * 6e-8 */
     scene_free(s);
 }
 

@@ -147,7 +147,7 @@ static void missing_things_are_named(void **state)
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS, "r.mtl, line 5: the opacity '2' is left out; allowed are numbers");
     put("r.mtl", RED_GREEN "map_Kd C:\\maps\\no.png\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
-                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; it belongs beside");
+                   "r.mtl, line 5: the texture 'C:\\maps\\no.png' is missing; put it beside");
 }
 
 /* For any contents, a file of that name is the texture. */
@@ -281,8 +281,7 @@ static void ply_textures(void **state)
     assert_int_equal(s->surface[2].texture, 0);
     assert_true(s->uv[1][2][0] == 0.0f && s->uv[1][2][1] == 1.0f);
     assert_int_equal(n_warnings, 1);
-    assert_non_null(
-        strstr(warnings, "a.ply, line 4: the texture 'D:\\b c.png' is missing; it belongs beside the mesh"));
+    assert_non_null(strstr(warnings, "a.ply, line 4: the texture 'D:\\b c.png' is missing; put it beside the mesh"));
     scene_free(s);
 }
 
@@ -318,7 +317,7 @@ static void stl_by_its_size(void **state)
     assert_non_null(strstr(warnings, "a.stl: 7 bytes after the last of its 2 triangles ignored"));
     scene_free(s);
     n = binary_stl(data, "solid", 4, 2);
-    refuse("a.stl", data, n, "cut off: a binary STL of 4 triangles has 284 bytes, and there are 184");
+    refuse("a.stl", data, n, "cut off: a binary STL of 4 triangles has 284 bytes, but the file has 184");
     n = binary_stl(data, "x", 2, 2);
     refuse("a.stl", data, n - 1, "cut off");
     unlink(path);

@@ -192,7 +192,7 @@ static void test_never(void **state)
         {"frames: 0", "instrument: {transit_offset_m: 0.01}\n", "moves the beam"},
         {"frames: 0", "platform: {kind: live}\n", "the head moves"},
         {"frames: 0", "beam: {mode: rings}\n", "no ray for the centre"},
-        {"frames: 1, pan_stop_deg: 1", "", "too few to pay"},
+        {"frames: 1, pan_stop_deg: 1", "", "too few: a map would cost"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char head[128];

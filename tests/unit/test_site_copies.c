@@ -230,7 +230,7 @@ static void faults_of_a_file_say_where(void **state)
         {"x_m,y_m\n1,2\n", "trees.csv, line 1: the first line needs x_m,y_m,z_m, and may have turn_deg,scale"},
         {"x_m,y_m,z_m,turn\n1,2,3,4\n", "turn"},
         {"x_m,y_m,z_m\n", "trees.csv: no copies below the first line"},
-        {"x_m,y_m,z_m\n1,2,3\n\n1,2\n", "trees.csv, line 4: 2 values; the first line names 3"},
+        {"x_m,y_m,z_m\n1,2,3\n\n1,2\n", "trees.csv, line 4: 2 values, but the first line names 3"},
         {"x_m,y_m,z_m\n1,2,x\n", "trees.csv, line 2: z_m is not a finite decimal number"},
         {"x_m,y_m,z_m\n1,2,2e9\n", "trees.csv, line 2: z_m 2e+09; allowed -1e9 to 1e9 m"},
         {"x_m,y_m,z_m,turn_deg\n1,2,2,0\n1,2,2,361\n", "trees.csv, line 3: turn_deg 361; allowed -360 to 360 deg"},
@@ -295,7 +295,7 @@ static void targets_are_chosen_among_copies(void **state)
     compare_sites(text_of("  target: {objects: [\"* 4\", \"* 1\", \"* 2\"], others: hide}\n", own, ""), 0.0);
     assert_loads(load_text(text_of("  target: {objects: [\"crown 1\", \"trunk 2\"]}\n", own, "")));
     assert_int_equal(site_load(cfg, NULL, &site, &err), SH_EINPUT);
-    assert_says("copy 2 of a mesh would keep other objects of it than one before");
+    assert_says("copy 2 of a mesh would keep other objects than an earlier copy");
 }
 
 /* A station stands on a copy: 0.3 m from the crown's axis of the second one, whose sides rise 3 m in 0.5 m there. */

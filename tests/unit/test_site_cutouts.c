@@ -141,7 +141,7 @@ static void single_rays_and_rings_pass_holes(void **state)
 static void adaptive_beams_do_not_pretend(void **state)
 {
     (void)state;
-    static const char why[] = "outlines of what textures cut out (scene.cutouts) are not known";
+    static const char why[] = "outlines of holes that textures cut (scene.cutouts) are not known";
     static struct config cfg;
     struct site *site;
     struct sh_err err;

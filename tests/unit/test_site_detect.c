@@ -94,9 +94,9 @@ static void ghosts_need_labels(void **state)
     site_free(site);
     write_surfaces(32768);
     assert_int_equal(load(mirror, &site), SH_EINPUT);
-    assert_non_null(strstr(err.text,
-                           "32768 surfaces and a mirror: each needs a second label for its ghost; allowed up to "
-                           "32767"));
+    assert_non_null(
+        strstr(err.text,
+               "32768 surfaces and a mirror: each needs a second label for its ghost points; allowed are up to 32767"));
     assert_int_equal(load("", &site), SH_OK); /* without a mirror they are allowed */
     site_free(site);
 }

@@ -65,11 +65,11 @@ static void out_of_reach(void **state)
     (void)state;
     write_box(-0.2, 0);
     load("0, 0, 790", 1, "", ""); /* 800 m; the corners are 42 m aside, the face itself is within */
-    assert_null(strstr(warned, "nothing within"));
+    assert_null(strstr(warned, "no surface within"));
     load("0, 0, 801", 1, "", "");
-    says("station 1 station-1 at 0 0 801 m: nothing within range_max_m, 800 m");
+    says("station 1 station-1 at 0 0 801 m: no surface within range_max_m, 800 m");
     load("600, 600, 1", 1, "", ""); /* 570 m off in x and in y: 806 m */
-    says("nothing within");
+    says("no surface within");
 }
 
 static void under_the_floor(void **state)
@@ -77,7 +77,7 @@ static void under_the_floor(void **state)
     (void)state;
     write_box(0, 10);
     load("0, 0, -2", 1, "", "");
-    says("no surface below it, and one 2 m above it: is it under the floor?");
+    says("no surface below it, but one 2 m above it: it may be under the floor");
 }
 
 /* The head is in a slab of 20 cm. Everything but along it is nearer than the 1.5 m that this head sees. */
@@ -86,7 +86,7 @@ static void within_a_slab(void **state)
     (void)state;
     write_box(-0.2, 0);
     load("0, 0, -0.1", 1, "", "");
-    says("meet something nearer than range_min_m, 1.5 m: does it stand within something?");
+    says("hit something nearer than range_min_m, 1.5 m: the station may be inside an object");
 }
 
 /* The head is 300 m beside a slab of 20 cm, which it sees under 0.04 degrees. */
@@ -95,7 +95,7 @@ static void a_scan_that_is_mostly_empty(void **state)
     (void)state;
     write_box(-0.2, 0);
     load("0, 330, 1.7", 1, "", "");
-    says("the scan is mostly empty: of 1024 directions 0 meet something from 1.5 to 800 m away");
+    says("the scan is mostly empty: of 1024 directions 0 hit something from 1.5 to 800 m away");
 }
 
 static void a_scale_that_is_a_thousand_times_off(void **state)
@@ -104,7 +104,7 @@ static void a_scale_that_is_a_thousand_times_off(void **state)
     write_box(0, 10);
     load("0, 0, 5000", 1000, "", "");
     says("the scene is 6e+04 m large");
-    says("is scene.meshes[].scale right?");
+    says("check scene.meshes[].scale");
     write_box(0, 10);
     load("0, 0, 1", 0.0001, "", "");
     says("the scene is 0.006 m large");

@@ -87,7 +87,8 @@ static void test_counts(void **state)
         {2147.4, "layout: polar", "range: on", 1e-6, NULL},
         {4294.9, "layout: polar", "range: off", 1e-6, NULL}, /* 32 bits at 4294.967 m, and a range has no sign */
         {4294.95, "layout: polar", "range: on", 1e-5, "ranges up to 429"}, /* ten sigma more do not fit */
-        {4300, "layout: polar", "range: off", 1e-5, "4300 m have to fit into 32 bits, at 1e-06 m those up to 4295 m"},
+        {4300, "layout: polar", "range: off", 1e-5,
+         "4300 m must fit into 32 bits, but at 1e-06 m only those up to 4295 m"},
         {1000, "layout: polar", "ball: {radius_m: 100, distance_1_m: 0.05}", 1e-5, "ranges up to 6100 m"},
         /* Errors of the instrument's readings count: 1.5 m more or less, or 0.1 % of it, each alone. */
         {4294, "layout: polar", "range: off}\ninstrument: {range_offset_m: 1.5", 1e-5, "ranges up to 4295.5 m"},
@@ -97,7 +98,7 @@ static void test_counts(void **state)
         {2147.4, "layout: geo", "range: off", 1e-6, NULL},
         {2147.4, "layout: geo", "range: off}\ninstrument: {range_scale_ppm: -1000", 1e-5,
          "coordinates up to 2149.55 m"},
-        {2147.6, "layout: geo", "range: off", 1e-5, "coordinates up to 2147.6 m have to fit into 31 bits"},
+        {2147.6, "layout: geo", "range: off", 1e-5, "coordinates up to 2147.6 m must fit into 31 bits"},
         {3000, "layout: polar, scale_m: 1e-3", "range: off", 1e-3, NULL}, /* as asked for */
         {5000, "layout: polar, scale_m: 1e-6", "range: off", 0, NULL},    /* by the configuration alone */
         {4294.9, "layout: polar, scale_m: 1e-6", "ball: {radius_m: 100}", 0, NULL},

@@ -164,7 +164,7 @@ static void limits_between_rings_are_refused(void **state)
     emitter_set_sphere(e, 10 * DEG);
     assert_int_equal(emitter_set_rings(e, 1 * DEG, 9 * DEG, &err), SH_EINPUT);
     assert_non_null(
-        strstr(err.text, "no ring lies from 1 to 9 deg; allowed are limits around one, such as 0 or 10 deg"));
+        strstr(err.text, "no ring lies from 1 to 9 deg; allowed are limits around a ring, such as 0 or 10 deg"));
     assert_int_equal(emitter_set_rings(e, 1 * DEG, 10 * DEG - 1, &err), SH_OK); /* within a micro-degree */
     assert_int_equal(e->rings, 1);
     assert_true(fabs(emitter_ring_turn(e, 0) - 10.0 / 360.0) < 0x1p-52);

@@ -146,11 +146,11 @@ static void wrong_targets_are_refused(void **state)
         const char *target, *says;
     } wrong[] = {
         {"{objects: [tre]}",
-         "scene.target.objects[0]: no object fits \"tre\"; allowed names of the scene's 5 objects, near "
-         "ones are \"tree\""},
+         "scene.target.objects[0]: no object fits \"tre\"; allowed names of the scene's 5 objects, similar ones are "
+         "\"tree\""},
         {"{objects: [tree, \"xyzzy*\"]}", "scene.target.objects[1]: no object fits \"xyzzy*\""},
-        {"{objects: [flag]}", "nothing that stands still is among them; allowed with one that does, or others: hide"},
-        {"{others: hide}", "scene.target.others: but there are no scene.target.objects"},
+        {"{objects: [flag]}", "none of them stands still; allowed with an object that does, or with others: hide"},
+        {"{others: hide}", "scene.target.others: given, but there are no scene.target.objects"},
         {"{objects: tree}", "scene.target.objects: here stands a single value; allowed a list of 0 to 64"},
         {"{objects: [{a: b}]}", "scene.target.objects[0]: here stands a section with keys"},
         {"{objects: [\"\"]}", "scene.target.objects[0]"},

@@ -235,7 +235,7 @@ static void test_kinds(void **state)
             assert_non_null(strstr(
                 rig_notes, "9 points whose amplitude and width are left out; this format has no place for them"));
         if (which < 2)
-            assert_non_null(strstr(err.text, "the stream went on without attributes; a file holds one kind"));
+            assert_non_null(strstr(err.text, "the stream continued without attributes; a file holds one kind"));
         unlink(path);
     }
 }

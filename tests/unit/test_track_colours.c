@@ -259,7 +259,7 @@ static void test_frame(void **state)
     put_points(0, 0, 0, 0);
     const char *path = rig_path("a.ply");
     assert_int_equal(rig_record(path, options, 1, &err), SH_EFORMAT);
-    assert_non_null(strstr(err.text, "there are no frames"));
+    assert_non_null(strstr(err.text, "points have no frame scalar"));
     unlink(path);
 }
 
@@ -277,7 +277,7 @@ static void test_kinds(void **state)
         put_head(2, 0, NULL);
         put_points(0, 0, 0, 0);
         assert_int_equal(rig_record(path, options, 1, &err), made ? 0 : SH_EFORMAT);
-        if (!made) assert_non_null(strstr(err.text, "the stream went on without colours; a file holds one kind"));
+        if (!made) assert_non_null(strstr(err.text, "the stream continued without colours; a file holds one kind"));
         unlink(path);
     }
 }

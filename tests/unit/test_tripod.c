@@ -162,8 +162,9 @@ static void no_ground_is_said(void **state)
     struct site *site = load("head: {profile: sphere, step_deg: 3}\n"
                              "scene: {meshes: [{file: ground.obj, up: z, scale: 1}]}\n"
                              "stations: [{position_m: [20.5, 0, 1], tripod: {leg_m: 1.8, opening_min_deg: 30}}]\n");
-    assert_non_null(strstr(warned, "station 1 station-1: tripod: no ground below it; its legs have their smallest "
-                                   "opening, 30 deg\n"));
+    assert_non_null(strstr(
+        warned,
+        "station 1 station-1: tripod: there is no ground below it, so its legs have their smallest opening, 30 deg\n"));
     assert_true(fabs(site->station[0].tripod.cast.cos_opening - sqrt(0.75)) < 1e-15);
     site_free(site);
 }

@@ -121,9 +121,9 @@ static void wrong_files_are_refused(void **state)
 {
     static const struct {
         const char *path, *says;
-    } cases[] = {{"-", "standard input"},     {"a.e57", "CloudCompare"},  {"a.ptx", "-o scan.ply"},
-                 {"a.yaml", "--view"},        {"a.laz", "compressed"},    {"a.xyz", "FILE.las"},
-                 {".ply", "has this ending"}, {"/nowhere.shs", "No such"}};
+    } cases[] = {{"-", "standard input"},      {"a.e57", "CloudCompare"},  {"a.ptx", "-o scan.ply"},
+                 {"a.yaml", "--view"},         {"a.laz", "compressed"},    {"a.xyz", "FILE.las"},
+                 {".ply", "with this ending"}, {"/nowhere.shs", "No such"}};
     struct viewed v;
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -132,7 +132,7 @@ static void wrong_files_are_refused(void **state)
         viewed_free(&v);
     }
     assert_int_equal(viewed_load(&v, write_ply("", "", 1, "nan nan nan\n"), NULL, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, "no points in it, and 1 shots without echo"));
+    assert_non_null(strstr(err.text, "it has no points, but 1 shots without echo"));
     unlink(path);
     viewed_free(&v);
 }

@@ -118,7 +118,7 @@ void batch_expect_equal(struct wire *wire, const char *dir, const char *other)
 void batch_whole(struct wire *wire, const char *dir)
 {
     batch_expect(wire, dir, WITH("--quiet"), 0, "");
-    batch_expect(wire, dir, WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, dir, WITH("--merge"), 0, "6 jobs are complete");
 }
 
 void batch_shards(struct wire *wire, const char *dir, int n, const char *threads)
@@ -128,7 +128,7 @@ void batch_shards(struct wire *wire, const char *dir, int n, const char *threads
         snprintf(shard, sizeof shard, "%d/%d", i, n);
         assert_int_equal(batch_call(wire, dir, WITH("--shard", shard, "--threads", threads, "--quiet")), 0);
     }
-    batch_expect(wire, dir, WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, dir, WITH("--merge"), 0, "6 jobs are complete");
 }
 
 static void *ref;

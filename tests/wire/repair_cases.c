@@ -168,7 +168,7 @@ static uint64_t check_pcapng(const struct bytes *whole, const struct bytes *left
     if (is_full && repaired->len == at && left->len - at < 120) return n;
     const struct bytes note = {repaired->data + at, repaired->len - at}; /* a block of statistics with a comment */
     assert_true(note.len > 0 && note.len % 4 == 0 && block_len(&note, 0) == note.len && le_get32(note.data) == 5);
-    assert_true(behind(&note, "incomplete: the recorder came to no end") > 0);
+    assert_true(behind(&note, "incomplete: the recording was not completed") > 0);
     return n;
 }
 
@@ -183,7 +183,7 @@ static int is_no_pcapng(const struct bytes *left)
 
 static uint64_t check_poses(const struct bytes *whole, const struct bytes *left, const struct bytes *repaired)
 {
-    static const char last[] = "# incomplete: the recorder came to no end; what should follow may be missing\n";
+    static const char last[] = "# incomplete: the recording was not completed; data may be missing after this\n";
     const size_t end = end_of_lines(left, 0);
     assert_true(repaired->len == end + sizeof last - 1);
     assert_memory_equal(repaired->data + end, last, sizeof last - 1);

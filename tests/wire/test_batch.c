@@ -31,13 +31,13 @@ static void test_shared(void **state)
     struct wire *wire = *state;
     batch_change(wire_path(wire, "config.yaml"), "heading_deg: 30", "scanner: {head: {prr_hz: 300000}}");
     batch_expect(wire, "one", WITH("--sweep", sweep), 0, "12 jobs done, 12 of them now; meshes read 1 time\n");
-    batch_expect(wire, "one", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are whole");
+    batch_expect(wire, "one", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are complete");
     for (int i = 1; i <= 12; i++) {
         char shard[32];
         snprintf(shard, sizeof shard, "%d/12", i);
         batch_expect(wire, "each", WITH("--sweep", sweep, "--shard", shard), 0, "1 jobs done, 1 of them now");
     }
-    batch_expect(wire, "each", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are whole");
+    batch_expect(wire, "each", WITH("--sweep", sweep, "--merge"), 0, "12 jobs are complete");
     batch_expect_same(batch_in(wire, "each", "manifest.json"), batch_in(wire, "one", "manifest.json"));
 }
 
@@ -60,9 +60,9 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--stations", "3"), 2, "allowed 1 to 2");
     batch_expect(wire, "none", WITH("--set", "time.epoch=utc"), 2, "time.epoch");
     /* names of files would be wrong here */
-    batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames sets it, too");
-    batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs sets it, too");
-    batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "that of --stations");
+    batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames also sets it");
+    batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs also sets it");
+    batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "--stations sets the station");
     batch_expect(wire, "none", WITH("--sweep", "scene.meshes.0.scale=1,2", "--set", "scene.meshes[0].scale=3"), 2,
                  "is in --set and in --sweep");
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
@@ -83,7 +83,7 @@ static void test_images(void **state)
     job[sizeof job / sizeof job[0] - 2] = "--merge";
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 1);
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    assert_non_null(strstr(err, "0001_station-2.2.png: is not there"));
+    assert_non_null(strstr(err, "0001_station-2.2.png: is missing"));
     free(err);
 }
 
@@ -152,7 +152,7 @@ static void test_slurm(void **state)
         by_script(wire, "/bin/bash", "config/campaign/slurm.sh", "slurm");
     }
     assert_int_equal(access(batch_in(wire, "slurm", "manifest-3-of-3.jsonl"), F_OK), 0);
-    batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "slurm", "ref");
     /* Some tasks of an array of seven run again. */
     setenv("SHARDS", "7", 1);

@@ -68,7 +68,7 @@ static void test_killed(void **state)
     }
     batch_expect(wire, "killed", WITH("--shard", "1/2"), 0, "shard 1/2");
     batch_expect(wire, "killed", WITH("--shard", "2/2"), 0, "shard 2/2");
-    batch_expect(wire, "killed", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "killed", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "killed", "ref");
 }
 
@@ -123,7 +123,7 @@ static void test_spoilt(void **state)
     assert_true(part != NULL && fputs("ply\n", part) >= 0 && fclose(part) == 0);
     batch_expect(wire, "one", WITH("--merge"), 1, "job 1, ");
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    for (const char *const *says = WITH("bytes, and had", "job 3, ", "(sha256)", "job 4, ", "is not there", "job 6, ",
+    for (const char *const *says = WITH("bytes, but had", "job 3, ", "(sha256)", "job 4, ", "is missing", "job 6, ",
                                         ": missing", "4 of 6 jobs");
          *says != NULL; says++)
         if (strstr(err, *says) == NULL) fail_msg("no \"%s\" in: %s", *says, err);
@@ -131,7 +131,7 @@ static void test_spoilt(void **state)
     free(err);
     batch_expect(wire, "one", NULL, 0, "6 jobs done, 4 of them now");
     assert_int_not_equal(access(batch_in(wire, "one", "manifest.json"), F_OK), 0); /* it was out of date */
-    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "one", "ref");
     batch_expect(wire, "one", NULL, 0, "6 jobs done, 0 of them now");
     assert_int_equal(access(batch_in(wire, "one", "manifest.json"), F_OK), 0);
@@ -179,9 +179,10 @@ static void test_nothing_is_mixed(void **state)
     batch_change(manifest, "\"program\":\"", "\"program\":\"0.");
     batch_expect(wire, "one", WITH("--shard", "2/3"), 1, "release");
     batch_expect(wire, "one", WITH("--force", "--quiet"), 0, "");
-    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are whole");
+    batch_expect(wire, "one", WITH("--merge"), 0, "6 jobs are complete");
     assert_int_equal(link(batch_file(wire, "one", 0, ".ply"), batch_in(wire, "one", "0001_before.ply")), 0);
-    batch_expect(wire, "one", WITH("--merge"), 0, "1 files are of no job of this campaign, the first: 0001_before.ply");
+    batch_expect(wire, "one", WITH("--merge"), 0,
+                 "1 files belong to no job of this campaign, the first: 0001_before.ply");
 }
 
 /* ---- other processes at work, and jobs that fail */
@@ -192,7 +193,7 @@ static void test_locked(void **state)
     assert_int_equal(batch_call(wire, "one", WITH("--shard", "1/2", "--quiet")), 0);
     const int fd = open(batch_in(wire, "one", "manifest-2-of-2.jsonl"), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     assert_int_equal(flock(fd, LOCK_EX | LOCK_NB), 0);
-    batch_expect(wire, "one", WITH("--shard", "2/2"), 1, "another process is at shard 2/2");
+    batch_expect(wire, "one", WITH("--shard", "2/2"), 1, "another process does shard 2/2");
     close(fd);
     batch_expect(wire, "one", WITH("--shard", "2/2"), 0, "3 jobs done, 3 of them now");
 }

@@ -265,7 +265,7 @@ static void commands_add_and_clear(void **state)
     client_tell(sh, "FAULt:CLEar ALL");
     assert_int_equal(dark_shots(sh), 0);
     const char *refused = client_ask(sh, "FAULt:ADD {kind: window_soiled}");
-    assert_non_null(strstr(refused, "window_soiled would change nothing"));
+    assert_non_null(strstr(refused, "window_soiled would have no effect"));
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     const struct beam_run *run = beam_read(wire, 0, "run.shs", "live.json");

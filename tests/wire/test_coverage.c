@@ -217,7 +217,7 @@ static void test_refused(void **state)
         const char *args[8], *says[4];
     } cases[] = {
         {{"--colour", "red", "-o", "x.ply"}, {"--colour red", "seen, count, density, incidence"}},
-        {{"--colour", "count"}, {"--colour: no -o FILE"}},
+        {{"--colour", "count"}, {"--colour: allowed with -o FILE"}},
         {{"-o", "x.xyz"}, {"x.xyz", ".ply"}},
         {{"--by", "wall"}, {"--by wall", "label"}},
         {{"--next", "2"}, {"--grid STEP_M or --candidates"}},
@@ -226,7 +226,7 @@ static void test_refused(void **state)
         {{"--grid", "1", "--candidates", csv}, {"one of them"}},
         {{"--at", "0,0,1,1"}, {"--at: allowed only with --grid"}},
         {{"--grid", "1", "--at", "0,0,1"}, {"--at 0,0,1:", "X0,Y0,X1,Y1"}},
-        {{"--grid", "1", "--at", "1,0,0,1"}, {"--at 1,0,0,1:", "lower one"}},
+        {{"--grid", "1", "--at", "1,0,0,1"}, {"--at 1,0,0,1:", "the lower number"}},
         {{"--grid", "1", "--height", "3", "--at", "0,0,6,5,-1,1"}, {"no place to stand", "3.2 m of room"}},
         {{"--grid", "0.001"}, {"6000 by 5000 places", "step of at least"}},
         {{"--candidates", csv}, {"bad.csv", "x_m,y_m,z_m"}},

@@ -65,7 +65,7 @@ static void beams_have_no_grid(void **state)
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "a.ply"));
     const char *const args[] = {"record", config, "-o", ply, "-o", wire_path(wire, "a.ptx"), "--quiet", NULL};
     assert_int_equal(run(wire, args), 2);
-    assert_said(wire, "err", "a.ptx: a grid has rows and columns, and this head fires beams in turn; allowed .ply");
+    assert_said(wire, "err", "a.ptx: a grid has rows and columns, but this head fires beams in turn; allowed are .ply");
     assert_int_equal(access(ply, F_OK), -1); /* refused before a file is begun */
 }
 

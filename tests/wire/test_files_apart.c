@@ -120,7 +120,7 @@ static const struct {
     {"map @cloud.ply --perspective --output=@o.png", "cloud.ply", "o.png", "--output", "the operand"},
     {"map @c.yaml --perspective --cloud=@cloud.ply --output=@o.png", "cloud.ply", "o.png", "--output", "--cloud"},
     {"batch @c.yaml --output=@ --format=obj --set=scene.meshes[0].file=@0001_station-1.obj", "room.obj",
-     "0001_station-1.obj", "--output", "job 1,"},
+     "0001_station-1.obj", "--output", "an input"},
 };
 
 /* Pairs of written files, whose names say what they are. */
@@ -190,10 +190,9 @@ static void expect_refusal(struct wire *wire, const char *line, const char *file
     char *before = wire_read(path, &len[0]);
     assert_int_equal(link(path, wire_path(wire, alias)), 0);
     snprintf(given, sizeof given, "scanhead: %s ", who);
-    snprintf(read_as, sizeof read_as, " is the file of %s", other);
-    usage_expect(
-        wire, line, words_of(wire, line), 2,
-        (const char *const[]){given, read_as, "which is read, and would be overwritten; allowed another ", NULL});
+    snprintf(read_as, sizeof read_as, " is also read as %s", other);
+    usage_expect(wire, line, words_of(wire, line), 2,
+                 (const char *const[]){given, read_as, "and would be overwritten; name another ", NULL});
     unlink(wire_path(wire, alias));
     char *after = wire_read(path, &len[1]);
     if (len[0] != len[1] || memcmp(before, after, len[0]) != 0) usage_complain("# %s: %s has changed", line, file);
@@ -224,16 +223,16 @@ static void test_pairs(void **state)
                     continue;
                 snprintf(line, sizeof line, "%s %s %s %s", COMMANDS[c].name, COMMANDS[c].operands, other->words,
                          out->words);
-                usage_expect(wire, line, words_of(wire, line), 2,
-                             (const char *const[]){out->who, other->who, " is the file of ",
-                                                   ", too; allowed another file", NULL});
+                usage_expect(
+                    wire, line, words_of(wire, line), 2,
+                    (const char *const[]){out->who, other->who, " writes the same file; name another one", NULL});
                 n++;
             }
         }
     for (size_t i = 0; i < sizeof DOUBLES / sizeof DOUBLES[0]; i++)
-        usage_expect(wire, DOUBLES[i].line, words_of(wire, DOUBLES[i].line), 2,
-                     (const char *const[]){DOUBLES[i].who, " is the file of ", DOUBLES[i].other,
-                                           ", too; allowed another file", NULL});
+        usage_expect(
+            wire, DOUBLES[i].line, words_of(wire, DOUBLES[i].line), 2,
+            (const char *const[]){DOUBLES[i].who, DOUBLES[i].other, " writes the same file; name another one", NULL});
     for (size_t i = 0; i < sizeof LINES / sizeof LINES[0]; i++)
         expect_refusal(wire, LINES[i].line, LINES[i].file, LINES[i].alias, LINES[i].who, LINES[i].other);
     print_message("# %d pairs\n", n);
@@ -306,7 +305,7 @@ static void test_two_heads_one_file(void **state)
     begin(wire);
     snprintf(config, sizeof config, "%s", wire_path(wire, "f.yaml"));
     struct head first = head_start(wire, config, (const char *const[]){"--start", "--set", "head.frames=0", NULL});
-    snprintf(says, sizeof says, "is being written by process %ld (scanhead); allowed is a file of its own",
+    snprintf(says, sizeof says, "is being written by process %ld (scanhead); choose another file name",
              (long)first.pid);
     static const char *const lines[] = {"run @f.yaml --start --frames=1", "run @c.yaml --start --frames=1 --journal=@o",
                                         "run @c.yaml --start --frames=1 --truth=@o", "soak @f.yaml --duration=1"};

@@ -74,8 +74,8 @@ static void a_mesh_becomes_a_scan(void **state)
     contains(out, "x 0.000..8.000  y 0.000..6.000  z 0.000..3.000 m");
     contains(out, "inside, 1.6 m above a floor");
     contains(out, "written   room.yaml");
-    contains(text, "its unit is not in the file: a metre is assumed, which makes the mesh 8 m large");
-    contains(text, "which axis points up is not in the file: z is assumed");
+    contains(text, "the file does not give its unit: a metre is assumed, which makes the mesh 8 m large");
+    contains(text, "the file does not give the axis that points up: z is assumed");
     char *yaml = wire_read(wire_path(wire, "room.yaml"), NULL);
     contains(yaml, "file: \"room.obj\"");
     contains(yaml, "# inside, 1.6 m above a floor");
@@ -119,16 +119,16 @@ static void axes_that_no_key_can_say(void **state)
         {{"UpAxis", "1"}, NULL, "up: y # as the file says"},
         {{"UpAxis", "2", "FrontAxis", "1", "FrontAxisSign", "-1"}, NULL, "up: z # as the file says"},
         {{"UpAxisSign", "-1", "FrontAxisSign", "-1"},
-         "its -y axis points up, which no key can say: with up: y the mesh stands on its head; export it with y or z up",
+         "its -y axis points up, which no key can set: with up: y the mesh is upside down; export it with y or z up",
          "up: y # assumed"},
         {{"UpAxis", "2", "UpAxisSign", "-1", "FrontAxis", "1"},
-         "its -z axis points up, which no key can say: with up: z the mesh stands on its head; export it with y or z up",
+         "its -z axis points up, which no key can set: with up: z the mesh is upside down; export it with y or z up",
          "up: z # assumed"},
         {{"UpAxis", "0", "CoordAxis", "1", "CoordAxisSign", "-1"},
-         "its x axis points up, which no key can say: with up: z the mesh lies on its side; export it with y or z up",
+         "its x axis points up, which no key can set: with up: z the mesh lies on its side; export it with y or z up",
          "up: z # assumed"},
         {{"CoordAxisSign", "-1"},
-         "its axes are left-handed, which no key can say: the mesh is mirrored; export it with right-handed axes",
+         "its axes are left-handed, which no key can set: the mesh is mirrored; export it with right-handed axes",
          "up: y # as the file says"},
     };
     if (access("/usr/share/assimp/models/FBX/cubes_with_names.fbx", R_OK) != 0) skip();
@@ -153,7 +153,7 @@ static void unit_and_axes_can_be_given(void **state)
     struct wire *wire = *state;
     write_room(wire, "mm.obj", 1000, 1);
     assert_int_equal(RUN(wire, "init", "mm.obj", "--up", "y"), 0);
-    contains(text, "its unit is not in the file: a millimetre is assumed, which makes the mesh 8 m large");
+    contains(text, "the file does not give its unit: a millimetre is assumed, which makes the mesh 8 m large");
     assert_null(strstr(text, "axis"));
     contains(out, "size      8 x 6 x 3 m");
     contains(out, "inside, 1.6 m above a floor");
@@ -164,7 +164,7 @@ static void unit_and_axes_can_be_given(void **state)
     assert_int_equal(RUN(wire, "check", "twice.yaml"), 0);
     write_room(wire, "nm.obj", 1e9, 0); /* in metres it would be larger than a scene may be */
     assert_int_equal(RUN(wire, "init", "nm.obj"), 2);
-    contains(text, "is the scale of 1 metres per unit right?");
+    contains(text, "check the scale of 1 metres per unit");
     assert_int_equal(RUN(wire, "init", "nm.obj", "--up", "z", "--scale", "1e-9"), 0);
     contains(out, "size      8 x 6 x 3 m");
     forget();
@@ -205,7 +205,8 @@ static void the_unit_follows_from_what_there_is(void **state)
     contains(out, "unit      1 m, assumed: its coordinates, near ");
     write_city(wire, "here.obj", 0, 0, 0);
     assert_int_equal(RUN(wire, "init", "here.obj", "--up", "z"), 0);
-    contains(text, "a metre is assumed, since it is wide and flat as a survey, and would be a plate in millimetres");
+    contains(text, "a metre is assumed, since it is as wide and flat as a survey, and would be a thin plate in "
+                   "millimetres");
     contains(out, "size      2010 x 2010 x 10 m");
     write_room(wire, "mm.obj", 1000, 0);
     assert_int_equal(RUN(wire, "init", "mm.obj", "--up", "z"), 0);
@@ -219,12 +220,12 @@ static void a_sparse_city_is_looked_at(void **state)
     struct wire *wire = *state;
     write_city(wire, "city.obj", 2684500, 1246300, 440);
     assert_int_equal(RUN(wire, "init", "city.obj", "--up", "z"), 0);
-    contains(out, "outside, looking at the mesh");
+    contains(out, "outside, facing the mesh");
     double p[3];
     assert_int_equal(sscanf(strstr(out, "station "), "station %lf %lf %lf m", &p[0], &p[1], &p[2]), 3);
     /* The box in the middle: a sphere of 8.7 m is around it, and the station is 2.5 of its radii away. */
     assert_true(hypot(p[0] - 2685505, p[1] - 1247305) < 25 && p[2] > 440 && p[2] < 470);
-    const double seen = 0.01 * atof(strstr(out, "looking at the mesh; ") + strlen("looking at the mesh; "));
+    const double seen = 0.01 * atof(strstr(out, "facing the mesh; ") + strlen("facing the mesh; "));
     assert_true(seen > 0.3);
     assert_int_equal(RUN(wire, "record", "city.yaml", "-o", "city.ply", "--quiet"), 0);
     assert_true(points_of(wire, "city.ply") > 10000);
@@ -256,10 +257,10 @@ static void a_body_is_looked_at(void **state)
                     "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 0 1 1\nf 1 4 3 2\nf 5 6 7 8\n"
                     "f 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
     assert_int_equal(RUN(wire, "init", "box.obj", "--up", "z", "--scale", "1"), 0);
-    contains(out, "outside, looking at the mesh");
-    const char *share = strstr(out, "looking at the mesh; ");
+    contains(out, "outside, facing the mesh");
+    const char *share = strstr(out, "facing the mesh; ");
     assert_non_null(share);
-    const double seen = 0.01 * atof(share + strlen("looking at the mesh; "));
+    const double seen = 0.01 * atof(share + strlen("facing the mesh; "));
     assert_int_equal(RUN(wire, "record", "box.yaml", "-o", "box.ply", "--empty-shots", "--quiet"), 0);
     const double shots = (double)points_of(wire, "box.ply");
     assert_int_equal(RUN(wire, "record", "box.yaml", "-o", "box.ply", "--quiet"), 0);
@@ -291,7 +292,7 @@ static void what_is_there_stays(void **state)
     write_room(wire, "room.obj", 1, 0);
     wire_write_text(wire, "room.yaml", "mine\n");
     assert_int_equal(RUN(wire, "init", "room.obj"), 2);
-    contains(text, "room.yaml is there already; give another name with -o, or --force to replace it");
+    contains(text, "room.yaml already exists; give another name with -o, or --force to replace it");
     char *yaml = wire_read(wire_path(wire, "room.yaml"), NULL);
     assert_string_equal(yaml, "mine\n");
     free(yaml);
@@ -310,7 +311,7 @@ static void wrong_use_says_what_is_allowed(void **state)
     assert_int_equal(RUN(wire, "init", "room.obj", "--up", "x"), 2);
     contains(text, "--up x: allowed y, z");
     assert_int_equal(RUN(wire, "init", "points.obj"), 2);
-    contains(text, "no triangles in it");
+    contains(text, "has no triangles");
     contains(text, "export it again");
     wire_write_text(
         wire, "apart.gltf",
@@ -339,8 +340,8 @@ static void a_scan_of_nothing_is_told(void **state)
     write_room(wire, "room.obj", 1, 0);
     assert_int_equal(RUN(wire, "init", "room.obj"), 0);
     assert_int_equal(RUN(wire, "check", "room.yaml", "--set", moved), 0);
-    contains(text, "nothing within range_max_m, 130 m");
-    contains(text, "the scan is mostly empty: of 1024 directions 0 meet something");
+    contains(text, "no surface within range_max_m, 130 m");
+    contains(text, "the scan is mostly empty: of 1024 directions 0 hit something");
     assert_int_equal(RUN(wire, "record", "room.yaml", "--set", moved, "-o", "no.ply", "--quiet"), 0);
     contains(text, "the scan is mostly empty");
     contains(text, "mostly empty: 0 of ");

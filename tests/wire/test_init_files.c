@@ -49,7 +49,7 @@ static void a_raster_gives_the_place(void **state)
     tif_write(file, &t);
     if (init(wire, "hill.tif") != 0) fail_msg("%s", err_text);
     has(made, "\n  anchor: {source: geotiff} # EPSG:32632; height_m: ");
-    has(err_text, "scene.anchor.height_m says how high above it their 0 is");
+    has(err_text, "scene.anchor.height_m sets the height of their 0 above it");
     t.key[0][1] = 32767;
     t.key[2][1] = 32767;
     tif_write(file, &t);
@@ -76,7 +76,7 @@ static void long_names_of_glass_stay_whole(void **state)
     if (init(wire, "pane.obj") != 0) fail_msg("%s", err_text);
     has(made, rule);
     assert_null(strstr(made, "and more"));
-    has(err_text, "surfaces: [...]; check --scene-csv FILE has all");
+    has(err_text, "surfaces: [...]; check --scene-csv FILE lists all");
 }
 
 /* The mesh has only degenerate faces. The reader's words give the reason why nothing is left. */

@@ -147,7 +147,7 @@ static void end_it(struct wire *wire, pid_t pid, int err)
     assert_true(wire_now_ms() - begin_ms < SOON_MS); /* it does not wait either, however busy the machine is */
     const int64_t took_ms = past_ms() - before_ms;
     assert_int_equal(status, 1);
-    wait_for(err, "scanhead: interrupted while loading; nothing ran\n", got, sizeof got);
+    wait_for(err, "scanhead: stopped while loading; no scan was run\n", got, sizeof got);
     if (took_ms > MOST_MS) fail_msg("SIGTERM took %lld ms", (long long)took_ms);
     print_message("# SIGTERM took %lld ms\n", (long long)took_ms);
     close(err);

@@ -90,7 +90,7 @@ static void what_others_reach_is_said(void **state)
     assert_int_equal(try_tcp("127.0.0.2", port), 0); /* the other test would see such a link */
     head_end(&head, SIGTERM);
     char *said = wire_read(wire_path(wire, "head.err"), &len), want[64];
-    snprintf(want, sizeof want, "link tcp:0.0.0.0:%d: other machines may reach it", port);
+    snprintf(want, sizeof want, "link tcp:0.0.0.0:%d: other machines can reach", port);
     const char *at = strstr(said, "other machines");
     assert_non_null(strstr(said, want));
     assert_null(strstr(at + 1, "other machines"));

@@ -138,7 +138,7 @@ static void test_open_edges(void **state)
     assert_null(strstr(svg, "open edges"));
     free(svg);
     char *err = draw(wire, (const char *const[]){"--open-edges", "--perspective", NULL}, "map.png", 2);
-    assert_non_null(strstr(err, "--open-edges goes with a map from above"));
+    assert_non_null(strstr(err, "--open-edges: allowed for a map from above"));
     free(err);
 }
 

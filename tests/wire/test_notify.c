@@ -144,9 +144,10 @@ static void test_bad_sockets(void **state)
         const char *name, *says;
         int status;
     } bad[] = {
-        {"notify", "NOTIFY_SOCKET=notify: no socket's name; allowed are a path from / and @NAME, 2 to 107 bytes", 2},
-        {"@", "NOTIFY_SOCKET=@: no socket's name", 2},
-        {"vsock:2:1234", "NOTIFY_SOCKET=vsock:2:1234: no socket's name", 2},
+        {"notify",
+         "NOTIFY_SOCKET=notify: not the name of a socket; allowed are a path from / on and @NAME, 2 to 107 bytes", 2},
+        {"@", "NOTIFY_SOCKET=@: not the name of a socket", 2},
+        {"vsock:2:1234", "NOTIFY_SOCKET=vsock:2:1234: not the name of a socket", 2},
         {"/nowhere/notify", "NOTIFY_SOCKET=/nowhere/notify: No such file", 1}};
     char longer[109] = "@";
     memset(longer + 1, 'x', 107);
@@ -157,7 +158,7 @@ static void test_bad_sockets(void **state)
         fails(*state, bad[i].status, bad[i].says);
     }
     setenv("NOTIFY_SOCKET", longer, 1);
-    fails(*state, 2, "no socket's name");
+    fails(*state, 2, "not the name of a socket");
     unsetenv("NOTIFY_SOCKET");
 }
 

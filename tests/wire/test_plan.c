@@ -242,7 +242,7 @@ static void test_sight(void **state)
         {{"cast.sight=off", "beam.mode=single"}, {"none", "forced by cast.sight"}},
         {{"instrument.mirror_offset_m=0.01", "head.frames=0"}, {"none", "moves the beam"}},
         {{"beam.mode=rings", "head.frames=0"}, {"none", "no ray for the centre"}},
-        {{"head.frames=1", "head.pan_stop_deg=1"}, {"none", "too few to pay"}},
+        {{"head.frames=1", "head.pan_stop_deg=1"}, {"none", "too few: a map would cost"}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const int is_rings = strcmp(cases[i].sets[0], "beam.mode=rings") == 0;
@@ -417,9 +417,9 @@ static void test_run_warns(void **state)
                                     "--set", cases[i].set[0], "--set",      cases[i].set[1], "--set", cases[i].set[2],
                                     NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
-        char *text = wire_read(wire_path(wire, "err"), NULL), *at = strstr(text, "need about");
+        char *text = wire_read(wire_path(wire, "err"), NULL), *at = strstr(text, "needs about");
         if ((at != NULL) != cases[i].warns) fail_msg("%s", text);
-        if (at != NULL) assert_null(strstr(at + 1, "need about"));
+        if (at != NULL) assert_null(strstr(at + 1, "needs about"));
         free(text);
     }
 }

@@ -193,7 +193,7 @@ static void test_silence(void **state)
     const int device = device_open(source);
     struct raw_recorder recorder = raw_recorder_start(wire, source, NULL);
     const int fd = take_connection(device);
-    raw_recorder_end(&recorder, SIGINT, 1, "the device said nothing; most speak only when asked");
+    raw_recorder_end(&recorder, SIGINT, 1, "the device sent nothing; most devices send only after");
     close(fd);
     close(device);
 }

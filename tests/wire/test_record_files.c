@@ -54,15 +54,14 @@ static void test_same_file(void **state)
     snprintf(b, sizeof b, "%s", wire_path(wire, "./a.las"));
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", a, NULL}, "given twice");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", b, NULL},
-                   "is the file of --output, too");
+                   "--output writes the same file");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--truth", b, NULL},
-                   "is the file of --output, too");
-    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL},
-                   "is read, and would be");
+                   "--output writes the same file");
+    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL}, "is also read as");
     /* The part that a killed recording left is not overwritten: it may be the only one. */
     snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
     const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};
-    expect_refusal(wire, args, "a.las.part: an earlier recording has left 32 bytes there; scanhead record --repair ");
+    expect_refusal(wire, args, "a.las.part: an earlier recording left 32 bytes there; scanhead record --repair ");
     assert_int_equal(unlink(part), 0);
     wire_write_text(wire, "a-1.las.part", "left behind");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--quiet", "--split", NULL}, "a-1.las.part");

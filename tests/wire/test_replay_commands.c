@@ -98,7 +98,7 @@ static void test_settings_are_refused(void **state)
         {"SCAN:PAN:STOP MIN", "SCAN:PAN:STOP", "it is 3"},
         {"SCAN:FRAMes MAX", "SCAN:FRAMes", "it is 1"},
         {"SCAN:FRAMes 0", "SCAN:FRAMes", "it is 1"},
-        {"SITE:POSE 1,0,0,0,0,0,0", "SITE:POSE", "stations are where they were"},
+        {"SITE:POSE 1,0,0,0,0,0,0", "SITE:POSE", "its stations are fixed"},
     };
     static const char *const same[] = {"HEAD:PRR 10000",  "HEAD:PRR 10 KHZ",     "HEAD:PRR MAX",   "HEAD:PRR MIN",
                                        "HEAD:LINes 100",  "HEAD:PAN 10",         "HEAD:STATION 1", "SCAN:LINE:STOP 60",
@@ -106,7 +106,7 @@ static void test_settings_are_refused(void **state)
     static const char *const unknown[] = {"HEAD:NOISe", "HEAD:NOISe:ANGLe", "HEAD:NOISe:SIGMa", "HEAD:NOISe:BALL",
                                           "SCAN:ECHoes"};
     for (size_t i = 0; i < sizeof changes / sizeof *changes; i++) {
-        starts_with(sh, changes[i][0], "ERR -221,\"Settings conflict; ", "a recording is replayed, and its ");
+        starts_with(sh, changes[i][0], "ERR -221,\"Settings conflict; ", "a recording is replayed; its ");
         starts_with(sh, "SYST:ERR?", "-221,\"Settings conflict; ", changes[i][1]);
         starts_with(sh, changes[i][0], "ERR -221", changes[i][2]);
         client_tell(sh, "*CLS");
@@ -116,9 +116,9 @@ static void test_settings_are_refused(void **state)
     for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
         char line[64];
         snprintf(line, sizeof line, "%s?", unknown[i]);
-        starts_with(sh, line, "ERR -221", "the recording does not say it");
+        starts_with(sh, line, "ERR -221", "the recording does not have this value");
         snprintf(line, sizeof line, "%s DEF", unknown[i]);
-        starts_with(sh, line, "ERR -221", "the recording does not say it");
+        starts_with(sh, line, "ERR -221", "the recording does not have this value");
     }
     client_tell(sh, "*CLS");
     starts_with(sh, "HEAD:PRR fast", "ERR -104", "");
@@ -257,8 +257,8 @@ static void test_unknown_echoes(void **state)
         .kind = NATIVE_EMIT_PLANAR, .steps = 360, .turn = 1, .sequence_ns_den = 1, .echoes = 4000000000};
     struct head head = head_start(*state, write_moment(*state, &e), LINK);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
-    starts_with(sh, "SCAN:ECHoes?", "ERR -221", "does not say");
-    starts_with(sh, "SCAN:ECHoes ALL", "ERR -221", "does not say");
+    starts_with(sh, "SCAN:ECHoes?", "ERR -221", "does not have this value");
+    starts_with(sh, "SCAN:ECHoes ALL", "ERR -221", "does not have this value");
     scanhead_close(sh);
     head_end(&head, SIGTERM);
 }
@@ -293,7 +293,7 @@ static void test_faults_by_command(void **state)
     uint64_t first_ns, last_ns;
     starts_with(sh, "FAULt:ADD {kind: mirror_stop, every: 10}", "ERR ", "");
     starts_with(sh, "HEAD:REBOOT", "ERR -221", "a recording is replayed");
-    starts_with(sh, "FAULt:ADD {kind: power_cycle, for_ms: 200, from_s: 1}", "ERR ", "a recording has none");
+    starts_with(sh, "FAULt:ADD {kind: power_cycle, for_ms: 200, from_s: 1}", "ERR ", "a recording has no head");
     starts_with(sh, "FAULt:ADD {kind: none_such}", "ERR ", "");
     assert_string_equal(client_ask(sh, "FAULt:LIST?"), "none");
     assert_string_equal(client_ask(sh, "FAULt:ADD {kind: drop, every: 10}"), "1");

@@ -20,14 +20,14 @@ static void test_cut_and_bad_bytes(void **state)
     char *bytes = wire_read(file, &n);
     snprintf(file, sizeof file, "%s", wire_write(wire, "cut.shs", bytes, n - 20));
     replay_to_file(wire, file, quiet, "out.shs");
-    replay_said(wire, "bytes are in no whole frame, and were left out; it is cut at its end");
+    replay_said(wire, "bytes left out, which belong to no complete frame; its end is cut off");
     replay_same_file(wire, "out.shs", "cut.shs");
     bytes[n / 2] ^= 1;
     memset(bytes + n / 3, 0x55, 400);
     snprintf(file, sizeof file, "%s", wire_write(wire, "bad.shs", bytes, n));
     free(bytes);
     replay_to_file(wire, file, quiet, "out.shs");
-    replay_said(wire, "bytes are in no whole frame, and were left out");
+    replay_said(wire, "bytes left out, which belong to no complete frame");
     replay_same_file(wire, "out.shs", "bad.shs");
 }
 
@@ -55,7 +55,7 @@ static void test_no_recordings(void **state)
     memcpy(pcapng + 28, interface, sizeof interface);
     memcpy(pcapng + 48, packet, sizeof packet);
     pcapng[140] = 96;
-    refused(wire, wire_write(wire, "empty.shs", "", 0), 1, "no descriptor is in it");
+    refused(wire, wire_write(wire, "empty.shs", "", 0), 1, "it has no descriptor");
     refused(wire, wire_write_text(wire, "text.shs", "head: {profile: any-rate}\nlinks: []\n"), 1, "not");
     refused(wire, wire_write(wire, "ethernet.pcapng", pcapng, sizeof pcapng), 1, "link type 1");
     refused(wire, wire_path(wire, "none.shs"), 2, "cannot open");
@@ -67,7 +67,7 @@ static void test_no_recordings(void **state)
     while (tape.frame[i].type != SCANHEAD_DESCRIPTOR)
         i++;
     const size_t at = tape.frame[i + 1].at;
-    refused(wire, wire_write(wire, "late.shs", tape.bytes + at, tape.len - at), 1, "no descriptor is in it");
+    refused(wire, wire_write(wire, "late.shs", tape.bytes + at, tape.len - at), 1, "it has no descriptor");
     tape_free(&tape);
 }
 

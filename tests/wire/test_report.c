@@ -321,7 +321,7 @@ static void wrong_input_is_one_line(void **state)
     const char *const pdf[] = {"report", config, cloud, "--html", "page.pdf", NULL};
     const char *const nowhere[] = {"report", config, cloud, "--html", "/nowhere/page.html", NULL};
     const char *const *const args[] = {pdf, nowhere};
-    static const char *const said[] = {"allowed is a name that ends in .html", "there are no points"};
+    static const char *const said[] = {"allowed is a name that ends in .html", "it has no points"};
     for (int i = 0; i < 2; i++) {
         assert_int_equal(run(wire, "out", args[i], (const char *const[]){"output.layout=polar", NULL}), 2);
         text = wire_read(wire_path(wire, "err"), NULL);

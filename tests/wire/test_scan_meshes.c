@@ -211,9 +211,9 @@ static void what_is_refused(void **state)
     } row[] = {
         {USAGE_GOOD, {"--mesh", "-o", "a.las"}, "--mesh: no .ply is among the files"},
         {USAGE_GOOD, {"--sparse", "5", "-o", "a.obj"}, "--sparse: no .ply is among the files"},
-        {USAGE_GOOD, {"--sparse", "5", "--mesh", "-o", "a.ply"}, "a .ply is one of the two"},
+        {USAGE_GOOD, {"--sparse", "5", "--mesh", "-o", "a.ply"}, "a .ply can be only one of the two"},
         {USAGE_GOOD, {"--mesh", "--ply-columns", "range,time", "-o", "a.ply"}, "allowed are range, reflectance, label"},
-        {USAGE_GOOD, {"--mesh", "--empty-shots", "-o", "a.ply"}, "has no place for them"},
+        {USAGE_GOOD, {"--mesh", "--empty-shots", "-o", "a.ply"}, "can not hold them"},
         {USAGE_GOOD, {"--sparse", "0", "-o", "a.ply"}, "--sparse 0"},
         {USAGE_GOOD, {"--sparse-seed", "1", "--mesh", "-o", "a.ply"}, "--sparse-seed needs --sparse"},
         {USAGE_GOOD, {"--long-edge", "3", "-o", "a.ply"}, "--long-edge: no mesh is among the files"},
@@ -221,7 +221,7 @@ static void what_is_refused(void **state)
         {PLACED, {"--crs", "ecef", "-o", "a.glb"}, "a.glb: .glb holds coordinates as float"},
         {PLACED, {"--crs", "geodetic", "-o", "a.obj"}, "a.obj: this format holds metres"},
         {USAGE_GOOD, {"--each", "-o", "a.ply", "-o", "a-2.ply"}, "the file of one scan of"},
-        {USAGE_GOOD, {"--listen", "-o", "a.ply"}, "allowed with a head on a wire"},
+        {USAGE_GOOD, {"--listen", "-o", "a.ply"}, "allowed only with a head on a wire"},
         {PLANAR, {"-o", "a.obj"}, "it neither pans nor moves"},
         {BEAMS, {"--mesh", "-o", "a.ply"}, "this head fires beams in turn"},
     };

@@ -286,9 +286,9 @@ static void test_target(void **state)
     assert_int_equal(t.points, edges.points - edges.chosen);
     assert_int_equal(t.chosen, 0);
     expect_refusal(wire, "x.ply", (const char *const[]){"--set", "scene.target.objects.0=bord*", NULL},
-                   "no object fits \"bord*\"; allowed names of the scene's 7 objects, near ones are \"board\"");
+                   "no object fits \"bord*\"; allowed names of the scene's 7 objects, similar ones are \"board\"");
     expect_refusal(wire, "x.ply", (const char *const[]){"--set", "scene.target.others=hide", NULL},
-                   "scene.target.others: but there are no scene.target.objects");
+                   "scene.target.others: given, but there are no scene.target.objects");
 }
 
 /* An error of a scanner whose turn comes late is reported before the first scan, and there is no file. The room isn't 9

@@ -226,10 +226,11 @@ static void meshes_of_parts(void **state)
 
 static void rounding_is_said(void **state)
 {
-    static const char said[] = "warning: ", figures[] =
-                                                "head.step_deg: 2.2 deg does not divide 180 and 360 deg: used are "
-                                                "82 steps of 2.19512195 deg from ring to ring, and 164 of "
-                                                "2.19512195 deg along a ring\n";
+    static const char
+        said[] = "warning: ",
+        figures[] =
+            "head.step_deg: 2.2 deg does not divide 180 and 360 deg: 82 steps of 2.19512195 deg are used from ring to "
+            "ring, and 164 of 2.19512195 deg along a ring\n";
     struct wire *wire = *state;
     char config[128], ply[128];
     write_config(wire, &sector);

@@ -231,7 +231,7 @@ static void test_wrong_usage(void **state)
     struct room_config none = SLOW;
     none.links = "links: [{type: null}]\n";
     snprintf(config, sizeof config, "%s", room_config_write(wire, &none));
-    expect_usage(wire, (const char *const[]){"soak", config, NULL}, "none that can be soaked");
+    expect_usage(wire, (const char *const[]){"soak", config, NULL}, "soak can use none of them");
 }
 
 int main(void)

@@ -266,7 +266,7 @@ static void test_end(void **state)
     kill(head.pid, SIGTERM);
     assert_int_equal(wire_wait(wire, head.pid), 1);
     char *said = wire_read(wire_path(wire, "head.err"), NULL), want[64];
-    snprintf(want, sizeof want, "nothing was taken for 2 s; %llu lines are missing",
+    snprintf(want, sizeof want, "its reader took no data for 2 s; %llu lines are missing",
              (unsigned long long)stats_uint(wire, "lost_journal_lines"));
     if (strstr(said, want) == NULL) fail_msg("%s, not %s", said, want);
     free(said);
@@ -297,7 +297,7 @@ static void test_messages(void **state)
     head_end(&head, SIGTERM);
     char *text = fifo_join(&fifo), *at = text;
     int n = 0;
-    while ((at = strstr(at, "nothing within range_max_m")) != NULL)
+    while ((at = strstr(at, "no surface within range_max_m")) != NULL)
         n++, at++;
     assert_int_equal(n, N);
     free(text);

@@ -67,7 +67,7 @@ static void surfaces_of_a_campaign(void **state)
     line[6] = "--merge";
     assert_int_equal(wire_wait(wire, wire_spawn(wire, line, "out", "err", -1)), 1);
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    assert_non_null(strstr(err, "0001_station-1.surfaces.csv: is not there"));
+    assert_non_null(strstr(err, "0001_station-1.surfaces.csv: is missing"));
     free(err);
 }
 

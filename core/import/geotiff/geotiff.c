@@ -61,8 +61,7 @@ static int read_size(struct reader *r)
     if (rc != SH_OK) return rc;
     if (!(n[0] >= 2.0 && n[1] >= 2.0 && n[0] <= INT32_MAX && n[1] <= INT32_MAX))
         return sh_fail(r->err, SH_EINPUT,
-                       "%s: %.0f x %.0f cells; terrain needs at least 2 x 2, whose middles are its "
-                       "vertices",
+                       "%s: %.0f x %.0f cells; allowed are at least 2 x 2, since their middles are the vertices",
                        r->tags.path, n[0], n[1]);
     r->g->width = (uint32_t)n[0];
     r->g->height = (uint32_t)n[1];
@@ -77,11 +76,12 @@ static int fail_unplaced(const struct reader *r, size_t n_tie)
     if (n_tie > 6)
         return sh_fail(
             r->err, SH_EINPUT,
-            "%s: its place is given by control points; allowed is a grid: gdalwarp -t_srs EPSG:CODE -dstnodata -9999 makes one of it",
+            "%s: its place is given by control points; allowed is a grid, which gdalwarp -t_srs EPSG:CODE -dstnodata "
+            "-9999 makes",
             r->tags.path);
     return sh_fail(r->err, SH_EINPUT,
-                   "%s: no GeoTIFF: it doesn't say where its cells are (ModelTransformation, or ModelPixelScale and "
-                   "ModelTiepoint); gdal_translate puts what a .tfw beside it says into a new one",
+                   "%s: not a GeoTIFF: it doesn't say where its cells are (ModelTransformation, or ModelPixelScale and "
+                   "ModelTiepoint); where a .tfw file is beside it, gdal_translate makes a GeoTIFF of both",
                    r->tags.path);
 }
 
@@ -112,7 +112,7 @@ static int read_map(struct reader *r)
     r->g->turns_heights = n >= 12 && (z[0] != 0.0 || z[1] != 0.0 || z[3] != 0.0 || (z[2] != 0.0 && z[2] != 1.0));
     const double area = m[0] * m[5] - m[1] * m[4];
     if (isfinite(area) && area != 0.0 && isfinite(m[3]) && isfinite(m[7])) return SH_OK;
-    return sh_fail(r->err, SH_EINPUT, "%s: its cells have no area, or no place that is a number", r->tags.path);
+    return sh_fail(r->err, SH_EINPUT, "%s: its cells have no area, or their place is infinite or NaN", r->tags.path);
 }
 
 /* ---- systems and units */

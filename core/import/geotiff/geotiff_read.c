@@ -74,7 +74,7 @@ static int drop_warning(TIFF *tif, void *raster, const char *module, const char 
 static int fail_reading(struct raster *r, const char *what, struct sh_err *err)
 {
     return build_fail(r->b, SH_EINPUT, err, "%s can't be read: %s", what,
-                      r->said[0] != '\0' ? r->said : "libtiff says no reason");
+                      r->said[0] != '\0' ? r->said : "libtiff gives no reason");
 }
 
 static int open_tiff(struct raster *r, struct sh_err *err)
@@ -122,13 +122,14 @@ static int look_at_others(struct raster *r, struct sh_err *err)
     if (n_masks > 0)
         return build_fail(
             r->b, SH_EINPUT, err,
-            "a mask says which cells have no height; allowed is a value for them: gdalwarp -dstnodata -9999 "
+            "a mask marks the cells without height; allowed is a value that marks them: gdalwarp -dstnodata -9999 "
             "makes one");
     if (n > 0)
         sh_warn(r->b->report, "%s: only its first image is read; there %s %u more", r->b->name, n > 1 ? "are" : "is",
                 n);
     if (r->said[0] != '\0')
-        sh_warn(r->b->report, "%s: only its first image is read; what follows is broken: %.200s", r->b->name, r->said);
+        sh_warn(r->b->report, "%s: only its first image is read; the data after it are broken: %.200s", r->b->name,
+                r->said);
     r->said[0] = '\0';
     return r->lib.TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
 }
@@ -345,11 +346,10 @@ static void doubt_heights(const struct raster *r)
     const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;
     const double odd = is_low ? r->lowest : r->highest;
     if (!is_low && odd <= 9000.0) return;
-    sh_warn(
-        r->b->report,
-        "%s: its heights go from %g to %g m; where %g means that there is none, gdal_translate -a_nodata says it in the "
-        "file",
-        r->b->name, r->lowest, r->highest, (odd - r->g.height_m) / r->g.height_scale_m);
+    sh_warn(r->b->report,
+            "%s: its heights go from %g to %g m; if %g marks cells without height, add that to the file with "
+            "gdal_translate -a_nodata",
+            r->b->name, r->lowest, r->highest, (odd - r->g.height_m) / r->g.height_scale_m);
 }
 
 static int say(struct raster *r, struct sh_err *err)
@@ -357,7 +357,7 @@ static int say(struct raster *r, struct sh_err *err)
     const struct sh_report *report = r->b->report;
     int rc = r->n_holes > 0 ? count_alone(r, err) : SH_OK;
     if (r->n_holes == (uint64_t)r->g.width * r->g.height)
-        return build_fail(r->b, SH_EINPUT, err, "no cell of %u x %u has a height", r->g.width, r->g.height);
+        return build_fail(r->b, SH_EINPUT, err, "none of %u x %u cells has a height", r->g.width, r->g.height);
     if (r->n_holes > 0)
         sh_warn(report, "%s: %llu of %llu cells have no height, and are holes", r->b->name,
                 (unsigned long long)r->n_holes, (unsigned long long)r->g.width * r->g.height);
@@ -365,19 +365,17 @@ static int say(struct raster *r, struct sh_err *err)
         sh_warn(report, "%s: %llu heights beside holes touch no triangle, and are left out", r->b->name,
                 (unsigned long long)r->n_alone);
     if (!r->g.unit_given)
-        sh_warn(report, "%s: neither its system nor its unit is named: metres are assumed", r->b->name);
+        sh_warn(report, "%s: it names neither its system nor its unit: metres are assumed", r->b->name);
     if (!r->g.height_unit_given && r->g.unit_m != 1.0)
-        sh_warn(report, "%s: its system is in feet, and the unit of its heights is not named: metres are assumed",
-                r->b->name);
+        sh_warn(report, "%s: its system is in feet, but its heights have no unit: metres are assumed", r->b->name);
     if (r->g.maps_heights)
         sh_warn(
             report,
-            "%s: its ModelPixelScale or ModelTiepoint scales the heights, which is not used, since the file names no "
-            "system of theirs",
+            "%s: its ModelPixelScale or ModelTiepoint scales the heights; this is not used, since the file names no "
+            "system for heights",
             r->b->name);
     if (r->g.turns_heights)
-        sh_warn(report, "%s: its ModelTransformation changes the heights, which is not used: they stay as they are",
-                r->b->name);
+        sh_warn(report, "%s: its ModelTransformation changes the heights; this is not used", r->b->name);
     doubt_heights(r);
     return rc;
 }

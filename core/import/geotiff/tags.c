@@ -26,7 +26,7 @@ static int take(const struct tags *t, uint64_t at, void *out, size_t size, struc
 {
     if (at <= INT64_MAX && fseeko(t->file, (off_t)at, SEEK_SET) == 0 && fread(out, 1, size, t->file) == size)
         return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s: cut off: a TIFF that goes on at byte %llu", t->path, (unsigned long long)at);
+    return sh_fail(err, SH_EINPUT, "%s: cut off: its data continue at byte %llu", t->path, (unsigned long long)at);
 }
 
 /* The head: byte order, 42 or 43, and where the directory is. */
@@ -35,11 +35,11 @@ static int read_head(struct tags *t, struct sh_err *err)
     uint8_t head[16], count[8];
     uint64_t at;
     int rc = take(t, 0, head, 8, err);
-    if (rc != SH_OK) return sh_fail(err, rc, "%s: no TIFF: it has less than 8 bytes", t->path);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: not a TIFF: it has less than 8 bytes", t->path);
     t->is_big_endian = head[0] == 'M';
     const uint64_t version = load(t, head + 2, 2);
     if (head[0] != head[1] || (head[0] != 'I' && head[0] != 'M') || (version != 42 && version != 43))
-        return sh_fail(err, SH_EINPUT, "%s: no TIFF by its first bytes, which are \"II\" or \"MM\" and a 42 or 43",
+        return sh_fail(err, SH_EINPUT, "%s: not a TIFF: its first bytes must be \"II\" or \"MM\" and 42 or 43",
                        t->path);
     t->is_big = version == 43;
     if (t->is_big) rc = take(t, 0, head, 16, err);
@@ -89,8 +89,8 @@ static int find(const struct tags *t, unsigned tag, struct entry *found, struct 
         const unsigned type = (unsigned)load(t, p + 2, 2);
         if (size_of(type) == 0)
             return sh_fail(err, SH_EINPUT,
-                           "%s: its tag %u has values of type %u; read are 2, 3, 4, 12 and 16 of TIFF's", t->path, tag,
-                           type);
+                           "%s: its tag %u has values of type %u; allowed are the TIFF types 2, 3, 4, 12 and 16",
+                           t->path, tag, type);
         const uint64_t n = load(t, p + 4, field);
         *found = (struct entry){type, n, n <= field / size_of(type) ? at + 4 + field : load(t, p + 4 + field, field)};
         return SH_OK;

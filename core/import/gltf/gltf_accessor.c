@@ -190,7 +190,7 @@ int gltf_view_open(struct gltf *g, uint32_t accessor, const char *type, struct g
     if (size_of(component) == 0)
         return gltf_fail(g, "%s.componentType is %llu; allowed are 5120 to 5123, 5125 and 5126", at.text,
                          (unsigned long long)component);
-    if (out->count == GLTF_NONE) return gltf_fail(g, "%s.count is not there", at.text);
+    if (out->count == GLTF_NONE) return gltf_fail(g, "%s.count is missing", at.text);
     out->component = (enum gltf_component)component;
     out->is_normalized = json_is_true(json_object_get(object, "normalized"));
     return open_accessor(g, accessor, object, out);

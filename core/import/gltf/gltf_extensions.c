@@ -62,8 +62,7 @@ static void warn_unknown(const struct scene_build *b, const json_t *used)
         n++;
     }
     if (n > 0)
-        sh_warn(b->report, "%s: %u extensions are not known, and were not required: they are not read: %s", b->name, n,
-                names);
+        sh_warn(b->report, "%s: %u extensions are unknown but not required; they are not read: %s", b->name, n, names);
 }
 
 json_t *gltf_extension(const json_t *of, const char *name)
@@ -88,8 +87,7 @@ static int check_for_assimp(struct scene_build *b, const json_t *root, struct sh
             return build_fail(b, SH_EINPUT, err, "it needs KHR_draco_mesh_compression and %s; allowed is one of them",
                               other[i]);
     if (json_array_size(json_object_get(root, "skins")) > 0)
-        sh_warn(b->report, "%s: its meshes are packed by Draco, and so Assimp reads it: its skins move nothing there",
-                b->name);
+        sh_warn(b->report, "%s: its meshes are packed by Draco, so Assimp reads it, which ignores its skins", b->name);
     return SH_OK;
 }
 
@@ -121,14 +119,14 @@ int gltf_check_extensions(struct scene_build *b, const json_t *root, bool *by_as
                  *used = json_object_get(root, "extensionsUsed");
     for (size_t i = 0; i < json_array_size(required); i++) {
         const char *name = json_string_value(json_array_get(required, i));
-        if (name == NULL) return build_fail(b, SH_EINPUT, err, "extensionsRequired[%zu] is no text", i);
+        if (name == NULL) return build_fail(b, SH_EINPUT, err, "extensionsRequired[%zu] is not a text", i);
         if (!is_known(name))
             return build_fail(b, SH_EINPUT, err,
                               "it requires the extension %.60s, which is not known; known are " KNOWN_SAYS, name);
     }
     warn_unknown(b, used);
     if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
-        sh_warn(b->report, "%s: it has colours by shaders (KHR_techniques_webgl), which are not read", b->name);
+        sh_warn(b->report, "%s: its colours come from shaders (KHR_techniques_webgl), which are not read", b->name);
     *by_assimp = gltf_is_required(root, "KHR_draco_mesh_compression") || has_packed(root);
     return *by_assimp ? check_for_assimp(b, root, err) : SH_OK;
 }

@@ -31,7 +31,7 @@ static int find_chunks(struct gltf *g, struct gltf_bytes *json)
 {
     const struct text *t = &g->file;
     const size_t length = u32_at(t->data + 8);
-    if (length > t->size) return gltf_fail(g, "cut off: it has %zu bytes, and says that it has %zu", t->size, length);
+    if (length > t->size) return gltf_fail(g, "cut off: it has %zu bytes, but its header says %zu", t->size, length);
     if (length < t->size)
         sh_warn(g->b->report, "%s: %zu bytes after its end are not read", g->b->name, t->size - length);
     for (size_t at = GLB_HEAD; at < length;) {
@@ -71,7 +71,7 @@ static int check_version(struct gltf *g)
     if (version == NULL || strncmp(version, "2.", 2) != 0)
         return gltf_fail(g, "asset.version is %.20s; allowed are 1.0 and 2.x", version != NULL ? version : "not there");
     if (least != NULL && strcmp(least, "2.0") != 0)
-        return gltf_fail(g, "asset.minVersion is %.20s; what is read is 2.0", least);
+        return gltf_fail(g, "asset.minVersion is %.20s; allowed is 2.0", least);
     return SH_OK;
 }
 
@@ -84,7 +84,7 @@ static int parse(struct gltf *g, struct gltf_bytes json)
         sh_keep_line(error.text);
         return gltf_fail(g, "its JSON can't be read: line %d, column %d: %.120s", error.line, error.column, error.text);
     }
-    return json_is_object(g->root) ? check_version(g) : gltf_fail(g, "its JSON is no object");
+    return json_is_object(g->root) ? check_version(g) : gltf_fail(g, "its JSON is not an object");
 }
 
 static int count_entries(struct gltf *g, const char *list, uint32_t *n)
@@ -159,10 +159,9 @@ static int read_file(struct gltf *g, const char *uri, struct gltf_kept *out)
     if (path == NULL || plain == NULL) rc = build_fail(g->b, SH_ENOMEM, g->err, "no memory for a name");
     const char *file = rc == SH_OK && access(path, F_OK) != 0 && access(plain, F_OK) == 0 ? plain : path;
     if (rc == SH_OK && access(file, F_OK) != 0)
-        rc = gltf_fail(g,
-                       "there is no \"%.150s\"; its geometry is in that file, which belongs in the same folder: copy "
-                       "it there",
-                       file);
+        rc = gltf_fail(
+            g, "there is no \"%.150s\"; its geometry is in that file, which belongs in the same folder: copy it there",
+            file);
     else if (rc == SH_OK && text_open(&t, file, NULL, NULL, &why) != SH_OK)
         rc = build_fail(g->b, why.code, g->err, "%.250s; allowed are regular files", why.text);
     if (rc == SH_OK) {
@@ -203,7 +202,7 @@ int gltf_buffer(struct gltf *g, uint32_t buffer, struct gltf_bytes *out)
 {
     const char *mesh = g->b->mesh;
     if (buffer == GLTF_NONE) return gltf_fail(g, "a buffer view names no buffer");
-    if (buffer >= g->n_buffers) return gltf_fail(g, "buffers[%u] is not there: there are %u", buffer, g->n_buffers);
+    if (buffer >= g->n_buffers) return gltf_fail(g, "buffers[%u] is missing: there are %u", buffer, g->n_buffers);
     struct gltf_kept *kept = &g->buffer[buffer];
     g->b->mesh = NULL;
     int rc = kept->is_open ? SH_OK : open_buffer(g, buffer, kept);

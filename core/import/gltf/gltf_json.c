@@ -11,7 +11,7 @@ int gltf_list(struct gltf *g, const json_t *of, const char *key, const char *at,
 {
     *out = json_object_get(of, key);
     if (*out == NULL || json_is_array(*out)) return SH_OK;
-    return gltf_fail(g, "%s%s%s is no list", at, *at != '\0' ? "." : "", key);
+    return gltf_fail(g, "%s%s%s is not a list", at, *at != '\0' ? "." : "", key);
 }
 
 int gltf_object(struct gltf *g, const char *list, uint32_t i, json_t **out)
@@ -19,11 +19,11 @@ int gltf_object(struct gltf *g, const char *list, uint32_t i, json_t **out)
     json_t *all;
     int rc = gltf_list(g, g->root, list, "", &all);
     if (rc != SH_OK) return rc;
-    if (i == GLTF_NONE) return gltf_fail(g, "an index into %s is missing where one is needed", list);
+    if (i == GLTF_NONE) return gltf_fail(g, "an index into %s is missing", list);
     if (i >= json_array_size(all))
-        return gltf_fail(g, "%s[%u] is not there: there are %zu", list, i, json_array_size(all));
+        return gltf_fail(g, "%s[%u] is missing: there are %zu", list, i, json_array_size(all));
     *out = json_array_get(all, i);
-    return json_is_object(*out) ? SH_OK : gltf_fail(g, "%s[%u] is no object", list, i);
+    return json_is_object(*out) ? SH_OK : gltf_fail(g, "%s[%u] is not an object", list, i);
 }
 
 int gltf_whole(struct gltf *g, const json_t *of, const char *key, const char *at, uint64_t *out)
@@ -66,7 +66,7 @@ int gltf_child(struct gltf *g, const json_t *of, const char *key, const char *at
 {
     *out = json_object_get(of, key);
     if (*out == NULL || json_is_object(*out)) return SH_OK;
-    return gltf_fail(g, "%s.%s is no object", at, key);
+    return gltf_fail(g, "%s.%s is not an object", at, key);
 }
 
 const char *gltf_text(const json_t *of, const char *key)

@@ -161,10 +161,11 @@ static int miss_image(struct gltf *g, const json_t *texture, const char *at)
     const char *name = json_object_iter_key(json_object_iter(json_object_get(texture, "extensions")));
     if (name == NULL) return SH_OK; /* a texture without an image is allowed */
     if (g->b->spec->textures && gltf_is_required(g->root, name))
-        return gltf_fail(g,
-                         "%s is an image by %.60s, which is not read; allowed are PNG, JPEG, TGA, BMP and WebP: "
-                         "convert it, or scan without colours",
-                         at, name);
+        return gltf_fail(
+            g,
+            "%s is an image of %.60s, which is not supported; allowed are PNG, JPEG, TGA, BMP and WebP: convert it, "
+            "or scan without colours",
+            at, name);
     if (g->n_images++ == 0) snprintf(g->image, sizeof g->image, "%.60s", name);
     return SH_OK;
 }

@@ -123,7 +123,7 @@ static int open_index(struct part *p, const json_t *primitive, const char *at)
     rc = gltf_view_open(p->g, accessor, "SCALAR", &p->index);
     const enum gltf_component is = p->index.component;
     if (rc == SH_OK && ((is != GLTF_U8 && is != GLTF_U16 && is != GLTF_U32) || p->index.is_normalized))
-        rc = gltf_fail(p->g, "%s.indices: accessors[%u] has no whole numbers from 0 on", at, accessor);
+        rc = gltf_fail(p->g, "%s.indices: accessors[%u] has numbers that are not whole or below 0", at, accessor);
     return rc;
 }
 

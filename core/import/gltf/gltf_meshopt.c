@@ -54,8 +54,8 @@ static int check(struct scene_build *b, const struct gltf_packed *p, const char 
                           "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL", at,
                           p->filter);
     if (!sizes_fit(p) || p->count >= UINT32_MAX)
-        return build_fail(b, SH_EINPUT, err, "%s: meshopt has no %s of %llu times %llu bytes", at, p->mode,
-                          (unsigned long long)p->count, (unsigned long long)p->stride);
+        return build_fail(b, SH_EINPUT, err, "%s: meshopt does not allow %s with %llu elements of %llu bytes", at,
+                          p->mode, (unsigned long long)p->count, (unsigned long long)p->stride);
     return SH_OK;
 }
 

@@ -33,7 +33,8 @@ static int read_local(struct gltf *g, const json_t *node, const char *at, gltf_m
     if (rc == SH_OK) rc = gltf_numbers(g, node, "translation", at, 3, t);
     if (rc == SH_OK) rc = gltf_numbers(g, node, "rotation", at, 4, r);
     if (rc == SH_OK) rc = gltf_numbers(g, node, "scale", at, 3, s);
-    if (rc == SH_OK && !gltf_compose(t, r, s, out)) rc = gltf_fail(g, "%s.rotation is 0 0 0 0, which is none", at);
+    if (rc == SH_OK && !gltf_compose(t, r, s, out))
+        rc = gltf_fail(g, "%s.rotation is 0 0 0 0, which is not a rotation", at);
     return rc;
 }
 
@@ -45,7 +46,7 @@ static int take_children(struct gltf *g, uint32_t i, const json_t *node)
     for (size_t k = 0; k < json_array_size(children) && rc == SH_OK; k++) {
         const double child = json_number_value(json_array_get(children, k));
         if (!(child >= 0.0 && child < g->n_nodes) || floor(child) != child)
-            return gltf_fail(g, "%s.children[%zu] is no node; there are %u", at.text, k, g->n_nodes);
+            return gltf_fail(g, "%s.children[%zu] is not a node; there are %u", at.text, k, g->n_nodes);
         struct gltf_node *below = &g->node[(uint32_t)child];
         if (below->parent != GLTF_NONE)
             return gltf_fail(g, "nodes[%.0f] is a child of nodes[%u] and of nodes[%u]; allowed is one parent", child,
@@ -90,7 +91,7 @@ static int place_all(struct gltf *g, uint32_t *stack)
     for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
         if (g->node[i].parent == GLTF_NONE) place_tree(g, nodes, i, stack);
     for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
-        if (!g->node[i].has_world) rc = gltf_fail(g, "nodes[%u] is below itself", i);
+        if (!g->node[i].has_world) rc = gltf_fail(g, "nodes[%u] is a child of itself", i);
     return rc;
 }
 
@@ -116,7 +117,7 @@ static int open_instances(struct gltf *g, const json_t *attributes, const char *
         if (rc != SH_OK) return rc;
         if (view[k].count == GLTF_NONE) continue;
         if (n != GLTF_NONE && view[k].count != n)
-            return gltf_fail(g, "%s has %u of %s and %u of another", at, view[k].count, name[k], n);
+            return gltf_fail(g, "%s has %u values of %s but %u of another property", at, view[k].count, name[k], n);
         n = view[k].count;
     }
     return n != GLTF_NONE ? SH_OK : gltf_fail(g, "%s has none of TRANSLATION, ROTATION and SCALE", at);
@@ -137,7 +138,7 @@ static int add_instances(struct gltf *g, uint32_t i, const char *object, const j
                 trs[a][c] = gltf_value(&view[a], k, c);
         }
         if (!gltf_compose(trs[0], trs[1], trs[2], m))
-            return gltf_fail(g, "%s: instance %u has the rotation 0 0 0 0, which is none", at.text, k);
+            return gltf_fail(g, "%s: instance %u has the rotation 0 0 0 0, which is not a rotation", at.text, k);
         gltf_multiply(g->node[i].world, m, m);
         rc = gltf_add_mesh(g, i, object, m);
     }
@@ -193,7 +194,7 @@ static int draw_roots(struct gltf *g, const json_t *roots, const char *at, uint3
     for (size_t k = 0; k < json_array_size(roots) && rc == SH_OK; k++) {
         const double i = json_number_value(json_array_get(roots, k));
         if (!(i >= 0.0 && i < g->n_nodes) || floor(i) != i)
-            return gltf_fail(g, "%s.nodes[%zu] is no node; there are %u", at, k, g->n_nodes);
+            return gltf_fail(g, "%s.nodes[%zu] is not a node; there are %u", at, k, g->n_nodes);
         const struct gltf_node *node = &g->node[(uint32_t)i];
         if (node->parent != GLTF_NONE)
             return gltf_fail(g, "%s.nodes has nodes[%.0f], which is a child of nodes[%u]: allowed are roots", at, i,
@@ -218,8 +219,8 @@ static int draw_default(struct gltf *g, uint32_t *stack)
         return rc;
     }
     if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) > 1)
-        sh_warn(g->b->report, "%s: it has %zu scenes, and says of none that it is the default: the first is read",
-                g->b->name, json_array_size(scenes));
+        sh_warn(g->b->report, "%s: it has %zu scenes and no default scene: the first is read", g->b->name,
+                json_array_size(scenes));
     if (number == GLTF_NONE) number = 0;
     const struct gltf_at at = gltf_at("scenes[%u]", number);
     if (rc == SH_OK) rc = gltf_object(g, "scenes", number, &scene);

@@ -76,7 +76,7 @@ static int take_joint(struct gltf *g, const json_t *joints, uint32_t i, const st
     gltf_matrix bind = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     const double node = json_number_value(json_array_get(joints, i));
     if (!(node >= 0.0 && node < g->n_nodes) || floor(node) != node)
-        return gltf_fail(g, "%s.joints[%u] is no node; there are %u", at, i, g->n_nodes);
+        return gltf_fail(g, "%s.joints[%u] is not a node; there are %u", at, i, g->n_nodes);
     for (uint32_t r = 0; r < 3 && inverse->count > 0; r++)
         for (uint32_t c = 0; c < 4; c++)
             bind[r][c] = gltf_value(inverse, i, 4 * c + r);
@@ -125,7 +125,7 @@ static int open_sets(struct gltf *g, const json_t *attributes, const char *at, s
         if (rc == SH_OK) rc = gltf_view_open(g, weight, "VEC4", &pose->weights[i]);
         if (rc != SH_OK) break;
         if (pose->joints[i].count != pose->position.count || pose->weights[i].count != pose->position.count)
-            return gltf_fail(g, "%s: %s and %s are not as many as its vertices", at, joints.text, weights.text);
+            return gltf_fail(g, "%s: %s and %s differ in number from the vertices", at, joints.text, weights.text);
         pose->n_sets = i + 1;
     }
     return rc;

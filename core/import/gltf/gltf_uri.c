@@ -67,12 +67,12 @@ int gltf_uri_data(struct scene_build *b, const char *uri, const char *at, void *
 {
     const char *comma = strchr(uri, ','), *wrong;
     if (comma == NULL || comma - uri < 7 || strncasecmp(comma - 7, ";base64", 7) != 0)
-        return build_fail(b, SH_EINPUT, err, "%s.uri has data that are not base64", at);
+        return build_fail(b, SH_EINPUT, err, "%s.uri must have its data in base64", at);
     uint8_t *data = malloc(strlen(comma) + 1);
     if (data == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %s", at);
     *own = data;
     wrong = decode_base64(comma + 1, data, &out->n);
     out->p = data;
     if (wrong == NULL) return SH_OK;
-    return build_fail(b, SH_EINPUT, err, "%s.uri: byte %td is none of base64", at, wrong - uri);
+    return build_fail(b, SH_EINPUT, err, "%s.uri: byte %td is not a base64 character", at, wrong - uri);
 }

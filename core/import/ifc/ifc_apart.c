@@ -57,9 +57,9 @@ bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, 
     if (!has_node())
         snprintf(why, size, "node is not installed");
     else if (!find_folder(limits, folder))
-        snprintf(
-            why, size,
-            "the readers of IFC are not installed (make deps-build; beside the program, in ../share/scanhead/ifc)");
+        snprintf(why, size,
+                 "the readers of IFC are not installed (`make deps-build` installs them; an installed program looks in "
+                 "../share/scanhead/ifc)");
     else
         return true;
     return false;

@@ -30,7 +30,7 @@ struct reading {
 
 static int wrong(const struct reading *r, const char *what)
 {
-    return sh_fail(r->err, SH_EINPUT, "its result makes no sense at byte %zu: %s", r->at, what);
+    return sh_fail(r->err, SH_EINPUT, "its result is inconsistent at byte %zu: %s", r->at, what);
 }
 
 /* The next bytes, up to a multiple of 8; NULL: there are not as many. */
@@ -50,7 +50,7 @@ static int check_part(const struct reading *r, const struct ifc_part *part)
             if (!(fabs(part->vertex_m[i][k]) <= MOST_M)) return wrong(r, "a vertex out of range");
     for (uint32_t i = 0; i < part->n_triangles; i++)
         for (int k = 0; k < 3; k++)
-            if (part->triangle[i][k] >= part->n_vertices) return wrong(r, "a corner that is no vertex");
+            if (part->triangle[i][k] >= part->n_vertices) return wrong(r, "a corner that is not a vertex");
     for (int k = 0; k < 4; k++)
         if (!(part->colour[k] >= 0.0f && part->colour[k] <= 1.0f)) return wrong(r, "a colour out of range");
     return part->largest_m >= 0.0 && part->largest_m <= MOST_M ? SH_OK : wrong(r, "a rounding out of range");

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-// ifc-lite: the bodies of an IFC file to descriptor 3, as result.mjs has them.
-//   node ifc_lite.mjs FILE LEVEL      LEVEL: lowest low medium high highest; how fine curves are cut up
+// ifc-lite reads an IFC file, and this program writes its bodies to descriptor 3, in the form of result.mjs.
+//   node ifc_lite.mjs FILE LEVEL      LEVEL is lowest, low, medium, high or highest; it sets how fine curves are cut up
 import fs from 'node:fs'
 import { createRequire } from 'node:module'
 import { begin, end, fail, load, placed, product } from './result.mjs'
 
 for (const name of ['log', 'warn', 'error', 'info', 'debug']) console[name] = () => {}
 
-// Items without a surface: plans, texts and axes. They are none of a body's failures.
+// These items have no surface: plans, texts and axes. They do not count as failures of a body.
 const NO_BODY = /^Ifc(GeometricCurveSet|GeometricSet|Text|Annotation|Polyline|IndexedPolyCurve|TrimmedCurve|Composite|Line|Circle$|Point)/
 
 function failures_of(diagnostics) {
@@ -24,7 +24,7 @@ function part_of(mesh) {
   return part
 }
 
-// A product at a time, so that a failure has its product.
+// It takes one product at a time, so that a failure has its product.
 function run_job(api, pre, bytes, job) {
   const rtc = pre.needsShift ? pre.rtcOffset : [0, 0, 0]
   const made = api.processGeometryBatchFromSource(pre.jobs.subarray(3 * job, 3 * job + 3), pre.unitScale, ...rtc,

@@ -142,8 +142,8 @@ static int say_missing(struct reading *r, const char *name, const struct sh_err 
     if (said->code == 0) return SH_OK;
     ifc_reason(r->b, name, said, why);
     if (r->limits.ifc_strict)
-        return build_fail(r->b, SH_EINPUT, r->err,
-                          "not cross-checked; allowed only with both readers (scene.ifc_strict): %s", why);
+        return build_fail(r->b, SH_EINPUT, r->err, "not cross-checked, but scene.ifc_strict demands both readers: %s",
+                          why);
     sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %s", r->b->name, name, why);
     return SH_OK;
 }
@@ -153,12 +153,13 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
 {
     if (fineness->deviation_m <= r->b->tolerance_m) return SH_OK;
     if (r->limits.ifc_strict)
-        return build_fail(r->b, SH_EINPUT, r->err,
-                          "facets of its curves, of radii up to %.3g m, lie up to %.2g m beside them; allowed %.2g m "
-                          "(scene.tolerance_m)",
-                          r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
+        return build_fail(
+            r->b, SH_EINPUT, r->err,
+            "facets of its curves, of radii up to %.3g m, are up to %.2g m away from the curves; allowed %.2g m "
+            "(scene.tolerance_m)",
+            r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
     sh_warn(r->b->report,
-            "%s: facets of its curves, of radii up to %.3g m, lie up to %.2g m beside them, more than %.2g m "
+            "%s: facets of its curves, of radii up to %.3g m, are up to %.2g m away from the curves, more than %.2g m "
             "(scene.tolerance_m)",
             r->b->name, r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
     return SH_OK;
@@ -173,9 +174,9 @@ static int check_number(struct reading *r)
     if (n + r->b->scene->n_surfaces <= SCENE_MAX_SURFACES) return SH_OK;
     return build_fail(
         r->b, SH_EINPUT, r->err,
-        "%zu products with bodies, each of which is a surface at least, and the scene has %u before: it holds "
-        "up to %d, since labels have 16 bits; export parts of the model to files of their own, and scan "
-        "each with a configuration",
+        "%zu products with bodies need at least a surface each, and the scene already has %u: it holds up to %d, "
+        "since labels have 16 bits; export parts of the model to files of their own, and scan each with a "
+        "configuration",
         n, r->b->scene->n_surfaces, SCENE_MAX_SURFACES);
 }
 
@@ -203,9 +204,7 @@ static int read_by_assimp(struct reading *r, const char *why)
     const bool asked = r->limits.ifc_reader == IFC_READER_ASSIMP;
     if (r->limits.ifc_strict)
         return build_fail(r->b, SH_EINPUT, r->err,
-                          "%s, so nothing is cross-checked; allowed only with both readers "
-                          "(scene.ifc_strict)",
-                          why);
+                          "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
     if (!asked) sh_warn(r->b->report, "%s: %s: Assimp reads it", r->b->name, why);
     const int rc = ifc_say_assimp(r->b, &r->records, !asked, why, r->err);
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
@@ -216,10 +215,8 @@ static int say_unit(struct reading *r)
 {
     const struct sh_err *said = &r->records.no_unit;
     if (said->code == 0) return SH_OK;
-    if (r->limits.ifc_strict)
-        return sh_fail(r->err, SH_EINPUT, "%.420s; allowed only with one (scene.ifc_strict)", said->text);
-    sh_warn(r->b->report, "%s; as a rule it is read in metres then: compare its size (scene.meshes[].scale)",
-            said->text);
+    if (r->limits.ifc_strict) return sh_fail(r->err, SH_EINPUT, "%.420s; scene.ifc_strict demands a unit", said->text);
+    sh_warn(r->b->report, "%s; readers mostly take metres then: check its size (scene.meshes[].scale)", said->text);
     return SH_OK;
 }
 
@@ -233,14 +230,13 @@ static int read_records(struct reading *r)
     if (r->limits.ifc_reader == IFC_READER_ASSIMP) return read_by_assimp(r, "scene.ifc_reader is assimp");
     if (r->limits.ifc_strict && r->limits.ifc_reader != IFC_READER_AUTO)
         return build_fail(r->b, SH_EINPUT, r->err,
-                          "one reader alone is not cross-checked; allowed only with both readers "
-                          "(scene.ifc_strict)");
+                          "one reader alone is not cross-checked, but scene.ifc_strict demands both readers");
     if (ifc_readers_are_there(&r->limits, why, sizeof why))
         rc = read_by_two(r);
     else if (r->limits.ifc_reader == IFC_READER_AUTO)
         return read_by_assimp(r, why);
     else
-        return build_fail(r->b, SH_EINPUT, r->err, "%s; allowed without: scene.ifc_reader: assimp", why);
+        return build_fail(r->b, SH_EINPUT, r->err, "%s; to read without them set scene.ifc_reader: assimp", why);
     r->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
     return rc;
 }

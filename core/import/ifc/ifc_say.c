@@ -76,7 +76,7 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, c
 
 void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records)
 {
-    struct lines l = {.b = b, .text = "curved, and taken from ifc-lite, whose facets don't follow scene.tolerance_m"};
+    struct lines l = {.b = b, .text = "curved, with the body of ifc-lite, whose facets don't keep scene.tolerance_m"};
     for (size_t i = 0; i < records->n_products; i++)
         l.n += records->product[i].is_coarse;
     for (size_t i = 0; i < records->n_products; i++)
@@ -87,7 +87,7 @@ void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records)
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
                    struct sh_err *err)
 {
-    struct lines l = {.b = b, .text = "Assimp is known to get what they consist of wrong, without a word"};
+    struct lines l = {.b = b, .text = "Assimp is known to read their shapes wrong, without a message"};
     const struct ifc_product *first = NULL;
     for (size_t i = records->n_products; i-- > 0;) {
         const struct ifc_product *p = &records->product[i];
@@ -96,11 +96,12 @@ int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, boo
         l.n++;
     }
     if (first != NULL && refuse)
-        return build_fail(b, SH_EINPUT, err,
-                          "%s, and Assimp is known to get %.*s wrong, of which %zu products consist, the first "
-                          "'%.40s' %.22s; scene.ifc_reader: assimp reads it all the same",
-                          why, (int)(first->assimp_wrong.n < 48 ? first->assimp_wrong.n : 48), first->assimp_wrong.p,
-                          l.n, first->name, first->guid);
+        return build_fail(
+            b, SH_EINPUT, err,
+            "%s, and Assimp is known to read %.*s wrong, which %zu products use, the first '%.40s' %.22s; "
+            "scene.ifc_reader: assimp reads them in spite of that",
+            why, (int)(first->assimp_wrong.n < 48 ? first->assimp_wrong.n : 48), first->assimp_wrong.p, l.n,
+            first->name, first->guid);
     for (size_t i = 0; i < records->n_products; i++)
         if (!records->product[i].is_air && records->product[i].assimp_wrong.n > 0) add_name(&l, &records->product[i]);
     end_group(&l);

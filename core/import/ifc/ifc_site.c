@@ -18,7 +18,7 @@ enum { CONTEXT_TYPE = 1, CONTEXT_WORLD = 4, CONTEXT_NORTH = 5, CONTEXT_ARGS = 6 
 enum { MAP_CRS = 1, MAP_EASTING, MAP_NORTHING, MAP_HEIGHT, MAP_ABSCISSA, MAP_ORDINATE, MAP_SCALE, MAP_ARGS };
 enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
 
-static const char ADVICE[] = "an anchor of source explicit needs none of this";
+static const char ADVICE[] = "use scene.anchor.source: explicit, which needs neither";
 
 struct reader {
     struct ifc_index index;
@@ -100,7 +100,7 @@ static int follow(struct reader *r, const struct step_record *from, struct text_
 {
     uint64_t id;
     char what[96];
-    snprintf(what, sizeof what, "no reference to %s where one is needed", type);
+    snprintf(what, sizeof what, "a reference to %s is missing", type);
     if (!step_reference(ref, &id)) return fail(r, from, what);
     const struct step_record *record = ifc_index_find(&r->index, id);
     if (record == NULL || !text_is(record->type, type)) return fail(r, from, what);
@@ -141,7 +141,7 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct t
 {
     struct text_span list, part[3];
     size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
-    if (n < min || n > max) return fail(r, at, "not the numbers that are needed");
+    if (n < min || n > max) return fail(r, at, "needs 2 or 3 numbers");
     for (size_t i = 0; i < n; i++)
         if (!step_real(&r->index.text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
     return SH_OK;
@@ -235,7 +235,7 @@ static int read_map_unit(struct reader *r, const struct found *crs, double scale
         return rc == SH_OK ? check_scale(r, scale, model_m / *m) : rc;
     }
     *m = known_unit_m(model_m / scale, model_m);
-    return isnan(*m) ? fail(r, &r->map, "no unit of maps fits its Scale, and the system has no MapUnit") : SH_OK;
+    return isnan(*m) ? fail(r, &r->map, "its Scale fits no unit of maps, and the system has no MapUnit") : SH_OK;
 }
 
 /* A number of the map conversion. The first two must be there; a height that is not is NaN. */
@@ -248,7 +248,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
     *value = which == MAP_HEIGHT ? NAN : which == MAP_ORDINATE ? 0.0 : 1.0;
     if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
     if (step_real(&r->index.text, arg, value)) return SH_OK;
-    snprintf(what, sizeof what, "%s is missing, or is no number", name[which]);
+    snprintf(what, sizeof what, "%s is missing, or is not a number", name[which]);
     return fail(r, &r->map, what);
 }
 
@@ -259,7 +259,10 @@ static int read_map_name(struct reader *r, const struct found *crs, struct ifc_m
     const size_t n = strlen(name);
     if (n > 0 && n < sizeof map->crs) memcpy(map->crs, name, n + 1);
     free(name);
-    return map->crs[0] != '\0' ? SH_OK : fail(r, &crs->record, "no name, or one of over 127 bytes, as \"EPSG:25832\"");
+    return map->crs[0] != '\0'
+               ? SH_OK
+               : fail(r, &crs->record,
+                      "its name is missing or over 127 bytes long; allowed is one such as \"EPSG:25832\"");
 }
 
 static int read_map(struct reader *r, double unit_m, struct ifc_map *map)

@@ -41,15 +41,15 @@ static int read_converted(const struct ifc_index *x, const struct step_record *u
     const struct step_record *measure = follow(x, ref, "IFCMEASUREWITHUNIT");
     struct text_span arg[2], list;
     double factor;
-    if (measure == NULL) return ifc_index_fail(x, unit, err, "no reference to IFCMEASUREWITHUNIT where one is needed");
+    if (measure == NULL) return ifc_index_fail(x, unit, err, "a reference to IFCMEASUREWITHUNIT is missing");
     if (step_split(measure->args, arg, 2) != 2) return ifc_index_fail(x, measure, err, "attributes are missing");
     const struct step_record *si = follow(x, arg[1], "IFCSIUNIT");
-    if (si == NULL) return ifc_index_fail(x, measure, err, "no reference to IFCSIUNIT where one is needed");
+    if (si == NULL) return ifc_index_fail(x, measure, err, "a reference to IFCSIUNIT is missing");
     const char *open = memchr(arg[0].p, '(', arg[0].n);
     const size_t skip = open != NULL ? (size_t)(open - arg[0].p) : 0;
     if (!step_list((struct text_span){arg[0].p + skip, arg[0].n - skip}, &list) ||
         !step_real(&x->text, list, &factor) || factor <= 0.0)
-        return ifc_index_fail(x, measure, err, "no factor of a length unit");
+        return ifc_index_fail(x, measure, err, "the factor of a length unit is missing");
     int rc = read_si(x, si, m, err);
     *m *= factor;
     return rc;
@@ -64,7 +64,7 @@ static bool is_length(const struct step_record *unit, struct text_span of[SI_ARG
 int ifc_unit_of(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err)
 {
     struct text_span of[SI_ARGS];
-    if (!is_length(unit, of)) return ifc_index_fail(x, unit, err, "no unit of length where one is needed");
+    if (!is_length(unit, of)) return ifc_index_fail(x, unit, err, "not a unit of length");
     return text_is(unit->type, "IFCSIUNIT") ? read_si(x, unit, m, err) : read_converted(x, unit, of[3], m, err);
 }
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-// web-ifc: the bodies of an IFC file to descriptor 3, as result.mjs has them.
-//   node web_ifc.mjs FILE SEGMENTS      SEGMENTS: of a full circle
+// web-ifc reads an IFC file, and this program writes its bodies to descriptor 3, in the form of result.mjs.
+//   node web_ifc.mjs FILE SEGMENTS      SEGMENTS is the number of segments of a full circle
 import { createRequire } from 'node:module'
 import { begin, end, fail, load, placed, product } from './result.mjs'
 
-// Its log goes to the console, a line a failure, before the product that has it.
+// Its log goes to the console: a line for each failure, before the product that has it.
 const failures = []
 for (const name of ['log', 'warn', 'error', 'info', 'debug'])
   console[name] = (...text) => failures.push(text.join(' ').replace(/^\[WEB-IFC\]\[\w+\]/, ''))

@@ -57,8 +57,8 @@ int cloud_read_columns(const char *path, unsigned columns, const struct sh_repor
 {
     *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
     if (is_neither(path))
-        return sh_fail(err, SH_EINPUT, "%s: not a PLY file and not a LAS file; a point cloud of one of these is needed",
-                       path);
+        return sh_fail(err, SH_EINPUT,
+                       "%s: not a PLY file and not a LAS file; allowed are point clouds of these two formats", path);
     int rc = cloud_is_las(path) ? cloud_read_las(path, columns, report, out, err)
                                 : cloud_read_ply(path, columns, report, out, err);
     if (rc != SH_OK) cloud_free(out);

@@ -40,7 +40,7 @@ static int check_stations(const struct cloud *cloud, const struct cloud_site *si
         int epsg = georef != NULL ? georef_epsg(georef) : 0;
         if (cloud->epsg != CLOUD_EPSG_UNKNOWN && cloud->epsg != epsg)
             return sh_fail(err, SH_EINPUT,
-                           "the points are in EPSG %lld, those of station %u have to be in EPSG %d (0: scene frame)",
+                           "the points are in EPSG %lld, but those of station %u must be in EPSG %d (0: scene frame)",
                            (long long)cloud->epsg, station, epsg);
     }
     return SH_OK;

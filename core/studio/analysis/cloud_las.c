@@ -202,7 +202,7 @@ static int read_points(struct las *las, struct sh_err *err)
         free(c->station);
         c->station = NULL;
     } else if (las->n_no_station > 0) {
-        return fail(las, err, "some points have the point source ID 0, which is no station; others have one");
+        return fail(las, err, "some points have the point source ID 0, which is not a station; others have a station");
     }
     return SH_OK;
 }

@@ -68,7 +68,7 @@ static int keep_point(void *reading, struct sh_err *err)
     int n_nan = isnan(p[0]) + isnan(p[1]) + isnan(p[2]);
     if (n_nan != 3 && !(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]))) {
         char what[112];
-        snprintf(what, sizeof what, "(%.9g %.9g %.9g) is no position; a shot without echo has three times nan", p[0],
+        snprintf(what, sizeof what, "(%.9g %.9g %.9g) is not a position; a shot without echo has nan three times", p[0],
                  p[1], p[2]);
         return ply_fail(&g->r, err, what);
     }
@@ -99,7 +99,7 @@ static void note_single(const struct reading *g)
     if (g->cloud->epsg == 4979) largest *= 111320.0; /* degrees */
     g->cloud->count_m = fmax(g->cloud->count_m, largest * 1.2e-7);
     if (largest * 6e-8 > worth_a_word_m)
-        sh_warn(g->report, "%s: stored in single precision, so good to %.2g m only", g->r.t.path, largest * 6e-8);
+        sh_warn(g->report, "%s: stored in single precision, with errors up to %.2g m", g->r.t.path, largest * 6e-8);
 }
 
 /* Colours count where they are whole bytes: as floats they mean something else in every program. */
@@ -147,7 +147,7 @@ static int read_body(struct reading *g, struct sh_err *err)
     g->cloud->epsg = find_epsg(&g->r.t);
     for (int i = 0; i < h->n_elements; i++)
         has_points |= h->element[i].kind == PLY_VERTEX;
-    if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "no element vertex: there are no points");
+    if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "it has no element vertex, so no points");
     int rc = ply_walk(&g->r, &user, err);
     if (h->format == PLY_ASCII) g->cloud->count_m = 1e-6;
     if (rc == SH_OK && g->r.is_single) note_single(g);

@@ -15,7 +15,7 @@ static int check_camera(const struct view_camera *c, struct sh_err *err)
 {
     for (int i = 0; i < 3; i++)
         if (!isfinite(c->eye_m[i]) || !isfinite(c->look_at_m[i]) || !isfinite(c->look_at_m[i] - c->eye_m[i]))
-            return sh_fail(err, SH_EINPUT, "view: the eye's %c or that of what it looks at is not finite", "xyz"[i]);
+            return sh_fail(err, SH_EINPUT, "view: %c of the eye or of its target is not finite", "xyz"[i]);
     if (!(c->fov_rad >= 0.01 && c->fov_rad <= 2.8))
         return sh_fail(err, SH_EINPUT, "view: field of view %g rad; allowed are 0.01 to 2.8", c->fov_rad);
     if (c->width < VIEW_MIN_PX || c->height < VIEW_MIN_PX || c->width > VIEW_MAX_SIDE_PX ||
@@ -32,7 +32,7 @@ static int set_axes(struct view *view, struct sh_err *err)
     for (int i = 0; i < 3; i++)
         d[i] = c->look_at_m[i] - c->eye_m[i];
     const double length = sqrt(vec3_dot(d, d)), flat = hypot(d[0], d[1]);
-    if (!(length > 0)) return sh_fail(err, SH_EINPUT, "view: the eye is at the place it looks at");
+    if (!(length > 0)) return sh_fail(err, SH_EINPUT, "view: the eye is at its target");
     /* straight down or up: as a head that faces north and nods */
     const int nods = !(flat > 1e-9 * length);
     const double right[3] = {nods ? 1 : d[1] / flat, nods ? 0 : -d[0] / flat, 0};

@@ -118,10 +118,11 @@ static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
         return sh_fail(err, SH_EINPUT,
                        "%u triangles need %.0f MiB for coverage even in the largest cells, and %.0f MiB are allowed",
                        c->scene->n_triangles, mib_of(c, c->scene->n_triangles), c->spec.memory_mib);
-    return sh_fail(err, SH_EINPUT,
-                   "cells of %g m cut the surface into %.3g pieces, which take up to %.0f MiB, and %.0f MiB are "
-                   "allowed; a cell of %.2g m would do",
-                   c->spec.cell_m, pieces, mib_of(c, pieces), c->spec.memory_mib, cell_m);
+    return sh_fail(
+        err, SH_EINPUT,
+        "cells of %g m cut the surface into %.3g pieces, which take up to %.0f MiB, and %.0f MiB are allowed; use a "
+        "cell of at least %.2g m",
+        c->spec.cell_m, pieces, mib_of(c, pieces), c->spec.memory_mib, cell_m);
 }
 
 /* ---- which pieces are one cell */

@@ -289,7 +289,9 @@ int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_re
         const double ratio = 1.03 * sqrt(fmax(n, 1.0) / most);
         cell_m = was_too_coarse ? cell_m * fmin(ratio, 0.9) : fmin(cell_m * fmin(fmax(ratio, 1.1), 4.0), fits_m);
     }
-    rc = n < 0.0 ? (int)n : n > most ? sh_fail(err, SH_ESTATE, "no grid gives %u triangles", most) : keep(&w, out, err);
+    rc = n < 0.0    ? (int)n
+         : n > most ? sh_fail(err, SH_ESTATE, "no cell size gives %u triangles", most)
+                    : keep(&w, out, err);
     tear_down(&w);
     return rc;
 }

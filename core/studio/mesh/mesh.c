@@ -59,7 +59,7 @@ int mesh_check_box(const char *path, const double low[3], const double high[3], 
     if (error <= allowed) return SH_OK;
     return sh_fail(
         err, SH_EINPUT,
-        "%s: %s holds coordinates as float, which moves those of %.0f m by up to %.2g m; allowed for a mesh of "
+        "%s: %s holds coordinates as float, which moves coordinates of %.0f m by up to %.2g m; allowed for a mesh of "
         "%.4g m are %.2g m: write .ply or .obj, or keep coordinates near 0 (output.crs: local)",
         path, format->ending, most, error, sqrt(size2), allowed);
 }
@@ -115,7 +115,7 @@ static int check_parts(const char *path, const struct mesh *mesh, struct sh_err 
         face += p->n_faces;
     }
     if (vertex != mesh->n_vertices || face != mesh->n_faces)
-        return sh_fail(err, SH_EINPUT, "%s: its parts are not all of its %u vertices and %u faces", path,
+        return sh_fail(err, SH_EINPUT, "%s: its parts do not add up to its %u vertices and %u faces", path,
                        mesh->n_vertices, mesh->n_faces);
     return SH_OK;
 }
@@ -126,10 +126,10 @@ static int check(const char *path, const struct mesh_format *format, const struc
         return sh_fail(err, SH_EINPUT, "%s: %u vertices; allowed are up to %d", path, mesh->n_vertices,
                        MESH_MAX_VERTICES);
     if ((mesh->face == NULL || mesh->n_faces == 0) && !format->takes_points)
-        return sh_fail(err, SH_EINPUT, "%s: %s holds meshes, and there is no face; allowed for points are .ply .obj",
+        return sh_fail(err, SH_EINPUT, "%s: %s holds meshes, but there are no faces; allowed for points are .ply .obj",
                        path, format->ending);
     if (mesh->texture != NULL && mesh->uv == NULL)
-        return sh_fail(err, SH_EINPUT, "%s: a texture without texture coordinates", path);
+        return sh_fail(err, SH_EINPUT, "%s: it has a texture but no texture coordinates", path);
     int rc = check_vertices(path, mesh, err);
     if (rc == SH_OK && mesh->n_parts > 0) return check_parts(path, mesh, err);
     const struct range all = {0, mesh->n_faces, 0, mesh->n_vertices};
@@ -140,7 +140,8 @@ int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report
 {
     const struct mesh_format *format = find(path);
     if (format == NULL)
-        return sh_fail(err, SH_EINPUT, "%s: no mesh has this ending; known are .ply .obj .gltf .glb .fbx", path);
+        return sh_fail(err, SH_EINPUT, "%s: no mesh format has this ending; allowed are .ply .obj .gltf .glb .fbx",
+                       path);
     struct mesh_work work = {.report = report, .all = (uint64_t)mesh->n_vertices + mesh->n_faces};
     size_t len;
     const char *name = mesh_stem(path, &len);

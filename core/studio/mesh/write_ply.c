@@ -149,7 +149,7 @@ int mesh_write_ply(const struct mesh_format *format, struct mesh_output *out, co
     struct mesh_file *file;
     (void)format;
     if (mesh->n_scalars > MAX_SCALARS)
-        return sh_fail(err, SH_EINPUT, "%s: %u figures a vertex; allowed are up to %d", out->path, mesh->n_scalars,
+        return sh_fail(err, SH_EINPUT, "%s: %u figures per vertex; allowed are up to %d", out->path, mesh->n_scalars,
                        MAX_SCALARS);
     int rc = mesh_output_open(out, out->path, &file, err);
     if (rc != SH_OK) return rc;

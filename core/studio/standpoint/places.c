@@ -147,8 +147,8 @@ static int check_grid(struct search *s, struct sh_err *err)
     for (int i = 0; i < 2; i++)
         n[i] = fmax(floor((g->max_m[i] - g->min_m[i]) / g->step_m), 1.0);
     if (n[0] * n[1] > STANDPOINT_MAX_PLACES)
-        return sh_fail(err, SH_EINPUT, "a grid of %.0f by %.0f places; allowed are %d: a step of at least %.2g m", n[0],
-                       n[1], STANDPOINT_MAX_PLACES, 1.1 * g->step_m * sqrt(n[0] * n[1] / STANDPOINT_MAX_PLACES));
+        return sh_fail(err, SH_EINPUT, "a grid of %.0f by %.0f places; allowed are %d: use a step of at least %.2g m",
+                       n[0], n[1], STANDPOINT_MAX_PLACES, 1.1 * g->step_m * sqrt(n[0] * n[1] / STANDPOINT_MAX_PLACES));
     for (int i = 0; i < 2; i++) {
         s->across[i] = (uint64_t)n[i];
         s->first_m[i] = 0.5 * (g->min_m[i] + g->max_m[i] - (n[i] - 1.0) * g->step_m);

@@ -40,7 +40,8 @@ int standpoint_find(const struct scene *scene, const struct standpoint_view *vie
 {
     *out = (struct standpoint){0};
     if (!(view->range_min_m < view->range_max_m) || !(view->line_min_rad < view->line_max_rad))
-        return sh_fail(err, SH_EINPUT, "standpoint: a view of %g to %g m, %g to %g rad; allowed is one with some room",
+        return sh_fail(err, SH_EINPUT,
+                       "standpoint: a view of %g to %g m, %g to %g rad; each second limit must be above the first",
                        view->range_min_m, view->range_max_m, view->line_min_rad, view->line_max_rad);
     struct survey *s = malloc(sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a survey of the scene");

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-// The bar: state and control in words; start, stop; the banner when the head is gone.
+// The bar shows state and control in words, and has start and stop. A banner shows that the head is gone.
 import {atMostEvery, byId, say, clock, grouped} from './page.js';
 import {stateWord, why} from './session.js';
 
 export class Bar {
   #session;
-  #frames = 0;  // of a scan, 0: until it is stopped
+  #frames = 0;  // the scan has so many frames; 0: it runs until it is stopped
   #done = 0;
-  #share = null; // of the scan, 0 to 1
+  #share = null; // this part of the scan is done, 0 to 1
   #frame_s = 0;
   #showSoon = atMostEvery(250, () => say(byId('progress'), this.#progressText(this.#session.scan)));
   #busy = false;
@@ -30,7 +30,7 @@ export class Bar {
     document.title = words ? `${words} · scanhead` : 'scanhead';
   }
 
-  // Frames of the scan, those that are done, and the time of one frame (0: not known).
+  // Takes the frames of the scan, the number of frames done, and the time of one frame (0: not known).
   progress({frames = this.#frames, done = this.#done, frame_s = this.#frame_s}) {
     if (frames === this.#frames && done === this.#done && frame_s === this.#frame_s) return;
     if (frames !== this.#frames || frame_s !== this.#frame_s || done < this.#done) this.#share = null;
@@ -40,7 +40,7 @@ export class Bar {
     this.show();
   }
 
-  // How far the scan is: t_s since its start. Written a few times a second at most.
+  // Shows the progress of the scan, t_s after its start. The text changes a few times a second at most.
   reached(t_s) {
     if (!(this.#frames > 0 && this.#frame_s > 0 && t_s >= 0)) return;
     const share = Math.min(0.99, t_s / (this.#frame_s * this.#frames), (this.#done + 1) / this.#frames);
@@ -66,7 +66,7 @@ export class Bar {
   #timer = 0;
   #notice = '';
   #kind = '';
-  // kind: '' for information, 'warn', 'bad'.
+  // kind is '' for information, 'warn' or 'bad'.
   notice(text, ms, kind = '') {
     clearTimeout(this.#timer);
     this.#notice = text;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-// The points that are held, in blocks of typed arrays: the newest `capacity` points and less than a block more. The
+// The cloud stores points in blocks of typed arrays: the newest `capacity` points and less than a block more. The
 // oldest blocks are dropped.
 //
-// Positions are Float32, relative to `origin` (Float64, scene frame): the place of the first point. So a cloud at UTM
+// Positions are Float32, relative to `origin` (Float64, scene frame), which is the place of the first point. So a
+// cloud at UTM
 // coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have 0.5 m.
 //
 // In a closed block the first k points are spread evenly over the block, for any k: one point at random from each k-th
@@ -11,15 +12,15 @@
 
 export const BLOCK = 65536;
 
-// Nested scrambling (Owen 1995) of the numbers below 2^16 with their bits reversed: at each level one bit at random
-// tells which half comes first.
+// This is nested scrambling (Owen 1995) of the numbers below 2^16 with their bits reversed. At each level a random bit
+// decides which half comes first.
 let evenly = null;
 export function evenOrder(n) {
   if (evenly === null) {
     evenly = new Uint16Array(BLOCK);
     for (let i = 0; i < BLOCK; i++) {
       let out = 0;
-      let prefix = 1; // the bits decided so far, under a leading one
+      let prefix = 1; // it has the bits decided so far, under a leading one
       for (let bit = 0; bit < 16; bit++) {
         const taken = ((i >> bit) & 1) ^ (mix(prefix) & 1);
         out = (out << 1) | taken;
@@ -31,33 +32,33 @@ export function evenOrder(n) {
   return n === BLOCK ? evenly : evenly.filter((i) => i < n);
 }
 
-// Finalizer of MurmurHash3 (Appleby, public domain).
+// This is the finalizer of MurmurHash3 (Appleby, public domain).
 function mix(h) {
   h = Math.imul(h ^ (h >>> 16), 0x85ebca6b);
   h = Math.imul(h ^ (h >>> 13), 0xc2b2ae35);
   return (h ^ (h >>> 16)) >>> 8;
 }
 
-const MODELLED = ['reflectance', 'amplitude']; // NaN where not modelled; a block without any has no array for it
+const MODELLED = ['reflectance', 'amplitude']; // values not modelled are NaN; an empty block has no array
 
 class Block {
   n = 0;
   closed = false;
-  order = null; // of a closed block: which of the points, as they came, stands at each place
-  lo = [Infinity, Infinity, Infinity]; // relative to the origin
+  order = null; // in a closed block it gives the arrival number of the point at each place
+  lo = [Infinity, Infinity, Infinity]; // it is relative to the origin
   hi = [-Infinity, -Infinity, -Infinity];
   position = new Float32Array(3 * BLOCK);
   t = new Float32Array(BLOCK);
   range = new Float32Array(BLOCK);
   label = new Uint16Array(BLOCK);
-  echo = new Uint8Array(BLOCK); // number, and times 16 how many the pulse has
-  pulse = new Uint32Array(BLOCK); // from pulse0 on
+  echo = new Uint8Array(BLOCK); // it is the echo's number plus 16 times the pulse's number of echoes
+  pulse = new Uint32Array(BLOCK); // it counts from pulse0 on
   reflectance = null;
   amplitude = null;
-  rgb = null; // in threes
+  rgb = null; // each point has three values
 
   constructor(first, batch) {
-    this.first = first; // number of its first point since the cloud was cleared
+    this.first = first; // this is the number of its first point since the cloud was cleared
     this.scan = batch.scan;
     this.station = batch.station;
     this.pulse0 = batch.n > 0 ? batch.pulse[0] : 0;
@@ -69,7 +70,7 @@ class Block {
       batch.pulse[batch.n - 1] - this.pulse0 < 2 ** 32;
   }
 
-  // How many of the batch it took, from `from` on.
+  // Returns how many points of the batch it took, from `from` on.
   append(batch, from, origin) {
     const k = Math.min(batch.n - from, BLOCK - this.n);
     const {lo, hi, position, pulse, echo, pulse0} = this;
@@ -107,7 +108,7 @@ class Block {
     return k;
   }
 
-  // No more points come: the even order, and no more memory than needed.
+  // No more points come, so the block gets the even order, and only the memory that it needs.
   close() {
     const order = evenOrder(this.n);
     this.closed = true;
@@ -140,14 +141,14 @@ class Block {
 }
 
 export class Cloud {
-  total = 0; // points that came since it was cleared
-  gone = 0; // those of them that are no longer held
-  replaced = 0; // how often points were dropped because their scan was made again
+  total = 0; // so many points came since it was cleared
+  gone = 0; // so many of them are no longer stored
+  replaced = 0; // so often points were dropped because their scan was repeated
   origin = null;
   blocks = [];
-  changed = null; // called after each change
-  #scans = new Map(); // of each station, the newest
-  #outdated = 0; // the points before this one are of another run of the head
+  changed = null; // it is called after each change
+  #scans = new Map(); // it has the newest scan of each station
+  #outdated = 0; // the points before this one come from another run of the head
   #gone_lo = [Infinity, Infinity, Infinity];
   #gone_hi = [-Infinity, -Infinity, -Infinity];
 
@@ -179,7 +180,7 @@ export class Cloud {
     this.changed?.();
   }
 
-  // Whole blocks, as long as what remains is at least the capacity.
+  // Drops whole blocks, as long as the rest has at least the capacity.
   #let_go() {
     let n = 0;
     let over = this.count - this.capacity;
@@ -197,8 +198,8 @@ export class Cloud {
     }
   }
 
-  /** A scan takes the place of the scans that its station had before, which it may have made from another place. To be
-   * called before add(); false: the batch is of such an older scan, and comes late (`past`). */
+  /** A scan replaces the earlier scans of its station, which may be from another place. Call it before add(). It
+   * returns false for a batch of such an older scan, which comes late (`past`). */
   replace({station, scan, past = false}) {
     const now = this.#scans.get(station);
     if (past && now !== undefined && scan < now) return false;
@@ -208,14 +209,14 @@ export class Cloud {
     return true;
   }
 
-  /** The last block takes no more; how many points came so far. */
+  /** Closes the last block, and returns how many points came so far. */
   cut() {
     const last = this.blocks.at(-1);
     if (last && !last.closed) last.close();
     return this.total;
   }
 
-  /** The first `total` points that came are of another run of the head, which counts its scans anew. So the next scan
+  /** The first `total` points come from another run of the head, which counts its scans from 1 again. So the next scan
    * of a station replaces them, whatever its number. */
   outdate(total) {
     this.#outdated = total;
@@ -242,7 +243,7 @@ export class Cloud {
     this.changed?.();
   }
 
-  // {min, max} in the scene frame, of the points held, or of all that came; null without points.
+  // Returns {min, max} in the scene frame, of the stored points or of all that came; null without points.
   #within(lo, hi) {
     lo = [...lo];
     hi = [...hi];
@@ -260,7 +261,7 @@ export class Cloud {
   get boundsOfAll() { return this.#within(this.#gone_lo, this.#gone_hi); }
 }
 
-// All figures of point i of a block.
+// Returns all figures of point i of a block.
 export function pointOf(cloud, block, i) {
   const at = (axis) => block.position[3 * i + axis] + cloud.origin[axis];
   return {

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-// CRC-32C of RFC 3720 (reflected polynomial 0x82f63b78), eight bytes a step: slicing by 8, after Kounavis and Berry,
+// This is the CRC-32C of RFC 3720 (reflected polynomial 0x82f63b78). It takes eight bytes a step: slicing by 8, after
+// Kounavis and Berry,
 // "Novel Table Lookup-Based Algorithms for High-Performance CRC Generation", IEEE Transactions on Computers 57 (2008).
 
-// Table k, from 256 k on: what a byte adds to the register when k bytes follow it.
+// Table k, from 256 k on, has the value that a byte adds to the register when k bytes follow it.
 const table = new Int32Array(8 * 256);
 for (let n = 0; n < 256; n++) {
   let c = n;
@@ -11,7 +12,7 @@ for (let n = 0; n < 256; n++) {
 }
 for (let i = 256; i < table.length; i++) table[i] = (table[i - 256] >>> 8) ^ table[table[i - 256] & 255];
 
-/** The CRC of the bytes from..to of a DataView, 0 to 2^32 - 1. */
+/** Returns the CRC of the bytes from..to of a DataView, 0 to 2^32 - 1. */
 export function crc32c(view, from, to) {
   let c = -1, at = from;
   for (; to - at >= 8; at += 8) {

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-// Descriptions of the head's settings: HELP:SETtings? lists them, HELP? of each describes it. A head without these
+// This module reads descriptions of the head's settings: HELP:SETtings? lists the settings, HELP? describes each one.
+// A head without these
 // commands has MIN, MAX and DEF.
 
-// 'number,"Hz",1000,1200000,300000,0.000001,"all",""' -> its fields; a field in quotes may hold commas.
+// Splits 'number,"Hz",1000,1200000,300000,0.000001,"all",""' into its fields; a field in quotes may hold commas.
 export function splitReply(reply) {
   return [...`${reply},`.matchAll(/\s*(?:"((?:[^"]|"")*)"|([^,]*))\s*,/g)]
     .map(([, quoted, plain]) => (quoted !== undefined ? quoted.replaceAll('""', '"') : plain.trim()));
@@ -10,7 +11,7 @@ export function splitReply(reply) {
 
 const words = (text) => text.split(/\s+/).filter(Boolean);
 
-// kind, unit, min, max, default, step, states, values
+// the fields are kind, unit, min, max, default, step, states, values
 function fromHelp(header, reply) {
   const [kind, unit, min, max, preset, step, states, values] = splitReply(reply);
   return {header, kind, unit, min, max, preset, step, states: states ?? '', values: words(values ?? '')};
@@ -26,7 +27,7 @@ async function describeOld(head, header) {
   return {header, kind: 'number', unit: '', min, max, preset, step: '', states, values: []};
 }
 
-// All settings, in the head's order: [{header, kind: 'number' | 'word', unit, min, max, preset, step, states,
+// Returns all settings, in the head's order: [{header, kind: 'number' | 'word', unit, min, max, preset, step, states,
 // values}]. Figures are the head's own texts. A setting that this head does not have has no states.
 export async function describeSettings(head) {
   const all = words(await head.command('HELP?'));

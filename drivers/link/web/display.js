@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The look of the picture: colours with their legend, point size, what is drawn besides points, the place to look from.
+// This panel sets the look of the picture: colours with their legend, point size, the things drawn besides points, and
+// the viewpoint.
 import {bodyOf, byId, kept, make, say} from './page.js';
 
 const MODES = [['height', 'Height'], ['range', 'Range'], ['reflectance', 'Reflectance'], ['amplitude', 'Amplitude'],
@@ -14,7 +15,7 @@ export class Display {
   #legend = byId('legend');
   #shown = '';
 
-  // names(mode, label): what people call a surface or a station
+  // names(mode, label) returns the name of a surface or a station for people
   constructor(view, names, isRecording = false) {
     this.#view = view;
     this.#names = names;
@@ -58,7 +59,7 @@ export class Display {
     return byId(`show-${key}`)?.checked ?? true;
   }
 
-  // The scene as the head sent it, or null.
+  // It takes the scene as the head sent it, or null.
   setScene(bytes) {
     this.#view?.setScene(bytes);
   }
@@ -112,7 +113,7 @@ export class Display {
     return ramp;
   }
 
-  // Round values at their places; where there are none, the ends in words.
+  // Shows round values at their places, or the ends in words if there are none.
   #ticks({ticks, from, to}) {
     const all = ticks.length > 0 ? ticks : [{at: 0, text: String(from)}, {at: 1, text: String(to)}];
     return make('div', {class: 'scale'}, ...all.map(({at, text}) => {

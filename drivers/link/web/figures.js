@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// State in figures: what the head delivers, how much of it came here, what was lost, how the page handles it.
+// This panel shows the state in figures: data that the head sends, data that arrived, losses, and the page's own work.
 import {bodyOf, byId, duration, figureList, grouped, make, makeSvg, say, short, NONE} from './page.js';
 
 const HEAD = [
@@ -37,8 +37,8 @@ const number = (value) => (value === null || value === undefined ? NaN : Number(
 
 export class Figures {
   #set;
-  #last = null;     // telemetry before, with its device time
-  #lastPage = null; // the page's own counts before
+  #last = null;     // it is the previous telemetry, with its device time
+  #lastPage = null; // these are the page's own counts before
   #rates = [];
   #texts = {};
   #path = makeSvg('path');
@@ -72,7 +72,7 @@ export class Figures {
     const now = {t_s: number(t.t_ns) / 1e9, at: performance.now() / 1e3, pulses: number(t.pulses), echoes: number(t.echoes), lines: number(t.lines)};
     if (!Number.isFinite(now.t_s)) now.t_s = now.at;
     const before = this.#last;
-    // Two telemetries at one time, as at a scan's end, make no rate; a restarted head begins anew.
+    // Two telemetries at one time, as at a scan's end, give no rate; a restarted head starts again from 0.
     if (before && now.t_s - before.t_s < 0.2 && now.t_s >= before.t_s) return this.#counts(t, now);
     this.#last = now;
     const s = before ? now.t_s - before.t_s : 0;
@@ -158,7 +158,7 @@ export class Figures {
 
 const mark = (key, bad) => byId(`figure-${key}`)?.classList.toggle('bad', bad);
 
-// f: a head's figures.
+// f has a head's figures.
 function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}) {
   if (!points && !gone && !lost) return NONE;
   return [grouped(number(points)), gone > 0 && `${short(gone)} older ones are gone`,

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-// The head's settings, as the head describes them: a field each, with limits, unit and the head's own refusals.
+// This panel has a field for each of the head's settings, with the limits, the unit and the refusals that the head
+// gives.
 import {bodyOf, byId, make, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
-// Names of the settings for people, in the order of the page. A setting that is not here stands under "More" with its
+// These are the names of the settings for people, in the order of the page. A setting that is not here stands under
+// "More" with its
 // header.
 const GROUPS = [
   ['Rates', [['HEAD:PRR', 'Pulses'], ['HEAD:LINes', 'Lines'], ['HEAD:PAN', 'Pan']]],
@@ -25,7 +27,7 @@ const choice = (word) => CHOICES[word.toUpperCase()] ?? word;
 const sameWord = (a, b) => a.toUpperCase() === b.toUpperCase()
   || a.toUpperCase().startsWith(b.replace(/[a-z]+$/, '').toUpperCase()) && b.toUpperCase().startsWith(a.toUpperCase());
 
-// '1200000' -> '1 200 000'; the figures stay those of the head.
+// Turns '1200000' into '1 200 000'; the figures stay those of the head.
 function readable(text) {
   const [whole, part] = text.split('.');
   const grouped = whole.length > 5 ? whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') : whole;
@@ -34,7 +36,8 @@ function readable(text) {
 
 const decimals = (text) => (/^\d*\.(\d*)$/.exec(text)?.[1] ?? '').length;
 
-// A limit in few figures, where it has no more: 1200000 -> '1.2 M'. A limit one step beside a round number that is not
+// Writes a limit in few figures, where it has no more: 1200000 becomes '1.2 M'. A limit one step beside a round number
+// that is not
 // allowed is shown by that number: 59.999999 -> '< 60'; the tooltip has all figures.
 export function limit(text, step = '', isUpper = false) {
   const round = Number(Number(text).toFixed(Math.max(0, decimals(step) - 2)));
@@ -61,14 +64,15 @@ function inward(text, isUpper) {
   return String(Number(((isUpper ? Math.floor : Math.ceil)(value * scale) / scale).toFixed(places)));
 }
 
-// Whether no other value can be set now: only one is allowed or, as with a pan that stands still, only the present one.
+// Returns whether no other value can be set now: only one is allowed or, as with a pan that stands still, only the
+// present one.
 const isFixed = ({min, max}) => Boolean(min) && Boolean(max) && Number(min) >= Number(max);
 
 const unitName = (unit) => unit.replace('deg', '°');
 
 export class Knobs extends EventTarget {
   #session;
-  #knobs = new Map(); // header -> {field, hint, box, setting, value}
+  #knobs = new Map(); // it maps a header to {field, hint, box, setting, value}
   #note = make('p', {class: 'note'});
   #form = make('div', {class: 'groups'});
   #again;
@@ -146,7 +150,7 @@ export class Knobs extends EventTarget {
     }
   }
 
-  // A unit that all of a group have stands in its title.
+  // The title of a group has the unit if all its settings have the same one.
   #makeGroup(title, rows, has) {
     const units = new Set(rows.map(([header]) => unitName(has.get(header).unit)));
     const common = units.size === 1 ? [...units][0] : '';
@@ -189,7 +193,7 @@ export class Knobs extends EventTarget {
     this.#hint(knob);
   }
 
-  // The head's refusal, in its own words.
+  // Shows the head's refusal, in the head's words.
   #refuse(knob, text) {
     for (const other of this.#knobs.values()) {
       if (other.says === knob.says) other.field.removeAttribute('aria-invalid');

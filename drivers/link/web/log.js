@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-// Events and errors in words, the newest on top; and the plan.
+// This panel shows events and errors in words, the newest on top, and the plan.
 import {bodyOf, byId, clock, fetchJson, grouped, make, metres, percent, say} from './page.js';
 import {peerOf} from './head.js';
 import {sessionWords, stateName, stateWord} from './session.js';
 
-const MOST = 200; // entries that are kept
+const MOST = 200; // so many entries are stored
 
-// Errors not caused by a command, by COMMANDS.md (*Errors*): their text says who or how many.
+// These errors have no command as their cause (COMMANDS.md, *Errors*): their text says who or how many.
 const HEADS_OWN = {101: 'Client lost (101):', 102: 'Reader too slow (102):', 103: 'Pulses lost (103):', 104: 'Client refused (104):',
   105: 'Incomplete command (105):', 106: 'Lines lost (106):'};
 
 const ns = (value) => Number(value);
 const seconds = (value) => `${(ns(value) / 1e9).toFixed(3)} s`;
 
-// An event in words, and how bad it is; null: nothing to be said.
+// Returns an event in words, and how bad it is; null: there is nothing to report.
 export function eventWords(e) {
   switch (e.name) {
     case 'STATE': return [stateWord(stateName(e.state)), stateName(e.state) === 'fault' ? 'bad' : ''];
@@ -31,7 +31,7 @@ export function eventWords(e) {
     case 'SITE': return [`Station ${e.a}${e.text ? ` (${e.text})` : ''} was moved`
       + (ns(e.b) > 0 ? `; ${grouped(ns(e.b))} warnings` : ''), ns(e.b) > 0 ? 'warn' : ''];
     case 'POSE_LATE': return [`No pose of the platform in time, for ${seconds(e.since_ns)}`, 'warn'];
-    case 'PPS': case 'TIME': return null; // every second; the figures have the time
+    case 'PPS': case 'TIME': return null; // they come every second; the figures show the time
     default: return [`Event ${e.code}${e.text ? `: ${e.text}` : ''}`, ''];
   }
 }
@@ -39,7 +39,7 @@ export function eventWords(e) {
 export class Log {
   #list = make('ol', {class: 'log', tabindex: '0', 'aria-label': 'Events, the newest first'});
   #waiting = [];
-  #last = null; // {text, times, span}
+  #last = null; // each entry is {text, times, span}
   #timer = 0;
   #aside = byId('panel-log').querySelector('summary').appendChild(make('span', {class: 'aside'}));
   #gone = 0;
@@ -54,7 +54,7 @@ export class Log {
     session?.head.addEventListener('close', ({detail}) => detail.wasOpen && this.add(`Not connected: ${detail.words}`, 'bad'));
   }
 
-  // kind: '', 'warn' or 'bad'
+  // kind is '', 'warn' or 'bad'
   add(text, kind = '') {
     this.#waiting.push({text, kind, at: new Date()});
     if (this.#waiting.length > MOST) this.#gone += this.#waiting.splice(0, this.#waiting.length - MOST).length;

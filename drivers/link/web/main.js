@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Connects the page's modules: a head and its points, or a recording.
+// This module connects the page's modules: a head and its points, or a recording.
 import {byId, fetchJson, kept, say} from './page.js';
 import {Head} from './head.js';
 import {Cloud} from './cloud.js';
@@ -14,10 +14,10 @@ import {Display} from './display.js';
 import {Point} from './point.js';
 import {Recording} from './recording.js';
 
-const CAPACITY = 10e6; // points that are held
+const CAPACITY = 10e6; // so many points are stored
 const WIDE = '(min-width: 47rem)';
 
-// Which panels are open is kept; at first, a small screen has only a few.
+// The browser remembers which panels are open; at first a small screen has only a few.
 function startPanels() {
   const few = ['panel-quality', 'panel-recording'];
   for (const panel of document.querySelectorAll('.panel')) {
@@ -27,7 +27,7 @@ function startPanels() {
   }
 }
 
-// Without a picture the page goes on: figures and settings need none.
+// The page works without a picture: figures and settings need none.
 async function makeView(cloud) {
   try {
     const {View} = await import('./view.js');
@@ -41,7 +41,7 @@ async function makeView(cloud) {
   }
 }
 
-// Names of surfaces and stations for people, as /head has them.
+// These are the names of surfaces and stations for people, as /head has them.
 class Names {
   surfaces = new Map();
   stations = null;
@@ -71,7 +71,7 @@ async function fetchScene() {
   }
 }
 
-// How long a frame takes by its descriptor; 0 where no pan turns through it.
+// Returns the time of a frame by its descriptor; 0 if no pan turns through it.
 const frameSeconds = ({pan_start_udeg: from, pan_stop_udeg: to, pan_udeg_s: rate}) =>
   (Number(rate) > 0 ? Math.abs(Number(to) - Number(from)) / Number(rate) : 0);
 
@@ -90,8 +90,8 @@ function startHead(cloud, view, names, keepsPast) {
   new Point(view, names.of);
 
   const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
-  let before = ''; // who the head was
-  let run = ''; // which of its runs
+  let before = ''; // it says who the head was
+  let run = ''; // it says which of the head's runs it was
   const learn = async () => {
     const came = cloud.cut();
     countFrames();
@@ -109,7 +109,7 @@ function startHead(cloud, view, names, keepsPast) {
     names.add(info.surfaces ?? []);
     bar.name(info);
     session.paced(info.pace);
-    stations.reload(info.stations ?? []).catch(() => {}); // gone again
+    stations.reload(info.stations ?? []).catch(() => {}); // it is gone again
     showPlan();
     display.setScene(await fetchScene());
   };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The records of a points frame, as columns in the scene frame. The hot path: no object, no BigInt a point.
+// The records of a points frame become columns in the scene frame. This is the hot path: it makes no object and no
+// BigInt for a point.
 import {fitCubic, geodeticToEcef, toScene} from './native_earth.js';
 
 const TWO_PI = 6.283185307179586476925, PARTS = 256, HEAD = 40, RECORD = 20, NO_REFLECTANCE = -32768;
@@ -8,7 +9,7 @@ const cosPart = Float64Array.from({length: PARTS}, (_, i) => Math.cos((TWO_PI * 
 
 const NAMES = ['x', 'y', 'z', 'pulse', 't', 'range', 'reflectance', 'amplitude', 'label', 'echo', 'echoes', 'record'];
 
-/** Room for the points of some frames. */
+/** This is room for the points of some frames. */
 export class Columns {
   constructor(room) {
     this.room = room;
@@ -18,11 +19,11 @@ export class Columns {
     this.label = new Uint16Array(room);
     this.echo = new Uint8Array(room);
     this.echoes = new Uint8Array(room);
-    this.record = new Uint16Array(room); // which record of its frame a point is: attributes and colours follow these
+    this.record = new Uint16Array(room); // each is the record of a point in its frame
     this.rgb = new Uint8Array(3 * room);
   }
 
-  /** The points from..to in arrays of their own, which share one buffer. */
+  /** Returns the points from..to in their own arrays, which share one buffer. */
   copy(from, to, hasColours) {
     const n = to - from, buffer = new ArrayBuffer(n * (hasColours ? 55 : 52)), out = {};
     let at = 0;
@@ -41,19 +42,19 @@ export class Columns {
     return out;
   }
 
-  // Points from..this.n come to `to`.
+  // Moves points from..this.n to `to`.
   #move(to, from) {
     for (const name of NAMES) this[name].copyWithin(to, from, this.n);
     this.rgb.copyWithin(3 * to, 3 * from, 3 * this.n);
     this.n -= from - to;
   }
 
-  /** Points from `from` on come to the front. */
+  /** Moves points from `from` on to the front. */
   drop(from) {
     this.#move(0, from);
   }
 
-  /** Points from `from` on that have no place go. */
+  /** Removes points from `from` on that have no place. */
   dropNaN(from) {
     for (let i = this.n - 1; i >= from; i--) if (Number.isNaN(this.x[i])) this.#move(i, i + 1);
   }
@@ -76,8 +77,9 @@ export function polarPlacer(descriptor, anchor) {
   const m = Float64Array.from(anchor.rotation), [x0, y0, z0] = anchor.station_m, scale = descriptor.range_scale_m;
   const lineTurn = 1 / descriptor.mirror_counts_per_turn, panTurn = 1 / descriptor.pan_counts_per_turn;
   const turned = !(anchor.moving & 1);
-  // sin and cos of a turn's part: whole 1/256 turns by the table, the rest by its series, whose next terms are below
-  // 2^-56: the same operations in the same order as libscanhead's (drivers/host/decode_points.c).
+  // These compute sin and cos of a part of a turn: whole 1/256 turns by the table, the rest by a series, whose next
+  // terms are below 2^-56. They are the same operations in the same order as libscanhead's
+  // (drivers/host/decode_points.c).
   return (c, view, n, pulse0, t0_ns) => {
     const {x, y, z, range} = c;
     let to = c.n, pulse = pulse0 - 1, atStart = true;
@@ -101,7 +103,7 @@ export function polarPlacer(descriptor, anchor) {
         y[to] = y0 + (m[3] * dx + m[4] * dy + m[5] * dz);
         z[to] = z0 + (m[6] * dx + m[7] * dy + m[8] * dz);
       } else {
-        x[to] = dx; // in the head's frame: poses take it to the scene
+        x[to] = dx; // it is in the head's frame: poses move it to the scene
         y[to] = dy;
         z[to] = dz;
       }
@@ -113,7 +115,8 @@ export function polarPlacer(descriptor, anchor) {
   };
 }
 
-/** The same for a geo stream. `exact` as toScene's. The range is the distance from the anchor, in the CRS or, if that
+/** Does the same for a geo stream. `exact` is as for toScene. The range is the distance from the anchor, in the CRS
+ * or, if that
  * is geodetic, straight through space. It is NaN where the head moves, since the anchor is not its place. */
 export function geoPlacer(descriptor, anchor) {
   const {at: exactAt, exact, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
@@ -147,7 +150,7 @@ export function geoPlacer(descriptor, anchor) {
   return placer;
 }
 
-// Local and ECEF: a rotation and a shift.
+// Local and ECEF need a rotation and a shift.
 function placeFlat(exactAt, anchor) {
   const [ox, oy, oz] = exactAt(anchor.anchor), m = anchor.axes;
   return (c, to, _x, _y, _z, dx, dy, dz) => {
@@ -163,7 +166,7 @@ function placeExactly(exactAt) {
   };
 }
 
-// A grid: the cubic through the exact map within the head's reach d. Its error is about d^4 / R^3 with the Earth's
+// A grid needs the cubic through the exact map within the head's reach d. Its error is about d^4 / R^3 with the Earth's
 // radius R: 0.1 um at 2 km.
 function placeByCubic(exactAt, anchor, descriptor) {
   const reach_m = Math.min(Math.max(1.1 * descriptor.range_max_m, 10), 20000), [ax, ay, az] = anchor.anchor;
@@ -181,7 +184,7 @@ function placeByCubic(exactAt, anchor, descriptor) {
   };
 }
 
-/** The hash of points (README.md): of each record two sums, modulo 2^32, of words mixed. */
+/** This is the hash of points (README.md): it has two sums over all records, modulo 2^32, of mixed words. */
 export class PointHash {
   constructor() {
     this.a = 0;

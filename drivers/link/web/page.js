@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Helpers of all panels: making elements, writing figures, and doing things no more often than needed.
+// These helpers of all panels make elements, write figures, and do things no more often than needed.
 
 // Makes an element: make('p', {id: 'x', class: 'y'}, 'text', child). A function as a value is a listener.
 export function make(name, attributes = {}, ...children) {
@@ -45,7 +45,7 @@ export function atMostEvery(ms, call) {
 export const NONE = '–';
 const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
-// 1234567 -> '1 234 567' with thin spaces; at most `digits` after the point.
+// Turns 1234567 into '1 234 567' with thin spaces; at most `digits` stand after the point.
 export function grouped(value, digits = 0) {
   if (typeof value === 'bigint') value = Number(value);
   if (!known(value)) return NONE;
@@ -54,7 +54,7 @@ export function grouped(value, digits = 0) {
   return Number(text.replace(/\u2009/g, '')) !== 0 && value < 0 ? `−${text}` : text;
 }
 
-// 1234567 -> '1.23 M': three figures and a prefix, for rates and counts.
+// Turns 1234567 into '1.23 M': three figures and a prefix, for rates and counts.
 export function short(value, unit = '') {
   if (typeof value === 'bigint') value = Number(value);
   if (!known(value)) return NONE;
@@ -70,7 +70,7 @@ function three(value) {
   return value.toFixed(size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
 }
 
-// Metres as people read them: micrometres up to metres.
+// Writes metres for people: micrometres up to metres.
 export function metres(value) {
   if (!known(value)) return NONE;
   const size = Math.abs(value), sign = value < 0 ? '−' : '';
@@ -82,7 +82,7 @@ export function metres(value) {
   return `${sign}${three(size)}\u00a0m`;
 }
 
-// Seconds as people read them: nanoseconds up to minutes.
+// Writes seconds for people: nanoseconds up to minutes.
 export function duration(value_s) {
   if (!known(value_s)) return NONE;
   const size = Math.abs(value_s), sign = value_s < 0 ? '−' : '';
@@ -98,7 +98,7 @@ export const percent = (share, digits = 1) => (known(share) ? `${(share * 100).t
 
 export const clock = (date = new Date()) => date.toTimeString().slice(0, 8);
 
-// A list of names and figures: rows is [[key, name, title], ...]; the result sets them: set({key: text}).
+// Makes a list of names and figures: rows is [[key, name, title], ...]; the result sets them: set({key: text}).
 export function figureList(parent, rows, kind = '') {
   const cells = {};
   const list = make('dl', {class: `figures ${kind}`});
@@ -112,7 +112,7 @@ export function figureList(parent, rows, kind = '') {
   };
 }
 
-// Something small kept in the browser; a browser that keeps nothing is no fault.
+// Stores something small in the browser; a browser that stores nothing is not an error.
 export const kept = {
   get(key) {
     try {
@@ -124,11 +124,11 @@ export const kept = {
   set(key, value) {
     try {
       localStorage.setItem(`scanhead.${key}`, value);
-    } catch { /* private windows */ }
+    } catch { /* private windows store nothing */ }
   },
 };
 
-// JSON of one of the link's resources; null where there is none or it does not come.
+// Returns the JSON of one of the link's resources; null if there is none or it does not come.
 export async function fetchJson(path) {
   try {
     const answer = await fetch(path, {cache: 'no-store'});

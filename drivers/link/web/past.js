@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The points from before this page came, or while it was away: the head keeps the last ones, and gives them in pieces
+// This class gets the points from before this page came, or while it was away: the head stores the last ones, and
+// gives them in pieces
 // (GET /past, firmware_sim/app/studio/watch/README.md). They are frames of the stream with their own numbers. So each points
 // frame is taken once, either from /past or from the connection.
 //
@@ -8,8 +9,8 @@
 import {BESIDE_POINTS, Decoder, isBefore, LOCAL, Parser, POINTS} from './native.js';
 
 const HEAD = 56, VERSION = 1;
-const REST_MS = 20; // between two pieces: a head that scans has other things to do
-const AGAIN_MS = 100, PATIENCE_MS = 10000; // the head's keeper reads the stream a little later than this page
+const REST_MS = 20; // it waits so long between two pieces, since a scanning head has other work
+const AGAIN_MS = 100, PATIENCE_MS = 10000; // the head's observer reads the stream a little later than this page
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
@@ -23,8 +24,8 @@ function readHead(bytes) {
 
 export class Past {
   stats = {past_points: 0, past_pulses: 0, past_gone: 0, past_lost_frames: 0};
-  unplaced = {points: 0, shots: 0}; // of live frames, left to a /past that is not there
-  #left = {points: 0, shots: 0}; // of live frames that are left to /past
+  unplaced = {points: 0, shots: 0}; // so many points of live frames were left to a /past that is missing
+  #left = {points: 0, shots: 0}; // these are live frames that are left to /past
   #give;
   #hasRoom;
   #get;
@@ -32,16 +33,16 @@ export class Past {
   #connection = 0;
   #isReading = false;
   #run = null;
-  #at = 0; // position in /past
-  #last = null; // number of the newest points frame that was taken
-  #seen = null; // the same, from earlier connections only
-  #first = null; // number of the first live points frame that was taken
-  #need = null; // number of the newest frame that only /past brings
+  #at = 0; // it is the position in /past
+  #last = null; // it is the number of the newest points frame that was taken
+  #seen = null; // it is the same, from earlier connections only
+  #first = null; // it is the number of the first live points frame that was taken
+  #need = null; // it is the number of the newest frame that only /past brings
   #takesLive = true;
   #takesPast = true;
 
-  /** give(batch): points of the past. hasRoom(): false while the owner is behind. get(url): a promise of the bytes, null
-   * where there is nothing. */
+  /** give(batch) takes points of the past. hasRoom() is false while the owner is late. get(url) returns a promise of
+   * the bytes, or of null if there is nothing. */
   constructor({give, hasRoom = () => true, get = getBytes}) {
     this.#give = give;
     this.#hasRoom = hasRoom;
@@ -61,7 +62,7 @@ export class Past {
     this.parser = new Parser({frame: (frame) => this.#take(frame)});
   }
 
-  /** A connection is there; url: of its /past. */
+  /** A connection has begun; url is that of its /past. */
   start(url) {
     this.stop();
     this.#url = url;
@@ -77,13 +78,13 @@ export class Past {
     this.#isReading = false;
   }
 
-  /** Whether a live frame goes to its decoder; canPlace: what the decoder says. */
+  /** Returns whether a live frame goes to its decoder; canPlace comes from the decoder. */
   takes(frame, canPlace) {
     if (this.#url === null || frame.flags & LOCAL) return true;
     const {seq} = frame;
     if (this.#need === null) this.#wants((seq - 1) >>> 0);
     if (!BESIDE_POINTS.includes(frame.type)) return true;
-    if (frame.type !== POINTS) return this.#takesLive; // it is beside the points before
+    if (frame.type !== POINTS) return this.#takesLive; // it follows the points before
     const hasCome = this.#first === null && this.#last !== null && this.#last !== this.#seen && !isBefore(this.#last, seq);
     this.#takesLive = canPlace && !hasCome;
     if (this.#takesLive) {
@@ -140,7 +141,7 @@ export class Past {
       if (this.#run !== head.run) {
         const isOther = this.#run !== null;
         this.#run = head.run;
-        if (isOther) { // these positions and numbers are of another run
+        if (isOther) { // these positions and numbers come from another run
           this.#fresh();
           continue;
         }
@@ -164,7 +165,7 @@ export class Past {
       past_lost_frames: head.lost_frames});
   }
 
-  // The head keeps nothing, as an older one: live frames that were left to /past stay without a place.
+  // The head stores nothing, as older heads: live frames that were left to /past stay without a place.
   #hasNone() {
     this.unplaced.points += this.#left.points;
     this.unplaced.shots += this.#left.shots;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The point under the pointer, in figures. Its place is there also while there is none: nothing jumps.
+// This panel shows the point under the pointer, in figures. Its area stays also without a point, so nothing jumps.
 import {byId, grouped, make, say, NONE} from './page.js';
 
 const CELLS = [['place', 'x, y, z', 'wide'], ['range', 'Range'], ['reflectance', 'Reflectance'],
@@ -13,7 +13,7 @@ export class Point {
   #names;
   #next = null;
   #timer = 0;
-  t0_s = 0; // what times count from
+  t0_s = 0; // times count from this
 
   constructor(view, names, rename = {}) {
     this.#names = names;

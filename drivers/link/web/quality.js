@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// How good the scan is so far, as the head reports it at /quality: it knows the truth.
+// This panel shows the quality of the scan so far. The head, which knows the true values, reports it at /quality.
 import {bodyOf, byId, fetchJson, figureList, grouped, make, makeSvg, metres, percent, say, short, NONE} from './page.js';
 
 const ROWS = [

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-// A recording, without a head: its points, the mesh of a scan, or points spread evenly over that mesh.
+// This module shows a recording, without a head: its points, the mesh of a scan, or points spread evenly over that
+// mesh.
 import {atMostEvery, bodyOf, byId, figureList, grouped, make, metres, say, short} from './page.js';
 import {batchesOf, countWithin, fetchCloud, fetchMesh} from './recording_files.js';
 
 const MOST_POINTS = 10e6;
-const SLIDER_OFF = 100; // beyond a factor of 100: no filter
+const SLIDER_OFF = 100; // a factor above 100 means no filter
 const factorOf = (slider) => (slider >= SLIDER_OFF ? 0 : 10 ** (slider / 50));
 const sliderOf = (factor) => Math.round(50 * Math.log10(factor));
 
@@ -16,7 +17,7 @@ export class Recording {
   #view;
   #what = 'points';
   #abort = null;
-  #mesh = null; // {origin, positions, triangles, ratio, mean_edge_m} of the chosen scan
+  #mesh = null; // it is {origin, positions, triangles, ratio, mean_edge_m} of the chosen scan
   #parts = {};
 
   constructor(info, cloud, view) {
@@ -171,7 +172,7 @@ export class Recording {
 
   #later = atMostEvery(250, () => this.#show());
 
-  // The triangles within the filter: a beginning of the sorted list.
+  // Returns the triangles within the filter, which are the beginning of the sorted list.
   #show() {
     const m = this.#mesh;
     if (!m) {
@@ -183,7 +184,7 @@ export class Recording {
     this.#progress(n, m.ratio.length, `${grouped(n)} of ${grouped(m.ratio.length)} triangles`);
   }
 
-  // The points make way for a mesh.
+  // The points are removed for a mesh.
   #draw(mesh) {
     this.drawn = mesh !== null;
     if (!this.#view) return;

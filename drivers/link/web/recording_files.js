@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Reads a recording from the link: clouds in columns, meshes with sorted triangles. Pure but for fetch.
+// Reads a recording from the link: clouds in columns, meshes with sorted triangles. It is pure except for fetch.
 
 const KINDS = {1: Uint8Array, 2: Uint16Array, 3: Uint32Array, 4: Float32Array};
 const POINTS_AT_A_TIME = 200000, TRIANGLES_AT_A_TIME = 1 << 20;
@@ -10,7 +10,7 @@ async function fetchBytes(path, signal) {
   return answer.arrayBuffer();
 }
 
-// The bytes of /cloud or /sparse: {n, first, every, total, origin, columns: {name: typed array}}
+// Reads the bytes of /cloud or /sparse: {n, first, every, total, origin, columns: {name: typed array}}
 function readCloud(bytes) {
   const view = new DataView(bytes), u32 = (at) => view.getUint32(at, true);
   if (bytes.byteLength < 56 || u32(0) !== 0x4c434853 || u32(4) !== 1) throw new Error('not a cloud of version 1');
@@ -24,7 +24,7 @@ function readCloud(bytes) {
   return cloud;
 }
 
-// The bytes of /mesh: {n, first, total, first_point, n_points, mean_edge_m, triangles, ratio}
+// Reads the bytes of /mesh: {n, first, total, first_point, n_points, mean_edge_m, triangles, ratio}
 export function readMesh(bytes) {
   const view = new DataView(bytes), u32 = (at) => view.getUint32(at, true);
   if (bytes.byteLength < 40 || u32(0) !== 0x534d4853 || u32(4) !== 1) throw new Error('not a mesh of version 1');
@@ -33,7 +33,8 @@ export function readMesh(bytes) {
     triangles: new Uint32Array(bytes, 40, 3 * n), ratio: new Float32Array(bytes, 40 + 12 * n, n)};
 }
 
-// All pieces of a cloud, one after the other: take(piece) each. path: '/cloud?...' without first and count.
+// Reads all pieces of a cloud, one after the other, and calls take(piece) for each. path is '/cloud?...' without first
+// and count.
 export async function fetchCloud(path, {first = 0, end = Infinity, every = 1, signal, take}) {
   for (let at = first, total = end; at < Math.min(end, total);) {
     const count = Math.min(POINTS_AT_A_TIME, Math.ceil((Math.min(end, total) - at) / every));
@@ -45,7 +46,7 @@ export async function fetchCloud(path, {first = 0, end = Infinity, every = 1, si
   }
 }
 
-// A mesh whole: {triangles, ratio, ...} as readMesh has it.
+// Reads a complete mesh: {triangles, ratio, ...} as readMesh returns it.
 export async function fetchMesh(scan, signal, progress = () => {}) {
   let mesh = null;
   for (let at = 0; mesh === null || at < mesh.total;) {
@@ -60,7 +61,7 @@ export async function fetchMesh(scan, signal, progress = () => {}) {
   return mesh;
 }
 
-// How many of the sorted ratios are at most the factor; factor 0: all of them.
+// Returns how many of the sorted ratios are at most the factor; factor 0 means all.
 export function countWithin(ratio, factor) {
   if (factor === 0) return ratio.length;
   const most = Math.fround(factor);
@@ -75,8 +76,8 @@ export function countWithin(ratio, factor) {
 
 const filled = (Kind, n, value) => new Kind(n).fill(value);
 
-// A piece as batches for the Cloud: one for each run of points of one station. Pulses are not known; in their place
-// stands the number of the point in the file.
+// Returns a piece as batches for the Cloud: one for each run of points of one station. Pulses are not known; the
+// number of the point in the file is used instead.
 export function batchesOf(piece, station = 1) {
   const {n, origin, columns: c} = piece;
   const axis = (k) => Float64Array.from({length: n}, (_, i) => c.xyz[3 * i + k] + origin[k]);

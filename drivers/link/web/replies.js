@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Command lines and their replies, by COMMANDS.md: each line has one reply, in the order of the lines. A reply that did
+// This class sends command lines and assigns the replies, by COMMANDS.md: each line has one reply, in the order of the
+// lines. A reply that did
 // not come in time may still come. So the head is then asked *IDN?, and all replies before the answer to that are
 // dropped (*Coming into step*).
 
@@ -14,17 +15,17 @@ export class CommandError extends Error {
 }
 
 const isIdentity = (reply) => !reply.includes('"') && reply.split(',').length === 4;
-const LATER_MS = 200; // how long further answers to *IDN? may take, where some were given up
+const LATER_MS = 200; // further answers to *IDN? may take so long, if some were given up
 
 export class Replies {
   #send;
-  #asked = []; // {line, timeout_s, resolve, reject, timer}, sent; only the timer of the first one runs
-  #waiting = []; // the same, not sent yet: the order of replies isn't known at the moment; all timers run
-  #settling = null; // {left}: answers to *IDN? that are still to come
+  #asked = []; // these lines, {line, timeout_s, resolve, reject, timer}, are sent; only the timer of the first one runs
+  #waiting = []; // these are not sent yet, since the order of replies isn't known at the moment; all timers run
+  #settling = null; // its {left} counts answers to *IDN? that have not come yet
   #isOpen = false;
   #timer = 0;
 
-  /** send(line): to the head. */
+  /** send(line) sends to the head. */
   constructor(send) {
     this.#send = send;
   }
@@ -34,7 +35,7 @@ export class Replies {
     this.#settling = null;
   }
 
-  /** The connection is gone: all that was asked fails with these words. */
+  /** The connection is gone: all open commands fail with these words. */
   close(words) {
     this.#isOpen = false;
     this.#settling = null;
@@ -43,7 +44,8 @@ export class Replies {
     for (const one of all) this.#fail(one, new CommandError(one.line, 0, words));
   }
 
-  /** A promise of the reply to one line. The head answers one line after the other, and so the time counts from when all
+  /** Returns a promise of the reply to one line. The head answers one line after the other, so the time counts from
+   * when all
    * lines before it have their replies. It throws CommandError; number 0: no reply came, or the line is none. */
   ask(line, timeout_s) {
     return new Promise((resolve, reject) => {

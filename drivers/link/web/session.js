@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The present state of the head for the panels: connection, state, who has control. It sends 'change' events.
+// A Session has the present state of the head for the panels: connection, state, control. It sends 'change' events.
 import {STATES} from './native.js';
 import {kept} from './page.js';
 
@@ -8,29 +8,29 @@ const WORDS = {
   'spin-down': 'Spinning down', 'fault': 'Fault',
 };
 
-// The number of a state as its word; words stay.
+// Turns the number of a state into its word; words stay.
 export const stateName = (state) => STATES[Number(state)] ?? String(state);
 // In the pace step a head that was granted no time yet stays in its self test.
 export const stateWord = (state, pace) => (pace === 'step' && state === 'boot' ? 'Waits for time steps' : WORDS[state] ?? state);
 
-// A session by kind of link and address, "tcp 127.0.0.1:40312", or where these are not known by its number.
+// Names a session by kind of link and address, "tcp 127.0.0.1:40312", or by its number if these are not known.
 export const sessionWords = (session, who) => who || `Session ${session}`;
 
-// A promise's ERR as a sentence: the words after the semicolon are what exactly was wrong.
+// Turns a promise's ERR into a sentence: the words after the semicolon say exactly what was wrong.
 export function why(error) {
   const text = String(error?.text ?? error?.message ?? error);
   return text.includes('; ') ? text.slice(text.indexOf('; ') + 2) : text;
 }
 
 export class Session extends EventTarget {
-  link = 'opening'; // or 'open', 'closed'
-  state = null;     // a word of the protocol
+  link = 'opening'; // it is this, 'open' or 'closed'
+  state = null;     // it is a word of the protocol
   scan = 0;
-  pace = '';        // as the configuration has it; '': not known
-  owner = 0;        // the session in control, 0: nobody
-  who = '';         // that session in words, for a sentence's beginning
+  pace = '';        // it is that of the configuration; '': not known
+  owner = 0;        // this session has control; 0: nobody has it
+  who = '';         // it is that session in words, for a sentence's beginning
   mine = false;     // this page has control
-  since = null;     // when the connection ended, and why
+  since = null;     // it says when the connection ended, and why
   words = '';
   wasOpen = false;  // there was a connection
 
@@ -55,7 +55,7 @@ export class Session extends EventTarget {
     });
   }
 
-  // Why a setting can't be made now, in words; '' where it can. states: those in which it can, or 'all'.
+  // Says why a setting can't be made now, in words; '' if it can. states has the states in which it can, or 'all'.
   whyNot(states = 'all') {
     if (this.link !== 'open') return 'The head is not connected.';
     if (!this.mine) return this.owner ? `${this.who} has control and has to give it back first.` : 'Take control first.';
@@ -87,7 +87,7 @@ export class Session extends EventTarget {
     this.#changed();
   }
 
-  // again_s: when the head is tried again; words: why the connection ended.
+  // again_s is the time until the next attempt; words say why the connection ended.
   #closed({words = '', wasOpen = true} = {}) {
     if (wasOpen || this.link === 'opening') this.since = new Date();
     if (wasOpen || this.words === '') this.words = words;
@@ -118,7 +118,7 @@ export class Session extends EventTarget {
   }
 }
 
-// Light, dark, or as the system has it: kept in the browser.
+// The browser stores the theme: light, dark, or that of the system.
 export function startTheme(button) {
   const system = matchMedia('(prefers-color-scheme: dark)');
   const show = () => {

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-// Where the stations stand: to be read, and, with control and while the head is idle, to be moved.
+// This panel shows the places of the stations. With control, and while the head is idle, they can be moved.
 import {bodyOf, fetchJson, make, say} from './page.js';
 import {why} from './session.js';
 
 const PARTS = [['x_m', 'East x', 'm'], ['y_m', 'North y', 'm'], ['z_m', 'Height z', 'm'],
   ['heading_deg', 'Heading', '°'], ['pitch_deg', 'Pitch', '°'], ['roll_deg', 'Roll', '°']];
 
-const PLAN_TIMEOUT_S = 120; // a map of what a station sees may take long
+const PLAN_TIMEOUT_S = 120; // a visibility map of a station may take long
 
-// The head says places exactly; a field shows no more figures than the number has, and at most six decimals.
+// The head gives exact places; a field shows no more figures than the number has, and at most six decimals.
 const shown = (value) => (value === null ? '' : String(Math.round(value * 1e6) / 1e6));
 
 export class Stations extends EventTarget {
@@ -16,10 +16,10 @@ export class Stations extends EventTarget {
   #session;
   #knobs;
   #view;
-  #items = new Map(); // number -> {item, place, fields, says, time, buttons}
+  #items = new Map(); // it maps a number to {item, place, fields, says, time, buttons}
   #ol = make('ol', {class: 'stations'});
   #note = make('p', {class: 'note'});
-  #asks = null; // whether the head knows SITE:POSE
+  #asks = null; // it says whether the head has SITE:POSE
 
   constructor(session, knobs, view) {
     super();
@@ -37,7 +37,7 @@ export class Stations extends EventTarget {
     this.#allow();
   }
 
-  // list: as /head has it
+  // list is as /head has it
   show(list) {
     const same = list.length === this.list.length && list.every((s, i) => s.number === this.list[i].number);
     this.list = list;
@@ -198,7 +198,7 @@ export class Stations extends EventTarget {
       says.className = error ? 'refusal' : 'note';
       says.hidden = !error && !busy;
       say(says, error || (busy ? 'Moving; what depends on it is planned again.' : ''));
-      time.hidden = !busy; // not in `says`: a screen reader would read out each second
+      time.hidden = !busy; // it is not in `says`, since a screen reader would read out each second
       say(time, busy ? `${Math.floor((performance.now() - began) / 1000)}\u00a0s so far` : '');
     }
   }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The picture of a cloud: WebGL 2 points, the scene, the stations, and what is under the pointer. See README.md for what
+// The view draws the picture of a cloud: WebGL 2 points, the scene, the stations, and the point under the pointer. See
+// README.md for what
 // it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once it rests the rest is
 // added, a slice at a time; points that come are added to what is there.
 
@@ -17,16 +18,16 @@ import {searchSlowly} from './view_pick.js';
 import {readTheme} from './view_theme.js';
 import {pointOf} from './cloud.js';
 
-const REST_MS = 120; // without a movement: the view rests
-const SHOW_MS = 160; // between two updates of a picture that grows; at least twice the time that one takes
+const REST_MS = 120; // after so long without a movement the view rests
+const SHOW_MS = 160; // updates of a growing picture are so far apart, and twice the time of one
 const HOVER_MS = 70;
-const GONE_SHARE = 0.04; // of the capacity: if more drawn points are gone, the picture is drawn anew
-const PLAIN = 150_000; // with fewer points per frame, a frame is plain
-const COARSE = 0.5; // scale of such a frame
-const SHADING = 260; // eye-dome lighting: per unit of logarithmic depth
+const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from the picture, it is drawn again
+const PLAIN = 150_000; // with fewer points per frame, a frame is drawn plain
+const COARSE = 0.5; // this is the scale of such a frame
+const SHADING = 260; // eye-dome lighting counts per unit of logarithmic depth
 
 export class View extends EventTarget {
-  static keys = KEYS; // [[keys, what they do]], for a help text
+  static keys = KEYS; // these are [[keys, their effect]], for a help text
   static modes = MODES;
   movable = true; // stations can be dragged
   camera = new Camera();
@@ -45,21 +46,21 @@ export class View extends EventTarget {
   #scheduled = false;
   #lost = false;
   #touched = false;
-  #fitted = 0; // number of points when the view was fitted
+  #fitted = 0; // there were so many points when the view was fitted
   #pointSize = 2;
   #hover = {timer: 0, stop: null, point: null};
   #waiting = [];
   #goneDrawn = 0;
   #lastGone = 0;
   #replaced = 0; // scans, as the cloud counts them
-  #origin = null; // of the points that are drawn
+  #origin = null; // it is that of the points that are drawn
   #scale;
   #pointsOn = true;
-  #size = null; // of the picture, in its pixels
-  #made = null; // {target, camera} of a frame that is not on the page yet
+  #size = null; // it is the size of the picture, in its pixels
+  #made = null; // it is {target, camera} of a frame that is not on the page yet
   #grown = false; // more is drawn than on the page
   #showEvery = SHOW_MS;
-  #seen = this.camera; // camera of the picture that is on the page
+  #seen = this.camera; // it is the camera of the picture on the page
 
   constructor(canvas, cloud) {
     super();
@@ -105,7 +106,7 @@ export class View extends EventTarget {
     if (!canvas.hasAttribute('aria-label')) canvas.setAttribute('aria-label', 'The points in space. Arrow keys turn, plus and minus zoom, Home shows all.');
   }
 
-  // Everything on the GPU, also after a lost context.
+  // Makes everything on the GPU, also after a lost context.
   #attach() {
     const gl = this.#gl;
     this.programs = programsOf(gl);
@@ -117,7 +118,7 @@ export class View extends EventTarget {
     this.#bare();
   }
 
-  // The page's ground until there is a picture: a canvas without one is black.
+  // The page's ground is shown until there is a picture, since an empty canvas is black.
   #bare() {
     const gl = this.#gl;
     this.colours ??= readTheme(this.canvas);
@@ -139,14 +140,15 @@ export class View extends EventTarget {
     this.#fitUntouched();
   }
 
-  // {origin, positions, triangles, drawTriangles} or null.
+  // It takes {origin, positions, triangles, drawTriangles} or null.
   setMesh(mesh) {
     this.#solids.setMesh(mesh);
     this.#fitUntouched();
     this.#ask('restart');
   }
 
-  // {points, scene, mesh, stations}: true or false; scene also 'glass' or 'solid'. What is not named stays.
+  // Each of {points, scene, mesh, stations} is true or false; scene also 'glass' or 'solid'. Members that are not
+  // given stay.
   show(what) {
     const s = this.#solids;
     if (what.points !== undefined) this.#pointsOn = Boolean(what.points);
@@ -169,7 +171,7 @@ export class View extends EventTarget {
     this.#ask('restart');
   }
 
-  // See legendOf in view_colours.js.
+  // It returns the legend; see legendOf in view_colours.js.
   legend() { return this.#scale.legend(); }
 
   pointSize(px) {
@@ -179,7 +181,7 @@ export class View extends EventTarget {
 
   select(number) { this.stations.select(number); }
 
-  // From a station's head; a number, or as setStations() has it. Without one: from the first.
+  // Looks from a station's head; the station is a number, or as setStations() has it. Without one it is the first.
   lookFrom(station = this.stations.list[0]) {
     const s = typeof station === 'object' && station !== null ? station : this.stations.get(Number(station));
     if (!s) return;
@@ -195,7 +197,7 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
-  // From now on turns about the point at a place of the canvas, and goes half the way to it.
+  // Turns about the point at a place of the canvas from now on, and goes half the distance to it.
   lookAt({x, y}) {
     searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
       if (!found) return;
@@ -207,7 +209,7 @@ export class View extends EventTarget {
     });
   }
 
-  // Resolves once all that is there is on the page.
+  // Resolves once all present points are on the page.
   screenshotReady() {
     this.#ask('show');
     return new Promise((resolve) => this.#waiting.push(resolve));
@@ -348,7 +350,7 @@ export class View extends EventTarget {
     }
   }
 
-  // Draws the shown picture, shaded, with its overlay, into a target that goes onto the page once it is done.
+  // Draws the shown picture, shaded and with its overlay, into a target that is put onto the page once it is done.
   #present() {
     const gl = this.#gl;
     const {shade} = this.programs;
@@ -374,7 +376,7 @@ export class View extends EventTarget {
     this.#made = {target, camera: Object.assign(new Camera(), this.camera), moving: this.#moving};
   }
 
-  // Onto the page, now that the GPU has it.
+  // Puts it onto the page, now that the GPU has it.
   #put(now) {
     const {target, camera, moving} = this.#made;
     this.#made = null;
@@ -428,7 +430,7 @@ export class View extends EventTarget {
     const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (w === 0 || h === 0) return;
     if (this.#size?.[0] !== w || this.#size?.[1] !== h || !this.#painter.shown) {
-      this.#size = [w, h]; // the canvas gets it with its picture: it is black from then on
+      this.#size = [w, h]; // the canvas gets its size with its picture, since a new size makes it black
       this.#made = null;
       this.#painter.resize(w, h);
       this.#want.camera = true;
@@ -440,7 +442,8 @@ export class View extends EventTarget {
     this.#want.overlay = true;
   }
 
-  // A frame of a moving view where the GPU is slow: half as wide and high, and without what costs by the pixel.
+  // Where the GPU is slow, a frame of a moving view is half as wide and high, and without effects that take time per
+  // pixel.
   get #plain() { return this.#painter.moving.points < PLAIN; }
 
   // ---- what follows from the cloud
@@ -449,14 +452,14 @@ export class View extends EventTarget {
   #follow() {
     const {cloud} = this;
     const gone = cloud.gone;
-    if (cloud.origin !== this.#origin) { // cleared, and perhaps filled again since
+    if (cloud.origin !== this.#origin) { // the cloud was cleared, and perhaps filled again
       this.#origin = cloud.origin;
       this.#lastGone = this.#goneDrawn = 0;
       this.#scale.forget();
       this.#fitted = 0;
       this.#want.restart = 'now';
     }
-    if (cloud.replaced !== this.#replaced) { // at once: the old points are elsewhere
+    if (cloud.replaced !== this.#replaced) { // it is done at once, since the old points are elsewhere
       this.#replaced = cloud.replaced;
       this.#want.restart = 'now';
     }
@@ -472,7 +475,7 @@ export class View extends EventTarget {
     return true;
   }
 
-  // Until the user has moved the view, it shows all: the scene, or where there is none the points so far.
+  // Until the user has moved the view, it shows everything: the scene, or the points so far if there is none.
   #fitUntouched() {
     if (this.#touched) return;
     this.#fitted = this.cloud.total;

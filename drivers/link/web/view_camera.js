@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The camera: where the eye is, where it looks, and what lies where on the screen. Pure; lengths in metres, angles in
-// radians, scene frame (x east, y north, z up) in doubles. Screen places are CSS pixels from the top left corner.
+// The camera has the place and direction of the eye, and converts between scene and screen. It is pure; lengths are in
+// metres, angles in radians, in the scene frame (x east, y north, z up) in doubles. Screen places are CSS pixels from
+// the top left corner.
 //
 // Depth is logarithmic: from NEAR_M to FAR_M each doubling of the distance has the same share of the 24 bits, so two
 // points 1.2 um apart at 1 m, or 1.2 mm at 1 km, are told apart. Shaders and test have the same formula.
@@ -9,7 +10,7 @@ export const NEAR_M = 1e-3;
 export const FAR_M = 1e6;
 const TURN = 2 * Math.PI;
 const STEEPEST = Math.PI / 2 - 1e-3;
-const FILLED = 0.97; // share of the picture's width or height that a fitted box fills
+const FILLED = 0.97; // a fitted box fills this share of the picture's width or height
 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const add = (a, b, k = 1) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
@@ -18,10 +19,10 @@ export const clamp = (v, lo, hi) => Math.min(hi, Math.max(lo, v));
 export const degrees = (rad) => ((rad * 180 / Math.PI) % 360 + 360) % 360;
 export const radians = (deg) => deg * Math.PI / 180;
 
-// Depth of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
+// Returns the depth of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
 export const depthOf = (w) => Math.log2(w / NEAR_M) / Math.log2(FAR_M / NEAR_M);
 
-// A double as the sum of two floats; the difference to a float coordinate, hi first, loses nothing near the eye.
+// Returns a double as the sum of two floats; the difference to a float coordinate, hi first, is exact near the eye.
 export function split(v) {
   const hi = v.map(Math.fround);
   return {hi, lo: v.map((c, a) => Math.fround(c - hi[a]))};
@@ -30,9 +31,9 @@ export function split(v) {
 export class Camera {
   target = [0, 0, 0];
   distance = 10;
-  azimuth = radians(-35); // of the line of sight, clockwise from north
+  azimuth = radians(-35); // it is the heading of the line of sight, clockwise from north
   elevation = radians(-25);
-  fov = radians(50); // across the shorter side
+  fov = radians(50); // it is the angle across the shorter side
   inside = false; // the eye stays, as in a head: turning looks round
   width = 1;
   height = 1;
@@ -48,13 +49,13 @@ export class Camera {
   }
   get eye() { return add(this.target, this.forward, -this.distance); }
 
-  // Pixels of one metre at the distance of one metre.
+  // Returns the pixels of one metre at the distance of one metre.
   get focal() { return 0.5 * Math.min(this.width, this.height) / Math.tan(0.5 * this.fov); }
 
-  // Rows: right, up, forward.
+  // Its rows are right, up and forward.
   get rotation() { return [this.right, this.up, this.forward]; }
 
-  // {x, y, w}: w is the distance along the line of sight; at most 0: behind the eye.
+  // Returns {x, y, w}: w is the distance along the line of sight; a place behind the eye has at most 0.
   project(p) {
     const d = sub(p, this.eye);
     const w = dot(d, this.forward);
@@ -62,7 +63,7 @@ export class Camera {
     return {x: 0.5 * this.width + k * dot(d, this.right), y: 0.5 * this.height - k * dot(d, this.up), w};
   }
 
-  // Direction of the ray through a place of the screen, with a length of 1 along the line of sight.
+  // Returns the direction of the ray through a place of the screen, with a length of 1 along the line of sight.
   ray(x, y) {
     const {focal} = this;
     return add(add(this.forward, this.right, (x - 0.5 * this.width) / focal), this.up, (0.5 * this.height - y) / focal);
@@ -96,7 +97,8 @@ export class Camera {
     this.target = add(add(this.target, this.right, -dx * k), this.up, dy * k);
   }
 
-  // factor < 1: nearer; the place p stays where it is on the screen. From inside the field of view changes instead.
+  // With factor < 1 the eye comes nearer; the place p stays where it is on the screen. From inside the field of view
+  // changes instead.
   zoom(factor, p) {
     if (this.inside) {
       this.fov = clamp(this.fov * factor, radians(2), radians(110));
@@ -108,7 +110,7 @@ export class Camera {
     this.distance = distance;
   }
 
-  // All of a box in sight.
+  // Brings all of a box into sight.
   fit({min, max}) {
     if (this.inside) this.elevation = radians(-25);
     this.inside = false;
@@ -133,7 +135,8 @@ export class Camera {
     this.target = add(eye, this.forward, this.distance);
   }
 
-  // Is any of a box in the pyramid of sight? lo, hi: relative to origin. Never false where it is.
+  // Returns whether any part of a box is in sight; lo and hi are relative to origin. It may be true for a box out of
+  // sight, but never false for one in sight.
   sees(lo, hi, origin) {
     const eye = sub(this.eye, origin);
     const [right, up, forward] = this.rotation;
@@ -148,8 +151,8 @@ export class Camera {
   }
 }
 
-// Where the ray through a place of the screen meets the plane z = height; beyond `reach` from the eye, or where it
-// doesn't, the place at that reach in the ray's direction, on the plane.
+// Returns the place where the ray through a place of the screen hits the plane z = height. Beyond `reach` from the
+// eye, or without a hit, it is the place at that reach in the ray's direction, on the plane.
 export function onPlane(camera, x, y, height, reach) {
   const {eye} = camera;
   const ray = camera.ray(x, y);
@@ -160,17 +163,17 @@ export function onPlane(camera, x, y, height, reach) {
   return [eye[0] + d * ray[0] / along, eye[1] + d * ray[1] / along, height];
 }
 
-// Heading, degrees clockwise from north, from one place to another.
+// Returns the heading from one place to another, in degrees clockwise from north.
 export const headingTo = (from, to) => degrees(Math.atan2(to[0] - from[0], to[1] - from[1]));
 
-// A step of an arrow key along the axis of the scene that lies nearest to where the arrow points on the screen.
+// Returns a step of an arrow key along the scene axis that is closest to the arrow's direction on the screen.
 export function arrowStep(camera, key, step) {
   const turns = {ArrowUp: 0, ArrowRight: 1, ArrowDown: 2, ArrowLeft: 3}[key];
   const quarter = (Math.round(camera.azimuth / (Math.PI / 2)) + turns) & 3;
   return [[0, step], [step, 0], [0, -step], [-step, 0]][quarter];
 }
 
-// The largest of 1, 2, 5 times a power of ten that is at most v.
+// Returns the largest of 1, 2, 5 times a power of ten that is at most v.
 export function roundBelow(v) {
   const power = 10 ** Math.floor(Math.log10(v));
   for (const k of [5, 2]) if (k * power <= v * (1 + 1e-12)) return k * power;

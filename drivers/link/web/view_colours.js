@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-// Colours of points: what each mode shows, its ramp and limits, and the legend for it. Pure.
+// This module has the colours of points: each mode with its values, ramp, limits and legend. It is pure.
 //
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
 // `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
-export const NONE = Math.fround(-1e30); // in place of NaN, which shaders needn't know; the same in a Float32Array
+export const NONE = Math.fround(-1e30); // it replaces NaN in shaders, and is exact as a float
 export const GREY = [128, 132, 138];
 
-// The modes, in the order in which they are offered. least: between a ramp's limits, so that it does not show rounding.
+// These are the modes, in the order of the menu. least is the smallest difference of a ramp's limits, so that it does
+// not show rounding.
 export const MODES = {
   height: {title: 'Height', unit: 'm', kind: 'ramp', ramp: 'spectrum', least: 0.01},
   range: {title: 'Range', unit: 'm', kind: 'ramp', ramp: 'spectrum', least: 0.01},
@@ -20,7 +21,8 @@ export const MODES = {
   rgb: {title: 'Colour', unit: '', kind: 'rgb'},
 };
 
-// Stops, evenly spaced. Lightness rises or stays in the middle, so that each end can be read on dark and on light.
+// The stops are evenly spaced. Lightness rises, or stays in the middle, so that each end can be read on dark and on
+// light.
 const RAMPS = {
   spectrum: ['#3b4cc0', '#2f7fe0', '#1fb2c9', '#35c98b', '#8fd14f', '#e0c93f', '#f39a35', '#e4572e', '#b5213f'],
   steel: ['#31364a', '#46618c', '#5b8db0', '#86b4bf', '#bfd2c8', '#f2ead2'],
@@ -38,16 +40,16 @@ export function rampAt(name, f) {
   return a.map((v, c) => v + (at - i) * (b[c] - v));
 }
 
-// Hues a golden angle apart, with lightness in four steps: neighbours in number differ most.
+// Hues are a golden angle apart, with lightness in four steps, so that neighbouring numbers differ most.
 function listColour(k) {
   const hue = (k * 137.508 + 210) % 360, light = [0.58, 0.48, 0.68, 0.54][k & 3], sat = [0.62, 0.7, 0.55, 0.42][(k >> 2) & 3];
-  return [0, 8, 4].map((n) => { // the usual HSL to RGB, by its closed form
+  return [0, 8, 4].map((n) => { // this is the usual HSL to RGB, by its closed form
     const h = (n + hue / 30) % 12;
     return 255 * (light - sat * Math.min(light, 1 - light) * Math.max(-1, Math.min(h - 3, 9 - h, 1)));
   });
 }
 
-// 256 colours, four bytes each.
+// Returns 256 colours, four bytes each.
 export function tableOf(mode) {
   const table = new Uint8Array(4 * 256);
   const {kind, ramp} = MODES[mode];
@@ -58,13 +60,13 @@ export function tableOf(mode) {
   return table;
 }
 
-// The index into ECHOES of a packed echo number and count.
+// Returns the index into ECHOES of a packed echo number and count.
 const echoClass = (packed) => {
   const echo = packed & 15, echoes = packed >> 4;
   return echoes <= 1 ? 0 : echo === 1 ? 1 : echo === echoes ? 3 : 2;
 };
 
-// The numbers of points from..to of a block; for rgb four bytes a point in the same buffer.
+// Returns the numbers of points from..to of a block; for rgb four bytes a point in the same buffer.
 export function valuesOf(block, mode, from, to, base = 0) {
   const n = to - from;
   const out = new Float32Array(n);
@@ -88,7 +90,7 @@ export function valuesOf(block, mode, from, to, base = 0) {
   return out;
 }
 
-// A few numbers of each block, spread evenly; of those that are known.
+// Returns a few known numbers of each block, spread evenly.
 export function sampleOf(cloud, mode, most = 20000) {
   const each = Math.max(16, Math.floor(most / Math.max(1, cloud.blocks.length)));
   const all = [];
@@ -103,7 +105,8 @@ export function sampleOf(cloud, mode, most = 20000) {
   return all.filter((v) => v !== NONE && v === v);
 }
 
-// Limits from the 1st to the 99th percentile, a little wider, so that single far points don't take all colours. They
+// Returns limits from the 1st to the 99th percentile, a little wider, so that single far points don't use up all
+// colours. They
 // are at least `least` apart; null without values.
 export function robustLimits(values, least = 0) {
   if (values.length === 0) return null;
@@ -114,14 +117,14 @@ export function robustLimits(values, least = 0) {
   return [lo - margin, hi + margin];
 }
 
-// The limits after more points: widened where the fresh ones exceed them by more than a tenth of their range.
+// Returns the limits after more points, widened if the new points exceed them by more than a tenth of their range.
 export function widened(old, fresh) {
   if (old === null || fresh === null) return fresh ?? old;
   const slack = 0.1 * (old[1] - old[0]);
   return [fresh[0] < old[0] - slack ? fresh[0] : old[0], fresh[1] > old[1] + slack ? fresh[1] : old[1]];
 }
 
-// Steps of 1, 2 or 5 times a power of ten within the limits, at most `most`.
+// Returns steps of 1, 2 or 5 times a power of ten within the limits, at most `most`.
 export function ticks([lo, hi], most = 6) {
   const raw = (hi - lo) / most;
   const power = 10 ** Math.floor(Math.log10(raw));
@@ -132,7 +135,8 @@ export function ticks([lo, hi], most = 6) {
   return out;
 }
 
-// The legend for panels: {mode, title, unit, none}. A ramp adds {stops: colours, from, to, ticks: [{at, text}]}, a list
+// Returns the legend for panels: {mode, title, unit, none}. A ramp adds {stops: colours, from, to, ticks: [{at,
+// text}]}, a list
 // {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names the item. A colour is
 // [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of their own.
 export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true}) {

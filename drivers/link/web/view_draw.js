@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-// Draws parts piece by piece into a picture that is kept: a prefix of each part while the view moves, the rest once it
+// Draws parts piece by piece into a stored picture: a prefix of each part while the view moves, the rest once it
 // rests, and only new points as they come.
 //
-// A part: {n, drawn, weight, skip, draw(from, to)}. `drawn` of its elements are in the picture being worked on. The
+// A part is {n, drawn, weight, skip, draw(from, to)}. `drawn` of its elements are in the picture being worked on. The
 // amount per step follows from the time that the last steps took on the GPU (by fences), so that a step takes STEP_MS.
 
 import {Target} from './view_gl.js';
 
-const STEP_MS = 40; // a step while the view rests
-const MOVE_MS = 55; // a frame while it moves
+const STEP_MS = 40; // a step may take so long while the view rests
+const MOVE_MS = 55; // a frame may take so long while it moves
 const LEAST = 25_000;
 const MOST = 20_000_000;
 
-// Points of a resting view that are spread over all parts, before the rest comes part by part: each call to draw costs
-// as much as 1000 points.
+// So many points of a resting view are spread over all parts before the rest comes part by part, since each call to
+// draw takes as long as 1000 points.
 const EVENLY = 400_000;
 
 export class Budget {
@@ -22,14 +22,14 @@ export class Budget {
     this.points = points;
   }
 
-  // A step of `points` took `ms`. If it had fewer points than allowed, it says nothing about larger steps.
+  // A step of `points` took `ms`. If it had fewer points than allowed, it does not apply to larger steps.
   took(ms, points) {
     const factor = Math.min(1.6, Math.max(0.4, this.goal_ms / Math.max(1, ms)));
     if (factor < 1 || points > 0.7 * this.points) this.points = Math.min(MOST, Math.max(LEAST, this.points * factor));
   }
 }
 
-// How many elements of each part shall be drawn, for `more` in all: the same share of each. Pure.
+// Returns how many elements of each part are to be drawn, for `more` in all: the same share of each. It is pure.
 export function shares(parts, more) {
   let all = 0, done = 0;
   for (const part of parts) {
@@ -41,7 +41,8 @@ export function shares(parts, more) {
   return parts.map((part) => (part.skip ? part.drawn : Math.max(part.drawn, f === 1 ? part.n : Math.ceil(f * part.n))));
 }
 
-// The same for a view that rests: first a share of each, then one part after the other. A part that is `whole` is drawn
+// Does the same for a view that rests: first a share of each, then one part after the other. A part that is `whole` is
+// drawn
 // at once, since later it is not known which of its elements a share has left out.
 export function restShares(parts, more) {
   if (progress(parts).drawn < EVENLY) {
@@ -56,8 +57,9 @@ export function restShares(parts, more) {
   });
 }
 
-// The targets: one that is shown, one that is drawn into (the same, or one that replaces it once it has enough points),
-// and one for the page. Those of a moving view are smaller. A frame for the page is drawn aside, and put onto the
+// There are three targets: one that is shown, one that is drawn into (the same, or one that replaces it once it has
+// enough points), and one for the page. Those of a moving view are smaller. A frame for the page is drawn aside, and
+// put onto the
 // canvas only once the GPU has it: a browser that composes in software waits for the canvas, and the page waits, too.
 export class Painter {
   moving = new Budget(MOVE_MS, 150_000);
@@ -76,8 +78,8 @@ export class Painter {
   constructor(gl) { this.#gl = gl; }
 
   get shown() { return this.#shown; }
-  get scale() { return this.#work.scale; } // of what is drawn into
-  get swapped() { return this.#work === this.#shown; } // is what is drawn into also what is shown?
+  get scale() { return this.#work.scale; } // it is that of the target that is drawn into
+  get swapped() { return this.#work === this.#shown; } // it is true if the target that is drawn into is also shown
 
   resize(width, height) {
     for (const target of new Set([this.#shown, this.#work, ...this.#spare])) target?.free();
@@ -94,14 +96,14 @@ export class Painter {
     return new Target(this.#gl, Math.max(1, Math.round(this.#width * scale)), Math.max(1, Math.round(this.#height * scale)), scale);
   }
 
-  // A target for what goes onto the page, of the same scale as what is shown.
+  // Returns a target for the page, of the same scale as the shown one.
   pageTarget() {
     const target = this.#take(this.#shown.scale);
     this.#spare.push(target); // nobody else takes one before it is on the page
     return target;
   }
 
-  // Anew, from nothing. `enough`: the old picture stays on the page until the new one has so many points.
+  // Starts again with an empty picture. The old one stays on the page until the new one has `enough` points.
   begin(parts, enough = 0, scale = 1) {
     if (this.#work !== this.#shown) this.#spare.push(this.#work);
     this.#work = this.#shown;
@@ -118,7 +120,7 @@ export class Painter {
     this.#shown = this.#work;
   }
 
-  // Draws up to so many points more; how many it drew. of: shares or restShares.
+  // Draws up to so many more points, and returns how many it drew. of is shares or restShares.
   draw(parts, points, of = restShares) {
     const upTo = of(parts, points);
     let did = 0;
@@ -136,7 +138,7 @@ export class Painter {
     return did;
   }
 
-  // After a step's last command; then(ms) once the GPU has done it.
+  // Call it after a step's last command; it calls then(ms) once the GPU has done it.
   fence(then) {
     const gl = this.#gl;
     this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -145,7 +147,7 @@ export class Painter {
     this.#then = then;
   }
 
-  // Is the GPU still at the last step? To be asked between tasks of the page.
+  // Returns whether the GPU still does the last step. Call it between tasks of the page.
   busy() {
     const gl = this.#gl;
     if (this.#fence === null) return false;

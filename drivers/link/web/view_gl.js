@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Shaders, programs and targets of the picture: WebGL 2, and nothing of what they are used for.
+// This module has shaders, programs and targets of the picture in WebGL 2, but not their use.
 //
 // All positions are relative to an origin of their own; the eye relative to it comes as the sum of two floats. Depth is
 // logarithmic (view_camera.js), and stands in the target's texture, where shading and hiding read it.
@@ -52,7 +52,8 @@ out vec4 colour;
 void main() { colour = vec4(v_colour, 1.0); }`,
 };
 
-// Triangles and lines. Hidden ones are left out, or faint, by the depth texture of what was drawn before (u_behind).
+// These draw triangles and lines. Hidden ones are left out, or faint, by the depth texture of the earlier drawing
+// (u_behind).
 const MESH = {
   vertex: `${HEAD}${PLACE}
 layout(location = 0) in vec3 a_position;
@@ -91,7 +92,7 @@ void main() {
 }`,
 };
 
-// Puts the picture onto the page: the ground where nothing is, and darker beside nearer things (eye-dome lighting,
+// Puts the picture onto the page: the ground where it is empty, and darker beside nearer things (eye-dome lighting,
 // Boucheny 2009). With logarithmic depth the shading is the same at all scales.
 const SHADE = {
   vertex: `${HEAD}
@@ -128,7 +129,7 @@ function compile(gl, type, text) {
   return shader;
 }
 
-// {program, <uniform's name>: location}
+// Returns {program, <uniform's name>: location}.
 function link(gl, {vertex, fragment}) {
   const program = gl.createProgram();
   const shaders = [compile(gl, gl.VERTEX_SHADER, vertex), compile(gl, gl.FRAGMENT_SHADER, fragment)];
@@ -159,7 +160,8 @@ function texture(gl, internal, format, type, width, height, data = null) {
 
 export const tableTexture = (gl, table) => texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 256, 1, table);
 
-// A picture that is kept between frames, so that points can be added to it. scale: its pixels to those of the page.
+// This is a picture that is stored between frames, so that points can be added to it. scale is the ratio of its pixels
+// to those of the page.
 export class Target {
   constructor(gl, width, height, scale = 1) {
     this.gl = gl;
@@ -190,7 +192,7 @@ export class Target {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  // Onto the canvas, which has so many pixels.
+  // Puts it onto the canvas, which has so many pixels.
   toPage(width, height) {
     const {gl} = this;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.buffer);

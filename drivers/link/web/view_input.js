@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Pointer, touch, wheel and keys on the picture, turned into turns, shifts and zooms of the camera.
+// This module turns pointer, touch, wheel and keys on the picture into turns, shifts and zooms of the camera.
 //
 //   drag, one finger          orbit about what is under the pointer; look round from inside
 //   right or middle button, Shift or Ctrl and drag, two fingers     shift; two fingers also zoom
@@ -21,7 +21,7 @@ const TAP_PX = 6;
 
 export class Input {
   #view;
-  #down = new Map(); // pointer id -> {x, y}
+  #down = new Map(); // it maps a pointer's id to {x, y}
   #gesture = null;
   #moved = 0;
   #tap = {time: 0, x: 0, y: 0};
@@ -53,7 +53,7 @@ export class Input {
     view.canvas.focus({preventScroll: true});
     try {
       view.canvas.setPointerCapture(e.pointerId);
-    } catch { /* a pointer that was made by a script */ }
+    } catch { /* a script made this pointer */ }
     this.#down.set(e.pointerId, p);
     view.hover(null);
     view.touched();
@@ -112,7 +112,7 @@ export class Input {
 
   #turn(dx, dy, place) {
     const {camera} = this.#view;
-    if (camera.inside) { // what is seen goes with the pointer
+    if (camera.inside) { // the picture moves with the pointer
       const k = 1 / camera.focal;
       camera.turn(-dx * k, dy * k);
     } else camera.orbit(place, dx * TURN_PER_PX, -dy * TURN_PER_PX);
@@ -167,7 +167,7 @@ export class Input {
     const factor = Math.exp(Math.max(-300, Math.min(300, e.deltaY * lines)) * 0.0016);
     const now = performance.now();
     const g = this.#gesture;
-    // One turn of the wheel holds on to one place.
+    // One turn of the wheel keeps one place.
     if (g?.kind !== 'wheel' || now - g.time > 400 || Math.hypot(p.x - g.x, p.y - g.y) > 4) {
       this.#gesture = {kind: 'wheel', ...p, place: camera.inside ? null : grip(cloud, camera, p.x, p.y)};
     }

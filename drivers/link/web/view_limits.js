@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-// Limits of the colours and of the view, from the cloud's points. They change rarely, so that nothing flickers: each
+// This class finds limits of the colours and of the view from the cloud's points. They change rarely, so that nothing
+// flickers: each
 // time the cloud has twice the points, and then only if they miss much.
 
 import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
 
-const AGED = 1.15; // the mode age: its limits follow sooner
+const AGED = 1.15; // in the mode age the limits follow sooner
 
 export class Scale {
   mode = 'height';
-  limits = null; // heights: relative to the cloud's origin
+  limits = null; // heights are relative to the cloud's origin
   #cloud;
-  #fixed = null; // what the user set, in the scene frame
-  #at = 0; // total when they were found
+  #fixed = null; // the user set these, in the scene frame
+  #at = 0; // it is the total when they were found
   #sample = [];
   #legend = null;
 
@@ -43,7 +44,7 @@ export class Scale {
     return this.#legend;
   }
 
-  // {first, changed}: there are limits for the first time; others than before.
+  // Returns {first, changed}: there are limits for the first time, or other ones than before.
   follow() {
     const {total, blocks} = this.#cloud;
     const due = total > this.#at && (total >= 2 * this.#at || (this.mode === 'age' && total > AGED * this.#at));
@@ -60,7 +61,7 @@ export class Scale {
   }
 }
 
-// Without the far ends of the points. {min, max} in the scene frame, or null.
+// Returns {min, max} in the scene frame, without the far ends of the points, or null.
 function robustBox({blocks, origin}) {
   const axes = [[], [], []];
   for (const block of blocks) {
@@ -71,8 +72,8 @@ function robustBox({blocks, origin}) {
   return {min: limits.map((l, a) => l[0] + origin[a]), max: limits.map((l, a) => l[1] + origin[a])};
 }
 
-// The box of a view of all: the points (or, before there are any, the scene), and the stations. sceneFirst: the scene,
-// even if there are points.
+// Returns the box of a view of everything: the points (or the scene, before there are any) and the stations.
+// sceneFirst takes the scene even if there are points.
 export function boxOf(cloud, stations, solids, sceneFirst = false) {
   const scene = sceneFirst || cloud.count <= 500 ? solids.bounds() : null;
   const box = scene ?? (cloud.count > 500 ? robustBox(cloud) : cloud.bounds);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-// Meshes as arrays: the coarse scene from its bytes, its edges, and the shapes of a station. Pure.
+// This module makes meshes as arrays: the coarse scene from its bytes, its edges, and the shapes of a station. It is
+// pure.
 
 const MAGIC = 0x43534853; // "SHSC"
 
-// {origin, positions, triangles} of the bytes of /scene; throws an Error that says what is wrong with them.
+// Returns {origin, positions, triangles} of the bytes of /scene. It throws an Error that says what is wrong with them.
 export function parseScene(buffer) {
   const view = ArrayBuffer.isView(buffer) ? new DataView(buffer.buffer, buffer.byteOffset, buffer.byteLength) : new DataView(buffer);
   if (view.byteLength < 40) throw new Error(`scene of ${view.byteLength} bytes: its header has 40`);
@@ -18,7 +19,7 @@ export function parseScene(buffer) {
   return {origin: [16, 24, 32].map((at) => view.getFloat64(at, true)), positions: new Float32Array(bytes, 0, 3 * nVertices), triangles};
 }
 
-// Edges where faces meet at more than `least` radians, and borders, as pairs of vertices; the longest first.
+// Returns edges where faces meet at more than `least` radians, and borders, as pairs of vertices, the longest first.
 export function featureEdges(positions, triangles, least = 0.6) {
   const same = new Map(); // vertices at the same place are one
   const id = new Uint32Array(positions.length / 3);
@@ -75,7 +76,7 @@ function rod(mesh, a, b, ra, rb = ra, sides = 8) {
   }
 }
 
-// A station, its head's origin at 0, heading north: a body, its mirror's window, a mark to the front.
+// Makes a station with its head's origin at 0, heading north: a body, its mirror's window, a mark to the front.
 export function stationMesh() {
   const mesh = {positions: [], triangles: []};
   rod(mesh, [0, 0, -0.22], [0, 0, -0.1], 0.1, 0.1, 12);
@@ -87,11 +88,11 @@ export function stationMesh() {
   return packed(mesh);
 }
 
-// How far a tripod's feet are below the head's origin; of none: the body's lower end.
+// Returns the depth of a tripod's feet below the head's origin; without a tripod that of the body's lower end.
 export const feetBelow = (tripod) => (tripod ?
   tripod.head_above_m + Math.sqrt(Math.max(0, tripod.leg_m ** 2 - tripod.foot_radius_m ** 2)) : 0.22);
 
-// The legs of a tripod, the head's origin at 0, the first leg towards north.
+// Makes the legs of a tripod, with the head's origin at 0 and the first leg towards north.
 export function legsMesh(tripod) {
   const mesh = {positions: [], triangles: []};
   const r = tripod.foot_radius_m;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The overlay over the points: scale bar, axes with north, stations' names and handles, the point under the pointer. It
-// is a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
+// The overlay has the scale bar, axes with north, stations' names and handles, and the point under the pointer. It is
+// a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
 
 import {roundBelow} from './view_camera.js';
 
@@ -13,7 +13,7 @@ function lengthText(m) {
   return m >= 1000 ? `${round(m / 1000)} km` : m >= 1 ? `${round(m)} m` : m >= 0.01 ? `${round(m * 100)} cm` : `${round(m * 1000)} mm`;
 }
 
-// The bar at the target's distance: {px, m}, at most `most` pixels.
+// Returns the bar at the target's distance: {px, m}, at most `most` pixels.
 function scaleBar(camera, most = 150) {
   const m = roundBelow(most * camera.distance / camera.focal);
   return {m, px: m * camera.focal / camera.distance};
@@ -79,7 +79,7 @@ export class Overlay {
     c.textBaseline = 'middle';
     c.lineWidth = 3.5;
     c.strokeStyle = this.colours.ground;
-    if (inside) { // of the picture: a name at its edge is moved, not cut
+    if (inside) { // a name at the picture's edge is moved, not cut
       const half = 0.5 * c.measureText(text).width + 4;
       if (x > -half && x < inside + half) x = Math.max(half, Math.min(inside - half, x));
     }
@@ -157,7 +157,7 @@ export class Overlay {
     c.stroke();
   }
 
-  // From where to where, and how far.
+  // Shows the begin and end of a move, and its length.
   #moving(camera, station, moved, head, pending) {
     const from = camera.project([station.x_m, station.y_m, station.z_m]);
     const d = [moved.x - station.x_m, moved.y - station.y_m, moved.z - station.z_m];

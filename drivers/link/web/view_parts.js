@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The parts that are drawn into the kept picture (view_draw.js): blocks of points with their buffers on the GPU, and
-// meshes.
+// This module has the parts that are drawn into the stored picture (view_draw.js): blocks of points with their buffers
+// on the GPU, and meshes.
 
 import {MODES, GREY, tableOf, valuesOf} from './view_colours.js';
 import {setPlace, tableTexture} from './view_gl.js';
@@ -8,13 +8,13 @@ import {split, sub} from './view_camera.js';
 
 const STRIDE_MOST = 21; // 255 bytes of 12
 
-// One block of a cloud: positions, and one number a point for the colour mode.
+// This is one block of a cloud: positions, and one number a point for the colour mode.
 class BlockPart {
   weight = 1;
   drawn = 0;
   skip = false;
-  #held = 0; // positions on the GPU
-  #valued = 0; // numbers on the GPU, of
+  #held = 0; // it has the positions on the GPU
+  #valued = 0; // it has the numbers on the GPU, for
   #mode = null;
   #closed = false;
   #capacity = 0;
@@ -47,7 +47,7 @@ class BlockPart {
   #upload() {
     const {gl, mode, base} = this.points;
     const {block} = this;
-    if (block.closed && !this.#closed) { // in another order now
+    if (block.closed && !this.#closed) { // they are in another order now
       this.#closed = true;
       this.#capacity = this.#held = this.#valued = 0;
     }
@@ -77,7 +77,7 @@ class BlockPart {
     const {gl} = this.points;
     this.points.use();
     this.#upload();
-    // The block that is still filled is in the order of the scan: every k-th point of it.
+    // The block that is still filled is in the order of the scan, so every k-th point is drawn.
     const k = !this.block.closed && from === 0 ? Math.min(STRIDE_MOST, Math.floor(this.n / to)) : 1;
     if (k > 1) {
       this.#layout(k);
@@ -104,14 +104,14 @@ class BlockPart {
   }
 }
 
-// The cloud's blocks as parts.
+// This class has the cloud's blocks as parts.
 export class Points {
   parts = [];
   mode = 'height';
   limits = [0, 1];
-  base = 0; // number of the point that counts as 0 in the mode age
+  base = 0; // the point of this number counts as 0 in the mode age
   size = 2; // pixels
-  scale = 1; // pixels of the target to those of the page
+  scale = 1; // it is the ratio of the target's pixels to those of the page
   #using = false;
   #table = null;
   #known = new Map();
@@ -126,7 +126,7 @@ export class Points {
     this.#table = tableTexture(this.gl, tableOf(mode));
   }
 
-  // Takes over what the cloud has. True: blocks are gone that were drawn.
+  // Takes over the blocks of the cloud. It returns true if drawn blocks are gone.
   follow() {
     let gone = false;
     const {blocks} = this.cloud;
@@ -149,7 +149,7 @@ export class Points {
     return gone;
   }
 
-  // Before each step: the camera; parts out of sight are left out.
+  // Takes the camera before each step; parts out of sight are left out.
   aim(camera) {
     this.camera = camera;
     this.#using = false;
@@ -175,7 +175,7 @@ export class Points {
   }
 }
 
-// Uniforms of the mesh program that have a usual value.
+// These uniforms of the mesh program have a usual value.
 export function useMesh(gl, program, camera, origin, {colour, edge = 0, push = 1, faint = 1, flat = false, behind = null,
   shift = [0, 0, 0], heading = 0}) {
   gl.useProgram(program.program);
@@ -194,12 +194,13 @@ export function useMesh(gl, program, camera, origin, {colour, edge = 0, push = 1
   gl.activeTexture(gl.TEXTURE0);
 }
 
-// A mesh on the GPU. {origin (scene frame), positions Float32 relative to it, triangles Uint32, lines Uint32 or none}
+// This is a mesh on the GPU: {origin (scene frame), positions Float32 relative to it, triangles Uint32, lines Uint32
+// or none}
 export class Mesh {
   weight = 2;
   drawn = 0;
   skip = false;
-  n = 0; // triangles to draw, from the first on
+  n = 0; // so many triangles are drawn, from the first on
 
   constructor(gl, program, {origin, positions, triangles, lines = null, drawTriangles = null}) {
     Object.assign(this, {gl, program, origin});
@@ -231,7 +232,7 @@ export class Mesh {
     return array;
   }
 
-  // As a part of the kept picture; `look` and `camera` are set before.
+  // Returns it as a part of the stored picture; `look` and `camera` are set before.
   draw(from, to) {
     useMesh(this.gl, this.program, this.camera, this.origin, this.look);
     this.triangles(from, to);
@@ -242,7 +243,7 @@ export class Mesh {
     this.gl.drawElements(this.gl.TRIANGLES, 3 * (to - from), this.gl.UNSIGNED_INT, 12 * from);
   }
 
-  // At most so many, from the first on.
+  // Draws at most so many, from the first on.
   lines(most = Infinity) {
     if (this.nLines === 0) return;
     this.gl.bindVertexArray(this.edges);

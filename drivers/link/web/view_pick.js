@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Finds the point under the pointer: the nearest one on the screen; nearer ones win over those behind them. Pure.
+// Finds the point under the pointer: the nearest one on the screen; nearer ones win over those behind them. It is pure.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
@@ -8,8 +8,8 @@ import {dot, sub} from './view_camera.js';
 // Four pixels beside the pointer count as much as lying a tenth further away.
 const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
 
-// Whether a box may have a place at most `slope` from the ray, per length along it. It tests the sphere around the box,
-// so it may be true without such a place. centre, half: relative to the eye.
+// Returns whether a box may have a place at most `slope` from the ray, per length along it. It tests the sphere around
+// the box, so it may be true without such a place. centre and half are relative to the eye.
 function meets(block, eye, forward, slope) {
   const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
   const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));
@@ -21,14 +21,14 @@ function meets(block, eye, forward, slope) {
 }
 
 // Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null.
-// limit: points of each block that are looked at.
+// limit is the number of points of each block that it tests.
 export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   if (cloud.origin === null) return null;
   const eye = sub(camera.eye, cloud.origin);
   const ray = camera.ray(x, y);
   const length = Math.hypot(...ray);
   const f = ray.map((c) => c / length);
-  const k = camera.focal * length; // pixels per slope, near the ray
+  const k = camera.focal * length; // these are pixels per slope, near the ray
   const slope = radius_px / k;
   const slope2 = slope * slope;
   let best = null;
@@ -63,13 +63,13 @@ export function nearest(cloud, camera, x, y, radius_px, limit) {
   }
 }
 
-// The place that a gesture at (x, y) holds on to: of a sample of the points, else at the target's distance.
+// Returns the place that a gesture at (x, y) keeps: of a sample of the points, else at the target's distance.
 export function grip(cloud, camera, x, y) {
   const found = nearest(cloud, camera, x, y, 14, 4096);
   return camera.at(x, y, found ? found.w : camera.distance);
 }
 
-// The same, slices of a few milliseconds at a time, so that the page goes on. The callback gets the result; the
+// Does the same in slices of a few milliseconds, so that the page goes on. The callback gets the result; the
 // function returned stops it.
 export function searchSlowly(cloud, camera, x, y, radius_px, then, slice_ms = 6) {
   const steps = search(cloud, camera, x, y, radius_px);
@@ -89,7 +89,7 @@ export function searchSlowly(cloud, camera, x, y, radius_px, then, slice_ms = 6)
   return () => clearTimeout(timer);
 }
 
-// Distance from a place of the screen to a line between two, pixels.
+// Returns the distance from a place of the screen to a line between two, in pixels.
 export function toSegment(x, y, a, b) {
   const dx = b.x - a.x, dy = b.y - a.y;
   const t = Math.min(1, Math.max(0, ((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1)));

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Draws all but the points: the coarse scene, a recording's mesh, the stations. Owns their buffers on the GPU.
+// Draws everything except the points: the coarse scene, a recording's mesh, the stations. It owns their buffers on the
+// GPU.
 
 import {Mesh, useMesh} from './view_parts.js';
 import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
@@ -9,12 +10,12 @@ import {radians} from './view_camera.js';
 const EDGES = 16_000, EDGES_MOVING = 3_000;
 
 export class Solids {
-  scene = null; // {origin, positions, triangles, lines}: kept, so that a lost context can be made again
+  scene = null; // it stores {origin, positions, triangles, lines}, so that a lost context can be made again
   mesh = null;
-  sceneMode = 'glass'; // 'off', 'glass', 'solid'
+  sceneMode = 'glass'; // it is 'off', 'glass' or 'solid'
   meshOn = true;
   stationsOn = true;
-  #shapes = new Map(); // the body, and legs by the tripod's measures
+  #shapes = new Map(); // it has the body, and legs by the tripod's measures
 
   attach(gl, programs) {
     this.gl = gl;
@@ -24,7 +25,7 @@ export class Solids {
     this.meshPart = this.mesh && new Mesh(gl, this.program, this.mesh);
   }
 
-  // bytes of /scene; null: none.
+  // It takes the bytes of /scene; null: there is none.
   setScene(bytes) {
     this.scene = bytes === null || bytes === undefined ? null : parseScene(bytes);
     if (this.scene) this.scene.lines = featureEdges(this.scene.positions, this.scene.triangles);
@@ -32,7 +33,8 @@ export class Solids {
     this.sceneMesh = this.scene && new Mesh(this.gl, this.program, this.scene);
   }
 
-  // {origin, positions, triangles, drawTriangles}; the same arrays again with another drawTriangles cost nothing.
+  // It takes {origin, positions, triangles, drawTriangles}; the same arrays again with another drawTriangles take no
+  // time.
   setMesh(mesh) {
     const same = mesh && this.mesh && mesh.triangles === this.mesh.triangles && mesh.positions === this.mesh.positions;
     this.mesh = mesh;
@@ -57,7 +59,7 @@ export class Solids {
     return null;
   }
 
-  // The parts of the kept picture, under the points.
+  // Returns the parts of the stored picture, under the points.
   parts(camera, colours) {
     const parts = [];
     if (this.sceneMesh && this.sceneMode === 'solid') {
@@ -67,8 +69,8 @@ export class Solids {
     return parts;
   }
 
-  // Draws over the kept picture, each time it is shown. behind: that picture's depth; plain: only the longest edges of
-  // the scene.
+  // Draws over the stored picture, each time it is shown. behind is that picture's depth; plain draws only the longest
+  // edges of the scene.
   overlay(camera, colours, stations, behind, plain) {
     const {gl} = this;
     gl.enable(gl.DEPTH_TEST);
@@ -84,7 +86,7 @@ export class Solids {
     gl.disable(gl.BLEND);
   }
 
-  // Only the nearest of its faces, then its edges.
+  // It draws only the nearest of its faces, then its edges.
   #glass(camera, colours, behind, plain) {
     const {gl, sceneMesh: mesh} = this;
     const face = {colour: [...colours.scene, 0.07], edge: 0.25, push: 1.002, faint: 0, behind};
@@ -113,7 +115,7 @@ export class Solids {
     const {tripod} = station;
     const {at, heading_deg, ghost} = stations.placeOf(station);
     const eye = camera.eye;
-    if (Math.hypot(...at.map((c, a) => c - eye[a])) < 0.4) return; // looked from
+    if (Math.hypot(...at.map((c, a) => c - eye[a])) < 0.4) return; // the eye is in this station
     const colour = station.number === stations.selected || ghost ? colours.accent : colours.ink;
     const drawOne = (shape, place, heading, alpha) => {
       useMesh(gl, this.program, camera, place, {colour: [...colour, alpha], faint: 0.22, behind, heading: radians(heading)});

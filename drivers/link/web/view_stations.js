@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The stations in the picture: tripods, which one is selected, and moving it: dragged along the plane at its height,
-// turned by its handle, or by keys. While it is moved, a ghost stays where it was.
+// This module has the stations in the picture: tripods, the selected one, and its moves. It is dragged along the plane
+// at its height, and turned by its handle or by keys. During a move a ghost stays at its old place.
 
 import {arrowStep, degrees, headingTo, onPlane, radians} from './view_camera.js';
 import {feetBelow} from './view_mesh.js';
@@ -12,14 +12,14 @@ const KEYS_END_MS = 700; // after so long without a key the station is let go
 export class Stations {
   list = [];
   selected = null; // number
-  moved = null; // {number, x, y, z, heading_deg, what}: where it is being moved to
-  pending = false; // let go, and not yet confirmed by setStations()
+  moved = null; // {number, x, y, z, heading_deg, what} is the place to which it is being moved
+  pending = false; // it was let go, but setStations() has not confirmed it yet
   #changed;
   #tell;
   #timer = 0;
-  #hold = null; // of a drag: {what, dx, dy, dHeading}
+  #hold = null; // a drag is {what, dx, dy, dHeading}
 
-  // changed(): the picture has to be drawn anew; tell(move): a station was let go.
+  // changed() says that the picture must be drawn again; tell(move) says that a station was let go.
   constructor(changed, tell) {
     this.#changed = changed;
     this.#tell = tell;
@@ -53,14 +53,14 @@ export class Stations {
     this.select(this.list[at < 0 ? 0 : (at + step + this.list.length) % this.list.length].number);
   }
 
-  // Where it is drawn, moved or not.
+  // Returns the place where it is drawn, moved or not.
   placeOf(station) {
     const m = this.moved?.number === station.number ? this.moved : null;
     return m ? {at: [m.x, m.y, m.z], heading_deg: m.heading_deg, ghost: true} :
       {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
   }
 
-  // The ring around a station: its radius in metres is at least 46 px on the screen; null: out of sight.
+  // Returns the ring around a station: its radius in metres is at least 46 px on the screen; null: it is out of sight.
   ring(camera, station) {
     const {at, heading_deg} = this.placeOf(station);
     const {w} = camera.project(at);
@@ -71,7 +71,7 @@ export class Stations {
     return {at, radius, heading, place, handle: place(heading)};
   }
 
-  // {number, what: 'move' or 'turn'} under a place of the screen, or null.
+  // Returns {number, what: 'move' or 'turn'} under a place of the screen, or null.
   hit(camera, x, y) {
     let best = null, least = GRAB_PX;
     for (const station of this.list) {
@@ -81,7 +81,7 @@ export class Stations {
       if (station.number === this.selected) {
         const knob = camera.project(ring.handle);
         const d = Math.hypot(knob.x - x, knob.y - y) - 4;
-        if (knob.w > 0 && d < least && Math.hypot(knob.x - head.x, knob.y - head.y) > 14) { // not one behind the other
+        if (knob.w > 0 && d < least && Math.hypot(knob.x - head.x, knob.y - head.y) > 14) { // they are apart
           least = d;
           best = {number: station.number, what: 'turn'};
         }
@@ -114,7 +114,7 @@ export class Stations {
     const hold = this.#hold;
     if (hold === null || !this.get(hold.number)) return;
     if (!hold.began) {
-      if (Math.hypot(x - hold.x, y - hold.y) < 4) return; // a click
+      if (Math.hypot(x - hold.x, y - hold.y) < 4) return; // it was a click
       this.#begin(hold.number);
       hold.began = true;
       const at = [this.moved.x, this.moved.y, this.moved.z];
@@ -122,7 +122,7 @@ export class Stations {
       const on = onPlane(camera, hold.x, hold.y, at[2], hold.reach);
       hold.off = [at[0] - on[0], at[1] - on[1]];
       hold.turn = this.moved.heading_deg - headingTo(at, on);
-      // Looked at from the side, places on its plane are too close together to be told apart: a vertical one then.
+      // From the side, places on its plane are too close together, so a vertical plane is used.
       hold.steep = Math.abs(camera.ray(hold.x, hold.y)[2]) > 0.04;
     }
     const m = this.moved;
@@ -151,7 +151,7 @@ export class Stations {
 
   get dragging() { return this.#hold !== null; }
 
-  // True: the key was for the selected station.
+  // Returns true if the key was for the selected station.
   key(camera, key, shift) {
     if (this.selected === null) return false;
     const step = shift ? 1 : 0.1;

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-// The picture's colours for shaders and overlay. Ground, ink and accent are the page's (CSS variables); the page's
+// This module has the picture's colours for shaders and overlay. Ground, ink and accent are the page's (CSS
+// variables); the page's
 // scheme, light or dark, selects the set of the others.
 
 let probe = null;
 
-// [r, g, b] of 1, of any CSS colour.
+// Returns [r, g, b] of 0 to 1, from any CSS colour.
 function parts(css) {
   probe ??= Object.assign(document.createElement('canvas'), {width: 1, height: 1}).getContext('2d', {willReadFrequently: true});
   probe.fillStyle = '#000';

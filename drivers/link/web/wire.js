@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-// One connection with a head, decoded. It runs in the page's worker (wire_worker.js), or in the page itself if it has
-// no workers. It hands on frames and replies in messages of many, and reads no further until its owner has taken these
-// (`ack`).
+// A Wire decodes one connection with a head. It runs in the page's worker (wire_worker.js), or in the page itself if
+// it has
+// no workers. It passes on frames and replies, many in one message, and reads no further until its owner has taken
+// these (`ack`).
 //
-// Two ways to read. A WebSocketStream is read when there is room: what isn't read stays with the head, which leaves
+// There are two ways to read. A WebSocketStream is read when there is room: what isn't read stays with the head, which
+// leaves
 // out whole frames for this reader and says how many, or waits, as its link is set. A plain WebSocket can't be told to
 // wait: the bytes would pile up in the browser. So it is always decoded at once, and batches that have no room are
 // dropped here, and counted (dropped_points, dropped_shots).
@@ -11,35 +13,36 @@ import {Decoder, Parser} from './native.js';
 import {Past} from './past.js';
 
 const SUBPROTOCOL = 'scanhead-native-1';
-const MAX_UNTAKEN = 3; // messages that the owner has not acknowledged
+const MAX_UNTAKEN = 3; // so many messages may be without the owner's `ack`
 const MESSAGE_POINTS = 65536, MESSAGE_THINGS = 4096; // a message goes out when it has so many,
-const MESSAGE_MS = 30; // or after so long
-const ANSWER_S = 10; // how long a head may take to answer
-const OPENING_MS = 100; // how long a link may take to refuse a connection that it has taken up
-const MAX_POINTS = 1 << 20; // that wait for a message, where the reading can't stop
+const MESSAGE_MS = 30; // or it goes out after so long
+const ANSWER_S = 10; // a head may take so long to answer
+const OPENING_MS = 100; // a link may take so long to refuse a connection that it has accepted
+const MAX_POINTS = 1 << 20; // so many wait for a message, if the reading can't stop
 
 export class Wire {
   #post;
   #socket = null;
-  #things = []; // [name, value], in the order in which they came
+  #things = []; // these are [name, value], in the order in which they came
   #points = 0;
   #transfer = [];
   #timer = 0;
   #untaken = 0;
-  #room = null; // resolves when the owner has taken enough
+  #room = null; // it resolves when the owner has taken enough
   #opening = 0; // a timer, as
   #limit = 0;
-  #number = 0; // of the connection, so that late events of an older one are ignored
+  #number = 0; // it numbers the connection, so that late events of an older one are ignored
   #past = new Past({give: (batch) => this.#addPast(batch), hasRoom: () => this.#untaken < MAX_UNTAKEN});
   #pastUrl = null;
 
-  /** post(message, transfer): {connection, things, figures} to the owner. */
+  /** post(message, transfer) sends {connection, things, figures} to the owner. */
   constructor(post) {
     this.#post = post;
     this.#fresh();
   }
 
-  /** From the owner: {connect: url, past: url of what was before, or null}, {send: line}, {close: true}, {ack: true}. */
+  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true} or {ack: true}.
+   * */
   take(message) {
     if (message.connect !== undefined) this.#connect(message.connect, message.past ?? null);
     if (message.send !== undefined) this.#socket?.send(message.send);
@@ -51,7 +54,7 @@ export class Wire {
 
   #fresh() {
     const hand = (name) => (value) => this.#add(name, value);
-    // With `shots`: pulses received so far.
+    // It adds `shots`, the pulses received so far.
     const handCounted = (name) => (value) => this.#add(name, Object.assign(value, {shots: this.decoder.stats.shots}));
     this.decoder = new Decoder({points: (batch) => this.#addPoints(batch), descriptor: handCounted('descriptor'),
       anchor: hand('anchor'), emitter: hand('emitter'), names: hand('names'), lineEnd: hand('line-end'),
@@ -133,14 +136,14 @@ export class Wire {
     else if (held > 0 || this.decoder.shots > 0) this.#later();
   }
 
-  // Reply lines, with or without CR LF, one or more.
+  // Takes one or more reply lines, with or without CR LF.
   #text(text) {
     this.#open();
     for (const line of text.split(/\r?\n/)) if (line !== '') this.#add('text', line);
     this.#send();
   }
 
-  // After the points that came before it.
+  // It follows the points that came before it.
   #add(name, value) {
     this.decoder.flush();
     if (this.#things.length >= 4 * MESSAGE_THINGS && name !== 'text' && name !== 'close') this.dropped.dropped_things++;
@@ -164,7 +167,7 @@ export class Wire {
     this.#transfer.push(batch.x.buffer);
   }
 
-  // Live points that wait are handed on first: else this batch would be in the middle of theirs.
+  // Live points that wait are passed on first: else this batch would be among them.
   #addPast(batch) {
     this.decoder.flush();
     this.#addPoints(batch);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The page's worker: the connection is read and decoded here, so that a page which is drawing doesn't hold it up, nor
-// the other way round.
+// This is the page's worker: it reads and decodes the connection, so that drawing and reading don't delay each other.
 import {Wire} from './wire.js';
 
 const wire = new Wire((message, transfer) => postMessage(message, transfer));

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-const char help_title[] = "a terrestrial laser scanner head in software, real on the wire";
+const char help_title[] = "a terrestrial laser scanner head in software, which clients see as a real one";
 const char help_status[] = "0 done, 1 failed, 2 wrong usage, configuration or input.";
 
 struct help_wish {
@@ -88,7 +88,7 @@ static int print_one(const struct app_command *const *commands, const char *word
         if (strcmp(word, (*commands)->name) == 0) return help_of(*commands, NULL, NULL), APP_OK;
     meant = app_nearest(word, known, n);
     if (meant != NULL) return app_usage(&help_command, "no command %s, did you mean %s?", word, meant);
-    return app_usage(&help_command, "no command %s; %s --help has all of them", word, app_program);
+    return app_usage(&help_command, "no command %s; %s --help lists all commands", word, app_program);
 }
 
 int help_run(const struct app_command *const *commands, int argc, char **argv)
@@ -99,7 +99,7 @@ int help_run(const struct app_command *const *commands, int argc, char **argv)
     if (argc == 2 && argv[1][0] != '-') return print_one(commands, argv[1]);
     const int status = app_parse(&help_command, argc, argv, &in, &wish);
     if (status != APP_GO_ON) return status;
-    if (in.n_options > 1) return app_usage(&help_command, "--man and --completion: one of them is allowed");
+    if (in.n_options > 1) return app_usage(&help_command, "--man and --completion: allowed is one of them");
     if (in.n_options == 0) return help_print(commands, stdout), APP_OK; /* as of: scanhead help -- */
     if (wish.man != NULL) return man_print(commands, strcmp(wish.man, "list") == 0 ? NULL : wish.man);
     if (strcmp(wish.completion, shells[0]) != 0)

@@ -124,7 +124,7 @@ static void put_program(const struct app_command *const *commands)
     puts(".SH ENVIRONMENT\n.TP\n.B SCANHEAD_HEADS");
     roff_text("the folder of head profiles, in place of the installed one");
     puts(".TP\n.B NOTIFY_SOCKET");
-    roff_text("of run: the service manager is told there when the links are open, and when the end begins (sd_notify)");
+    roff_text("run reports there to the service manager when the links are open, and when its end begins (sd_notify)");
     put_ends("libscanhead", "3");
 }
 

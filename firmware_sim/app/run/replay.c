@@ -20,7 +20,7 @@ int run_take_link(void *values, const char *text)
                          text);
     const int n = snprintf(o->links + used, sizeof o->links - used, is_word ? "- {type: %s}\n" : "- {%s}\n", text);
     if (n >= (int)(sizeof o->links - used))
-        return app_usage(&app_run, "--link: too long; all together have %zu characters", sizeof o->links - 1);
+        return app_usage(&app_run, "--link: too long; all --link together share %zu characters", sizeof o->links - 1);
     return APP_OK;
 }
 
@@ -35,7 +35,7 @@ static int check_head(const struct run_options *o)
                          : o->config != NULL      ? "--config"
                                                   : NULL;
     if (option == NULL) return APP_GO_ON;
-    return app_usage(&app_run, "%s is for a recording, and %s is a configuration; allowed with FILE.shs, FILE.pcapng",
+    return app_usage(&app_run, "%s is for a recording, but %s is a configuration; allowed with FILE.shs, FILE.pcapng",
                      option, o->in.operand[0]);
 }
 
@@ -48,15 +48,16 @@ int run_check_options(const struct run_options *o, int is_recording)
                          : o->frames_given          ? "--frames"
                                                     : NULL;
     if (option != NULL)
-        return app_usage(&app_run, "%s needs a head that computes, and %s is a recording; allowed with a CONFIG",
+        return app_usage(&app_run, "%s needs a head that computes, but %s is a recording; allowed with a CONFIG",
                          option, o->in.operand[0]);
     if (o->config != NULL && o->links[0] != '\0')
-        return app_usage(&app_run, "--config and --link: both say where the links are; allowed one of them");
+        return app_usage(&app_run, "--config and --link: both give the links; allowed is one of them");
     if (o->clients > 0 && !o->device.start)
-        return app_usage(&app_run, "--clients: without --start a client's SCAN:STARt begins it; allowed with --start");
+        return app_usage(&app_run,
+                         "--clients: without --start a client's SCAN:STARt begins the replay; allowed with --start");
     if (o->replay.to_s > 0.0 && o->replay.to_s <= o->replay.from_s)
-        return app_usage(&app_run, "--to %.10g is not after --from, which is %.10g; allowed more", o->replay.to_s,
-                         o->replay.from_s);
+        return app_usage(&app_run, "--to %.10g is not after --from, which is %.10g; allowed is a larger number",
+                         o->replay.to_s, o->replay.from_s);
     return APP_GO_ON;
 }
 
@@ -74,11 +75,11 @@ static void say_what_ran(const struct run_options *o, struct replay *replay)
     struct replay_summary s;
     replay_get_summary(replay, &s);
     if (s.repeated + s.late != 0)
-        sh_warn(&app_report_stderr, "%s: %llu frames were left out, which came twice or too late in it",
-                o->in.operand[0], (unsigned long long)(s.repeated + s.late));
+        sh_warn(&app_report_stderr, "%s: %llu frames left out, which came twice or too late", o->in.operand[0],
+                (unsigned long long)(s.repeated + s.late));
     if (s.bad_bytes != 0)
-        sh_warn(&app_report_stderr, "%s: %llu bytes are in no whole frame, and were left out%s", o->in.operand[0],
-                (unsigned long long)s.bad_bytes, s.cut ? "; it is cut at its end" : "");
+        sh_warn(&app_report_stderr, "%s: %llu bytes left out, which belong to no complete frame%s", o->in.operand[0],
+                (unsigned long long)s.bad_bytes, s.cut ? "; its end is cut off" : "");
     if (!o->quiet)
         fprintf(stderr, "%s: %llu frames replayed, begun %u time%s\n", app_program, (unsigned long long)s.frames,
                 s.times, s.times == 1 ? "" : "s");
@@ -106,8 +107,7 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
         rc = sh_fail(err, SH_EINPUT, "%s: links: none; a replay needs at least one of pty, tcp, usb, web, file, null",
                      cfg->file);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
-        rc =
-            sh_fail(err, SH_EINPUT, "--speed: the pace is not realtime, and time passes otherwise; allowed without it");
+        rc = sh_fail(err, SH_EINPUT, "--speed: allowed only with the pace realtime");
     o->replay.path = o->in.operand[0];
     if (!(o->replay.speed > 0.0)) o->replay.speed = 1.0;
     o->replay.start = o->device.start;

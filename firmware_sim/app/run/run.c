@@ -24,8 +24,8 @@ static void say_sights(const struct site *site)
         n++;
     }
     if (n == 0) return;
-    fprintf(stderr, "%s: maps of what is seen from %u station%s in %.2f s, %.1f MiB\n", app_program, n,
-            n > 1 ? "s" : "", build_s, mib);
+    fprintf(stderr, "%s: visibility maps of %u station%s in %.2f s, %.1f MiB\n", app_program, n, n > 1 ? "s" : "",
+            build_s, mib);
 }
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
@@ -36,8 +36,10 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
             app_program, cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all,
             site->scene->n_surfaces, info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
     if (!config_is_alone(cfg))
-        fprintf(stderr, "%s: it is the scanner of %u of %u stations; --set head.station=N serves that of another\n",
-                app_program, site_n_served(site), site->n_stations);
+        fprintf(
+            stderr,
+            "%s: it is the scanner of %u of %u stations; --set head.station=N serves the scanner of another station\n",
+            app_program, site_n_served(site), site->n_stations);
     say_sights(site);
     char plan[512];
     site_plan_text(site, plan, sizeof plan);
@@ -71,8 +73,8 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
     if (o->device.replay == NULL || device_replay_ends(device) || o->device.duration_s > 0.0) return;
     sh_warn(
         &app_report_stderr,
-        "%s has no end: its head was killed, or could not write it; after its last command the head runs until it is "
-        "stopped, or for --duration S",
+        "%s has no end: its head was killed, or could not write the end; after its last command the head runs until "
+        "it is stopped, or for --duration S",
         o->device.replay);
 }
 
@@ -177,17 +179,17 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_FLAG, "start", NULL, .at = AT(device.start), .help = "scan at once, no command needed"},
+    {APP_FLAG, "start", NULL, .at = AT(device.start), .help = "scan at once, without a command"},
     {APP_FLAG, "view", NULL, .at = AT(view),
-     .help = "with a page for a browser, which shows the scan and sets the head; its address is printed. A web link of "
-             "the configuration is used where there is one. A page that is opened later shows what the scans had so far: "
-             "the head keeps their last 10 million points, in up to 320 MiB"},
+     .help = "serve a page for a browser, which shows the scan and sets the head; its address is printed. It uses a "
+             "web link of the configuration if there is one. A page that is opened later shows the points so far: the "
+             "head keeps the last 10 million points, in up to 320 MiB"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
-     .help = "end after S seconds of device time; they count from power-up, with --start from the scan's start. With "
-             "--start the scan goes on until then, frame after frame, whatever the file has as head.frames. Without "
-             "--duration and --frames the head runs until it is stopped"},
+     .help = "end after S seconds of device time, counted from power-up, or with --start from the scan's start. With "
+             "--start the scan continues until then, frame after frame, and head.frames of the file is not used. "
+             "Without --duration and --frames the head runs until it is stopped"},
     {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
@@ -198,44 +200,44 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal), .file = APP_WRITES,
      .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
-     .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
+     .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
     {APP_TEXT, "surfaces", "FILE", .at = AT(surfaces), .file = APP_WRITES,
      .help = "write the surfaces as CSV: label, object, material, IFC type and GlobalId, colour; - is standard output"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay), .file = APP_READS,
-     .help = "carry out the commands of a journal at their times, and end where its run ended"},
+     .help = "carry out the commands of a journal at their times, and end when its run ended"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
     {APP_NUMBER, "speed", "F", .min = 0.001, .max = 1000, .at = AT(replay.speed),
-     .help = "of a recording, in the pace realtime: F times as fast (default 1)"},
+     .help = "replay a recording F times as fast, in the pace realtime (default 1)"},
     {APP_NUMBER, "from", "S", .min = 0.0, .max = 1e9, .at = AT(replay.from_s),
-     .help = "of a recording: begin S seconds of device time after its first frame"},
+     .help = "begin a recording S seconds of device time after its first frame"},
     {APP_NUMBER, "to", "S", .min = 0.001, .max = 1e9, .at = AT(replay.to_s),
-     .help = "of a recording: end S seconds after its first frame"},
+     .help = "end a recording S seconds after its first frame"},
     {APP_WHOLE, "clients", "N", .min = 1, .max = 64, .at = AT(clients),
-     .help = "of a recording, with --start: begin once N clients are there"},
-    {APP_FLAG, "loop", NULL, .at = AT(replay.loop), .help = "of a recording: begin anew at its end"},
+     .help = "with --start, begin a recording once N clients are connected"},
+    {APP_FLAG, "loop", NULL, .at = AT(replay.loop), .help = "repeat a recording from its beginning at its end"},
     {APP_CALL, "link", "LINK", .apply = run_take_link,
-     .help = "of a recording: serve it there: pty, tcp, usb, web, file or null; or keys as in a configuration, such as "
-             "'type: tcp, port: 5025'; may be repeated (default: pty and tcp)"},
+     .help = "serve a recording on this link: pty, tcp, usb, web, file or null; or keys as in a configuration, such "
+             "as 'type: tcp, port: 5025'; may be repeated (default: pty and tcp)"},
     {APP_TEXT, "config", "CONFIG", .at = AT(config), .file = APP_READS,
-     .help = "of a recording: links, loop and faults of a configuration; its scene is not loaded"},
-    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
+     .help = "for a recording, use links, loop and faults of this configuration; its scene is not loaded"},
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "print only errors and warnings"},
     OPTION_END
 };
 /* clang-format on */
 
 static const char NOTES[] =
-    "Ctrl-C, or SIGTERM, ends the head in good order. A second signal within a second counts as the same one; a\n"
-    "third, or one that comes later, ends it at once.\n"
+    "Ctrl-C, or SIGTERM, ends the head with all files complete. A second signal within a second counts as the same\n"
+    "one; a third, or a later one, ends it at once.\n"
     "\n"
-    "As a service (systemd, Type=notify) it says READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
+    "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"
     "\n"
-    "A recording, FILE.shs or FILE.pcapng, may stand for CONFIG. Its frames are served as they are, with the timing\n"
-    "that they had, from the first one on each time that a client commands SCAN:STARt. With --start they are served\n"
-    "at once, and the run ends with them. Queries are answered from the recording's descriptor; settings can't\n"
+    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, with their\n"
+    "recorded timing, from the first one on each time that a client commands SCAN:STARt. With --start they are\n"
+    "served at once, and the run ends with them. Queries are answered from the recording's descriptor; settings can't\n"
     "change. Faults on the wire and of links apply.\n";
 
 const struct app_command app_run = {

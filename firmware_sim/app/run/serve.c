@@ -18,7 +18,7 @@ int run_add_view(struct config *cfg, struct sh_err *err)
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].type == LINK_WEB) return SH_OK;
     if (cfg->n_links == CONFIG_MAX_LINKS)
-        return sh_fail(err, SH_EINPUT, "%s: links: --view would be one more than the %d that are allowed", cfg->file,
+        return sh_fail(err, SH_EINPUT, "%s: links: with --view there is one more than the allowed %d", cfg->file,
                        (int)CONFIG_MAX_LINKS);
     cfg->link[cfg->n_links++] = (struct link_spec){.type = LINK_WEB, .max_sessions = VIEW_SESSIONS};
     return SH_OK;
@@ -168,7 +168,7 @@ void run_warn_losses(const struct device_counters *c)
 static void warn_lines(const char *file, uint64_t n)
 {
     if (n != 0)
-        sh_warn(&app_report_stderr, "%s: %llu lines are missing in its file, which could not be written in time", file,
+        sh_warn(&app_report_stderr, "%s: %llu lines are missing in its file; they could not be written in time", file,
                 (unsigned long long)n);
 }
 

@@ -18,8 +18,8 @@ static int take_sweep(void *values, const char *text)
 
 static int fail_format(const struct batch *b)
 {
-    return app_usage(&app_batch, "--format %s: allowed are up to %d endings that record knows, as in ply,las",
-                     b->format, RECORD_MAX_FILES);
+    return app_usage(&app_batch, "--format %s: allowed are up to %d endings of record, as in ply,las", b->format,
+                     RECORD_MAX_FILES);
 }
 
 /* Which endings there are, record says (batch_plan). */
@@ -44,14 +44,14 @@ static int check_option(const struct batch *b, const char *key)
                                         {"output.colour", "--colour"},
                                         {"loop.threads", "--threads"}};
     if (strcmp(key, "head.station") == 0)
-        return app_usage(&app_batch, "--sweep %s: a job's station is that of --stations; allowed any other key", key);
+        return app_usage(&app_batch, "--sweep %s: --stations sets the station of a job; allowed is any other key", key);
     for (size_t i = 0; i < sizeof by / sizeof by[0]; i++) {
         int given = strcmp(by[i][1], "--threads") == 0 && b->threads != NULL;
         for (int k = 0; k < b->options.n_names; k++)
             given |= strcmp(b->options.name[k], by[i][1]) == 0;
         const char *after = batch_after_key(by[i][0], key);
         if (given && after != NULL && (*after == '\0' || *after == '.'))
-            return app_usage(&app_batch, "%s is in --sweep, and %s sets %s, too; allowed is one of them", key, by[i][1],
+            return app_usage(&app_batch, "%s is in --sweep, but %s also sets %s; allowed is one of them", key, by[i][1],
                              *after == '\0' ? "it" : by[i][0]);
     }
     return APP_OK;
@@ -63,7 +63,7 @@ static int check_together(const struct batch *b)
     if (b->json && !b->list) return app_usage(&app_batch, "--json: allowed with --list");
     if (b->list && b->merge) return app_usage(&app_batch, "--list and --merge: allowed is one of them");
     if (b->merge && b->shard_text != NULL)
-        return app_usage(&app_batch, "--merge is of all shards; allowed without --shard");
+        return app_usage(&app_batch, "--merge checks all shards; allowed without --shard");
     for (uint32_t k = 0; k < b->sweeps.n; k++) {
         const char *key = b->sweeps.sweep[k].key;
         if (check_option(b, key) != APP_OK) return APP_USAGE;
@@ -116,27 +116,28 @@ static int work(struct batch *b)
 /* clang-format off */
 static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
     {APP_TEXT, "output", "DIR", .letter = 'o', .at = AT(dir),
-     .help = "the campaign's folder: files of all jobs, manifests; it is made where it isn't there"},
+     .help = "the campaign's folder, with the files of all jobs and the manifests; it is made if it doesn't exist"},
     {APP_CALL, "sweep", "KEY=A,B,...", .apply = take_sweep,
      .help = "values of a configuration key, or KEY=FIRST:LAST:STEP; repeated: all combinations, the last key varies "
              "fastest"},
     {APP_TEXT, "stations", "all|LIST", .at = AT(stations_text),
      .help = "the stations, or the stops of the platform, as in 1,3-5 (default all)"},
-    {APP_TEXT, "format", "A,B,...", .at = AT(format), .help = "endings of files, as record has them (default ply)"},
-    {APP_FLAG, "list", NULL, .at = AT(list), .help = "print the jobs, and do none; with -o, which are done"},
+    {APP_TEXT, "format", "A,B,...", .at = AT(format), .help = "endings of files, as for record (default ply)"},
+    {APP_FLAG, "list", NULL, .at = AT(list), .help = "print the jobs without doing them; with -o also which are done"},
     {APP_FLAG, "json", NULL, .at = AT(json), .help = "with --list: as JSON"},
     {APP_TEXT, "shard", "I/N", .at = AT(shard_text), .help = "only every N-th job, from the I-th on (default 1/1: all)"},
     {APP_FLAG, "merge", NULL, .at = AT(merge),
-     .help = "check all files of all shards, and write manifest.json where all are whole"},
+     .help = "check all files of all shards, and write manifest.json if all are complete"},
     {APP_FLAG, "surfaces", NULL, .at = AT(surfaces),
-     .help = "beside each job's files, the surfaces as CSV: NAME.surfaces.csv, as `record --surfaces` writes it"},
+     .help = "also write the surfaces of each job as CSV: NAME.surfaces.csv, as `record --surfaces` does"},
     {APP_FLAG, "force", NULL, .at = AT(force),
-     .help = "do jobs again that were made with another configuration, release, ..."},
+     .help = "repeat jobs that were done with another configuration, release, ..."},
     OPTION_SET,
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
-     .help = "in each job, with the faults of this file beside those of the configuration; a bare name is one of "
+     .help = "add the faults of this file to those of the configuration in each job; a bare name is one of "
              "config/faults. A job that loses frames by them fails"},
-    {APP_TEXT, "threads", "N", .at = AT(threads), .help = "threads that cast; 0: one per processor. No byte depends on it"},
+    {APP_TEXT, "threads", "N", .at = AT(threads), .help = "threads that cast; 0: one per processor. The files do not "
+                                                          "depend on it"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
@@ -161,22 +162,22 @@ static int run(int argc, char **argv)
 }
 
 static const char HELP_NOTES[] =
-    "A job is one station with one combination of values. Each has a number, which its files begin with:\n"
+    "A job is one station with one combination of values. Each has a number, and its files begin with it:\n"
     "\n"
     "  0002_station-2_head.prr_hz=300000.ply\n"
     "\n"
-    "All combinations are checked before the first job begins. A job's files appear whole or not at all, and\n"
-    "then its line in manifest-I-of-N.jsonl, with sizes and SHA-256. The same command again does what is not\n"
-    "done: after a signal, a crash, a job that failed. It checks the files that are there. The number of shards\n"
-    "may be another one each time.\n"
+    "All combinations are checked before the first job begins. A job's files appear complete or not at all.\n"
+    "After them its line, with sizes and SHA-256, is added to manifest-I-of-N.jsonl. The same command again does\n"
+    "the jobs that are not done: after a signal, a crash or a failed job. It checks the existing files. The number\n"
+    "of shards may change each time.\n"
     "\n"
-    "Files are the same bytes for any number of shards and threads, on processors of one kind. Where something\n"
-    "that they depend on has changed since (the configuration, a mesh, the profile, a value, the release, the\n"
-    "kind of processor), the command ends and says what, unless --force is given.\n"
+    "Files are the same bytes for any number of shards and threads, on processors of one kind. If something\n"
+    "that they depend on has changed (the configuration, a mesh, the profile, a value, the release, the kind of\n"
+    "processor), the command ends and names it, unless --force is given.\n"
     "\n"
     "--merge needs the same CONFIG, --sweep, --stations, --format and options as the shards had.\n"
     "\n"
-    "Exit status 1: a job failed, or isn't whole; a signal came; another process is at this shard.\n";
+    "Exit status 1: a job failed or is incomplete; a signal came; another process does this shard.\n";
 
 const struct app_command app_batch = {
     .name = "batch",

@@ -46,15 +46,15 @@ int batch_find_done(struct batch *b, int any_engine, struct sh_err *err)
     if (rc != SH_OK || b->force) return rc;
     for (uint32_t i = 0; i < b->n_jobs; i++)
         if (b->job[i].other != NULL && !b->job[i].is_done)
-            return sh_fail(err, SH_ESTATE,
-                           "%s: job %u there was made with %s; --force does such jobs again, another -o begins another "
-                           "campaign",
-                           b->dir, i + 1, b->job[i].other);
+            return sh_fail(
+                err, SH_ESTATE,
+                "%s: its job %u was made with %s; --force repeats such jobs, another -o begins another campaign",
+                b->dir, i + 1, b->job[i].other);
     if (f.beyond != 0)
         return sh_fail(
             err, SH_ESTATE,
-            "%s: has a job %u, and this campaign ends with job %u; --force leaves that one where it is, another "
-            "-o begins another campaign",
+            "%s: has a job %u, but this campaign ends with job %u; --force leaves that one in place, another -o "
+            "begins another campaign",
             b->dir, f.beyond, b->n_jobs);
     return SH_OK;
 }
@@ -68,13 +68,13 @@ int batch_check_files(const struct batch *b, uint32_t job, struct sh_err *err)
         struct stat st;
         uint64_t bytes;
         snprintf(path, sizeof path, "%s/%s", b->dir, file->name);
-        if (stat(path, &st) != 0) return sh_fail(err, SH_EIO, "%s: is not there", path);
+        if (stat(path, &st) != 0) return sh_fail(err, SH_EIO, "%s: is missing", path);
         if ((uint64_t)st.st_size != file->bytes)
-            return sh_fail(err, SH_EIO, "%s: has %llu bytes, and had %llu", path, (unsigned long long)st.st_size,
+            return sh_fail(err, SH_EIO, "%s: has %llu bytes, but had %llu", path, (unsigned long long)st.st_size,
                            (unsigned long long)file->bytes);
         int rc = batch_sha_file(path, sha, &bytes, &app_report_stderr, err);
         if (rc != SH_OK) return rc;
-        if (strcmp(sha, file->sha) != 0) return sh_fail(err, SH_EIO, "%s: has other bytes than it had (sha256)", path);
+        if (strcmp(sha, file->sha) != 0) return sh_fail(err, SH_EIO, "%s: its contents have changed (sha256)", path);
     }
     return SH_OK;
 }

@@ -133,7 +133,7 @@ static int read_lines(const char *path, int (*take)(void *ctx, struct batch_entr
         if (batch_entry_read(line, &entry))
             rc = take(ctx, &entry, err);
         else
-            sh_warn(report, "%s:%u: this line is none of a campaign; it doesn't count", path, number);
+            sh_warn(report, "%s:%u: this is not a line of a manifest; it is ignored", path, number);
     }
     if (rc == SH_OK && ferror(in)) rc = sh_fail(err, SH_EIO, "%s: cannot be read", path);
     free(line);
@@ -187,8 +187,8 @@ int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int 
     snprintf(path, sizeof path, "%s/manifest-%u-of-%u.jsonl", dir, shard, n_shards);
     int rc = newfile_append(path, fd, &why);
     if (rc == SH_ESTATE)
-        return sh_fail(err, rc, "%s: another process is at shard %u/%u; allowed once it has ended, or another shard",
-                       path, shard, n_shards);
+        return sh_fail(err, rc, "%s: another process does shard %u/%u; wait for its end, or choose another shard", path,
+                       shard, n_shards);
     if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
     rc = cut_tail(*fd, path, err);
     if (rc != SH_OK) close(*fd);

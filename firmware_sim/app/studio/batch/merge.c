@@ -50,8 +50,8 @@ static int check_engines(const struct batch *b, struct sh_err *err)
         if (strcmp(first->entry.made.engine, job->entry.made.engine) != 0)
             return sh_fail(
                 err, SH_ESTATE,
-                "%s: job %u was made by %s, job %u by %s; allowed one kind, as rays may meet other triangles on "
-                "another",
+                "%s: job %u was made by %s, job %u by %s; allowed is one kind of processor, since rays may hit other "
+                "triangles on another kind",
                 b->dir, first->entry.job, first->entry.made.engine, job->entry.job, job->entry.made.engine);
     }
     return SH_OK;
@@ -95,7 +95,7 @@ static void warn_of_strangers(const struct batch *b)
     }
     if (dir != NULL) closedir(dir);
     if (n != 0)
-        sh_warn(&app_report_stderr, "%s: %u files are of no job of this campaign, the first: %s", b->dir, n, first);
+        sh_warn(&app_report_stderr, "%s: %u files belong to no job of this campaign, the first: %s", b->dir, n, first);
 }
 
 /* ---- the manifest: nothing in it depends on the shards, or on the time */
@@ -175,7 +175,7 @@ static int check_folder(const struct batch *b, struct sh_err *err)
 {
     struct stat st;
     if (stat(b->dir, &st) == 0 && S_ISDIR(st.st_mode)) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "-o %s: no such folder; allowed is that of a campaign", b->dir);
+    return sh_fail(err, SH_EINPUT, "-o %s: no such folder; allowed is the folder of a campaign", b->dir);
 }
 
 int batch_merge(struct batch *b)
@@ -188,11 +188,11 @@ int batch_merge(struct batch *b)
     if (rc == SH_OK) rc = check_jobs(b, &gaps, &err);
     if (rc == SH_OK && gaps.n > MOST_LINES) fprintf(stderr, "scanhead: and %u more\n", gaps.n - MOST_LINES);
     if (rc == SH_OK && gaps.n != 0)
-        rc =
-            sh_fail(&err, SH_EIO, "%s: %u of %u jobs are not whole; run their shards again", b->dir, gaps.n, b->n_jobs);
+        rc = sh_fail(&err, SH_EIO, "%s: %u of %u jobs are incomplete; run their shards again", b->dir, gaps.n,
+                     b->n_jobs);
     if (rc == SH_OK) warn_of_strangers(b);
     if (rc == SH_OK) rc = write_whole(b, &err);
     if (rc != SH_OK) return app_fail(&err);
-    if (!b->quiet) fprintf(stderr, "scanhead: %u jobs are whole: %s/manifest.json\n", b->n_jobs, b->dir);
+    if (!b->quiet) fprintf(stderr, "scanhead: %u jobs are complete: %s/manifest.json\n", b->n_jobs, b->dir);
     return APP_OK;
 }

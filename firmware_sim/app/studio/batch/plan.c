@@ -111,17 +111,18 @@ static void print_values(const struct batch *b, uint32_t combination)
     const char *set[BATCH_MAX_SWEEPS];
     batch_sweeps_at(&b->sweeps, combination, set);
     for (uint32_t i = 0; i < b->sweeps.n; i++)
-        fprintf(stderr, "%s%s", i == 0 ? "scanhead: no job was begun; that is with " : ", ", set[i]);
+        fprintf(stderr, "%s%s", i == 0 ? "scanhead: no job was begun; the values are " : ", ", set[i]);
     if (b->sweeps.n > 0) fputc('\n', stderr);
 }
 
 static int check_epoch(const struct config *cfg, struct sh_err *err)
 {
     if (strcmp(cfg->time.epoch, "utc") != 0 && strcmp(cfg->time.epoch, "tai") != 0) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: time.epoch: %s is the clock of the machine, and a campaign's files are to be the same whenever "
-                   "they are made; allowed none, or a date as 2026-01-01T00:00:00Z",
-                   cfg->file, cfg->time.epoch);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: time.epoch: %s is the clock of the machine, but a campaign's files must not depend on when they are "
+        "made; allowed none, or a date such as 2026-01-01T00:00:00Z",
+        cfg->file, cfg->time.epoch);
 }
 
 static int add_jobs(struct batch *b, uint32_t combination, uint32_t n_stations, struct sh_err *err)

@@ -134,7 +134,7 @@ static int make_folder(const struct batch *b, struct sh_err *err)
     struct stat st;
     if (mkdir(b->dir, 0777) == 0 || (errno == EEXIST && stat(b->dir, &st) == 0 && S_ISDIR(st.st_mode))) return SH_OK;
     return sh_fail(err, errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM : SH_EINPUT,
-                   "-o %s: cannot be made a folder: %s", b->dir, strerror(errno == EEXIST ? ENOTDIR : errno));
+                   "-o %s: the folder cannot be made: %s", b->dir, strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
 /* The campaign is made of files that may lie in its folder: none of them has the name of a job's file. */
@@ -151,10 +151,11 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
         if (folder.st_dev != here.st_dev || folder.st_ino != here.st_ino) continue;
         batch_job_name(b, (uint32_t)job - 1, name);
         if (strncmp(file, name, strlen(name)) == 0 && file[strlen(name)] == '.')
-            return sh_fail(err, SH_EINPUT,
-                           "--output %s: %s is the file of job %lu, which is read, and would be overwritten; allowed "
-                           "another folder",
-                           b->dir, file, job);
+            return sh_fail(
+                err, SH_EINPUT,
+                "--output %s: %s, a file of job %lu, is also read as an input, and would be overwritten; name "
+                "another folder",
+                b->dir, file, job);
     }
     return SH_OK;
 }
@@ -194,8 +195,9 @@ static int say_end(const struct runner *r)
     const struct batch *b = r->b;
     const uint32_t done = r->n_mine - r->n_todo + r->n_did;
     if (app_interrupted())
-        fprintf(stderr, "scanhead: interrupted: %u of %u jobs of shard %u/%u are done; the same command goes on\n",
-                done, r->n_mine, b->shard, b->n_shards);
+        fprintf(stderr,
+                "scanhead: interrupted: %u of %u jobs of shard %u/%u are done; the same command does the rest\n", done,
+                r->n_mine, b->shard, b->n_shards);
     else if (r->n_failed != 0)
         fprintf(stderr, "scanhead: %u of %u jobs of shard %u/%u failed; the same command tries them again\n",
                 r->n_failed, r->n_mine, b->shard, b->n_shards);

@@ -57,8 +57,7 @@ static int add_list(struct batch_sweep *s, const char *values, struct sh_err *er
     for (const char *p = values;; p++) {
         const char *end = value_end(p);
         if (end == NULL)
-            return sh_fail(err, SH_EINPUT, "--sweep %s=%s: a bracket or a quote without its other half", s->key,
-                           values);
+            return sh_fail(err, SH_EINPUT, "--sweep %s=%s: a bracket or a quote is not closed", s->key, values);
         if (end == p)
             return sh_fail(err, SH_EINPUT, "--sweep %s=%s: an empty value; allowed as in %s=A,B", s->key, values,
                            s->key);
@@ -135,8 +134,9 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
                            s->key);
         after = batch_after_key(sweeps->sweep[i].key, s->key);
         if (after != NULL && (*after == '.' || *after == '['))
-            return sh_fail(err, SH_EINPUT, "--sweep %s: it would replace the values of --sweep %s; allowed before that",
-                           s->key, sweeps->sweep[i].key);
+            return sh_fail(err, SH_EINPUT,
+                           "--sweep %s: it would replace the values of --sweep %s; allowed is the other order", s->key,
+                           sweeps->sweep[i].key);
     }
     return is_range(equals + 1, range) ? add_range(s, equals + 1, range, err) : add_list(s, equals + 1, err);
 }

@@ -61,7 +61,7 @@ static int check_platform(const struct config *cfg, struct sh_err *err)
 {
     if (!config_head_moves(&cfg->platform)) return SH_OK;
     return sh_fail(err, SH_EINPUT,
-                   "%s: platform.kind: %s, and coverage is of places where the head stands; allowed static, stops",
+                   "%s: platform.kind: %s, but coverage needs a head that stands still; allowed static, stops",
                    cfg->file, cfg->platform.kind == PLATFORM_LIVE ? "live" : "trajectory");
 }
 
@@ -180,7 +180,7 @@ static int cover(struct config *cfg, void *ctx, struct sh_err *err)
         rc = look_from(r, i, err);
     if (rc == SH_OK) rc = show(r, err);
     if (rc == SH_ESTOPPED && r->written)
-        sh_fail(err, rc, "interrupted; %s is written, the next stations are not known", r->output);
+        sh_fail(err, rc, "interrupted; %s is written, but the next stations are not known", r->output);
     else if (rc == SH_ESTOPPED)
         sh_fail(err, rc, "interrupted; no file is written");
     free(r->result.station);
@@ -212,15 +212,15 @@ static int check_next(struct coverage_run *r)
         o->area_m[0][i] = o->area_m[1][i] = (double)NAN;
     if (o->stations == 0 && asks) o->stations = 1;
     if (o->stations > 0 && !asks)
-        return app_usage(&app_coverage, "--next: from which places? Needed is --grid STEP_M or --candidates FILE");
+        return app_usage(&app_coverage, "--next needs places to compare: --grid STEP_M or --candidates FILE");
     if (o->grid_m > 0.0 && o->candidates != NULL)
         return app_usage(&app_coverage, "--grid and --candidates: allowed is one of them");
     if (r->at != NULL && !(o->grid_m > 0.0)) return app_usage(&app_coverage, "--at: allowed only with --grid");
     if (r->at != NULL && !coverage_next_area(r->at, o->area_m))
-        return app_usage(&app_coverage,
-                         "--at %s: allowed is X0,Y0,X1,Y1 or X0,Y0,X1,Y1,Z0,Z1 in metres, the lower one of "
-                         "each first",
-                         r->at);
+        return app_usage(
+            &app_coverage,
+            "--at %s: allowed is X0,Y0,X1,Y1 or X0,Y0,X1,Y1,Z0,Z1 in metres, the lower number of each pair first",
+            r->at);
     return APP_GO_ON;
 }
 
@@ -228,11 +228,10 @@ static int check_options(struct coverage_run *r)
 {
     if (r->by != NULL && strcmp(r->by, "label") != 0)
         return app_usage(&app_coverage, "--by %s is not known; allowed label", r->by);
-    if (r->colour_name != NULL && r->output == NULL) return app_usage(&app_coverage, "--colour: no -o FILE to colour");
+    if (r->colour_name != NULL && r->output == NULL) return app_usage(&app_coverage, "--colour: allowed with -o FILE");
     if (r->output != NULL && !mesh_has_format(r->output))
         return app_usage(&app_coverage,
-                         "-o %s: it would hold a mesh; allowed is a name that ends in .ply, .obj, .gltf, "
-                         ".glb or .fbx",
+                         "-o %s: the file is a mesh; allowed is a name that ends in .ply, .obj, .gltf, .glb or .fbx",
                          r->output);
     const int status = r->colour_name != NULL ? find_colour(r) : APP_GO_ON;
     return status == APP_GO_ON ? check_next(r) : status;
@@ -261,29 +260,31 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_FLAG, "json", NULL, .at = AT(json),
-     .help = "the figures as JSON: cell_m, cells, pieces, triangles, area_m2, twin_m2, none_m2, one_m2, several_m2 and "
-             "the same as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), stations, labels, next"},
-    {APP_TEXT, "by", "label", .at = AT(by), .help = "the figures of each label, too: object and material"},
+     .help = "print the figures as JSON: cell_m, cells, pieces, triangles, area_m2, twin_m2, none_m2, one_m2, "
+             "several_m2 and the same as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), "
+             "stations, labels, next"},
+    {APP_TEXT, "by", "label", .at = AT(by), .help = "also print the figures of each label: object and material"},
     {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES,
-     .help = "the cells as a mesh with colours; .ply has the scalars stations, density, incidence_deg, range_m and cell"},
+     .help = "write the cells as a mesh with colours; .ply has the scalars stations, density, incidence_deg, range_m "
+             "and cell"},
     {APP_TEXT, "colour", "WHAT", .at = AT(colour_name), OPTION_CHOICES(COLOURS),
-     .help = "of the mesh: seen (by none red, one yellow, several green; the default), count (of stations, blue to red), "
-             "density (blue to red, in decades), incidence (blue head on to red grazing)"},
+     .help = "colours of the mesh: seen (by no station red, by one yellow, by several green; the default), count (of "
+             "stations, blue to red), density (blue to red, in decades), incidence (blue head on to red grazing)"},
     {APP_WHOLE, "next", "N", .min = 1, .max = COVERAGE_MOST_NEXT, .at = AT(o.stations),
-     .help = "the N next stations, one after the other: each where most is gained of what none has seen by then (default "
-             "1 with --grid or --candidates)"},
+     .help = "find the N next stations, one after the other: each is the place that adds most to the area seen so far "
+             "(default 1 with --grid or --candidates)"},
     {APP_NUMBER, "grid", "STEP_M", .min = 1e-3, .max = 1e6, .at = AT(o.grid_m),
-     .help = "look at the places of a grid with this step, on all floors where a tripod can stand"},
+     .help = "compare the places of a grid with this step, on all floors where a tripod can stand"},
     {APP_NUMBER, "height", "M", .min = 0.0, .max = 1000.0, .at = AT(o.height_m),
-     .help = "of the head's origin above the floor (default 1.6)"},
+     .help = "height of the head's origin above the floor (default 1.6)"},
     {APP_TEXT, "at", "X0,Y0,X1,Y1", .at = AT(at),
      .help = "limits of the grid (default: those of the scene); two more numbers, Z0,Z1, limit the heights of floors"},
     {APP_TEXT, "candidates", "FILE.csv", .at = AT(o.candidates), .file = APP_READS,
-     .help = "look at the places in a file with the columns x_m,y_m,z_m of the head's origin, and heading_deg where wanted"},
+     .help = "compare the places in a file with the columns x_m,y_m,z_m of the head's origin, and perhaps heading_deg"},
     {APP_NUMBER, "step-deg", "D", .min = 0.2, .max = 30.0, .at = AT(o.step_deg),
      .help = "angle between the rays by which places are compared (default 1)"},
     {APP_WHOLE, "scans", "K", .min = 1, .max = COVERAGE_MOST_SCANS, .at = AT(o.scans),
-     .help = "the K best places of each round are scanned as a whole, and the best one is taken (default 3)"},
+     .help = "scan the K best places of each round as a whole, and take the best one (default 3)"},
     OPTION_SET,
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
@@ -291,25 +292,25 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "The surface is cut into cells of coverage.cell_m. A cell is seen where the centre of a pulse meets it, from\n"
-    "whichever side, in a way that the head can report: within its ranges, and with signal.model above its\n"
-    "threshold; through glass, but not in mirrors; without noise. Each station scans with the settings at\n"
+    "The surface is cut into cells of coverage.cell_m. A cell is seen where the centre of a pulse hits it, from\n"
+    "either side, and the head can report it: within its ranges, and with signal.model above its threshold;\n"
+    "through glass, but not in mirrors; without noise. Each station scans with the settings at\n"
     "power-up, and with its own scanner. Percentiles are of the area that is seen. density counts the pulses of all\n"
     "stations; incidence and range are the smallest.\n"
     "\n"
-    "Each face is a surface. Walls of a building model are closed bodies: what lies between two bodies, and their\n"
-    "ends within others, is surface that nobody sees, and counts as seen by none. Faces with the same corners\n"
-    "count once, those outside of scene.target not at all. Meshes that move hide what they hide, and are no\n"
-    "surface here. With platform.kind: stops each stop is a station.\n"
+    "Each face is a surface. Walls of a building model are closed bodies: their faces between two bodies, and their\n"
+    "ends within others, can not be seen and count as seen by none. Faces with the same corners count once, those\n"
+    "outside of scene.target not at all. Meshes that move hide other surfaces, but their own surface does not\n"
+    "count. With platform.kind: stops each stop is a station.\n"
     "\n"
     "Take cells several times as wide as the points are apart: smaller ones fall between the points.\n"
     "\n"
-    "The next station is where the head of head.station, level and with the heading of that station, gains most\n"
-    "of what no station sees. A place of the grid is a floor of at most 20 degrees, with room for the head and a\n"
-    "tripod. Places are compared by rays; the best ones of each round are scanned as a whole, and these gains are\n"
-    "what counts. Places that see mostly backs of faces lie within bodies; they are left out where the stations\n"
-    "see fronts. The line below the table goes into `stations` as it is. Mesh, figures and labels are those of\n"
-    "the stations that are there already.\n";
+    "The next station is the place where the head of head.station, level and with the heading of that station,\n"
+    "sees most area that no station sees. A place of the grid is a floor of at most 20 degrees, with room for the\n"
+    "head and a tripod. Places are compared by rays. The best ones of each round are scanned as a whole, and the\n"
+    "gains of these scans decide. Places that see mostly backs of faces lie within bodies; they are left out where\n"
+    "the stations see fronts. The line below the table can be copied into `stations`. Mesh, figures and labels are\n"
+    "those of the present stations.\n";
 
 const struct app_command app_coverage = {
     .name = "coverage",

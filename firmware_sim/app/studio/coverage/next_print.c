@@ -53,11 +53,11 @@ void coverage_next_print(const struct coverage_next *next, const struct coverage
 {
     printf("\nplaces     %" PRIu32 " to stand at", next->n);
     if (next->within > 0)
-        printf(", %" PRIu32 " of them left out: they see mostly backs of faces, so they lie within bodies",
+        printf(", %" PRIu32 " of them left out: they see mostly backs of faces, so they are within bodies",
                next->within);
     printf("\nestimates  %" PRIu32 " rays from each place, ", next->directions);
     if (next->whole_cells)
-        printf("pulses of the head; each cell that is met counts");
+        printf("pulses of the head; each cell that they hit counts");
     else
         printf("%g deg apart", next->step_deg);
     if (next->n_rounds > 0) printf("; whole scans differ by up to %.3f m2", largest_error_m2(next));

@@ -29,7 +29,7 @@ static int check_upright(const struct coverage_finder *f, struct sh_err *err)
     const struct placement_anchor *anchor = &f->site->anchor;
     if (!anchor->known || anchor->frame.kind != GEOFRAME_ECEF) return SH_OK;
     return sh_fail(err, SH_EINPUT,
-                   "%s: scene.anchor.source: ecef, where z is not up: a grid has no floors; allowed is --candidates",
+                   "%s: scene.anchor.source: ecef, where z is not up, so a grid has no floors; allowed is --candidates",
                    site_file(f->site));
 }
 
@@ -46,7 +46,8 @@ static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
     int rc = check_upright(f, err);
     if (rc == SH_OK) rc = standpoint_places(f->site->bvh, &grid, f->report, &found, &n, err);
     if (rc == SH_OK && n > MOST_PLACES)
-        rc = sh_fail(err, SH_EINPUT, "--grid %g: %u places to stand; allowed are %d: a wider grid, or a part by --at",
+        rc = sh_fail(err, SH_EINPUT,
+                     "--grid %g: %u places to stand; allowed are %d: use a wider grid, or a part with --at",
                      f->o->grid_m, n, MOST_PLACES);
     for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
         struct coverage_next_place place = {.heading_deg = f->site->station[f->result->base].station->heading_deg,
@@ -175,7 +176,8 @@ static int choose_directions(struct coverage_finder *f, struct sh_err *err)
     f->next->directions = f->n_dir;
     f->next->step_deg = f->o->step_deg;
     if (rc == SH_OK && f->n_dir == 0)
-        rc = sh_fail(err, SH_EINPUT, "--step-deg %g: no ray lies within what the head scans; allowed is a smaller step",
+        rc = sh_fail(err, SH_EINPUT,
+                     "--step-deg %g: no ray lies within the head's field of view; allowed is a smaller step",
                      f->o->step_deg);
     return rc;
 }

@@ -50,10 +50,11 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
                                          angle_rad(1e-6 * (double)profile->fov_max_udeg)};
     rc = standpoint_find(scene, &view, &app_report_stderr, at, err);
     if (rc == SH_OK && at->seen == 0.0)
-        rc = sh_fail(err, SH_EINPUT,
-                     "%s: no place was found from where a head that sees %g to %g m meets anything: the mesh is %.3g m "
-                     "large; --scale sets metres per unit, now %g",
-                     run->name, profile->range_min_m, profile->range_max_m, init_largest_m(scene), run->as.scale);
+        rc = sh_fail(
+            err, SH_EINPUT,
+            "%s: no place was found from which a head with ranges of %g to %g m hits anything: the mesh is %.3g m "
+            "large; --scale sets metres per unit, now %g",
+            run->name, profile->range_min_m, profile->range_max_m, init_largest_m(scene), run->as.scale);
     if (rc != SH_OK || at->kind != STANDPOINT_INSIDE) return rc;
     struct config_profile room;
     rc = config_load_profile(ROOM_PROFILE, run->output, &room, err);
@@ -116,7 +117,7 @@ static int check_draft(const struct init_run *run, const char *draft, struct sh_
 
 static int refuse_to_overwrite(const struct init_run *run, struct sh_err *err)
 {
-    return sh_fail(err, SH_EINPUT, "%s is there already; give another name with -o, or --force to replace it",
+    return sh_fail(err, SH_EINPUT, "%s already exists; give another name with -o, or --force to replace it",
                    run->output);
 }
 
@@ -159,9 +160,10 @@ static void say_result(const struct init_run *run, const struct scene *s, const 
            s->max_m[2] - s->min_m[2]);
     printf("unit      %.7g m, %s\n", run->as.scale, run->as.scale_from);
     printf("axes      %c up, %s\n", run->as.up == SCENE_UP_Y ? 'y' : 'z', run->as.up_from);
-    printf("station   %.4f %.4f %.4f m, %s; %.0f %% of the view meets something\n", p[0], p[1], p[2], where,
+    printf("station   %.4f %.4f %.4f m, %s; %.0f %% of the view hits something\n", p[0], p[1], p[2], where,
            100.0 * at->seen);
-    if (at->faces_out) puts("          there is room inside, but its faces point outward: taken as a closed body");
+    if (at->faces_out)
+        puts("          there is room inside, but its faces point outward: it is treated as a closed body");
     printf("written   %s; next: scanhead record ", run->output);
     put_operand(run->output);
     puts(" -o scan.ply");
@@ -245,11 +247,11 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_TEXT, "output", "FILE.yaml", .letter = 'o', .at = AT(output), .file = APP_WRITES,
-     .help = "where to write; default: the mesh's name, with .yaml, in the working directory"},
-    {APP_FLAG, "force", NULL, .at = AT(force), .help = "replace FILE.yaml where it is there already"},
-    {APP_TEXT, "up", "y|z", .at = AT(wish.up), .help = "the axis that points up, in place of what the file says"},
+     .help = "file to write; default: the mesh's name, with .yaml, in the working directory"},
+    {APP_FLAG, "force", NULL, .at = AT(force), .help = "replace FILE.yaml if it exists"},
+    {APP_TEXT, "up", "y|z", .at = AT(wish.up), .help = "the axis that points up, in place of the one in the file"},
     {APP_NUMBER, "scale", "M", .min = 1e-9, .max = 1e9, .at = AT(wish.scale),
-     .help = "metres per unit, in place of what the file says"},
+     .help = "metres per unit, in place of the value in the file"},
     OPTION_END
 };
 /* clang-format on */
@@ -260,12 +262,13 @@ const struct app_command app_init = {
     .summary = "write a first configuration for a mesh",
     .options = OPTIONS,
     .notes =
-        "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif. Its unit and axes are taken where the format\n"
-        "defines them (glTF, Collada, IFC, GeoTIFF) or the file says them (FBX). Else metres and z up are assumed, or\n"
+        "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif. Its unit and axes come from the format where\n"
+        "that defines them (glTF, Collada, IFC, GeoTIFF), or from the file (FBX). Else metres and z up are assumed, "
+        "or\n"
         "millimetres where the mesh would be larger than 2 km; a warning says so. Coordinates of a projected system\n"
         "(large numbers beside the mesh's size), and a mesh that would be a thin plate in millimetres, are metres.\n"
         "\n"
-        "The station is put above a floor inside, or on open ground, or outside with the mesh before it: where\n"
-        "rays cast over the view of the head meet most. The configuration has comments; change what doesn't fit.\n",
+        "The station is put above a floor inside, or on open ground, or outside facing the mesh: where most rays over\n"
+        "the view of the head hit the mesh. The configuration has comments; change the values that don't fit.\n",
     .run = run,
 };

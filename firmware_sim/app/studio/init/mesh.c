@@ -36,14 +36,14 @@ static void warn_of_axes(const char *name, const struct scene_says *says, int y_
 {
     if (says->up == 1 || says->up < 0)
         sh_warn(&app_report_stderr,
-                "%s: its %s%c axis points up, which no key can say: with up: %c the mesh %s; export it with y or z up",
+                "%s: its %s%c axis points up, which no key can set: with up: %c the mesh %s; export it with y or z up",
                 name, says->up < 0 ? "-" : "", "xyz"[abs(says->up) - 1], y_up ? 'y' : 'z',
-                says->up == (y_up ? -2 : -3) ? "stands on its head" : "lies on its side");
+                says->up == (y_up ? -2 : -3) ? "is upside down" : "lies on its side");
     if (says->is_left_handed)
-        sh_warn(
-            &app_report_stderr,
-            "%s: its axes are left-handed, which no key can say: the mesh is mirrored; export it with right-handed axes",
-            name);
+        sh_warn(&app_report_stderr,
+                "%s: its axes are left-handed, which no key can set: the mesh is mirrored; export it with right-handed "
+                "axes",
+                name);
 }
 
 static void choose_up(const struct init_wish *wish, const char *name, const struct scene *scene, struct init_mesh *as)
@@ -56,15 +56,16 @@ static void choose_up(const struct init_wish *wish, const char *name, const stru
     else if (says == 2 || says == 3)
         from = said_by(wish->file);
     else
-        from = says == 0 ? "assumed: the file doesn't say; y is up in many a file" : "assumed";
+        from = says == 0 ? "assumed: the file doesn't say; in many files y is up" : "assumed";
     as->up = y_up ? SCENE_UP_Y : SCENE_UP_Z;
     snprintf(as->up_from, sizeof as->up_from, "%s", from);
     warn_of_axes(name, &scene->says, y_up);
     if (wish->up == NULL && says == 0)
-        sh_warn(&app_report_stderr,
-                "%s: which axis points up is not in the file: z is assumed; if the mesh lies on "
-                "its side, --up y",
-                name);
+        sh_warn(
+            &app_report_stderr,
+            "%s: the file does not give the axis that points up: z is assumed; if the mesh lies on its side, use --up "
+            "y",
+            name);
 }
 
 /* Eastings and northings of projected systems are large compared with the size of the mesh. In millimetres they would
@@ -104,7 +105,7 @@ static double guess_unit(const struct scene *scene, int y_up, char *why, size_t 
     }
     if (init_largest_m(scene) <= LARGEST_M) return 1.0;
     if (!is_survey(scene, y_up)) return 0.001;
-    snprintf(why, len, "it is wide and flat as a survey, and would be a plate in millimetres");
+    snprintf(why, len, "it is as wide and flat as a survey, and would be a thin plate in millimetres");
     return 1.0;
 }
 
@@ -124,8 +125,8 @@ static void choose_scale(const struct init_wish *wish, const char *name, const s
     as->scale = guess_unit(scene, as->up == SCENE_UP_Y, why, sizeof why);
     snprintf(as->scale_from, sizeof as->scale_from, "assumed: %s", why[0] != '\0' ? why : "the file doesn't say");
     sh_warn(&app_report_stderr,
-            "%s: its unit is not in the file: %s is assumed%s%s, which makes the mesh %.4g m large; "
-            "--scale sets another one",
+            "%s: the file does not give its unit: %s is assumed%s%s, which makes the mesh %.4g m large; --scale sets "
+            "another one",
             name, as->scale == 1.0 ? "a metre" : "a millimetre", why[0] != '\0' ? ", since " : "", why,
             as->scale * size);
 }

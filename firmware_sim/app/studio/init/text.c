@@ -73,7 +73,7 @@ void init_describe(const struct standpoint *at, char *buf, size_t len)
     else if (at->kind == STANDPOINT_GROUND)
         snprintf(buf, len, "on open ground, %.3g m above it", at->floor_m);
     else
-        snprintf(buf, len, "outside, looking at the mesh");
+        snprintf(buf, len, "outside, facing the mesh");
 }
 
 /* A double-quoted scalar of YAML. */
@@ -97,9 +97,10 @@ static void put_head(const struct init_text *t, FILE *out)
     const struct init_scan *scan = &t->scan;
     fprintf(out, "head:\n  profile: %s # sees from %g to %g m; `scanhead list` shows others\n", t->profile->name,
             t->profile->range_min_m, t->profile->range_max_m);
-    fprintf(out,
-            "  prr_hz: %.0f # a coarse scan of %.2g s, a line every %g deg; higher rates and a slower pan: finer\n",
-            scan->prr_hz, scan->duration_s, scan->step_deg);
+    fprintf(
+        out,
+        "  prr_hz: %.0f # a coarse scan of %.2g s, a line every %g deg; higher rates and a slower pan make it finer\n",
+        scan->prr_hz, scan->duration_s, scan->step_deg);
     fprintf(out, "  lines_hz: %g\n  pan_deg_s: %.6g\n", scan->lines_hz, scan->pan_deg_s);
     if (t->at->kind != STANDPOINT_OUTSIDE) return;
     fprintf(out, "  pan_stop_deg: %g # only the part of the view that holds the mesh\n", scan->pan_stop_deg);
@@ -113,8 +114,7 @@ static void put_scene(const struct init_text *t, FILE *out)
     fprintf(out, "\n      up: %s # %s\n", t->mesh->up == SCENE_UP_Y ? "y" : "z", t->mesh->up_from);
     fprintf(out, "      scale: %.7g # metres per unit; %s\n", t->mesh->scale, t->mesh->scale_from);
     if (t->mesh->crs[0] != '\0')
-        fprintf(out, "  anchor: {source: geotiff} # %s; height_m: how high its 0 is above the ellipsoid\n",
-                t->mesh->crs);
+        fprintf(out, "  anchor: {source: geotiff} # %s; height_m: height of its 0 above the ellipsoid\n", t->mesh->crs);
 }
 
 /* A file can't decide what is glass: the line is a comment, whose # the user may remove. */
@@ -123,8 +123,10 @@ static void put_clear(const struct scene *scene, FILE *out)
     struct site_clear clear = {0};
     for (uint32_t i = 0; i < scene->n_surfaces; i++)
         site_clear_add(&clear, &scene->surface[i], NULL, 0);
-    if (clear.n > 0) fprintf(out, "# transparent by the file; as glass:\n# surfaces: [%s]\n", clear.rules);
-    if (clear.n_left_out > 0) fputs("# and more: `scanhead check --scene-csv FILE` has all\n", out);
+    if (clear.n > 0)
+        fprintf(out, "# The file calls these transparent. To make them glass, remove the # below:\n# surfaces: [%s]\n",
+                clear.rules);
+    if (clear.n_left_out > 0) fputs("# and more: `scanhead check --scene-csv FILE` lists all\n", out);
 }
 
 static void put_station(const struct init_text *t, FILE *out)
@@ -135,7 +137,7 @@ static void put_station(const struct init_text *t, FILE *out)
     char where[128];
     double heading_deg = fmod(floor(10.0 * angle_deg(t->at->heading_rad)) / 10.0 + 720.0, 360.0);
     init_describe(t->at, where, sizeof where);
-    fprintf(out, "stations:\n  # %s; %.0f %% of the view meets something\n", where, 100.0 * t->at->seen);
+    fprintf(out, "stations:\n  # %s; %.0f %% of the view hits something\n", where, 100.0 * t->at->seen);
     fprintf(out, "  - {name: %s, position_m: [%.4f, %.4f, %.4f], heading_deg: %g}\n", name[t->at->kind], p[0], p[1],
             p[2], heading_deg);
 }

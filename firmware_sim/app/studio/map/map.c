@@ -189,10 +189,11 @@ static int write_map(struct map_run *run, uint32_t n_stations, struct sh_err *er
     const uint32_t left_out = map_place_labels(run->map, label);
     free(label);
     if (left_out > 0)
-        sh_warn(&app_report_stderr,
-                "map: there is no room for the names of %u of %u stations; a smaller --pixel-m makes room, and an SVG "
-                "has them as titles",
-                left_out, n_stations);
+        sh_warn(
+            &app_report_stderr,
+            "map: the names of %u of %u stations have no room; a smaller --pixel-m makes room, and an SVG has them as "
+            "titles",
+            left_out, n_stations);
     return app_ends_in(run->output, ".svg") ? map_write_svg(run->map, run->output, err)
                                             : map_write_png(run->map, run->output, err);
 }
@@ -264,13 +265,14 @@ static int run_view(struct map_run *run)
         return app_usage(&app_map, "-o %s: with --perspective it is an image; allowed is a name that ends in .png",
                          run->output);
     if (run->pixel_m > 0 || run->open_edges)
-        return app_usage(&app_map, "%s goes with a map from above, not with --perspective",
+        return app_usage(&app_map, "%s: allowed for a map from above, not with --perspective",
                          run->open_edges ? "--open-edges" : "--pixel-m");
     if (map_view_read(&run->view, &run->plan, &err) != SH_OK) return app_usage(&app_map, "%s", err.text);
     if (is_cloud(operand)) {
         if (run->view.cloud != NULL)
             return app_usage(&app_map, "%s and --cloud %s: one cloud is shown at a time", operand, run->view.cloud);
-        if (run->in.sets.n > 0) return app_usage(&app_map, "--set: %s is no configuration", operand);
+        if (run->in.sets.n > 0)
+            return app_usage(&app_map, "--set: %s is not a configuration; allowed with a CONFIG", operand);
         if (app_check_files(&run->in, NULL, &err) != SH_OK) return app_fail(&err);
         const int rc = map_view_cloud(NULL, operand, &run->plan, run->output, run->quiet, &err);
         return rc == SH_OK ? APP_OK : app_fail(&err);
@@ -287,8 +289,10 @@ static int run(int argc, char **argv)
     if (run.output == NULL) return app_usage(&app_map, "-o FILE.png or -o FILE.svg is needed");
     if (run.perspective) return run_view(&run);
     if (memcmp(&run.view, &map_view_default, sizeof run.view) != 0)
-        return app_usage(&app_map, "an eye, sizes, colours and clouds go with --perspective; a map from above has -o, "
-                                   "--pixel-m, --open-edges, --set and --quiet");
+        return app_usage(
+            &app_map,
+            "options of the eye, sizes, colours and clouds need --perspective; a map from above takes -o, --pixel-m, "
+            "--open-edges, --set and --quiet");
     if (is_cloud(run.in.operand[0]))
         return app_usage(&app_map, "%s is a point cloud; a map from above scans a CONFIG: add --perspective",
                          run.in.operand[0]);
@@ -302,30 +306,36 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES, .help = "where to write: .png, or .svg (points as an image, all else as vectors)"},
+    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES, .help = "file to write: .png, "
+                                                                                              "or .svg (points as an "
+                                                                                              "image, everything else "
+                                                                                              "as vectors)"},
     {APP_NUMBER, "pixel-m", "M", .min = 1e-4, .max = 1e4, .at = AT(pixel_m),
      .help = "side of a pixel; default: 1200 pixels on the longer side"},
     {APP_FLAG, "open-edges", NULL, .at = AT(open_edges),
-     .help = "mark edges of open bodies in red, those that check --scene counts"},
+     .help = "mark open edges of bodies in red, as counted by check --scene"},
     {APP_FLAG, "perspective", NULL, .at = AT(perspective),
-     .help = "a picture as seen from a place, shaded by depth; the options below go with it"},
+     .help = "make a picture from a viewpoint, shaded by depth; the options below need it"},
     {APP_TEXT, "cloud", "FILE", .at = AT(view.cloud), .file = APP_READS,
-     .help = "show this recording (.ply, .las) in place of a scan; CONFIG brings it to the scene, with its stations"},
+     .help = "show this recording (.ply, .las) in place of a scan; CONFIG gives its place in the scene, and the "
+             "stations"},
     {APP_TEXT, "from", "DIRECTION", .at = AT(view.from), OPTION_CHOICES(map_view_winds),
-     .help = "where to look from: north, north-east ..., or degrees clockwise from north (default south-west); so far that "
- "all is seen"},
+     .help = "side from which to look: north, north-east ..., or degrees clockwise from north (default south-west); "
+             "far enough to see everything"},
     {APP_NUMBER, "elevation-deg", "DEG", .min = -89, .max = 89, .at = AT(view.elevation_deg),
-     .help = "of the eye, above the horizon (default 40)"},
-    {APP_TEXT, "eye", "X,Y,Z", .at = AT(view.eye), .help = "where the eye is, in metres, in place of --from"},
+     .help = "elevation of the eye above the horizon (default 40)"},
+    {APP_TEXT, "eye", "X,Y,Z", .at = AT(view.eye), .help = "place of the eye, in metres, in place of --from"},
     {APP_TEXT, "look-at", "X,Y,Z", .at = AT(view.look_at),
-     .help = "what is in the picture's middle (default: the middle of what is seen)"},
+     .help = "place in the picture's middle (default: the middle of the points)"},
     {APP_NUMBER, "fov-deg", "DEG", .min = 1, .max = 160, .at = AT(view.fov_deg),
      .help = "field of view, across the width (default 40)"},
-    {APP_TEXT, "size", "WxH", .at = AT(view.size), .help = "of the picture, in pixels, up to 4096x4096 (default 1200x800)"},
+    {APP_TEXT, "size", "WxH", .at = AT(view.size), .help = "size of the picture in pixels, up to 4096x4096 (default "
+                                                           "1200x800)"},
     {APP_TEXT, "colour", "WHAT", .at = AT(view.colour), OPTION_CHOICES(map_view_colours),
-     .help = "height (default), range, reflectance, label, station, rgb (of a recording, or output.colour)"},
+     .help = "colours to show: height (default), range, reflectance, label, station, rgb (of a recording, or "
+             "output.colour)"},
     {APP_TEXT, "limits", "LOW,HIGH", .at = AT(view.limits),
-     .help = "between which the colours of height or range spread (default: what is seen, but for 1 %)"},
+     .help = "limits of the colours of height or range (default: those of the points, without 1 %)"},
     {APP_NUMBER, "below", "Z", .min = -1e9, .max = 1e9, .at = AT(view.below_m), .help = "only points below this z"},
     {APP_NUMBER, "above", "Z", .min = -1e9, .max = 1e9, .at = AT(view.above_m), .help = "only points above this z"},
     {APP_NUMBER, "point-m", "M", .min = 0, .max = 1000, .at = AT(view.point_m),

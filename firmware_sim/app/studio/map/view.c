@@ -86,7 +86,8 @@ static void include_stations(const struct site *site, struct picturing_bounds *b
 static int check_up(const struct site *site, struct sh_err *err)
 {
     if (!site->anchor.known || site->anchor.frame.kind != GEOFRAME_ECEF) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s: scene.anchor: a scene in ECEF has no z that is up, and --perspective needs one",
+    return sh_fail(err, SH_EINPUT,
+                   "%s: scene.anchor: the z axis of a scene in ECEF is not up, but --perspective needs that",
                    site->cfg->file);
 }
 
@@ -198,8 +199,8 @@ static int check_columns(const struct showing *s, struct sh_err *err)
     if (!has[colour]) return sh_fail(err, SH_EINPUT, "%s: its points have no %s for --colour", s->path, names[colour]);
     if (s->site == NULL && (c->epsg == 4978 || c->epsg == 4979))
         return sh_fail(err, SH_EINPUT,
-                       "%s: points in %s have no z that is up: scanhead map CONFIG --perspective --cloud %s", s->path,
-                       c->epsg == 4978 ? "ECEF" : "degrees", s->path);
+                       "%s: the z axis of points in %s is not up: use scanhead map CONFIG --perspective --cloud %s",
+                       s->path, c->epsg == 4978 ? "ECEF" : "degrees", s->path);
     return SH_OK;
 }
 
@@ -219,7 +220,7 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
     for (size_t i = 0; i < c->n; i++)
         picturing_include(&bounds, c->xyz_m[i]);
     if (!(bounds.max_m[0] >= bounds.min_m[0]))
-        return sh_fail(err, SH_EINPUT, "%s: there are no points in it, only %zu shots without echo", s->path, c->n);
+        return sh_fail(err, SH_EINPUT, "%s: it has no points, only %zu shots without echo", s->path, c->n);
     if (s->site != NULL) include_stations(s->site, &bounds);
     rc = picturing_look(s->p, &bounds, err);
     for (size_t i = 0; i < c->n && rc == SH_OK; i++) {

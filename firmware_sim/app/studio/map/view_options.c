@@ -64,8 +64,8 @@ static int read_place(const char *option, const char *text, double place_m[3], i
     if (text == NULL) return SH_OK;
     if (read_numbers(text, ',', place_m, 3) && fmax(fmax(fabs(place_m[0]), fabs(place_m[1])), fabs(place_m[2])) <= 1e9)
         return SH_OK;
-    return sh_fail(err, SH_EINPUT, "--%s %s: a place is X,Y,Z in metres, each within 1e9, as in --%s 10,-5,8.5", option,
-                   text, option);
+    return sh_fail(err, SH_EINPUT, "--%s %s: allowed are X,Y,Z in metres, each within 1e9, as in --%s 10,-5,8.5",
+                   option, text, option);
 }
 
 static int read_size(const char *text, struct view_camera *camera, struct sh_err *err)
@@ -73,7 +73,7 @@ static int read_size(const char *text, struct view_camera *camera, struct sh_err
     double size[2] = {1200, 800};
     if (text != NULL && (!read_numbers(text, 'x', size, 2) || size[0] != floor(size[0]) || size[1] != floor(size[1]) ||
                          !(fmin(size[0], size[1]) >= VIEW_MIN_PX && fmax(size[0], size[1]) <= VIEW_MAX_SIDE_PX)))
-        return sh_fail(err, SH_EINPUT, "--size %s: a size is WIDTHxHEIGHT in pixels, %d to %d each, as in 1200x800",
+        return sh_fail(err, SH_EINPUT, "--size %s: allowed are WIDTHxHEIGHT in pixels, %d to %d each, as in 1200x800",
                        text, VIEW_MIN_PX, VIEW_MAX_SIDE_PX);
     if (size[0] * size[1] > VIEW_MAX_PIXELS)
         return sh_fail(err, SH_EINPUT, "--size %s: %.0f pixels; allowed are %d in all, as in 4096x4096", text,
@@ -88,9 +88,10 @@ static int read_limits(const struct map_view_options *o, struct map_view_plan *p
     plan->has_limits = o->limits != NULL;
     if (o->limits == NULL) return SH_OK;
     if (!read_numbers(o->limits, ',', plan->limit, 2) || !(plan->limit[1] > plan->limit[0]))
-        return sh_fail(err, SH_EINPUT, "--limits %s: limits are LOW,HIGH, the second larger than the first", o->limits);
+        return sh_fail(err, SH_EINPUT, "--limits %s: allowed are LOW,HIGH, the second larger than the first",
+                       o->limits);
     if (plan->colour > MAP_VIEW_RANGE)
-        return sh_fail(err, SH_EINPUT, "--limits goes with --colour height and range, not %s",
+        return sh_fail(err, SH_EINPUT, "--limits: allowed with --colour height and range, not %s",
                        map_view_colours[plan->colour]);
     return SH_OK;
 }
@@ -114,8 +115,9 @@ int map_view_read(const struct map_view_options *o, struct map_view_plan *plan, 
     if (rc == SH_OK) rc = read_size(o->size, &plan->camera, err);
     if (rc == SH_OK) rc = read_limits(o, plan, err);
     if (rc == SH_OK && plan->has_eye && o->from != NULL)
-        rc = sh_fail(err, SH_EINPUT, "--eye and --from: both say where to look from; give one of them");
+        rc = sh_fail(err, SH_EINPUT, "--eye and --from: both give the place of the eye; allowed is one of them");
     if (rc == SH_OK && !(plan->below_m > plan->above_m))
-        rc = sh_fail(err, SH_EINPUT, "--below %g: allowed is more than --above, %g", plan->below_m, plan->above_m);
+        rc = sh_fail(err, SH_EINPUT, "--below %g: allowed is a height above that of --above, %g", plan->below_m,
+                     plan->above_m);
     return rc;
 }

@@ -177,8 +177,8 @@ static int check_figures(struct picturing *p, struct sh_err *err)
     if (counts.drawn == 0)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: no point is in the picture: %llu are beside it or behind the eye, --below and --above leave "
-            "out %llu, and %llu shots have no echo",
+            "%s: no point is in the picture: %llu are outside of it or behind the eye, --below and --above leave out "
+            "%llu, and %llu shots have no echo",
             p->output, (unsigned long long)counts.beyond, (unsigned long long)p->cut, (unsigned long long)counts.empty);
     if (p->plan->colour == MAP_VIEW_RGB) return SH_OK;
     const int known = view_range(p->view, &p->limit[0], &p->limit[1]);
@@ -228,9 +228,9 @@ int picturing_finish(struct picturing *p, struct sh_err *err)
     if (rc != SH_OK || p->quiet) return rc;
     struct view_counts counts;
     view_get_counts(p->view, &counts);
-    fprintf(stderr, "scanhead: %s: %llu points in the picture, %llu beside it", p->output,
+    fprintf(stderr, "scanhead: %s: %llu points in the picture, %llu outside of it", p->output,
             (unsigned long long)counts.drawn, (unsigned long long)counts.beyond);
-    if (p->cut > 0) fprintf(stderr, ", %llu cut away", (unsigned long long)p->cut);
+    if (p->cut > 0) fprintf(stderr, ", %llu left out by height", (unsigned long long)p->cut);
     fputc('\n', stderr);
     return rc;
 }

@@ -105,7 +105,7 @@ int colour_spool_drain(struct colour_spool *spool,
     /* Bytes, not frames: after a replug a frame may equal one before, which is then taken for that one. */
     if (rc == SH_OK) scanhead_get_stats(spool->sh, &stats);
     if (rc == SH_OK && (got != SCANHEAD_ECLOSED || stats.bytes != spool->bytes || stats.bad_bytes != 0))
-        rc = sh_fail(err, SH_EIO, "%s: the frames that were kept can't be read back: %s", spool->track.path,
+        rc = sh_fail(err, SH_EIO, "%s: the stored frames can't be read back: %s", spool->track.path,
                      scanhead_error(spool->sh));
     return rc;
 }

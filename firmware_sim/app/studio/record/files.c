@@ -37,7 +37,7 @@ int record_files_check_each(const struct record_files *files, struct sh_err *err
         for (int k = 0; k < files->n; k++)
             if (is_name_of_scan(&files->file[i], files->file[k].path))
                 return sh_fail(err, SH_EINPUT,
-                               "-o %s: with --each the file of one scan of %s has that name; allowed any other",
+                               "-o %s: with --each the file of one scan of %s has that name; allowed is any other name",
                                files->file[k].path, files->file[i].path);
     return SH_OK;
 }
@@ -96,10 +96,11 @@ int record_files_check_facing(const struct record_files *files, struct sh_err *e
 {
     for (int i = 0; i < files->n; i++)
         if (files->file[i].ops->is_mesh)
-            return sh_fail(err, SH_EINPUT,
-                           "record: -o %s: a mesh faces the head, and where a moving head was is known in the scene's "
-                           "frame alone; allowed output.crs: local, or output.layout: polar",
-                           files->file[i].path);
+            return sh_fail(
+                err, SH_EINPUT,
+                "record: -o %s: a mesh faces the head, but the places of a moving head are known only in the scene's "
+                "frame; allowed output.crs: local, or output.layout: polar",
+                files->file[i].path);
     return SH_OK;
 }
 
@@ -109,8 +110,8 @@ int record_files_check_surface(const struct record_files *files, struct sh_err *
         if (files->file[i].ops->is_mesh)
             return sh_fail(
                 err, SH_EINPUT,
-                "record: -o %s: a mesh needs a surface, and all lines of this head are one: it neither "
-                "pans nor moves, nor has it several rings; allowed .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
+                "record: -o %s: a mesh needs a surface, but this head scans a single line: it neither pans nor moves, "
+                "and has one ring; allowed are .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
                 files->file[i].path);
     return SH_OK;
 }
@@ -120,10 +121,10 @@ int record_files_check_emitter(const struct record_files *files, enum emitter_ki
     if (kind != EMITTER_BEAMS && kind != EMITTER_DIRECTIONS) return SH_OK;
     for (int i = 0; i < files->n; i++)
         if (files->file[i].ops->track.grid)
-            return sh_fail(err, SH_EINPUT,
-                           "record: -o %s: a grid has rows and columns, and this head fires %s; allowed .ply .las "
-                           ".e57 .shs",
-                           files->file[i].path, kind == EMITTER_BEAMS ? "beams in turn" : "along a list");
+            return sh_fail(
+                err, SH_EINPUT,
+                "record: -o %s: a grid has rows and columns, but this head fires %s; allowed are .ply .las .e57 .shs",
+                files->file[i].path, kind == EMITTER_BEAMS ? "beams in turn" : "along a list");
     return SH_OK;
 }
 
@@ -131,10 +132,11 @@ int record_files_check_heads(const struct record_files *files, struct sh_err *er
 {
     for (int i = 0; i < files->n && !files->split; i++)
         if (files->file[i].ops->track.points == NULL && files->file[i].ops->track.scan == NULL)
-            return sh_fail(err, SH_EINPUT,
-                           "record: -o %s: it is the stream of one head, and the stations have several scanners; "
-                           "allowed with --split, or with --station N",
-                           files->file[i].path);
+            return sh_fail(
+                err, SH_EINPUT,
+                "record: -o %s: the file is the stream of one head, but the stations have several scanners; allowed "
+                "with --split, or with --station N",
+                files->file[i].path);
     return SH_OK;
 }
 
@@ -201,7 +203,7 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
     if (len == 0) return SH_OK;
     return sh_fail(
         err, SH_EINPUT,
-        "%s: an earlier recording has left %lld bytes there; scanhead record --repair %s makes a file of them; "
+        "%s: an earlier recording left %lld bytes there; scanhead record --repair %s makes a complete file of them; "
         "or remove it",
         part, len, path);
 }

@@ -78,7 +78,7 @@ static void say_result(const struct record_job *r)
     if (!r->recording.progress || r->brief) return;
     if (result->faint != 0)
         snprintf(faint, sizeof faint, ", %llu hits not detected%s", (unsigned long long)result->faint,
-                 r->has_silent ? ", or on what is no target" : "");
+                 r->has_silent ? ", or on surfaces that are no target" : "");
     fprintf(stderr, "scanhead: %llu points, %llu shots without echo%s, %llu scans\n",
             (unsigned long long)result->points, (unsigned long long)result->empty, faint,
             (unsigned long long)result->counts.scans);
@@ -129,10 +129,11 @@ static void warn_of_little(const struct record_job *r)
     if (result->empty <= pulses) app_warn_empty(pulses, pulses - result->empty, result->faint);
     if (r->files.recorder.colour.scale.mode == COLOUR_REFLECTANCE && result->points != 0 &&
         result->with_reflectance == 0)
-        sh_warn(&app_report_stderr,
-                "--colour reflectance: none of %llu points has one, all have the colour for that; it needs the head's "
-                "signal.model: on",
-                (unsigned long long)result->points);
+        sh_warn(
+            &app_report_stderr,
+            "--colour reflectance: none of %llu points has a reflectance, so all have the colour for a missing one; "
+            "it needs the head's signal.model: on",
+            (unsigned long long)result->points);
 }
 
 static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
@@ -168,8 +169,8 @@ static int set_layout(const struct record_job *r, struct config *cfg, struct sh_
     if (cfg->output.layout_given)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: output.layout is polar, and polar recordings are in the scene frame; with --crs only geo is "
-            "allowed: --set output.layout=geo",
+            "%s: output.layout is polar, and polar recordings are in the scene frame; --crs needs geo: --set "
+            "output.layout=geo",
             cfg->file);
     cfg->output.layout = LINE_GEO;
     return SH_OK;
@@ -181,9 +182,10 @@ static int check_can_end(const struct record_job *r, const struct config *cfg, s
     const long frames = r->recording.frames >= 0 ? r->recording.frames : (long)cfg->head.settings.frames;
     const int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
     if (cfg->platform.kind == PLATFORM_LIVE)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: platform.kind: a live platform can't be recorded off line; run it, and record its link",
-                       cfg->file);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: platform.kind: a live platform can't be recorded off line; use scanhead run, and record its link",
+            cfg->file);
     if (frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         return sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration",
                        cfg->file);
@@ -214,15 +216,17 @@ static int check_colours(const struct record_job *r, const struct config *cfg, s
     const int has_frames = cfg->platform.kind == PLATFORM_TRAJECTORY || cfg->platform.kind == PLATFORM_STOPS;
     if (!c->given) return SH_OK;
     if (c->scale.mode == COLOUR_FRAME && !has_frames)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: --colour frame, but there are no frames; it needs platform.kind trajectory or stops",
-                       cfg->file);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: --colour frame, but points have no frame scalar; it needs platform.kind trajectory or stops",
+            cfg->file);
     if (is_known_here(cfg, c->scale.mode)) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: --colour %s, but points of a head that moves do not say it in output.layout geo%s; allowed "
-                   "output.colour with limits, or output.layout: polar",
-                   cfg->file, c->scale.mode == COLOUR_RANGE ? "range" : "height",
-                   c->scale.mode == COLOUR_RANGE ? "" : " and ECEF");
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: --colour %s, but points of a moving head do not have it in output.layout geo%s; allowed output.colour "
+        "with limits, or output.layout: polar",
+        cfg->file, c->scale.mode == COLOUR_RANGE ? "range" : "height",
+        c->scale.mode == COLOUR_RANGE ? "" : " and ECEF");
 }
 
 /* What grids and meshes need of the head, and of the coordinates. */
@@ -311,7 +315,7 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
     int rc = heads_load(cfg, heads, err);
     if (rc == SH_OK) rc = check_heads(r, heads, all ? cfg->n_stations : r->recording.last_station, err);
     if (rc == SH_OK && r->truth != NULL && heads->n > 1)
-        rc = sh_fail(err, SH_EINPUT, "%s: --truth: the stations have %u scanners; allowed with one", cfg->file,
+        rc = sh_fail(err, SH_EINPUT, "%s: --truth: the stations have %u scanners; allowed with one scanner", cfg->file,
                      heads->n);
     heads->one[0].offline.truth = r->truth;
     r->first = (struct recorder_scan){0};

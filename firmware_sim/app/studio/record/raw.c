@@ -112,13 +112,14 @@ static int read_source(struct raw *r)
     const int udp = strncmp(source, "udp:", 4) == 0, tcp = strncmp(source, "tcp:", 4) == 0;
     r->ops = udp ? &raw_udp : &raw_tcp;
     if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) || (tcp && r->place.port[0] == 0))
-        return app_usage(&command, "SOURCE %s: with --raw allowed udp:ADDRESS:PORT,PORT,... and tcp:HOST:PORT", source);
+        return app_usage(&command, "SOURCE %s: with --raw allowed are udp:ADDRESS:PORT,PORT,... and tcp:HOST:PORT",
+                         source);
     if (port_twice(&r->place) != 0)
-        return app_usage(&command, "%s: port %d is there twice", source, port_twice(&r->place));
+        return app_usage(&command, "%s: port %d is given twice", source, port_twice(&r->place));
     if (udp && (r->n_sends > 0 || r->relay != NULL))
         return app_usage(&command, "%s: --send and --relay need tcp:HOST:PORT", source);
     if (r->n_sends > 0 && r->relay != NULL)
-        return app_usage(&command, "--send and --relay: what is sent is the client's; allowed one of them");
+        return app_usage(&command, "--send and --relay: with --relay only the client sends; allowed is one of them");
     return APP_GO_ON;
 }
 
@@ -145,18 +146,20 @@ int raw_record(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_FLAG, "raw", NULL, .at = AT(raw), .help = "what is on the wire, whatever its protocol is, to a capture"},
+    {APP_FLAG, "raw", NULL, .at = AT(raw), .help = "write all data on the wire, of any protocol, to a capture"},
     {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "NAME.pcapng"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(duration_s),
      .help = "end S seconds after the first packet"},
     {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(wait_s),
-     .help = "wait up to S seconds for SOURCE to be there, and for its first packet (default: that as long as --duration)"},
+     .help = "wait up to S seconds for SOURCE to appear, and for its first packet (default: as long as --duration for "
+             "the packet)"},
     {APP_CALL, "send", "TEXT", .apply = take_send,
-     .help = "of tcp: send this when connected. \\n, \\r, \\t, \\0, \\\\ and \\xHH are bytes. May be repeated: the next one goes "
+     .help = "tcp: send this when connected. \\n, \\r, \\t, \\0, \\\\ and \\xHH are bytes. May be repeated: the next "
+             "one goes "
              "when an answer has come and 50 ms were silent, at the latest after 1 s"},
     {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(relay),
-     .help = "of tcp: listen there (default: 127.0.0.1), and join each client to SOURCE; both directions are recorded, "
-             "until Ctrl-C"},
+     .help = "tcp: listen there (default: 127.0.0.1), and connect each client to SOURCE; both directions are "
+             "recorded, until Ctrl-C"},
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_WRITES, .help = "write packets, bytes and dropped as JSON; - is standard output"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "once it listens, write a line of JSON with the endpoint to descriptor N"},
@@ -168,21 +171,21 @@ static const struct app_option OPTIONS[] = {
 static const char HELP_NOTES[] =
     "SOURCE is one of\n"
     "\n"
-    "  udp:ADDRESS:PORT,...     datagrams that come to an address of this machine, 0.0.0.0 (all of them), a\n"
+    "  udp:ADDRESS:PORT,...     datagrams to an address of this machine, 0.0.0.0 (all of them), a\n"
     "                           broadcast or a group (GROUP%INTERFACE)\n"
     "  tcp:HOST:PORT            a connection to it, or those of clients (--relay)\n"
     "\n"
-    "Each packet is an Ethernet frame with the kernel's time. Headers are made anew: addresses, ports, lengths,\n"
-    "checksums and sequence numbers are right, hardware addresses are made up.\n"
+    "Each packet is an Ethernet frame with the kernel's time. Headers are rebuilt: addresses, ports, lengths,\n"
+    "checksums and sequence numbers are right, hardware addresses are invented.\n"
     "\n"
-    "Exit status 1: no packet came, the kernel dropped some, the device said nothing or broke the connection.\n"
-    "FILE keeps what came.\n";
+    "Exit status 1: no packet came, the kernel dropped some, the device sent nothing or broke the connection.\n"
+    "FILE keeps the packets that came.\n";
 
 static const struct app_command command = {
     .name = "record",
     .operand = {"SOURCE"},
     .needs = "--raw -o FILE.pcapng",
-    .summary = "what is on the wire to a capture",
+    .summary = "write all data on the wire to a capture",
     .options = OPTIONS,
     .notes = HELP_NOTES,
     .run = raw_record,

@@ -127,7 +127,7 @@ static int record(struct raw *r, struct sh_err *err)
 static int check_any(const struct raw *r, struct sh_err *err)
 {
     if (r->capture.packets != 0) return SH_OK;
-    return sh_fail(err, SH_ETIMEOUT, "%s: no packet came; there is no %s", r->in.operand[0], r->path);
+    return sh_fail(err, SH_ETIMEOUT, "%s: no packet came; %s is not written", r->in.operand[0], r->path);
 }
 
 static void say_left(const struct raw *r)
@@ -136,7 +136,8 @@ static void say_left(const struct raw *r)
     snprintf(part, sizeof part, "%s.part", r->path);
     if (newfile_left_len(part) > 0)
         sh_warn(&app_report_stderr,
-                "%s keeps what came to the disk: scanhead record --repair %s makes a whole file of it", part, r->path);
+                "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it",
+                part, r->path);
 }
 
 /* As other recordings, it keeps what came also where it ended in a failure. */

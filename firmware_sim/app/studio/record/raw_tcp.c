@@ -69,10 +69,9 @@ static int tcp_open(struct raw *r, struct sh_err *err)
     if (tcp == NULL) return sh_fail(err, SH_ENOMEM, "no memory for connections");
     tcp->listen_fd = -1;
     snprintf(r->endpoint, sizeof r->endpoint, "%s", r->in.operand[0]);
-    const int rc = capture_add_interface(&r->capture, r->in.operand[0],
-                                         "TCP connections that scanhead had, as frames made anew; times are the "
-                                         "kernel's.",
-                                         err);
+    const int rc =
+        capture_add_interface(&r->capture, r->in.operand[0],
+                              "TCP connections that scanhead had, as rebuilt frames; times are the kernel's.", err);
     if (rc != SH_OK) return rc;
     return r->relay != NULL ? listen_for_clients(r, tcp, err) : connect_first(r, tcp, err);
 }
@@ -189,13 +188,14 @@ static int tcp_check(const struct raw *r, struct sh_err *err)
     if (tcp->listen_fd >= 0) return SH_OK;
     if (talk->was_reset) return sh_fail(err, SH_ELOST, "%s: the device broke the connection", source);
     if (talk->next_send < r->n_sends)
-        return sh_fail(err, SH_ECLOSED, "%s: %d of %d --send were not sent: the recording was over before", source,
+        return sh_fail(err, SH_ECLOSED, "%s: %d of %d --send were not sent: the recording ended before", source,
                        r->n_sends - talk->next_send, r->n_sends);
     if (tcp->received[1] != 0) return SH_OK;
-    return sh_fail(err, SH_ETIMEOUT,
-                   "%s: the device said nothing; most speak only when asked: --send TEXT, or --relay "
-                   "PORT for their driver",
-                   source);
+    return sh_fail(
+        err, SH_ETIMEOUT,
+        "%s: the device sent nothing; most devices send only after a command: use --send TEXT, or --relay PORT for "
+        "their driver",
+        source);
 }
 
 static void tcp_put(struct json *json, const struct raw *r)

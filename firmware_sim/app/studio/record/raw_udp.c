@@ -63,10 +63,8 @@ static int open_port(struct raw *r, struct port *p, int number, struct sh_err *e
     socket_address_text((struct sockaddr *)&p->socket.own, p->socket.own_len, at, sizeof at);
     snprintf(p->name, sizeof p->name, "udp:%s", at);
     p->interface = r->capture.n_interfaces;
-    return capture_add_interface(&r->capture, p->name,
-                                 "Datagrams that scanhead received, with headers made anew; "
-                                 "times are the kernel's.",
-                                 err);
+    return capture_add_interface(
+        &r->capture, p->name, "Datagrams that scanhead received, with rebuilt headers; times are the kernel's.", err);
 }
 
 /* An own address may come late: an interface that is not up yet. */
@@ -145,10 +143,11 @@ static int udp_check(const struct raw *r, struct sh_err *err)
 {
     const uint64_t dropped = udp_dropped(r);
     if (dropped == 0) return SH_OK;
-    return sh_fail(err, SH_ELOST,
-                   "%s: the recording is not complete: the system dropped %llu packets; it has no room for more where "
-                   "net.core.rmem_max is small",
-                   r->in.operand[0], (unsigned long long)dropped);
+    return sh_fail(
+        err, SH_ELOST,
+        "%s: the recording is not complete: the system dropped %llu packets; a larger net.core.rmem_max gives it more "
+        "room",
+        r->in.operand[0], (unsigned long long)dropped);
 }
 
 static void udp_put(struct json *json, const struct raw *r)

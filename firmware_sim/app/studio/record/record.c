@@ -144,14 +144,15 @@ static int check_meshes(struct record_line *r)
     if (o->mesh && o->sparse_per_m2 > 0)
         return app_usage(
             &app_record,
-            "--mesh, --sparse: a .ply is one of the two; allowed --sparse with a mesh as .obj, .gltf, .glb or .fbx");
+            "--mesh, --sparse: a .ply can be only one of the two; allowed is --sparse with a mesh as .obj, .gltf, "
+            ".glb or .fbx");
     if (r->sparse_seed >= 0 && !(o->sparse_per_m2 > 0)) return app_usage(&app_record, "--sparse-seed needs --sparse");
     const int is_mesh = o->mesh || o->sparse_per_m2 > 0;
     if (is_mesh && (o->columns & (PLY_TIME | PLY_ECHO | PLY_ATTRIBUTES | PLY_FLOAT)) != 0)
         return app_usage(&app_record, "--ply-columns: with --mesh and --sparse allowed are range, reflectance, label, "
                                       "station, frame, colour, xyz");
     if (is_mesh && o->empty_shots)
-        return app_usage(&app_record, "--empty-shots: a .ply with --mesh or --sparse has no place for them");
+        return app_usage(&app_record, "--empty-shots: a .ply with --mesh or --sparse can not hold them");
     record_files_shape(&r->job.files);
     if (r->long_edge >= 0 && !record_files_have_meshes(&r->job.files))
         return app_usage(
@@ -185,8 +186,10 @@ static int check_colours(const struct record_line *r)
     if (r->limited && !colour_has_limits(mode))
         return app_usage(&app_record, "--colour-limits needs --colour range, height or frame");
     if (mode == COLOUR_TEXTURE && !is_config(r->in.operand[0]))
-        return app_usage(&app_record, "--colour texture needs a CONFIG as SOURCE; a head on a wire sends the texels "
-                                      "itself where its configuration has output.colour: texture");
+        return app_usage(
+            &app_record,
+            "--colour texture needs a CONFIG as SOURCE; a head on a wire sends the texels itself if its configuration "
+            "has output.colour: texture");
     return APP_OK;
 }
 
@@ -234,11 +237,12 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     if (r->n_repairs > 0) return check_repair(r);
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     if (is_config(r->in.operand[0]) && (r->job.recording.listen || r->job.wait_s > 0 || r->job.recording.replug_s > 0))
-        return app_usage(&app_record,
-                         "--listen, --wait, --replug: a CONFIG runs in this process; allowed with a head on a wire");
+        return app_usage(
+            &app_record,
+            "--listen, --wait, --replug: a CONFIG runs in this process; allowed only with a head on a wire");
     if (r->job.files.split && r->job.each)
         return app_usage(&app_record,
-                         "--split and --each: --split writes files of each scan alone; allowed one of them");
+                         "--split and --each: --split writes only files of each scan; allowed is one of them");
     struct sh_err err = {0};
     if (r->job.each && record_files_check_each(&r->job.files, &err) != SH_OK)
         return app_usage(&app_record, "%s", err.text);
@@ -276,73 +280,80 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "where to write; may be repeated"},
+    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "file to write; may "
+                                                                                                "be repeated"},
     {APP_ALONE, "repair", "FILE", .apply = take_repair, .file = APP_READS,
-     .help = "instead of recording: make a whole file of what a killed recorder or a full disk has left (FILE.part), in "
-             "place, and say how much that is; a whole file is checked. May be repeated; without SOURCE and -o"},
+     .help = "instead of recording: complete the file that a killed recorder or a full disk left (FILE.part), in "
+             "place, and print how much was kept; a complete file is only checked. May be repeated; without SOURCE "
+             "and -o"},
     {APP_WHOLE, "station", "N|all", .min = 1, .max = CONFIG_MAX_STOPS, .word = "all", .at = AT(job.station),
      .help = "scan from station N, or from all one after the other into the same files"},
     {APP_WHOLE, "frames", "N", .min = 0, .max = HEAD_MAX_FRAMES, .at = AT(job.recording.frames),
      .help = "frames per scan; 0: without end"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(job.recording.duration_s),
-     .help = "end each scan after S seconds of device time: of a CONFIG to the pulse, of a head on a wire as "
-             "soon as it takes the command"},
+     .help = "end each scan after S seconds of device time: with a CONFIG exact to a pulse, with a head on a wire as "
+             "soon as it carries out the command"},
     {APP_FLAG, "split", NULL, .at = AT(job.files.split),
-     .help = "each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans"},
-    {APP_FLAG, "each", NULL, .at = AT(job.each), .help = "the same beside the files of all scans"},
+     .help = "write each scan to its own files: NAME-1.las, NAME-2.las, ..., in the order of scans"},
+    {APP_FLAG, "each", NULL, .at = AT(job.each), .help = "like --split, in addition to the files of all scans"},
     {APP_FLAG, "listen", NULL, .at = AT(job.recording.listen),
-     .help = "send no command: record what comes until the stream ends or Ctrl-C"},
+     .help = "send no command: record the stream until it ends or Ctrl-C comes"},
     {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(job.wait_s),
-     .help = "wait up to S seconds for SOURCE to be there"},
+     .help = "wait up to S seconds for SOURCE to appear"},
     {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(job.recording.replug_s),
-     .help = "when the head is unplugged, wait up to S seconds for it and go on in the same files"},
+     .help = "when the head is unplugged, wait up to S seconds for it and continue in the same files"},
     {APP_FLAG, "ascii", NULL, .at = AT(job.files.recorder.ascii), .help = "PLY as text"},
     {APP_CALL, "ply-names", "WHOSE", .apply = take_ply_names, OPTION_CHOICES(ply_names),
-     .help = "scanhead: range, time, ... (the default), or cloudcompare: scalar_range, scalar_time, ..., which it shows"},
+     .help = "names of columns: scanhead (range, time, ..., the default), or cloudcompare (scalar_range, scalar_time, "
+             "..., which CloudCompare shows)"},
     {APP_CALL, "ply-columns", "LIST", .apply = take_ply_columns,
-     .help = "of .ply beside x, y, z: some of range,reflectance,time,echo,label,station,frame,attributes,colour; xyz: none "
-             "of them; float: lengths as float, within 1 km of the origin (default: all, in double)"},
+     .help = "columns of .ply beside x, y, z: some of "
+             "range,reflectance,time,echo,label,station,frame,attributes,colour; xyz: none of them; float: lengths as "
+             "float, within 1 km of the origin (default: all, in double)"},
     {APP_CALL, "colour", "BY", .apply = take_colour, OPTION_CHOICES(colour_words),
-     .help = "red, green, blue in .ply, .las, .ptx, .e57, and the texture of meshes, show the range, height, "
+     .help = "value that red, green, blue in .ply, .las, .ptx, .e57 and the texture of meshes show: range, height, "
              "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory), texture (of a "
-             "CONFIG); or solid; none. Default: as the head sends them, if it does (output.colour)"},
+             "CONFIG); or solid; none. Default: the colours that the head sends, if any (output.colour)"},
     {APP_CALL, "colour-limits", "LOW,HIGH", .apply = take_colour_limits,
-     .help = "of range and height (m) and frame: blue is LOW, red is HIGH. Default: the smallest and the largest in the "
-             "file, which is then written when all scans are over"},
+     .help = "limits of the colours of range and height (m) and frame: blue is LOW, red is HIGH. Default: the "
+             "smallest and the largest value in the file, which is then written after the last scan"},
     {APP_CALL, "colour-rgb", "R,G,B", .apply = take_colour_rgb, .help = "the colour of --colour solid, 0 to 255 each"},
     {APP_FLAG, "mesh", NULL, .at = AT(job.files.recorder.mesh),
-     .help = ".ply is a mesh of the scan's grid, as .obj, .gltf, .glb and .fbx always are"},
+     .help = "write .ply as a mesh of the scan's grid, as .obj, .gltf, .glb and .fbx always are"},
     {APP_NUMBER, "long-edge", "FACTOR", .min = 0, .max = 1e9, .at = AT(long_edge),
-     .help = "of meshes: leave out triangles with an edge longer than FACTOR times the scan's mean edge (default "
-             "10); 0: none"},
+     .help = "leave out triangles of meshes with an edge longer than FACTOR times the scan's mean edge (default 10); "
+             "0: leave out none"},
     {APP_NUMBER, "sparse", "DENSITY", .min = 1e-6, .max = 1e9, .at = AT(job.files.recorder.sparse_per_m2),
-     .help = ".ply is points spread evenly over that mesh, DENSITY a square metre"},
+     .help = "write .ply as points spread evenly over that mesh, DENSITY per square metre"},
     {APP_WHOLE, "sparse-seed", "N", .min = 0, .max = 1000000000, .at = AT(sparse_seed),
-     .help = "which random points: the same N gives the same ones (default 1)"},
+     .help = "seed of the random points: the same N gives the same points (default 1)"},
     {APP_CALL, "las-version", "1.2|1.4", .apply = take_las_version,
-     .help = "of .las; 1.2 is for older readers and holds no labels, five returns of a pulse (default 1.4)"},
+     .help = "version of .las; 1.2 is for older readers and holds no labels, and up to five returns of a pulse "
+             "(default 1.4)"},
     {APP_FLAG, "empty-shots", NULL, .at = AT(job.files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
-     .help = "of a CONFIG: with the faults of this file (config/faults) beside its own"},
+     .help = "add the faults of this file (config/faults) to those of a CONFIG"},
     {APP_TEXT, "truth", "FILE", .at = AT(job.truth), .file = APP_WRITES,
-     .help = "of a CONFIG: write each fault that is injected as a line of JSON; - is standard output"},
+     .help = "write each fault that a CONFIG injects as a line of JSON; - is standard output"},
     {APP_TEXT, "surfaces", "FILE", .at = AT(job.surfaces), .file = APP_WRITES,
-     .help = "of a CONFIG: write the surfaces as CSV: label, object, material, IFC type and GlobalId, colour; - is standard "
-             "output"},
-    {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .file = APP_WRITES, .help = "write what was received as JSON; - is standard output"},
+     .help = "write the surfaces of a CONFIG as CSV: label, object, material, IFC type and GlobalId, colour; - is "
+             "standard output"},
+    {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .file = APP_WRITES, .help = "write counts of the received data "
+                                                                                 "as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
     {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(job.crs_given),
-     .help = "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"},
+     .help = "write points in this system: local, ecef, utm or geodetic; the same as output.layout=geo"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     {APP_FLAG, "raw", NULL, .at = AT(raw),
-     .help = "of udp:ADDRESS:PORT,... and tcp:HOST:PORT: write what is on the wire, whatever its protocol is, to a "
-             ".pcapng; its options: scanhead record --raw --help"},
-    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "only with --raw: what to send when connected"},
+     .help = "write all data from udp:ADDRESS:PORT,... or tcp:HOST:PORT, of any protocol, to a .pcapng; its options: "
+             "scanhead record --raw --help"},
+    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "only with --raw: text to send when connected"},
     {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only),
      .help = "only with --raw: listen there, and record the connections of others"},
-    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "only with --raw: where to say that it listens"},
+    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "only with --raw: descriptor that gets a line when it "
+                                                            "listens"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
@@ -353,23 +364,22 @@ static const char HELP_NOTES[] =
     "\n"
     "  CONFIG               a configuration: the head runs off line in this process, as fast as it computes.\n"
     "                       Only with it: --set, --crs, --threads, --scenario, --truth, --surfaces\n"
-    "  usb                  a head on USB, as scanhead list shows it; more exactly usb:vid:pid or\n"
+    "  usb                  a head on USB, as scanhead list shows it; one of several: usb:vid:pid or\n"
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"
     "  tcp:host:port        a socket\n"
     "  udp:address:port     only with --raw: datagrams of any protocol, to a .pcapng\n"
     "  FILE.shs             a raw stream; FILE.pcapng: its frames as packets\n"
     "\n"
-    "The ending of FILE says what is written:\n"
+    "The ending of FILE sets the format:\n"
     "\n"
     "  .ply                 points, binary or text, with double coordinates, label and station\n"
     "  .las                 LAS 1.4, point format 6 (7 with --colour): points with CRS, time, returns, label;\n"
     "                       station as point source ID\n"
     "  .ptx                 a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57                 points of each scan, with its pose\n"
-    "  .obj .gltf .glb .fbx a mesh of each scan's grid, which faces the head; its colours are an image beside it,\n"
-    "                       or within a .glb\n"
-    "                       (--colour; the label's by itself)\n"
+    "  .obj .gltf .glb .fbx a mesh of each scan's grid, which faces the head; its colours (--colour, else those of\n"
+    "                       labels) are an image beside it, or within a .glb\n"
     "  .poses.csv           true position and orientation of each scan, or a moving head's trajectory\n"
     "  .shs                 the raw stream\n"
     "  .pcapng              the stream's frames as packets, for capinfos and tshark\n"
@@ -381,15 +391,16 @@ static const char HELP_NOTES[] =
     "Exit status 1: the recording is not complete. One of these happened:\n"
     "\n"
     "  The stream ended before the scan did.\n"
-    "  Ctrl-C came before a scan with an end had its end (not with --listen).\n"
+    "  Ctrl-C came before the end of a scan that has an end (not with --listen).\n"
     "  Frames or pulses were lost on the way.\n"
-    "  The head was away within a scan.\n"
+    "  The head was disconnected within a scan.\n"
     "\n"
-    "FILE keeps what came. Where it can't be completed, as on a full disk, what was written stays as FILE.part, for\n"
-    "--repair, with FILE.grid beside a .ptx. A recorder does not begin while such a FILE.part is there.\n"
+    "FILE keeps the data that came. Where it can't be completed, as on a full disk, the written data stay as\n"
+    "FILE.part, for --repair, with FILE.grid beside a .ptx. A recorder does not begin while such a FILE.part\n"
+    "exists.\n"
     "\n"
-    "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
-    "a third, or one that comes later, ends it at once.\n";
+    "Ctrl-C, or SIGTERM, ends a recording with complete files. A second signal within a second counts as the same\n"
+    "one; a third, or a later one, ends it at once.\n";
 
 const struct app_command app_record = {
     .name = "record",

@@ -229,7 +229,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (is_long_enough(r, &frame)) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
     if (rc == SH_OK && goes_off(&frame) && !r->o->listen)
-        return sh_fail(err, SH_ELOST, "the head lost power, and the scan has no end");
+        return sh_fail(err, SH_ELOST, "the head lost power, so the scan has no end");
     return rc == SH_OK ? 1 : rc;
 }
 
@@ -243,7 +243,7 @@ static int wait_idle(struct recording *r, struct sh_err *err)
         if (rc != SH_OK) return rc;
         if (strcmp(r->reply, "idle") == 0) return SH_OK;
         if (strcmp(r->reply, "scanning") == 0 || strcmp(r->reply, "fault") == 0 || strcmp(r->reply, "off") == 0)
-            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", r->reply);
+            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records it without commands", r->reply);
         rc = step(r, 20, err); /* frames keep coming meanwhile */
         if (rc < 0) return rc;
     }
@@ -301,7 +301,7 @@ static int follow(struct recording *r, struct sh_err *err)
     }
     return r->scan_started || r->stopping || r->o->listen
                ? SH_OK
-               : sh_fail(err, SH_ESTATE, "the head gave up the scan before its first pulse");
+               : sh_fail(err, SH_ESTATE, "the head ended the scan before its first pulse");
 }
 
 static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)
@@ -390,7 +390,7 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     scanhead_get_stats(sh, &result->stream);
     if (options->hash) scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
-        return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
+        return sh_fail(err, SH_EFORMAT, "the stream ended without a frame");
     if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;
     return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan")
                                                      : rc;

@@ -83,7 +83,7 @@ int recording_describe_order(const struct recording_result *result, char *text, 
 {
     const struct scanhead_stats *s = &result->stream;
     text[0] = '\0';
-    add_count(text, len, s->repeated, "frames came twice (taken once)");
+    add_count(text, len, s->repeated, "frames came twice (used once)");
     add_count(text, len, s->late, "frames came after newer ones (lost)");
     add_count(text, len, s->restarts, "restarts of the sequence");
     return text[0] != '\0';
@@ -96,13 +96,14 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
     const uint64_t pulses = s->pulses_lost > result->counts.lost ? s->pulses_lost : result->counts.lost;
     if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     if (result->broken_scans != 0)
-        return sh_fail(err, SH_ELOST,
-                       "the recording is not complete: %s within %llu scans; %llu frames known to be lost",
-                       result->replugs == 0 && result->bus_resets != 0 ? "the USB bus was reset" : "the head was away",
-                       (unsigned long long)result->broken_scans, lost);
+        return sh_fail(
+            err, SH_ELOST, "the recording is not complete: %s within %llu scans; %llu frames known to be lost",
+            result->replugs == 0 && result->bus_resets != 0 ? "the USB bus was reset" : "the head was disconnected",
+            (unsigned long long)result->broken_scans, lost);
     if (lost == 0 && pulses == 0) return SH_OK;
-    return sh_fail(err, SH_EIO,
-                   "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; "
-                   "of the pulses that it delivered %llu are missing",
-                   lost, (unsigned long long)pulses, (unsigned long long)result->counts.missing);
+    return sh_fail(
+        err, SH_EIO,
+        "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; of the pulses that "
+        "it sent %llu are missing",
+        lost, (unsigned long long)pulses, (unsigned long long)result->counts.missing);
 }

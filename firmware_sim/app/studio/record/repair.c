@@ -30,9 +30,8 @@ static void say(const struct repaired *f)
     else
         fprintf(stderr, "scanhead: %s: kept %" PRIu64 " %s%s; %" PRIu64 " byte%s at the end cut%s\n",
                 f->is_part ? f->part : f->path, f->n_kept, f->unit, scans, f->cut_bytes, f->cut_bytes == 1 ? "" : "s",
-                f->was_whole ? "; nothing else had to be changed" : "; what should follow is missing");
-    if (f->is_part)
-        fprintf(stderr, "scanhead: %s keeps its name, as %s is there, and is not replaced\n", f->part, f->path);
+                f->was_whole ? "; nothing else was changed" : "; the data after that are missing");
+    if (f->is_part) fprintf(stderr, "scanhead: %s keeps its name: %s exists, and is not replaced\n", f->part, f->path);
 }
 
 static void put(struct json *json, const void *ctx)

@@ -168,7 +168,7 @@ static void put_histograms(FILE *out, struct report *r)
     page_histogram(out, "How many points lie how far before or after the surface along the beam", &f->along,
                    noisy ? expected_within : NULL, r);
     fputs("<figcaption>Points by their deviation along the beam; to the right of 0 they lie beyond the surface.", out);
-    if (noisy) fputs(" The line shows what is expected of the noise.", out);
+    if (noisy) fputs(" The line shows the expected noise.", out);
     put_beyond(out, &f->along);
     fputs("</figcaption></figure>\n</div>\n", out);
 }

@@ -10,7 +10,7 @@
 static int write_all(struct report *r, struct sh_err *err)
 {
     if (r->f.stats.points == 0)
-        return sh_fail(err, SH_EINPUT, "%s: there are no points in it (%zu shots without echo)", r->cloud_path,
+        return sh_fail(err, SH_EINPUT, "%s: it has no points (%zu shots without echo)", r->cloud_path,
                        r->f.stats.empty);
     int rc = r->html_path != NULL ? report_write_html(r, err) : SH_OK;
     if (rc == SH_OK && r->json) rc = app_write_json("-", report_put_json, r, err);
@@ -42,8 +42,8 @@ static int run(int argc, char **argv)
         status = app_usage(&app_report, "--tolerance-m %g is more than --max-m %g", r.tolerance_m, r.max_m);
     if (status == APP_GO_ON && r.html_path != NULL && !app_ends_in(r.html_path, ".html") &&
         !app_ends_in(r.html_path, ".htm"))
-        status = app_usage(&app_report, "--html %s: it would hold a page; allowed is a name that ends in .html",
-                           r.html_path);
+        status =
+            app_usage(&app_report, "--html %s: the file is a page; allowed is a name that ends in .html", r.html_path);
     return status == APP_GO_ON ? app_with_config(&r.in, report, &r) : status;
 }
 
@@ -53,18 +53,18 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "tolerance-m", "T", .min = 0.0, .max = FARTHEST_M, .at = AT(tolerance_m),
-     .help = "how far a point may be from the scene (default 0.001)"},
+     .help = "largest allowed distance of a point from the scene (default 0.001)"},
     {APP_NUMBER, "max-m", "M", .min = 1e-9, .max = FARTHEST_M, .at = AT(max_m),
-     .help = "how far to look for the scene; a point farther than that counts as far, and fails (default 10)"},
+     .help = "distance up to which the scene is searched; points farther away count as far, and fail (default 10)"},
     {APP_NUMBER, "cell-m", "C", .min = 1e-3, .max = 1000.0, .at = AT(cell_m),
      .help = "side of the cells in which the density of points is counted (default: 0.1, doubled until half of the points "
-             "lie in cells of 16)"},
+             "are in cells with 16 or more)"},
     {APP_FLAG, "json", NULL, .at = AT(json),
-     .help = "the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, max_m, "
-             "beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst, verdict, all, stations, "
-             "by_range, by_incidence, by_surface, distances, along_beam, shots_by_echoes"},
+     .help = "print the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, "
+             "max_m, beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst, verdict, all, "
+             "stations, by_range, by_incidence, by_surface, distances, along_beam, shots_by_echoes"},
     {APP_TEXT, "html", "FILE.html", .at = AT(html_path), .file = APP_WRITES,
-     .help = "also writes a page with tables and pictures: one file, which needs nothing else"},
+     .help = "also write a page with tables and pictures: one file, which needs no other files"},
     OPTION_SET,
     OPTION_END
 };
@@ -73,27 +73,29 @@ static const struct app_option OPTIONS[] = {
 static const char NOTES[] =
     "CONFIG is the configuration of the recording: its scene, stations, output.crs and output.layout are used.\n"
     "CLOUD is a LAS file, or a PLY file with x, y, z and, where it has them, station, echo and label, as\n"
-    "scanhead record writes both. Points without a station are taken to be of the first one. Three times NaN is\n"
+    "scanhead record writes both. Points without a station count as points of the first one. NaN three times is\n"
     "a shot without echo.\n"
     "\n"
     "Each point's distance to the nearest triangle of the scene is measured in double precision. Points seen in\n"
-    "mirrors lie where nothing is: with the mirrors in CONFIG (surfaces) they are left out. Mean, RMS, percentiles\n"
+    "mirrors are away from all surfaces: with the mirrors in CONFIG (surfaces) they are left out. Mean, RMS, "
+    "percentiles\n"
     "(nearest rank) and maximum are over all points that are not far. Percentiles are of the distances, which are\n"
     "never negative.\n"
     "\n"
     "Along the beam: the line from the station through a point is followed to the scene. Measured minus exact\n"
-    "range is given for points on smooth faces, away from edges. Beside it stands what is expected of noise and\n"
-    "counts. The last line says whether the points are within that: without noise each point has to be within\n"
-    "its bound (the plan's, and half a count an axis); with noise the RMS of deviation over sigma has to be 1.\n"
-    "Heads that moved have distances alone, and are not judged. Where only smooth faces are judged (noise, a\n"
-    "footprint), half of the points have to lie there. A point farther than --max-m fails in any case.\n"
+    "range is given for points on smooth faces, away from edges. Beside it is the RMS that noise and counts lead to. "
+    "The\n"
+    "last line says whether the points are within that: without noise each point must be within its bound (that\n"
+    "of the plan, and half a count on each axis); with noise the RMS of deviation over sigma must be 1. For heads\n"
+    "that moved there are only distances, which are not judged. Where only smooth faces are judged (noise, a\n"
+    "footprint), half of the points must lie there. A point farther than --max-m fails in any case.\n"
     "\n"
     "Density: of the points of one station in squares of --cell-m on each surface. Squares at a border count as\n"
-    "whole ones. There may be 4 million; beyond, their side is doubled.\n"
+    "whole ones. If there are more than 4 million, their side is doubled.\n"
     "\n"
     "Memory: about 90 bytes a point, 9 GB for 100 million points.\n"
     "\n"
-    "Bodies that move stand where they stood at the station's stop (platform.kind: stops). Points on what moved\n"
+    "Bodies that move are at their places of the station's stop (platform.kind: stops). Points on bodies that moved\n"
     "during a scan are refused.\n"
     "\n"
     "Exit status: 0 all points are within the tolerance, 1 some are not, 2 wrong usage or input.\n";

@@ -78,7 +78,7 @@ static void judge_bound(struct report_verdict *v, const struct figures *f, int f
         snprintf(
             v->text, sizeof v->text,
             "Within the expected error: no point%s is farther from the scene than its bound, %.3g mm at the largest "
-            "range. The bound is what the plan promises, plus half a count an axis.",
+            "range. The bound is the plan's, plus half a count on each axis.",
             which, 1e3 * v->bound_m);
     else
         snprintf(
@@ -105,7 +105,7 @@ static void judge_noise(struct report_verdict *v, const struct figures *f)
     v->judgement = within ? REPORT_WITHIN : REPORT_BEYOND;
     snprintf(
         v->text, sizeof v->text,
-        "%s: along the beam, the RMS deviation of %zu points on smooth faces is %.4g mm, and %.4g mm is expected of "
+        "%s: along the beam, the RMS deviation of %zu points on smooth faces is %.4g mm, and %.4g mm is expected from "
         "noise and counts. Deviation over expected sigma: RMS %.4f, allowed %.4f to %.4f; mean %+.4f, allowed %.4f to "
         "both sides.",
         within ? "Within the expected error" : "Not within the expected error", f->noisy, 1e3 * f->judged_rms_m,
@@ -144,13 +144,13 @@ void report_judge_one(const struct report_subject *s, struct report_verdict *v)
     else if (2 * f->along < f->points)
         snprintf(
             v->text, sizeof v->text,
-            "Not judged: only %zu of %zu points lie on smooth faces, and only those are judged; half of all points "
-            "have to.",
+            "Not judged: only %zu of %zu points lie on smooth faces, and only those are judged; at least half of all "
+            "points must lie there.",
             f->along, f->points);
     else if (f->noisy < JUDGED_LEAST)
         snprintf(v->text, sizeof v->text,
-                 "Not judged: only %zu points on smooth faces have a noise that is known beforehand; %d are needed.",
-                 f->noisy, JUDGED_LEAST);
+                 "Not judged: only %zu points on smooth faces have a known noise; %d are needed.", f->noisy,
+                 JUDGED_LEAST);
     else
         judge_noise(v, f);
 }

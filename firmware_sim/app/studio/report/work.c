@@ -91,10 +91,11 @@ static int check_bodies(const struct report *r, struct sh_err *err)
     for (size_t i = 0; i < r->cloud.n; i++)
         if (r->cloud.label[i] >= site->scene->n_surfaces && r->cloud.label[i] < site->n_surfaces &&
             (site->legs == NULL || r->cloud.label[i] != site->legs_label))
-            return sh_fail(err, SH_EINPUT,
-                           "%s: point %zu is on %s, which moved during the scan; allowed are points of what stands "
-                           "still, and scans with platform.kind: stops",
-                           r->cloud_path, i + 1, site_surface(site, r->cloud.label[i])->object);
+            return sh_fail(
+                err, SH_EINPUT,
+                "%s: point %zu is on %s, which moved during the scan; allowed are points on bodies that stand still, "
+                "and scans with platform.kind: stops",
+                r->cloud_path, i + 1, site_surface(site, r->cloud.label[i])->object);
     return SH_OK;
 }
 

@@ -38,15 +38,15 @@ static const char *why_not(const struct link_place *place, const struct link_spe
         return soak_usb_is_here(spec) ? NULL
                                       : "only a head of protocol native with backend usbip and attach on is on this "
                                         "machine";
-    if (strcmp(place->type, "udp") == 0) return "its packets go elsewhere, or their port is taken";
+    if (strcmp(place->type, "udp") == 0) return "its packets go to another place, or their port is taken";
     if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
-        if (strcmp(place->type, "web") == 0) return "libscanhead does not speak WebSocket";
+        if (strcmp(place->type, "web") == 0) return "libscanhead does not support WebSocket";
         return "nothing answers there";
     }
     if (strncmp(place->endpoint, "tty:/dev/pts/", 13) == 0)
-        return "a terminal that goes and comes needs a path, links[].path, to be found again";
+        return "a terminal that disappears and appears again needs a fixed path, links[].path";
     if (place->protocol != NULL && strcmp(place->protocol, "native") != 0)
-        return "libscanhead speaks the native protocol alone";
+        return "libscanhead supports only the native protocol";
     return NULL;
 }
 
@@ -71,7 +71,7 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     link->datagrams = soak->datagrams[i];
     link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
                        : link->datagrams == NULL  ? why_not(place, &soak->cfg->link[i])
-                       : begins_anew(soak) ? "its packets begin anew with power or plug, so nothing is beside them"
+                       : begins_anew(soak) ? "its packets restart with power or plug, so they can not be compared"
                                            : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
@@ -89,10 +89,11 @@ int soak_clients_open(struct soak *soak, const struct loop *loop, uint32_t only,
         n += is_open;
     }
     if (n > 0) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: links: none that can be soaked; allowed pty, tcp and usb (attach on) with protocol "
-                   "native, as --set links.0.type=tcp",
-                   soak->cfg->file);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: links: soak can use none of them; allowed are pty, tcp and usb (attach on) with protocol native, as "
+        "--set links.0.type=tcp",
+        soak->cfg->file);
 }
 
 /* ---- the thread */

@@ -22,15 +22,15 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
     const int has_mirror = soak->cfg->profile.emitter.kind == EMITTER_LINE && soak->cfg->output.layout == LINE_POLAR;
     switch (kind) {
     case FAULT_PAN_SLIP:
-        return "no encoder shows it: points that no longer fit do";
+        return "no encoder shows it; only points that no longer fit do";
     case FAULT_WINDOW_SOILED:
-        return "amplitudes fall: that needs others to compare with";
+        return "amplitudes fall: a client has no others to compare with";
     case FAULT_COUNTERS_HIGH:
-        return "numbers go on over their wrap";
+        return "counters continue after their wrap";
     case FAULT_MIRROR_SLOW:
     case FAULT_MIRROR_STUCK:
     case FAULT_MIRROR_WOBBLE:
-        return has_mirror ? NULL : "the encoder of a mirror is in the polar layout of a line head alone";
+        return has_mirror ? NULL : "only the polar layout of a line head has the encoder of the mirror";
     default:
         return NULL;
     }
@@ -306,7 +306,7 @@ void soak_judge_head(struct soak_link *link)
         if (m->kind == FAULT_LEAP_SECOND)
             soak_hide(&link->row[m->kind], 1, "the minute was not over");
         else if (m->kind == FAULT_SLOW_BOOT && !link->soak->realtime)
-            soak_hide(&link->row[m->kind], 1, "out of real time it may be over before a client is there");
+            soak_hide(&link->row[m->kind], 1, "out of real time it may end before a client connects");
         else
             link->row[m->kind].missed++;
     }

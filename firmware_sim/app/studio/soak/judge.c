@@ -107,7 +107,7 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
         else if (f->for_ms < LATE_MS)
             soak_hide(row, n, "shorter than 10 ms");
         else if (link->datagrams != NULL)
-            soak_hide(row, n, "packets are compared by what they hold alone");
+            soak_hide(row, n, "packets are compared only by their contents");
         else if (f->got == 0)
             soak_hide(row, n, "the frame did not come in its place");
         else

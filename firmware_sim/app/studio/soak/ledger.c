@@ -125,7 +125,7 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
         return;
     }
     if (!note->has_seq && link->datagrams == NULL) {
-        soak_hide(row, 1, "a frame for one reader alone has no number");
+        soak_hide(row, 1, "a frame for a single reader has no number");
         return;
     }
     if ((note->kind == FAULT_FLIP || note->kind == FAULT_TRUNCATE) && note->n == 0) {

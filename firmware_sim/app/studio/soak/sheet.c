@@ -67,10 +67,10 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
         link->row[link->plugs.note[i].kind].missed++;
     for (int row = 0; row < SOAK_N_ROWS; row++)
         add(&sum, &link->row[row]);
-    fail(soak, has_open_rows(link->row), "a fault was neither noticed nor known to be hidden");
+    fail(soak, has_open_rows(link->row), "a fault was not noticed, and is not one that can't be noticed");
     if (!link->usable) return;
     fail(soak, link->failed[0] != '\0', "a client gave up");
-    fail(soak, sum.missed != 0, "a fault that can be noticed was not");
+    fail(soak, sum.missed != 0, "a fault that can be noticed was not noticed");
     fail(soak, link->wrong_plain != 0, "a frame that was accepted differs from the clean one, without a fault");
     fail(soak, link->lost_plain > link->reader_lost, "frames were lost without a fault");
     fail(soak, link->ask.odd != 0, "a reply was wrong or missing without a fault");
@@ -78,7 +78,7 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
     fail(soak, link->frames == 0, "a client got no frame");
     fail(soak, !link->in_session, "a client had no connection at the end");
     fail(soak, bad < link->expected_bad_min || bad > link->expected_bad_max,
-         "the bytes that belong to no frame are not those of the faults");
+         "the number of bytes outside of frames is not that of the faults");
 }
 
 void soak_conclude(struct soak *soak)
@@ -111,7 +111,7 @@ static void print_row(FILE *out, const char *where, int row, const struct soak_r
     if (r->hidden == r->injected)
         fprintf(out, "%s", r->why != NULL ? r->why : "");
     else if (r->hidden != 0)
-        fprintf(out, "%" PRIu64 " not to be noticed: %s", r->hidden, r->why);
+        fprintf(out, "%" PRIu64 " can't be noticed: %s", r->hidden, r->why);
     fprintf(out, "\n");
 }
 
@@ -142,7 +142,7 @@ void soak_print(const struct soak *soak, FILE *out)
     for (uint32_t i = 0; i < soak->n_links; i++)
         print_link(&soak->link[i], out);
     fprintf(out,
-            "%-22s %-16s %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 "  %" PRIu64 " not to be noticed, %" PRIu64
+            "%-22s %-16s %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 "  %" PRIu64 " can't be noticed, %" PRIu64
             " not noticed\n",
             "all", "", sum.injected, sum.noticed, sum.lost, sum.accepted, sum.hidden, sum.missed);
     if (soak->n_failures == 0)

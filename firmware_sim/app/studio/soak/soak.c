@@ -206,7 +206,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct soak_options *o = ctx;
     struct soak_head head = {0};
     if (cfg->loop.pace == PACE_STEP)
-        return sh_fail(err, SH_EINPUT, "loop.pace: step, where nobody grants time; allowed realtime and fast");
+        return sh_fail(err, SH_EINPUT, "loop.pace: step, but no client grants time; allowed realtime and fast");
     if (o->link > (long)cfg->n_links)
         return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
     struct soak *soak = calloc(1, sizeof *soak);
@@ -242,12 +242,13 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
-     .help = "with the faults of this file beside those of the configuration; a bare name is one of config/faults"},
+     .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults"},
     {APP_NUMBER, "duration", "S", .min = 0.1, .max = 1e8, .at = AT(duration_s),
-     .help = "faults strike for S seconds from the first points on (30); of device time in the pace fast"},
+     .help = "inject faults for S seconds from the first points on (default 30), in the pace fast of device time"},
     {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
-     .help = "a client on this link of the configuration alone"},
-    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES, .help = "write the sheet as JSON, too; - is standard output"},
+     .help = "connect a client only to this link of the configuration"},
+    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES, .help = "write the results as JSON, too; - is "
+                                                                           "standard output"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},
@@ -258,17 +259,18 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "The sheet has a row for each link and kind of fault: how often it was injected, how often the client noticed\n"
-    "it at its place, frames that the client lost by it, and frames that it accepted although they differ from the\n"
-    "clean ones. A fault that no client can notice has a -, and why.\n"
+    "The results have a row for each link and kind of fault: how often it was injected, how often the client\n"
+    "noticed it at its place, frames that the client lost by it, and frames that it accepted although they differ\n"
+    "from the clean ones. A fault that no client can notice has a - and the reason.\n"
     "\n"
-    "Exit status 0: each fault that can be noticed was; frames were lost by faults alone; those that were wrongly\n"
-    "accepted are resealed flips; the head is healthy. 1: one of these does not hold.\n";
+    "Exit status 0: each fault that can be noticed was noticed; frames were lost only by faults; all frames that\n"
+    "were wrongly accepted have flipped bits with a corrected checksum; the head is healthy. 1: one of these is\n"
+    "not so.\n";
 
 const struct app_command app_soak = {
     .name = "soak",
     .operand = {"CONFIG"},
-    .summary = "the head with faults on request and our own clients; what they noticed",
+    .summary = "inject faults into a head with clients, and report what the clients notice",
     .options = OPTIONS,
     .opens_links = 1,
     .notes = NOTES,

@@ -42,8 +42,8 @@ static int read_word(struct word *words, const char *text, size_t len, struct sh
             return fail_word(w, equals + 1, value_len < 64 ? value_len : 64, err);
         return SH_OK;
     }
-    return sh_fail(err, SH_EINPUT, "%.*s: not known here; allowed%s%s", (int)(name_len < 64 ? name_len : 64), text,
-                   known, words->name == NULL ? " nothing after ?" : "");
+    return sh_fail(err, SH_EINPUT, "%.*s: unknown; allowed%s%s", (int)(name_len < 64 ? name_len : 64), text, known,
+                   words->name == NULL ? " nothing after ?" : "");
 }
 
 /* A query of NAME=NUMBER with & between them; words end with one without a name. */

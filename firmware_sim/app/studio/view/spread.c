@@ -59,8 +59,8 @@ static int check_count(const struct mesh_points *points, const uint32_t (*face)[
     scan_sampler_free(&sampler);
     if (rc != SH_OK || *sum_m2 * wish->per_m2 <= VIEW_MAX_SPARSE) return rc;
     return sh_fail(err, SH_EINPUT,
-                   "per_m2=%.10g: more than %d points on %.4g m2 and more; allowed for these up to %.3g", wish->per_m2,
-                   VIEW_MAX_SPARSE, *sum_m2, 0.99 * VIEW_MAX_SPARSE / *sum_m2);
+                   "per_m2=%.10g: more than %d points on at least %.4g m2; allowed for these are up to %.3g",
+                   wish->per_m2, VIEW_MAX_SPARSE, *sum_m2, 0.99 * VIEW_MAX_SPARSE / *sum_m2);
 }
 
 /* Meshes that are spread, one after the other. */

@@ -108,12 +108,13 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_WHOLE, "port", "P", .min = 0, .max = 65535, .at = AT(port), .help = "of the page; 0: the system chooses (default)"},
+    {APP_WHOLE, "port", "P", .min = 0, .max = 65535, .at = AT(port), .help = "port of the page; 0: the system chooses "
+                                                                             "(default)"},
     {APP_TEXT, "address", "A", .at = AT(address),
-     .help = "where to listen, a number or a name (default 127.0.0.1: this machine alone)"},
+     .help = "address to listen on, a number or a name (default 127.0.0.1: only this machine)"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the page's address to descriptor N once it can be opened"},
-    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "print only errors and warnings"},
     OPTION_END
 };
 /* clang-format on */
@@ -122,7 +123,7 @@ static const char NOTES[] =
     "FILE is a recording: .shs or .pcapng (points, and the mesh of each scan's grid), .ply or .las (points). The\n"
     "address of its page is printed to standard output once the file is read. Open it in a browser.\n"
     "\n"
-    "Ctrl-C, or SIGTERM, ends it; exit status 0.\n";
+    "Ctrl-C, or SIGTERM, ends it with exit status 0.\n";
 
 const struct app_command app_view = {
     .name = "view",

@@ -24,16 +24,18 @@ int viewed_check_ending(const char *path, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "-: a recording is shown from a file, not from standard input; %s", allowed);
     if (app_is_recording(path) || app_ends_in(path, ".ply") || app_ends_in(path, ".las")) return SH_OK;
     if (app_ends_in(path, ".e57") || app_ends_in(path, ".ptx"))
-        return sh_fail(err, SH_EINPUT,
-                       "%s: this format is written, not read; %s: `scanhead record` writes a scan as several files at "
-                       "once (-o scan.ply beside it), and CloudCompare saves such files as .ply",
-                       path, allowed);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: this format is written, not read; %s: `scanhead record` can write a scan to several files at once "
+            "(with another -o scan.ply), and CloudCompare saves such files as .ply",
+            path, allowed);
     if (app_ends_in(path, ".yaml") || app_ends_in(path, ".yml"))
-        return sh_fail(err, SH_EINPUT, "%s: a configuration, no recording: `scanhead run %s --view` shows its head; %s",
+        return sh_fail(err, SH_EINPUT,
+                       "%s: this is a configuration, not a recording: `scanhead run %s --view` shows its head; %s",
                        path, path, allowed);
     if (app_ends_in(path, ".laz"))
         return sh_fail(err, SH_EINPUT, "%s: compressed (LAZ), which is not read; %s", path, allowed);
-    return sh_fail(err, SH_EINPUT, "%s: no recording that is shown has this ending; %s", path, allowed);
+    return sh_fail(err, SH_EINPUT, "%s: recordings with this ending are not shown; %s", path, allowed);
 }
 
 /* That it is a file, and not empty; the first bytes. */
@@ -61,9 +63,10 @@ int viewed_load(struct viewed *v, const char *path, const struct sh_report *repo
     rc = strcmp(v->format, "shs") == 0 ? viewed_load_stream(v, report, err) : viewed_load_cloud(v, report, err);
     if (rc != SH_OK) return rc;
     if (v->n_left_out > 0)
-        sh_warn(report, "%s: %llu echoes left out, whose place is not known", path, (unsigned long long)v->n_left_out);
+        sh_warn(report, "%s: %llu echoes left out, since their place is not known", path,
+                (unsigned long long)v->n_left_out);
     if (v->points.n == 0)
-        return sh_fail(err, SH_EINPUT, "%s: there are no points in it, and %llu shots without echo", path,
+        return sh_fail(err, SH_EINPUT, "%s: it has no points, but %llu shots without echo", path,
                        (unsigned long long)v->n_empty);
     rc = viewed_turn(v, err);
     if (rc == SH_OK) viewed_measure(v);
