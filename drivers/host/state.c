@@ -6,7 +6,7 @@
 
 #include "core/grow.h"
 #include "drivers/host/host.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 static int bad(struct scanhead *sh, const char *what)
 {

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/err.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native.h"
 
 #define UNIT_FIELD_32   4

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #include "core/line.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native_sequence.h"
 
 enum {

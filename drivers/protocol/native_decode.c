@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "core/err.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native.h"
 

@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/nmea.h"
 #include "drivers/protocol/velodyne.h"

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_packet.h"

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "core/grow.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_packet.h"

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/record/las_header.h"
 #include "drivers/record/scan_count.h"
 

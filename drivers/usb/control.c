@@ -5,7 +5,7 @@
  * transceiver to test), SET_DESCRIPTOR, SYNCH_FRAME (no isochronous endpoints). */
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/usb_core.h"
 
 struct setup {

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/usbredir_private.h"
 
 /* ---- what the device is */

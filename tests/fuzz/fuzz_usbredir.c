@@ -11,7 +11,7 @@
 
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/fuzz/rig.h"
 
 enum { HELLO = 0, HELLO_LEN = 64 + 4, PIECE = 4096 };

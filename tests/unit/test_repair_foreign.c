@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "core/newfile.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/record/repair.h"
 #include "tests/unit/repair_rig.h"
 

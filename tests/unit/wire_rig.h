@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "core/err.h"
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/fault/wire.h"

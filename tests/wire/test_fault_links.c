@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Links that are cut, refused and unplugged on request, by the program: the truth says where, the client sees it
  * there, comes back and goes on; the neighbour's stream is the clean one. */
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usbip_host.h"
 

@@ -2,7 +2,7 @@
 /* Heads that show themselves on USB as the device whose protocol they speak: ids, strings, interfaces, and a question
  * with its answer. What is configured of the identity stays as it is. The kernel's drivers and libusb on the same
  * devices: tests/guest. */
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/native.h"
 #include "tests/wire/room.h"

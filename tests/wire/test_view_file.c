@@ -3,7 +3,7 @@
  * recording; its end; ports that are taken. The recording is a sphere in a closed room, whose mesh has no hole. */
 #include <netinet/in.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/wire/room.h"
 
 /* A pole is one shot. */

@@ -6,7 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 
 enum { NEXT_MS = 50, REPLY_MS = 5000 };

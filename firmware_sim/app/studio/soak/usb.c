@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/backend.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 
