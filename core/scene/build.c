@@ -374,7 +374,6 @@ void build_announce(struct scene_build *b)
 
 struct text_span build_base_name(const struct scene_build *b)
 {
-    const char *slash = strrchr(b->spec->file, '/'), *name = slash != NULL ? slash + 1 : b->spec->file;
-    const char *dot = strrchr(name, '.');
+    const char *name = basename(b->spec->file), *dot = strrchr(name, '.');
     return (struct text_span){name, dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name)};
 }

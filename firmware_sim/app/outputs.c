@@ -31,11 +31,10 @@ struct files {
 /* The folder of a path, and the name in it. */
 static int split(const char *path, struct stat *folder, const char **name)
 {
-    const char *slash = strrchr(path, '/');
     char dir[PATH_MAX] = ".";
-    *name = slash != NULL ? slash + 1 : path;
-    if (slash != NULL && slash + 1 - path >= PATH_MAX) return 0; /* no such file can be made */
-    if (slash != NULL) snprintf(dir, sizeof dir, "%.*s", (int)(slash + 1 - path), path);
+    *name = basename(path);
+    if (*name - path >= PATH_MAX) return 0; /* no such file can be made */
+    if (*name != path) snprintf(dir, sizeof dir, "%.*s", (int)(*name - path), path);
     return stat(dir, folder) == 0;
 }
 

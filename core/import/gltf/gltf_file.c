@@ -133,9 +133,9 @@ void gltf_close(struct gltf *g)
 
 static char *beside(const struct gltf *g, const char *name)
 {
-    const char *mesh = g->b->spec->file, *slash = strrchr(mesh, '/');
+    const char *mesh = g->b->spec->file;
     char *path = NULL;
-    const int folder = slash != NULL && name[0] != '/' ? (int)(slash - mesh) + 1 : 0;
+    const int folder = name[0] != '/' ? (int)(basename(mesh) - mesh) : 0;
     return asprintf(&path, "%.*s%s", folder, mesh, name) >= 0 ? path : NULL;
 }
 

@@ -125,11 +125,10 @@ static void put_job(struct json *json, const struct batch *b, uint32_t i)
 static void put_all(struct json *json, const struct batch *b)
 {
     const struct batch_made *made = &b->job[0].entry.made;
-    const char *slash = strrchr(b->in.operand[0], '/');
     json_open_object(json, NULL);
     json_string(json, "program", made->program);
     json_string(json, "engine", made->engine);
-    json_string(json, "configuration", slash != NULL ? slash + 1 : b->in.operand[0]);
+    json_string(json, "configuration", basename(b->in.operand[0]));
     json_string(json, "configuration_sha256", made->configuration);
     json_open_array(json, "set");
     for (int i = 0; i < b->in.sets.n; i++)

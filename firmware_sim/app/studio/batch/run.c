@@ -142,10 +142,9 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
 {
     struct stat folder, here;
     for (size_t i = 0; i < b->cache.n; i++) {
-        const char *path = b->cache.known[i].path, *slash = strrchr(path, '/'),
-                   *file = slash != NULL ? slash + 1 : path;
+        const char *path = b->cache.known[i].path, *file = basename(path);
         char dir[PATH_MAX] = ".", name[BATCH_NAME_LEN];
-        if (slash != NULL) snprintf(dir, sizeof dir, "%.*s", (int)(slash + 1 - path), path);
+        if (file != path) snprintf(dir, sizeof dir, "%.*s", (int)(file - path), path);
         const unsigned long job = strtoul(file, NULL, 10);
         if (job == 0 || job > b->n_jobs || stat(b->dir, &folder) != 0 || stat(dir, &here) != 0) continue;
         if (folder.st_dev != here.st_dev || folder.st_ino != here.st_ino) continue;

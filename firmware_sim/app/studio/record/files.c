@@ -209,8 +209,7 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
 /* What is left of the files of single scans: a later one would stop the recording at its scan. */
 static int check_parts_of_scans(const struct record_file *file, struct sh_err *err)
 {
-    const char *slash = strrchr(file->path, '/');
-    const int folder = slash != NULL ? (int)(slash - file->path) + 1 : 0;
+    const int folder = (int)(basename(file->path) - file->path);
     char *name = folder > 0 ? strndup(file->path, (size_t)folder) : strdup(".");
     DIR *dir = name != NULL ? opendir(name) : NULL;
     int rc = SH_OK;

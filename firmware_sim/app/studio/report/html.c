@@ -12,12 +12,6 @@
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/app/studio/report/page.h"
 
-static const char *file_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 static void put_fact(FILE *out, const char *what, const char *text)
 {
     fprintf(out, "<dt>%s</dt><dd>", what);
@@ -55,7 +49,7 @@ static void put_top(FILE *out, const struct report *r)
     char text[CONFIG_PATH_LEN + 64];
     struct tm day;
     fputs("<h1>Scan report: ", out);
-    page_text(out, file_name(r->cloud_path));
+    page_text(out, basename(r->cloud_path));
     fputs("</h1>\n<dl class=\"facts\">\n", out);
     put_fact(out, "Recording", r->cloud_path);
     if (gmtime_r(&r->modified.tv_sec, &day) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &day) > 0)
@@ -261,7 +255,7 @@ static void put_words(FILE *out, const struct report *r)
 static int put_page(struct report *r, FILE *out, struct sh_err *err)
 {
     char title[300];
-    snprintf(title, sizeof title, "Scan report: %.250s", file_name(r->cloud_path));
+    snprintf(title, sizeof title, "Scan report: %.250s", basename(r->cloud_path));
     page_begin(out, title);
     put_top(out, r);
     put_verdict(out, &r->f.verdict);

@@ -75,9 +75,8 @@ static void put_meshes(const struct viewed *v, struct json *json)
 
 static void put_recording(const struct viewed *v, struct json *json)
 {
-    const char *slash = strrchr(v->path, '/');
     json_open_object(json, "recording");
-    json_string(json, "file", slash != NULL ? slash + 1 : v->path);
+    json_string(json, "file", basename(v->path));
     json_string(json, "format", v->format);
     put_frame(v, json);
     json_uint(json, "points", v->points.n);

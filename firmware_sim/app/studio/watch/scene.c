@@ -146,12 +146,6 @@ static void put_surfaces(struct json *json, const struct site *site)
     json_close_array(json);
 }
 
-static const char *base_of(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 static void put_head(struct json *json, const void *ctx)
 {
     static const char *const paces[] = {[PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"};
@@ -165,7 +159,7 @@ static void put_head(struct json *json, const void *ctx)
     json_string(json, "model", cfg->profile.model);
     json_string(json, "profile", cfg->profile.name);
     json_string(json, "serial", cfg->head.serial);
-    json_string(json, "config", base_of(cfg->file));
+    json_string(json, "config", basename(cfg->file));
     json_string(json, "pace", paces[cfg->loop.pace]);
     json_open_array(json, "stations");
     for (uint32_t i = 0; i < w->site->n_stations; i++)
