@@ -38,8 +38,7 @@ static int split(const char *path, struct stat *folder, const char **name)
     return stat(dir, folder) == 0;
 }
 
-/* Whether `name` is STEM-N.ENDING of a file of scans. */
-static int is_name_of_scan(const char *file, size_t n_ending, const char *name)
+int app_is_name_of_scan(const char *file, size_t n_ending, const char *name)
 {
     const size_t len = strlen(file), stem = len > n_ending ? len - n_ending : len;
     if (n_ending == 0 || strncmp(name, file, stem) != 0 || name[stem] != '-') return 0;
@@ -55,8 +54,8 @@ static int is_same_name(const struct named *a, const struct named *b)
     const int has_a = split(a->path, &folder[0], &name[0]), has_b = split(b->path, &folder[1], &name[1]);
     if (!has_a || !has_b) return strcmp(a->path, b->path) == 0;
     if (folder[0].st_dev != folder[1].st_dev || folder[0].st_ino != folder[1].st_ino) return 0;
-    return strcmp(name[0], name[1]) == 0 || is_name_of_scan(name[0], a->n_ending, name[1]) ||
-           is_name_of_scan(name[1], b->n_ending, name[0]);
+    return strcmp(name[0], name[1]) == 0 || app_is_name_of_scan(name[0], a->n_ending, name[1]) ||
+           app_is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
 /* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
-#include "core/studio/analysis/cloud_readers.h"
 #include "core/bytes.h"
+#include "core/studio/analysis/cloud_readers.h"
 #include "core/infile.h"
 #include "core/text.h"
 

@@ -10,6 +10,7 @@
 
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
+#include "firmware_sim/app/app.h"
 
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err)
 {
@@ -22,13 +23,9 @@ int record_files_add(struct record_files *files, const char *path, struct sh_err
     return SH_OK;
 }
 
-/* STEM-N.ENDING of a path STEM.ENDING. */
 static int is_name_of_scan(const struct record_file *file, const char *path)
 {
-    const size_t stem = strlen(file->path) - strlen(file->ops->ending);
-    if (strncmp(path, file->path, stem) != 0 || path[stem] != '-') return 0;
-    const size_t digits = strspn(path + stem + 1, "0123456789");
-    return digits > 0 && strcmp(path + stem + 1 + digits, file->path + stem) == 0;
+    return app_is_name_of_scan(file->path, strlen(file->ops->ending), path);
 }
 
 int record_files_check_each(const struct record_files *files, struct sh_err *err)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/studio/record/heads.h"
 
+#include <nettle/base16.h>
 #include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -113,7 +114,6 @@ static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *
 /* Of several streams: the hash of their hashes, as text, in the order of their heads. */
 static void add_streams(const struct heads *heads, int hash, struct recording_result *sum)
 {
-    static const char digits[] = "0123456789abcdef";
     struct sha256_ctx ctx;
     uint8_t digest[SHA256_DIGEST_SIZE];
     char hex[65];
@@ -128,10 +128,7 @@ static void add_streams(const struct heads *heads, int hash, struct recording_re
         sha256_update(&ctx, 64, (const uint8_t *)hex);
     }
     sha256_digest(&ctx, sizeof digest, digest);
-    for (size_t i = 0; i < sizeof digest && hash; i++) {
-        sum->sha256[2 * i] = digits[digest[i] >> 4];
-        sum->sha256[2 * i + 1] = digits[digest[i] & 15];
-    }
+    if (hash) base16_encode_update(sum->sha256, sizeof digest, digest);
 }
 
 /* Between the parts of a long recording, about once a second; within them recording_run says it. */
