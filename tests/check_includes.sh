@@ -25,8 +25,8 @@ core_headers='distance:bvh geoframe:georef locate:georef crs:georef scene_copies
 # On the way of a pulse core has no clock, no thread and no other process. Importing and the studio may have them. So may
 # these files, which prepare a scene before the first pulse: they measure how long that takes, and share it among threads.
 prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
-# Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers all may use core/err.h and
-# core/bytes.h, and besides:
+# Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers all may use core/err.h,
+# bytes.h, date.h and monotonic.h, and besides:
 #   protocol       itself, core/line.h
 #   socket         itself
 #   usb            itself, protocol (its data), socket
@@ -73,7 +73,7 @@ rules='
             if (a == "firmware_sim/firmware_sim") return to ~ /^(core|drivers|firmware_sim)\//
             return b ~ /^(core|drivers)\// || (b in rank && b ~ /^firmware_sim\// && rank[b] < rank[a])
         }
-        if (to == "core/err.h" || to == "core/bytes.h") return 1
+        if (to ~ /^core\/(err|bytes|date|monotonic)\.h$/) return 1
         if (to == "core/colour.h" || to == "core/infile.h" || b == "core/studio/mesh" || b == "core/studio/picture") return a == "drivers/record"
         if (to == "core/late.h") return a == "drivers/link"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"

@@ -6,22 +6,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "core/grow.h"
 #include "core/huge.h"
+#include "core/monotonic.h"
 #include "core/vec3.h"
-
-static int64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
 
 int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err)
 {
-    *b = (struct scene_build){.tolerance_m = tolerance_m, .report = report, .start_ns = now_ns()};
+    *b = (struct scene_build){.tolerance_m = tolerance_m, .report = report, .start_ns = monotonic_ns()};
     b->polygon.report = report;
     b->scene = calloc(1, sizeof *b->scene);
     if (b->scene == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scene");
@@ -56,14 +49,14 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->scene->says = (struct scene_says){0};
     b->has_uv = b->has_rgb = false;
     b->not_simple = b->n_rgb_limited = 0;
-    b->file_ns = now_ns();
+    b->file_ns = monotonic_ns();
 }
 
 static void report(struct scene_build *b, double fraction)
 {
     char what[sizeof b->name + 16];
     snprintf(what, sizeof what, "reading %s", b->name);
-    b->reported_ns = now_ns();
+    b->reported_ns = monotonic_ns();
     sh_progress(b->report, what, fraction);
 }
 
@@ -362,7 +355,7 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
 int build_progress(void *build, double fraction, struct sh_err *err)
 {
     struct scene_build *b = build;
-    int64_t now = now_ns();
+    int64_t now = monotonic_ns();
     if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
     return sh_check_stop(b->report, err);
 }

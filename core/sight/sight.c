@@ -4,10 +4,10 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "core/huge.h"
+#include "core/monotonic.h"
 #include "core/sight/build_inside.h"
 
 enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
@@ -207,9 +207,8 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
                  struct sh_err *err)
 {
     struct sight *s = *out = calloc(1, sizeof *s);
-    struct timespec from, to;
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
-    clock_gettime(CLOCK_MONOTONIC, &from);
+    const int64_t start_ns = monotonic_ns();
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     int rc = make(s, spec, threads, report, err);
@@ -218,8 +217,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
         *out = NULL;
         return rc;
     }
-    clock_gettime(CLOCK_MONOTONIC, &to);
-    s->info.build_s = (double)(to.tv_sec - from.tv_sec) + 1e-9 * (double)(to.tv_nsec - from.tv_nsec);
+    s->info.build_s = 1e-9 * (double)(monotonic_ns() - start_ns);
     return SH_OK;
 }
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "core/bytes.h"
+#include "core/monotonic.h"
 #include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/usbip_private.h"
@@ -80,7 +81,7 @@ static void run_control(struct usbip_conn *conn, struct usbip_urb *urb)
 /* Held requests are answered one after the other: each takes the delay that was asked for. */
 static void hold_control(struct usbip_conn *conn, struct usbip_urb *urb)
 {
-    const int64_t now_ns = usb_now_ns();
+    const int64_t now_ns = monotonic_ns();
     const int64_t from_ns =
         conn->slow_last != NULL && conn->slow_last->due_ns > now_ns ? conn->slow_last->due_ns : now_ns;
     urb->due_ns = from_ns + (int64_t)(usb_device_slow_ms(conn->device) * 1e6);
@@ -108,7 +109,7 @@ int64_t usbip_conn_due_ns(const struct usbip_conn *conn)
 
 void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
 {
-    while (conn->slow_first != NULL && !conn->broken && conn->slow_first->due_ns <= usb_now_ns() && go_on(ctx))
+    while (conn->slow_first != NULL && !conn->broken && conn->slow_first->due_ns <= monotonic_ns() && go_on(ctx))
         run_control(conn, let_go(conn, NULL));
 }
 
