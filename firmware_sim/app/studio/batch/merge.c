@@ -10,7 +10,6 @@
 
 #include "core/newfile.h"
 #include "firmware_sim/app/studio/batch/batch.h"
-#include "firmware_sim/base/clock.h"
 
 enum { MOST_LINES = 20 };
 
@@ -59,13 +58,10 @@ static int check_engines(const struct batch *b, struct sh_err *err)
 
 static int check_jobs(struct batch *b, struct gaps *gaps, struct sh_err *err)
 {
-    int64_t next_ns = clock_now_ns() + 1000000000;
     for (uint32_t i = 0; i < b->n_jobs; i++) {
         int rc = check_job(b, i, gaps, err);
         if (rc != SH_OK) return rc;
-        if (b->quiet || clock_now_ns() < next_ns) continue;
-        next_ns = clock_now_ns() + 1000000000;
-        sh_progress(&app_report_stderr, "checking files", (double)i / b->n_jobs);
+        if (!b->quiet) sh_progress(&app_report_seconds, "checking files", (double)i / b->n_jobs);
     }
     return SH_OK;
 }

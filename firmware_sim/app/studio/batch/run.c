@@ -162,7 +162,6 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
 static int check_done(struct runner *r, struct sh_err *err)
 {
     struct batch *b = r->b;
-    int64_t next_ns = clock_now_ns() + 1000000000;
     for (uint32_t i = 0; i < b->n_jobs; i++) {
         struct sh_err why = {0};
         if (!batch_is_mine(b, i)) continue;
@@ -172,9 +171,7 @@ static int check_done(struct runner *r, struct sh_err *err)
         if (rc != SH_OK) sh_warn(&app_report_stderr, "%s; job %u is done again", why.text, i + 1);
         if (rc != SH_OK) b->job[i].is_done = 0;
         r->n_todo += !b->job[i].is_done;
-        if (b->quiet || clock_now_ns() < next_ns) continue;
-        next_ns = clock_now_ns() + 1000000000;
-        sh_progress(&app_report_stderr, "checking what is done", (double)i / b->n_jobs);
+        if (!b->quiet) sh_progress(&app_report_seconds, "checking what is done", (double)i / b->n_jobs);
     }
     return SH_OK;
 }

@@ -50,8 +50,6 @@ struct report {
     const char *cloud_path, *html_path;
     int json;
     double tolerance_m, max_m, cell_m;
-    int64_t reported_ns; /* when progress was reported last */
-    struct sh_report progress;
     struct timespec modified; /* of the cloud's file */
     struct config *cfg;
     struct sites sites;
