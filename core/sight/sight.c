@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A sight: made by several threads, region by region, and given back. */
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -9,8 +8,9 @@
 #include "core/huge.h"
 #include "core/monotonic.h"
 #include "core/sight/build_inside.h"
+#include "core/together.h"
 
-enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
+enum { FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
 
 int sight_possible(const struct scene *scene)
 {
@@ -79,10 +79,11 @@ static int is_too_fine(const struct build_shared *b)
     return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);
 }
 
-static void *thread_main(void *shared)
+static void build_some(void *shared, int reports)
 {
     struct build_shared *b = shared;
     struct build_work w = {0};
+    (void)reports;
     const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
     for (;;) {
         const uint32_t region = atomic_fetch_add(&b->next, 1);
@@ -92,19 +93,12 @@ static void *thread_main(void *shared)
     }
     atomic_fetch_add(&b->given_back, w.taken);
     build_work_free(&w);
-    return NULL;
 }
 
 static int build_all(struct build_shared *b, unsigned threads, struct sh_err *err)
 {
-    pthread_t other[MAX_THREADS];
-    unsigned n = 0;
     if (threads == 0) threads = (unsigned)sysconf(_SC_NPROCESSORS_ONLN);
-    while (n + 1 < threads && n < MAX_THREADS && pthread_create(&other[n], NULL, thread_main, b) == 0)
-        n++;
-    thread_main(b);
-    for (unsigned i = 0; i < n; i++)
-        pthread_join(other[i], NULL);
+    together(threads, build_some, b);
     if (b->failed == SH_ESTOPPED) return sh_fail_stopped(err);
     return b->failed != 0 ? sh_fail(err, SH_ENOMEM, "sight: no memory") : SH_OK;
 }

@@ -3,14 +3,14 @@
 #include "core/studio/deviation.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/together.h"
 #include "core/vec3.h"
 
-enum { CHUNK = 16 * BVH_CHUNK, MAX_THREADS = 256, PLACES_AROUND = 12 };
+enum { CHUNK = 16 * BVH_CHUNK, PLACES_AROUND = 12 };
 
 /* As core/studio/deviation.h has it: what may differ where the nearest surface is the one that the beam meets. */
 static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
@@ -261,8 +261,9 @@ static void add(const struct work *w, struct batch *b, size_t i, const struct de
     b->range_m[k] = range_m;
 }
 
-static void work_on(struct work *w, int reports)
+static void work_on(void *ctx, int reports)
 {
+    struct work *w = ctx;
     struct batch *b = malloc(sizeof *b);
     const size_t n = w->cloud->n;
     size_t first;
@@ -288,12 +289,6 @@ static void work_on(struct work *w, int reports)
     free(b);
 }
 
-static void *helper_main(void *work)
-{
-    work_on(work, 0);
-    return NULL;
-}
-
 int deviation_along(const struct cloud *cloud, const struct cloud_site *site, const struct deviation_head *head,
                     const double *distance_m, const uint32_t *triangle, const struct sh_report *report,
                     const struct deviation_points *out, struct sh_err *err)
@@ -306,13 +301,7 @@ int deviation_along(const struct cloud *cloud, const struct cloud_site *site, co
                      .out = out,
                      .report = report,
                      .every = (cloud->n + DEVIATION_SAMPLE - 1) / DEVIATION_SAMPLE};
-    pthread_t helper[MAX_THREADS];
-    unsigned n = 0;
-    while (n + 1 < site->threads && n < MAX_THREADS && pthread_create(&helper[n], NULL, helper_main, &w) == 0)
-        n++;
-    work_on(&w, 1);
-    while (n > 0)
-        pthread_join(helper[--n], NULL);
+    together(site->threads, work_on, &w);
     if (atomic_load(&w.failed)) return sh_fail(err, SH_ENOMEM, "no memory to follow the beams");
     return sh_check_stop(report, err);
 }
