@@ -193,7 +193,7 @@ static int anchor_scene(struct site *site, struct sh_err *err)
 static int place(const struct site *site, const struct pose *head, struct placement *at, struct sh_err *err)
 {
     memcpy(at->position_m, head->position_m, sizeof at->position_m);
-    pose_matrix(head->quat, at->rotation);
+    quat_matrix(head->quat, at->rotation);
     at->floor_m = NAN;
     at->on_earth = site->anchor.known;
     return at->on_earth ? geoframe_locate(&site->anchor.frame, at->position_m, &at->place, err) : SH_OK;

@@ -96,7 +96,7 @@ static void turn_station(const struct geoframe *frame, struct viewed_station *s)
 {
     double quat[4], in_ecef[9], back[9], turned[9];
     pose_from_angles(s->heading_rad, s->pitch_rad, s->roll_rad, quat);
-    pose_matrix(quat, in_ecef);
+    quat_matrix(quat, in_ecef);
     mat3_transpose(frame->rotation, back);
     mat3_multiply(back, in_ecef, turned);
     pose_from_matrix(turned, quat);
