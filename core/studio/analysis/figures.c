@@ -78,7 +78,7 @@ static void find_p95(const struct figures_in *in, uint32_t n_groups, uint32_t (*
     }
     for (size_t i = 0; i < in->n; i++) {
         if (!isfinite(in->distance_m[i])) continue;
-        const uint32_t g = group(ctx, i);
+        const uint32_t g = group != NULL ? group(ctx, i) : 0;
         if (g < n_groups) by_group[at[g]++] = in->distance_m[i];
     }
     for (uint32_t g = 0; g < n_groups; g++) {
@@ -101,7 +101,7 @@ int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)
     for (uint32_t g = 0; g < n_groups; g++)
         out[g] = (struct figures){.max_m = (double)NAN, .along_max_m = (double)NAN}; /* fmax passes them over */
     for (size_t i = 0; i < in->n; i++) {
-        const uint32_t g = group(ctx, i);
+        const uint32_t g = group != NULL ? group(ctx, i) : 0;
         if (g < n_groups) add_point(in, i, &out[g], &sums[g]);
     }
     for (uint32_t g = 0; g < n_groups; g++)

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "drivers/protocol/crc32c.h"
+#include "firmware_sim/app/options.h"
 
 enum { NAME_KEPT = 96 };
 
@@ -68,19 +69,6 @@ static int add_list(struct batch_sweep *s, const char *values, struct sh_err *er
     }
 }
 
-/* FIRST:LAST:STEP, three numbers. */
-static int is_range(const char *values, double range[3])
-{
-    const char *p = values;
-    for (int i = 0; i < 3; i++) {
-        char *end;
-        range[i] = strtod(p, &end);
-        if (end == p || isspace((unsigned char)*p) || *end != (i < 2 ? ':' : '\0')) return 0;
-        p = end + 1;
-    }
-    return isfinite(range[0]) && isfinite(range[1]) && isfinite(range[2]);
-}
-
 /* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Twelve digits: 0.3 and not
  * 0.30000000000000004. */
 static int add_range(struct batch_sweep *s, const char *values, const double range[3], struct sh_err *err)
@@ -138,7 +126,8 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
             return sh_fail(err, SH_EINPUT, "--sweep %s: it would replace the values of --sweep %s; allowed before that",
                            s->key, sweeps->sweep[i].key);
     }
-    return is_range(equals + 1, range) ? add_range(s, equals + 1, range, err) : add_list(s, equals + 1, err);
+    return app_read_numbers(equals + 1, ':', range, 3) ? add_range(s, equals + 1, range, err)
+                                                       : add_list(s, equals + 1, err);
 }
 
 void batch_sweeps_free(struct batch_sweeps *sweeps)

@@ -145,13 +145,6 @@ static int compare(struct report *r, struct sh_err *err)
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
 }
 
-static uint32_t everything(void *ctx, size_t i)
-{
-    (void)ctx;
-    (void)i;
-    return 0;
-}
-
 static uint32_t by_station(void *ctx, size_t i)
 {
     const struct report *r = ctx;
@@ -207,7 +200,7 @@ static int tables(struct report *r, struct sh_err *err)
         uint32_t n;
         uint32_t (*group)(void *ctx, size_t i);
         struct figures *out;
-    } table[] = {{1, everything, &f->all},
+    } table[] = {{1, NULL, &f->all},
                  {n_stations, by_station, station},
                  {n_labels, by_label, f->label},
                  {f->n_ranges, by_range, f->range},

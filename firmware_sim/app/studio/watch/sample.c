@@ -154,13 +154,6 @@ int watch_sample_compare(struct watch *w, struct sh_err *err)
 
 /* ---- figures */
 
-static uint32_t everything(void *ctx, size_t i)
-{
-    (void)ctx;
-    (void)i;
-    return 0;
-}
-
 static int density(struct watch *w, const struct cloud *cloud, const struct figures_in *in, struct sh_err *err)
 {
     struct watch_sample *s = &w->sample;
@@ -196,7 +189,7 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
     struct watch_sample *s = &w->sample;
     const struct figures_in in = {.n = s->n, .distance_m = s->distance_m, .points = &s->points};
     const struct cloud cloud = {.n = s->n, .xyz_m = s->xyz_m, .epsg = CLOUD_EPSG_UNKNOWN};
-    int rc = figures_by(&in, 1, everything, NULL, &w->at.figures, err);
+    int rc = figures_by(&in, 1, NULL, NULL, &w->at.figures, err);
     if (rc == SH_OK) rc = density(w, &cloud, &in, err);
     if (rc != SH_OK) return rc;
     if (w->at.figures.along > 0)
