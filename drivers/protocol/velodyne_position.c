@@ -45,11 +45,6 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     return SH_OK;
 }
 
-static void destroy(void *protocol)
-{
-    free(protocol);
-}
-
 /* Times are multiples of the period, so that sessions agree. */
 static void open_at(void *protocol, int64_t t_ns)
 {
@@ -117,7 +112,7 @@ const struct protocol_ops protocol_velodyne_position = {
     .content = nmea_content,
     .reseal = nmea_reseal,
     .create = create,
-    .destroy = destroy,
+    .destroy = free,
     .open = open_at,
     .time = at_time,
     .input = input,
