@@ -88,27 +88,13 @@ int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err)
     return offline_prepare(&heads->at->offline, station, heads->report, err);
 }
 
+/* All of them are counts of 64 bits. */
 static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *more)
 {
-    sum->bytes += more->bytes;
-    sum->frames += more->frames;
-    sum->bad_payload += more->bad_payload;
-    sum->bad_bytes += more->bad_bytes;
-    sum->seq_gaps += more->seq_gaps;
-    sum->seq_lost += more->seq_lost;
-    sum->dropped += more->dropped;
-    sum->reader_lost += more->reader_lost;
-    sum->pulses_lost += more->pulses_lost;
-    sum->repeated += more->repeated;
-    sum->late += more->late;
-    sum->restarts += more->restarts;
-    sum->cuts += more->cuts;
-    sum->bad_unseen += more->bad_unseen;
-    sum->echoes += more->echoes;
-    sum->late_replies += more->late_replies;
-    sum->unasked += more->unasked;
-    sum->closed += more->closed;
-    sum->reattached += more->reattached;
+    uint64_t *to = (uint64_t *)(void *)sum;
+    const uint64_t *from = (const uint64_t *)(const void *)more;
+    for (size_t i = 0; i < sizeof *sum / sizeof *to; i++)
+        to[i] += from[i];
 }
 
 /* Of several streams: the hash of their hashes, as text, in the order of their heads. */
