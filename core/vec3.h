@@ -30,6 +30,15 @@ static inline void vec3_add(const double a[3], const double b[3], double out[3])
         out[i] = a[i] + b[i];
 }
 
+/* Twice the area of the triangle a, b, c, along its normal. */
+static inline void vec3_normal(const double a[3], const double b[3], const double c[3], double out[3])
+{
+    double u[3], v[3];
+    vec3_sub(b, a, u);
+    vec3_sub(c, a, v);
+    vec3_cross(u, v, out);
+}
+
 static inline double vec3_length(const double a[3])
 {
     return sqrt(vec3_dot(a, a));

@@ -74,18 +74,14 @@ void deviation_points_free(struct deviation_points *points)
 static int crosses(const struct scene *scene, uint32_t triangle, const double at_m[3])
 {
     const double *corner[3];
-    double e[2][3], n[3];
+    double n[3];
     for (int k = 0; k < 3; k++)
         corner[k] = scene->vertex_m[scene->triangle[triangle][k]];
-    vec3_sub(corner[1], corner[0], e[0]);
-    vec3_sub(corner[2], corner[0], e[1]);
-    vec3_cross(e[0], e[1], n);
+    vec3_normal(corner[0], corner[1], corner[2], n);
     const double least = -1e-9 * vec3_dot(n, n);
     for (int k = 0; k < 3; k++) {
-        double side[3], to[3], c[3];
-        vec3_sub(corner[(k + 1) % 3], corner[k], side);
-        vec3_sub(at_m, corner[k], to);
-        vec3_cross(side, to, c);
+        double c[3];
+        vec3_normal(corner[k], corner[(k + 1) % 3], at_m, c);
         if (!(vec3_dot(c, n) >= least)) return 0;
     }
     return 1;

@@ -176,7 +176,7 @@ static void measure(struct work *w)
         w->low_m[i] = INFINITY;
     for (uint32_t t = 0; t < m->n_triangles; t++) {
         const double *corner[3];
-        double e[2][3], n[3];
+        double n[3];
         for (int k = 0; k < 3; k++) {
             corner[k] = m->vertex_m[m->triangle[t][k]];
             for (int i = 0; i < 3; i++) {
@@ -184,9 +184,7 @@ static void measure(struct work *w)
                 if (corner[k][i] > high_m[i]) high_m[i] = corner[k][i];
             }
         }
-        vec3_sub(corner[1], corner[0], e[0]);
-        vec3_sub(corner[2], corner[0], e[1]);
-        vec3_cross(e[0], e[1], n);
+        vec3_normal(corner[0], corner[1], corner[2], n);
         w->area_m2 += 0.5 * vec3_length(n);
     }
     for (int i = 0; i < 3; i++)

@@ -111,11 +111,9 @@ static uint32_t cell_of(const struct survey *s, const struct cells *c, const dou
 static void fill(const struct survey *s, struct cells *c)
 {
     for (uint32_t i = 0; i < s->scene->n_all; i++) {
-        double corner[3][3], u[3], v[3], n[3];
+        double corner[3][3], n[3];
         scene_corners(s->scene, i, corner);
-        vec3_sub(corner[1], corner[0], u);
-        vec3_sub(corner[2], corner[0], v);
-        vec3_cross(u, v, n);
+        vec3_normal(corner[0], corner[1], corner[2], n);
         c->area_m2[cell_of(s, c, (const double(*)[3])corner)] += 0.5 * vec3_length(n);
     }
 }
