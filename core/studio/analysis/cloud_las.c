@@ -2,7 +2,6 @@
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
 #include "core/bytes.h"
 #include "core/studio/analysis/cloud_readers.h"
-#include "core/infile.h"
 #include "core/text.h"
 
 #include <math.h>
@@ -27,17 +26,6 @@ struct las {
     long label_at; /* in the record; -1: none */
     size_t n_no_station;
 };
-
-bool cloud_is_las(const char *path)
-{
-    char magic[4] = "";
-    const char *why;
-    FILE *in = infile_open(path, &why);
-    if (in == NULL) return false;
-    size_t n = fread(magic, 1, sizeof magic, in);
-    fclose(in);
-    return n == sizeof magic && memcmp(magic, "LASF", 4) == 0;
-}
 
 static int fail(const struct las *las, struct sh_err *err, const char *what)
 {
