@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "core/newfile.h"
 #include "firmware_sim/app/studio/batch/batch.h"
@@ -141,29 +140,19 @@ static void put_all(struct json *json, const struct batch *b)
     json_close_object(json);
 }
 
+static int put_whole(const void *batch, FILE *out, struct sh_err *err)
+{
+    struct json json;
+    json_begin(&json, out);
+    put_all(&json, batch);
+    return json_end(&json, err);
+}
+
 static int write_whole(const struct batch *b, struct sh_err *err)
 {
-    char path[PATH_MAX], part[PATH_MAX];
-    struct json json;
-    int fd;
+    char path[PATH_MAX];
     snprintf(path, sizeof path, "%s/manifest.json", b->dir);
-    snprintf(part, sizeof part, "%s/manifest.json.part", b->dir);
-    int rc = newfile_part(path, part, &fd, err);
-    if (rc != SH_OK) return rc;
-    const int copy = dup(fd);
-    FILE *out = copy >= 0 ? fdopen(copy, "w") : NULL;
-    if (out == NULL) {
-        if (copy >= 0) close(copy);
-        newfile_drop(part, fd);
-        return sh_fail(err, SH_EIO, "%s: cannot be written", path);
-    }
-    json_begin(&json, out);
-    put_all(&json, b);
-    rc = json_end(&json, err);
-    if (fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: cannot be written", path);
-    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
-    newfile_drop(part, fd);
-    return rc;
+    return newfile_write(path, put_whole, b, err);
 }
 
 static int check_folder(const struct batch *b, struct sh_err *err)
