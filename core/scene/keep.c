@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/scene/build.h"
 
 /* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
@@ -46,13 +47,6 @@ static void find_bounds(struct scene *s)
     }
 }
 
-/* Gives unused memory back; where that fails, the array stays as it is. */
-static void shrink(void *array_of, size_t n, size_t size)
-{
-    void **array = array_of, *less = *array != NULL && n > 0 ? realloc(*array, n * size) : NULL;
-    if (less != NULL) *array = less;
-}
-
 int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
 {
     uint16_t *label = calloc((size_t)s->n_surfaces + 1, sizeof *label);
@@ -70,11 +64,12 @@ int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
         s->n_surfaces = n;
         s->n_all = s->n_triangles;
         find_bounds(s);
-        shrink(&s->triangle, s->n_triangles, sizeof *s->triangle);
-        shrink(&s->label, s->n_triangles, sizeof *s->label);
-        shrink(&s->uv, s->n_triangles, sizeof *s->uv);
-        shrink(&s->rgb, s->n_triangles, sizeof *s->rgb);
-        shrink(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+        /* Where memory can't be given back, it stays. */
+        resize(&s->triangle, s->n_triangles, sizeof *s->triangle);
+        resize(&s->label, s->n_triangles, sizeof *s->label);
+        if (s->uv != NULL) resize(&s->uv, s->n_triangles, sizeof *s->uv);
+        if (s->rgb != NULL) resize(&s->rgb, s->n_triangles, sizeof *s->rgb);
+        resize(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
         rc = scene_keep_copies(s, keep, label, err);
     }
     free(label);

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/grow.h"
 #include "core/huge.h"
 #include "core/monotonic.h"
 #include "core/sight/build_inside.h"
@@ -103,20 +104,13 @@ static int build_all(struct build_shared *b, unsigned threads, struct sh_err *er
     return b->failed != 0 ? sh_fail(err, SH_ENOMEM, "sight: no memory") : SH_OK;
 }
 
-/* Arrays shrink to what they hold; where that fails they stay. */
-static void *keep(void *array, uint64_t used, uint64_t size)
-{
-    void *kept = realloc(array, used * size + 1);
-    return kept != NULL ? kept : array;
-}
-
 /* Records begin at cache lines, which realloc does not promise. Room that is not given back is resident once the head
  * locks its memory (mlockall), though nobody touches it. */
 static int keep_records(struct build_shared *b, struct sh_err *err)
 {
     struct sight *s = b->sight;
     const uint64_t bytes = b->record.used * sizeof *s->record;
-    s->record = keep(s->record, b->record.used, sizeof *s->record);
+    resize(&s->record, b->record.used, sizeof *s->record);
     if ((uintptr_t)s->record % sizeof *s->record == 0) return SH_OK;
     struct sight_record *aligned = aligned_alloc(sizeof *s->record, bytes + sizeof *s->record);
     if (aligned == NULL)
@@ -132,8 +126,9 @@ static void finish(struct build_shared *b)
     struct sight *s = b->sight;
     struct sight_info *info = &s->info;
     double all = 0.0;
-    s->leaf = keep(s->leaf, b->leaf.used, sizeof *s->leaf);
-    s->list = keep(s->list, b->list.used, sizeof *s->list);
+    /* Where an array can't shrink, it stays. */
+    resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
+    resize(&s->list, b->list.used, sizeof *s->list);
     for (int i = 0; i < 4; i++)
         all += (double)b->cells[i];
     all = all > 0.0 ? all : 1.0;

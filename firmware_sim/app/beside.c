@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/grow.h"
 #include "core/infile.h"
 #include "core/scene.h"
 #include "core/text.h"
@@ -87,9 +88,8 @@ static int search(struct search *s, const char *file, int depth);
 
 static int found(struct search *s, const char *name, const char *path, int depth)
 {
-    char **more = realloc(s->seen, (s->n_seen + 1) * sizeof *more);
-    if (more != NULL) s->seen = more;
-    if (more == NULL || (s->seen[s->n_seen] = strdup(path)) == NULL) return sh_fail(s->err, SH_ENOMEM, "no memory");
+    if (!resize(&s->seen, s->n_seen + 1, sizeof(char *)) || (s->seen[s->n_seen] = strdup(path)) == NULL)
+        return sh_fail(s->err, SH_ENOMEM, "no memory");
     s->n_seen++;
     int rc = s->take(s->ctx, name, path);
     if (rc != SH_OK || depth == DEEPEST || !app_ends_in(path, ".mtl")) return rc;

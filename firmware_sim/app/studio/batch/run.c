@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/grow.h"
 #include "firmware_sim/app/beside.h"
 #include "firmware_sim/app/studio/batch/load.h"
 #include "firmware_sim/base/clock.h"
@@ -37,10 +38,9 @@ static int add_file(struct listing *l, const char *path)
     struct batch_entry *entry = l->entry;
     for (uint32_t i = 0; i < entry->n_files; i++)
         if (strcmp(entry->file[i].name, name) == 0) return SH_OK;
-    struct batch_file *more = realloc(entry->file, (entry->n_files + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(l->err, SH_ENOMEM, "no memory for a job's files");
-    entry->file = more;
-    struct batch_file *file = &more[entry->n_files++];
+    if (!resize(&entry->file, entry->n_files + (size_t)1, sizeof *entry->file))
+        return sh_fail(l->err, SH_ENOMEM, "no memory for a job's files");
+    struct batch_file *file = &entry->file[entry->n_files++];
     snprintf(file->name, sizeof file->name, "%s", name);
     return batch_sha_file(path, file->sha, &file->bytes, NULL, l->err);
 }

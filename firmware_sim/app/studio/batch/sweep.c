@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "drivers/protocol/crc32c.h"
 #include "firmware_sim/app/options.h"
 
@@ -16,9 +17,8 @@ enum { NAME_KEPT = 96 };
 
 static int add_value(struct batch_sweep *s, const char *value, size_t len, struct sh_err *err)
 {
-    char **grown = realloc(s->set, (s->n + 1) * sizeof *s->set), *set = NULL;
-    if (grown != NULL) s->set = grown;
-    if (grown == NULL || asprintf(&set, "%s=%.*s", s->key, (int)len, value) < 0)
+    char *set = NULL;
+    if (!resize(&s->set, s->n + (size_t)1, sizeof(char *)) || asprintf(&set, "%s=%.*s", s->key, (int)len, value) < 0)
         return sh_fail(err, SH_ENOMEM, "no memory for the values of %s", s->key);
     for (uint32_t i = 0; i < s->n; i++) {
         if (strcmp(s->set[i], set) != 0) continue;

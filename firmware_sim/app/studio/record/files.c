@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
 #include "firmware_sim/app/app.h"
@@ -176,10 +177,10 @@ static char *present_path(const struct record_files *files, const struct record_
 /* The frames of another head are another stream. */
 static int add_spool(struct record_files *files, struct sh_err *err)
 {
-    struct colour_spool **more = realloc(files->spool, (files->n_spools + 1) * sizeof *more);
-    if (more != NULL) files->spool = more;
-    struct colour_spool *spool = more != NULL ? calloc(1, sizeof *spool) : NULL;
-    if (spool == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to keep its frames", files->file[0].path);
+    struct colour_spool *spool = NULL;
+    if (!resize(&files->spool, files->n_spools + (size_t)1, sizeof(struct colour_spool *)) ||
+        (spool = calloc(1, sizeof *spool)) == NULL)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to keep its frames", files->file[0].path);
     files->spool[files->n_spools++] = spool;
     return colour_spool_open(spool, files->file[0].now, files->recorder.colour.scale.mode, err);
 }
