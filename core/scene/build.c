@@ -122,18 +122,10 @@ static int find_bounds(const struct scene_build *b, struct sh_err *err)
 {
     struct scene *s = b->scene;
     int rc = SH_OK;
-    for (int k = 0; k < 3; k++) {
-        s->min_m[k] = INFINITY;
-        s->max_m[k] = -INFINITY;
-    }
+    vec3_bound_nothing(s->min_m, s->max_m);
     for (uint32_t i = 0; i < s->n_triangles && rc == SH_OK; i++) {
-        for (int c = 0; c < 3; c++) {
-            const double *v = s->vertex_m[s->triangle[i][c]];
-            for (int k = 0; k < 3; k++) {
-                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
-                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
-            }
-        }
+        for (int c = 0; c < 3; c++)
+            vec3_bound(s->min_m, s->max_m, s->vertex_m[s->triangle[i][c]]);
         if ((i & 0xfffff) == 0) rc = sh_check_stop(b->report, err);
     }
     return rc;

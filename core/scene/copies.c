@@ -9,6 +9,7 @@
 #include "core/grow.h"
 #include "core/scene/build.h"
 #include "core/scene/hull.h"
+#include "core/vec3.h"
 
 void scene_find_part(const struct scene *scene, uint32_t triangle, struct scene_part *part)
 {
@@ -135,11 +136,10 @@ static int set_copies(const struct scene *mesh, const struct scene_places *place
 
 void scene_widen(struct scene *scene, const struct scene_copy *copy, size_t n)
 {
-    for (size_t i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++) {
-            scene->min_m[k] = fmin(scene->min_m[k], copy[i].min_m[k]);
-            scene->max_m[k] = fmax(scene->max_m[k], copy[i].max_m[k]);
-        }
+    for (size_t i = 0; i < n; i++) {
+        vec3_bound(scene->min_m, scene->max_m, copy[i].min_m);
+        vec3_bound(scene->min_m, scene->max_m, copy[i].max_m);
+    }
 }
 
 static void keep_counts(struct scene *scene, const struct scene *mesh, const struct scene_copy *copy, size_t n)

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A scene without some of its surfaces. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/grow.h"
 #include "core/scene/build.h"
+#include "core/vec3.h"
 
 /* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
 static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)
@@ -35,18 +35,6 @@ static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t 
             s->triangle[i][c] = vertex[s->triangle[i][c]];
 }
 
-static void find_bounds(struct scene *s)
-{
-    for (int k = 0; k < 3; k++) {
-        s->min_m[k] = INFINITY;
-        s->max_m[k] = -INFINITY;
-        for (uint32_t v = 0; v < s->n_vertices; v++) {
-            s->min_m[k] = fmin(s->min_m[k], s->vertex_m[v][k]);
-            s->max_m[k] = fmax(s->max_m[k], s->vertex_m[v][k]);
-        }
-    }
-}
-
 int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
 {
     uint16_t *label = calloc((size_t)s->n_surfaces + 1, sizeof *label);
@@ -63,7 +51,9 @@ int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
         keep_triangles(s, keep, label, vertex);
         s->n_surfaces = n;
         s->n_all = s->n_triangles;
-        find_bounds(s);
+        vec3_bound_nothing(s->min_m, s->max_m);
+        for (uint32_t v = 0; v < s->n_vertices; v++)
+            vec3_bound(s->min_m, s->max_m, s->vertex_m[v]);
         /* Where memory can't be given back, it stays. */
         resize(&s->triangle, s->n_triangles, sizeof *s->triangle);
         resize(&s->label, s->n_triangles, sizeof *s->label);

@@ -137,16 +137,14 @@ static uint32_t find_fullest(const struct cells *c)
 /* From here on the survey has the bounds of the surface in that cell. */
 static void narrow(struct survey *s, const struct cells *c, uint32_t cell)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double low[3], high[3];
+    vec3_bound_nothing(low, high);
     for (uint32_t i = 0; i < s->scene->n_all; i++) {
         double corner[3][3];
         scene_corners(s->scene, i, corner);
         if (cell_of(s, c, (const double(*)[3])corner) != cell) continue;
         for (int v = 0; v < 3; v++)
-            for (int k = 0; k < 3; k++) {
-                low[k] = fmin(low[k], corner[v][k]);
-                high[k] = fmax(high[k], corner[v][k]);
-            }
+            vec3_bound(low, high, corner[v]);
     }
     vec3_sub(high, low, s->size_m);
     for (int k = 0; k < 3; k++)

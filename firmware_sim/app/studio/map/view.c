@@ -7,6 +7,7 @@
 
 #include "core/studio/cloud.h"
 #include "core/grow.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
@@ -99,13 +100,14 @@ static int scan(struct scanning *s, struct config *cfg, struct sh_err *err)
                                         .frame = add_frame,
                                         .ctx = s,
                                         .interrupted = app_interrupted};
-    struct picturing_bounds bounds = PICTURING_NO_BOUNDS;
+    struct picturing_bounds bounds;
     app_catch_signals();
     cfg->output.layout = LINE_GEO;
     int rc = heads_load(cfg, &s->heads, err);
     if (rc == SH_OK) rc = heads_open(&s->heads, NULL, 0.0, &app_report_stderr, err);
     if (rc != SH_OK) return rc;
     const struct site *site = s->p->site = s->heads.first->site;
+    vec3_bound_nothing(bounds.min_m, bounds.max_m);
     picturing_include(&bounds, site->scene->min_m);
     picturing_include(&bounds, site->scene->max_m);
     include_stations(site, &bounds);
@@ -188,7 +190,7 @@ static int check_columns(const struct showing *s, struct sh_err *err)
 
 static int show(struct showing *s, struct config *cfg, struct sh_err *err)
 {
-    struct picturing_bounds bounds = PICTURING_NO_BOUNDS;
+    struct picturing_bounds bounds;
     app_catch_signals();
     int rc = cloud_read_columns(s->path, CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, s->report, &s->cloud, err);
     if (rc == SH_OK && cfg != NULL) rc = site_load(cfg, &app_report_stderr, &s->site, err);
@@ -198,6 +200,7 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
     if (rc == SH_OK && s->site != NULL) rc = to_scene(s, cfg, err);
     if (rc != SH_OK) return rc;
     const struct cloud *c = &s->cloud;
+    vec3_bound_nothing(bounds.min_m, bounds.max_m);
     for (size_t i = 0; i < c->n; i++)
         picturing_include(&bounds, c->xyz_m[i]);
     if (!(bounds.max_m[0] >= bounds.min_m[0]))

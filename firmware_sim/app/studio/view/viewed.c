@@ -13,6 +13,7 @@
 #include "core/infile.h"
 #include "core/mat3.h"
 #include "core/pose.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 
 enum { EPSG_ECEF = 4978, EPSG_GEODETIC = 4979 };
@@ -175,15 +176,9 @@ static void measure_column(struct viewed *v, enum viewed_column column)
 
 void viewed_measure(struct viewed *v)
 {
-    for (int k = 0; k < 3; k++) {
-        v->min_m[k] = INFINITY;
-        v->max_m[k] = -INFINITY;
-    }
+    vec3_bound_nothing(v->min_m, v->max_m);
     for (uint32_t i = 0; i < v->points.n; i++)
-        for (int k = 0; k < 3; k++) {
-            v->min_m[k] = fmin(v->min_m[k], v->points.xyz_m[i][k]);
-            v->max_m[k] = fmax(v->max_m[k], v->points.xyz_m[i][k]);
-        }
+        vec3_bound(v->min_m, v->max_m, v->points.xyz_m[i]);
     for (int k = 0; k < 3; k++)
         v->origin_m[k] = round(0.5 * v->min_m[k] + 0.5 * v->max_m[k]);
     for (int c = 0; c < VIEWED_COLUMNS; c++)
