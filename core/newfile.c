@@ -392,18 +392,13 @@ int newfile_write(const char *path, newfile_put *put, const void *source, struct
     int fd;
     if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
     int rc = newfile_part(path, part, &fd, err);
-    if (rc == SH_OK) rc = write_part(path, part, fd, put, source, err);
+    if (rc == SH_OK && put == NULL) newfile_drop(part, fd);
+    if (rc == SH_OK && put != NULL) rc = write_part(path, part, fd, put, source, err);
     free(part);
     return rc;
 }
 
 int newfile_check(const char *path, struct sh_err *err)
 {
-    char *part;
-    int fd;
-    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
-    int rc = newfile_part(path, part, &fd, err);
-    if (rc == SH_OK) newfile_drop(part, fd);
-    free(part);
-    return rc;
+    return newfile_write(path, NULL, NULL, err);
 }
