@@ -9,16 +9,15 @@
 /* Attributes of an IfcProduct: GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement, Representation. */
 enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_PLACEMENT = 5, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
 
-static int compare_records(const void *a, const void *b)
+int ifc_compare(const void *a, const void *b)
 {
-    const struct step_record *x = a, *y = b;
-    return (x->id > y->id) - (x->id < y->id);
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
 }
 
 const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t id)
 {
-    const struct step_record key = {.id = id};
-    return r->n > 0 ? bsearch(&key, r->record, r->n, sizeof key, compare_records) : NULL;
+    return r->n > 0 ? bsearch(&id, r->record, r->n, sizeof *r->record, ifc_compare) : NULL;
 }
 
 int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, struct sh_err *err, const char *what)
@@ -27,16 +26,9 @@ int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, 
                      (unsigned long long)at->id, what);
 }
 
-static int compare_products(const void *a, const void *b)
-{
-    const struct ifc_product *x = a, *y = b;
-    return (x->id > y->id) - (x->id < y->id);
-}
-
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id)
 {
-    const struct ifc_product key = {.id = id};
-    return r->n_products > 0 ? bsearch(&key, r->product, r->n_products, sizeof key, compare_products) : NULL;
+    return r->n_products > 0 ? bsearch(&id, r->product, r->n_products, sizeof *r->product, ifc_compare) : NULL;
 }
 
 size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id)
@@ -70,7 +62,7 @@ static int read_all(struct ifc_records *r, struct sh_err *err)
         r->record[r->n++] = record;
     }
     if (rc < 0) return rc;
-    if (!sorted) qsort(r->record, r->n, sizeof *r->record, compare_records);
+    if (!sorted) qsort(r->record, r->n, sizeof *r->record, ifc_compare);
     for (size_t i = 1; i < r->n; i++)
         if (r->record[i].id == r->record[i - 1].id)
             return text_fail(&r->text, r->record[i].line, SH_EINPUT, err, "a second record #%llu; allowed one",

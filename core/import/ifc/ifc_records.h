@@ -68,7 +68,9 @@ int ifc_records_fail(const struct ifc_records *r, const struct step_record *at, 
 const struct step_record *ifc_records_find(const struct ifc_records *r, uint64_t id);
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id);
 
-/* The place of the first entry of a sorted list whose number, its first member, is id or above; n: there is none. */
+/* For lists of entries whose first member is their number, and for such a number itself. */
+int ifc_compare(const void *a, const void *b);
+/* The place of the first entry of such a list, sorted, whose number is id or above; n: there is none. */
 size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id);
 
 /* ---- ifc_walk.c: fills the marks of all products. */
