@@ -43,4 +43,8 @@ int offline_finish(struct offline *offline, struct sh_err *err);
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 
+/* A client of a head in this process: link becomes the head's end, and is to be one of its links. Returns the client's
+ * descriptor, which is the handle's, or an error; then link has none (-1). who: for errors. */
+int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err);
+
 #endif
