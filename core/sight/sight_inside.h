@@ -112,14 +112,4 @@ struct sight {
     struct sight_info info;
 };
 
-/* The face of a direction, and its coordinates there. */
-static inline uint32_t sight_face(const double d[3], double *u, double *v)
-{
-    const double a[3] = {d[0] < 0 ? -d[0] : d[0], d[1] < 0 ? -d[1] : d[1], d[2] < 0 ? -d[2] : d[2]};
-    const uint32_t axis = a[0] >= a[1] && a[0] >= a[2] ? 0 : a[1] >= a[2] ? 1 : 2;
-    *u = d[(axis + 1) % 3] / a[axis];
-    *v = d[(axis + 2) % 3] / a[axis];
-    return 2 * axis + (d[axis] < 0);
-}
-
 #endif

@@ -43,8 +43,6 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
                     struct sh_err *err);
 void coverage_free(struct coverage *coverage);
 
-enum { COVERAGE_MAX_STATIONS = 65535 };
-
 /* A scan: its setup, and its pulses. */
 struct coverage_scan {
     struct cast_setup setup;

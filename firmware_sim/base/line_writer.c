@@ -242,11 +242,6 @@ int line_writer_is_filling(const struct line_writer *w)
     return w != NULL && w->used > w->spec.room / 4 && w->error == 0;
 }
 
-int line_writer_error(const struct line_writer *w)
-{
-    return w->error;
-}
-
 /* Waits until all is written, or the file has taken nothing for PATIENCE_NS. */
 static void wait_for_end(struct line_writer *w)
 {

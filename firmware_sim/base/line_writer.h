@@ -42,9 +42,6 @@ int line_writer_put(struct line_writer *writer, enum line_kind kind, const char 
 /* 1: a quarter of the queue is full; callers that can wait should, so that nothing is dropped. 0 for NULL. */
 int line_writer_is_filling(const struct line_writer *writer);
 
-/* errno of the first failure in writing, or 0. */
-int line_writer_error(const struct line_writer *writer);
-
 /* Writes what is left, then the line `last` (NULL: none), and closes. When the file takes nothing for 2 s, the rest is
  * dropped. SH_EIO: that happened, or writing failed; the text says how many lines are missing. Lines that were dropped
  * before are counted in *lost alone. A writer of NULL is allowed. */

@@ -180,7 +180,6 @@ struct device_station {
     double head_above_m;               /* the head's origin above the tripod's top */
     double legs_heading_deg;           /* of the first leg, from the scene's north */
 };
-uint32_t device_n_stations(const struct device *device);
 void device_get_station(struct device *device, uint32_t station, struct device_station *out); /* 0.. */
 /* Holds the present site, for callers that need more of it. It is constant and valid until it is given back, which must
  * come before device_free, and soon: it may hold maps of hundreds of MiB. */

@@ -122,11 +122,6 @@ void device_close_moves(struct device *device)
     free(moves->first_place);
 }
 
-uint32_t device_n_stations(const struct device *device)
-{
-    return device->moves.first->n_stations;
-}
-
 void device_get_station(struct device *device, uint32_t station, struct device_station *out)
 {
     struct device_version *version;

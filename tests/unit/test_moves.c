@@ -223,7 +223,7 @@ static void who_asks_holds_the_site_of_now(void **state)
     device_get_station(rig->device, 0, &at);
     assert_true(at.place.position_m[2] == 0.4 && at.place.heading_deg == 90.0 && fabs(at.height_m - 2.2) < 1e-9);
     device_get_station(rig->device, 1, &at);
-    assert_true(!at.has_tripod && strcmp(at.name, "far") == 0 && device_n_stations(rig->device) == 2);
+    assert_true(!at.has_tripod && strcmp(at.name, "far") == 0);
     rig_close(rig);
 }
 

@@ -105,7 +105,7 @@ struct watch {
     pthread_mutex_t lock;
     struct watch_scan shown;
     struct watch_scan *shown_station; /* [n_stations] the last scan of each; scan 0: none */
-    uint32_t shown_cells, shown_seen;
+    uint32_t shown_seen;
     double shown_share;
     uint64_t shown_lost;
 };

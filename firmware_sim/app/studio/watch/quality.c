@@ -16,7 +16,6 @@ static void show(struct watch *w)
     pthread_mutex_lock(&w->lock);
     w->shown = w->at;
     if (w->at.station != 0) w->shown_station[w->at.station - 1] = w->at;
-    w->shown_cells = seen->n_cells;
     w->shown_seen = seen->n_seen;
     w->shown_share = seen->coverage != NULL ? seen->seen_m2 / seen->area_m2 : (double)NAN;
     w->shown_lost = w->lost_frames;
