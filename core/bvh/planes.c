@@ -2,7 +2,6 @@
 /* Planes of triangles in double: ranges, labels and steepness from them. Loops over arrays that compilers turn into
  * vectors. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
 #include "core/huge.h"

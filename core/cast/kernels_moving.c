@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses of a moving head: each turned and placed by the pose of its own time, as pose_between has it. */
-#include <math.h>
 
 #include "core/cast/kernels.h"
 #include "core/vecmath.h"

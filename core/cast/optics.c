@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Through glass and off mirrors: only rays that meet such a surface are cast again, together. */
 #include <math.h>
-#include <string.h>
 
 #include "core/cast/caster_private.h"
 #include "core/surface.h"

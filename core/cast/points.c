@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several
  * echoes. */
-#include <math.h>
 #include <string.h>
 
 #include "core/cast/caster_private.h"

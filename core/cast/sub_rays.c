@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses with a footprint: echoes from central hits, and from sub-rays where one hit is not enough. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "core/cast/sub_rays.h"
 #include "core/surface.h"

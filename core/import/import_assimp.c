@@ -4,8 +4,6 @@
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
  * one level after the other, so that the rounding of single precision on the way is known. */
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* A sight: made by several threads, region by region, and given back. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

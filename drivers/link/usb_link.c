@@ -7,7 +7,6 @@
  * session is reported once what came in it has been read. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "core/monotonic.h"

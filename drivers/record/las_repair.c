@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/record/las_repair.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/bytes.h"

@@ -8,7 +8,6 @@
 #include <strings.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "core/grow.h"
 #include "core/infile.h"

@@ -2,7 +2,6 @@
 /* The only list of commands, and the function of each. The common part of settings is in setting.c. */
 #include "firmware_sim/command/command_inside.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* clang-format off */

@@ -3,7 +3,6 @@
  * file, once for each scanner. Out: the scanner of each station, and diagnostics of all scanners. */
 #include "firmware_sim/config/table.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

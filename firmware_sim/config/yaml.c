@@ -3,7 +3,6 @@
 #include "firmware_sim/config/yaml.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 struct walk {

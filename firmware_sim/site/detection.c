@@ -2,7 +2,6 @@
 #include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

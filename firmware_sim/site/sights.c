@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/site/site_inside.h"
 
-#include <math.h>
 #include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

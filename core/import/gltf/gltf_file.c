@@ -5,7 +5,6 @@
  *          whole numbers of 32 bits, little-endian; chunks are padded to 4 bytes */
 #include "core/import/gltf/gltf.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

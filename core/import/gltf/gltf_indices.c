@@ -4,7 +4,6 @@
 #include "core/import/gltf/gltf.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 enum { MAX_DEPTH = 12 };

@@ -3,8 +3,6 @@
  * may share accessors that are much larger than themselves. */
 #include "core/import/gltf/gltf.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

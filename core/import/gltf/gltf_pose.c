@@ -8,9 +8,7 @@
 #include "core/import/gltf/gltf.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* ---- morph targets */
 

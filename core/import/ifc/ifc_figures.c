@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Area, volume, box, and whether a body is closed: core/body.h over all its edges. */
-#include <math.h>
 #include <string.h>
 
 #include "core/body.h"

@@ -3,7 +3,6 @@
  * only here. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/grow.h"
 #include "core/import/ifc/ifc_records.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales figures of the
  * records, and those of an anchor. */
-#include <math.h>
 #include <string.h>
 
 #include "core/import/ifc/ifc_records.h"

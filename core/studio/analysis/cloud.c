@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* A cloud's memory, and which reader a file gets. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

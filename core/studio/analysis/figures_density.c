@@ -2,7 +2,6 @@
 /* How dense points lie: cells of surfaces in a hash table. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/figures.h"
 #include "core/vec3.h"

@@ -2,7 +2,6 @@
 /* The area that heads at other places would see and that no station has seen. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/coverage/inside.h"
 #include "core/together.h"

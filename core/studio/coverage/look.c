@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Casting a scan onto the cells, on several threads. Sums of whole numbers and the larger of two do not depend on the
  * order, so results don't depend on how the work is shared out. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

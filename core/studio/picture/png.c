@@ -2,7 +2,6 @@
 /* An image as a PNG, and files that appear whole. */
 #include <errno.h>
 #include <png.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/studio/picture/inside.h"

@@ -3,7 +3,6 @@
 #include <math.h>
 #include <nettle/base64.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/picture/inside.h"
 

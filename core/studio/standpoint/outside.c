@@ -2,7 +2,6 @@
 /* Places around the scene, from which it is looked at. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/angle.h"
 #include "core/studio/standpoint/survey.h"

@@ -2,7 +2,6 @@
 /* The options of map --perspective: words and numbers into a plan. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"

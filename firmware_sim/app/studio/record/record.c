@@ -2,7 +2,6 @@
 /* scanhead record: the points of scans to files. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/app/app.h"

@@ -2,7 +2,6 @@
 /* Charts of a page, as SVG. All places are in units of a picture of 640 by 272. The names of axes and series are text
  * below, which wraps. On a narrow page letters are larger (page.c), so every second figure of an axis is left out. */
 #include <math.h>
-#include <string.h>
 
 #include "firmware_sim/app/studio/report/page.h"
 

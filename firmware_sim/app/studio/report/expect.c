@@ -2,7 +2,6 @@
 /* The deviations that a recording's configuration lets expect, and whether its points have them. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "firmware_sim/app/studio/report/report.h"
 

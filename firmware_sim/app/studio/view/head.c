@@ -2,7 +2,6 @@
 /* The description of a recording, as JSON. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"

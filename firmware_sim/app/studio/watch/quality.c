@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* /quality: the observer stores figures, and each request gets the latest ones. */
 #include <math.h>
-#include <string.h>
 
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/watch/inside.h"
