@@ -9,16 +9,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Room for `need` elements of `size` bytes in *array (a pointer to the array's pointer, from malloc or NULL),
- * with room to spare; *room is what there is. false: no memory, and the array is as it was. */
+/* Room for n elements of `size` bytes, one at least, in *array (a pointer to the array's pointer, from malloc or NULL).
+ * false: no memory, and the array is as it was. */
+static inline bool resize(void *array, size_t n, size_t size)
+{
+    void *old, *other;
+    memcpy(&old, array, sizeof old);
+    if (n > SIZE_MAX / size || (other = realloc(old, (n > 0 ? n : 1) * size)) == NULL) return false;
+    memcpy(array, &other, sizeof other);
+    return true;
+}
+
+/* Room for `need` elements, with room to spare; *room is what there is. */
 static inline bool grow(void *array, size_t *room, size_t need, size_t size)
 {
     if (need <= *room) return true;
     size_t more = need + need / 2 + 64;
-    void *old, *bigger;
-    memcpy(&old, array, sizeof old);
-    if (more > SIZE_MAX / size || (bigger = realloc(old, more * size)) == NULL) return false;
-    memcpy(array, &bigger, sizeof bigger);
+    if (!resize(array, more, size)) return false;
     *room = more;
     return true;
 }

@@ -29,3 +29,14 @@ FILE *infile_open(const char *path, const char **why)
     if (file == NULL && fd >= 0) close(fd);
     return file;
 }
+
+int infile_begins(const char *path, const char *magic)
+{
+    char begin[8] = "";
+    const char *why;
+    FILE *in = infile_open(path, &why);
+    if (in == NULL) return -1;
+    const size_t n = strlen(magic), got = fread(begin, 1, n < sizeof begin ? n : sizeof begin, in);
+    fclose(in);
+    return got == n && memcmp(begin, magic, n) == 0;
+}

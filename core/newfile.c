@@ -375,13 +375,32 @@ void newfile_drop(const char *part, int fd)
     close(fd);
 }
 
-int newfile_check(const char *path, struct sh_err *err)
+/* fd is taken in any case. */
+static int write_part(const char *path, const char *part, int fd, newfile_put *put, const void *source,
+                      struct sh_err *err)
+{
+    struct sh_err why = {0};
+    FILE *file = fdopen(dup(fd), "wb");
+    int rc = file != NULL ? put(source, file, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (file != NULL && fclose(file) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
+    newfile_drop(part, fd);
+    return sh_fail(err, rc, "%s: cannot be written: %.300s", path, why.text);
+}
+
+int newfile_write(const char *path, newfile_put *put, const void *source, struct sh_err *err)
 {
     char *part;
     int fd;
     if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
     int rc = newfile_part(path, part, &fd, err);
-    if (rc == SH_OK) newfile_drop(part, fd);
+    if (rc == SH_OK && put == NULL) newfile_drop(part, fd);
+    if (rc == SH_OK && put != NULL) rc = write_part(path, part, fd, put, source, err);
     free(part);
     return rc;
+}
+
+int newfile_check(const char *path, struct sh_err *err)
+{
+    return newfile_write(path, NULL, NULL, err);
 }

@@ -12,6 +12,8 @@
 #ifndef CORE_NEWFILE_H
 #define CORE_NEWFILE_H
 
+#include <stdio.h>
+
 #include "core/err.h"
 
 /* Opens a file that is written in place: it is made, or emptied. It is locked as long as *fd is open: a second
@@ -28,6 +30,9 @@ int newfile_append(const char *path, int *fd, struct sh_err *err);
  * has its name, so that a second writer of the same file is refused. A writer of a file that is being written in
  * place is refused, too. A `part` that a killed writer has left is taken over. *fd is for reading and writing. */
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
+/* Such a file, written by put in one go, as PATH.part. Its errors follow "PATH: cannot be written: ". */
+typedef int newfile_put(const void *source, FILE *file, struct sh_err *why);
+int newfile_write(const char *path, newfile_put *put, const void *source, struct sh_err *err);
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. It leaves no
  * file behind. */
 int newfile_check(const char *path, struct sh_err *err);

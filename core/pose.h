@@ -28,6 +28,7 @@
 
 #include "core/err.h"
 #include "core/geoframe.h"
+#include "core/quat.h"
 
 struct pose {
     double position_m[3]; /* of the body's origin, prcs */
@@ -51,8 +52,6 @@ enum pose_flags {
 void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, double quat[4]);
 /* heading in [0, 2 pi), pitch in [-pi/2, pi/2], roll in (-pi, pi]; at the poles of pitch roll is 0. */
 void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad);
-/* R, row by row. */
-void pose_matrix(const double quat[4], double rotation[9]);
 void pose_from_matrix(const double rotation[9], double quat[4]);
 /* R of a head turned by heading, then pitch, then roll, each about the axes as they lie by then; row by row:
  *
@@ -62,13 +61,9 @@ void pose_from_matrix(const double rotation[9], double quat[4]);
 void pose_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9]);
 /* The same of a levelled head. */
 void pose_heading(double heading_rad, double rotation[9]);
-void pose_multiply(const double a[4], const double b[4], double out[4]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */
 double pose_angle_between(const double a[4], const double b[4]);
-/* The rotation from a to b in a's body frame: unit axis, and angle in [0, pi]. Axis x where they are the
- * same. */
-void pose_turn(const double a[4], const double b[4], double axis[3], double *angle_rad);
 void pose_between(const struct pose *a, const struct pose *b, double fraction, struct pose *out);
 /* The pose of what is mounted on a body: mount is its pose in the body's frame. */
 void pose_mount(const struct pose *body, const struct pose *mount, struct pose *out);

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/date.h"
+
 enum { DAY_S = 86400, FIRST_YEAR = 1972, LAST_YEAR = 2199 };
 static const int64_t GPS_EPOCH_TAI_S = 315964800 + 19; /* 1980-01-06, ten years and 7 days of 1970's, TAI-UTC 19 s */
 static const int64_t NTP_TO_POSIX_S = 2208988800;      /* 1900 to 1970: 70 years, 17 leap days */
@@ -82,34 +84,6 @@ int utc_table_add(struct utc_table *table, int64_t posix_s)
     return 1;
 }
 
-/* ---- dates of the Gregorian calendar */
-
-static int64_t days_since_1970(int year, int month, int day)
-{
-    /* Years that begin in March, so that the leap day is the last; (153 m + 2) / 5 days lie before month
-     * m. */
-    int64_t y = year - (month <= 2), m = month > 2 ? month - 3 : month + 9;
-    return 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day - 1 - 719468;
-}
-
-static void date_of(int64_t days, struct utc_time *out)
-{
-    int year = (int)(1970 + days / 366), month = 12;
-    while (days >= days_since_1970(year + 1, 1, 1))
-        year++;
-    while (days < days_since_1970(year, month, 1))
-        month--;
-    out->year = year;
-    out->month = month;
-    out->day = (int)(days - days_since_1970(year, month, 1)) + 1;
-}
-
-static int days_in_month(int year, int month)
-{
-    int next = month == 12;
-    return (int)(days_since_1970(year + next, next ? 1 : month + 1, 1) - days_since_1970(year, month, 1));
-}
-
 /* ---- scales */
 
 static int64_t floor_div(int64_t a, int64_t b)
@@ -144,7 +118,7 @@ void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time
     posix_s -= leap;
     int64_t days = floor_div(posix_s, DAY_S);
     int of_day = (int)(posix_s - days * DAY_S);
-    date_of(days, out);
+    date_of_days(days, &out->year, &out->month, &out->day);
     out->hour = of_day / 3600;
     out->minute = of_day / 60 % 60;
     out->second = of_day % 60 + leap;
@@ -155,12 +129,12 @@ int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_
 {
     if (utc->year < FIRST_YEAR || utc->year > LAST_YEAR)
         return sh_fail(err, SH_EINPUT, "year %d is out of range; allowed %d to %d", utc->year, FIRST_YEAR, LAST_YEAR);
-    if (utc->month < 1 || utc->month > 12 || utc->day < 1 || utc->day > days_in_month(utc->year, utc->month))
+    if (!date_exists(utc->year, utc->month, utc->day))
         return sh_fail(err, SH_EINPUT, "there is no %04d-%02d-%02d", utc->year, utc->month, utc->day);
     if (utc->hour < 0 || utc->hour > 23 || utc->minute < 0 || utc->minute > 59 || utc->second < 0 || utc->second > 60 ||
         utc->ns < 0 || utc->ns >= UTC_SECOND_NS)
         return sh_fail(err, SH_EINPUT, "there is no %02d:%02d:%02d", utc->hour, utc->minute, utc->second);
-    int64_t midnight_s = days_since_1970(utc->year, utc->month, utc->day) * DAY_S;
+    int64_t midnight_s = date_days(utc->year, utc->month, utc->day) * DAY_S;
     int64_t posix_s = midnight_s + utc->hour * 3600 + utc->minute * 60 + utc->second;
     int32_t offset = table->leap[entry_at_posix(table, midnight_s)].tai_minus_utc;
     int32_t tomorrow = table->leap[entry_at_posix(table, midnight_s + DAY_S)].tai_minus_utc;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Vectors of three doubles: sums and products of two of them, and arrays of them as kernels take them, an
+/* Vectors of three doubles: sums and products of two of them, bounds, and arrays of them as kernels take them, an
  * array for each component. */
 #ifndef CORE_VEC3_H
 #define CORE_VEC3_H
@@ -30,6 +30,15 @@ static inline void vec3_add(const double a[3], const double b[3], double out[3])
         out[i] = a[i] + b[i];
 }
 
+/* Twice the area of the triangle a, b, c, along its normal. */
+static inline void vec3_normal(const double a[3], const double b[3], const double c[3], double out[3])
+{
+    double u[3], v[3];
+    vec3_sub(b, a, u);
+    vec3_sub(c, a, v);
+    vec3_cross(u, v, out);
+}
+
 static inline double vec3_length(const double a[3])
 {
     return sqrt(vec3_dot(a, a));
@@ -40,6 +49,23 @@ static inline double vec3_distance(const double a[3], const double b[3])
     double d[3];
     vec3_sub(a, b, d);
     return vec3_length(d);
+}
+
+/* Bounds: of nothing yet, and of one point more; NaN widens nothing. */
+static inline void vec3_bound_nothing(double min[3], double max[3])
+{
+    for (int i = 0; i < 3; i++) {
+        min[i] = INFINITY;
+        max[i] = -INFINITY;
+    }
+}
+
+static inline void vec3_bound(double min[3], double max[3], const double a[3])
+{
+    for (int i = 0; i < 3; i++) {
+        if (a[i] < min[i]) min[i] = a[i];
+        if (a[i] > max[i]) max[i] = a[i];
+    }
 }
 
 /* Vectors as arrays, one per axis; the arrays stay the caller's. */

@@ -25,12 +25,13 @@ core_headers='distance:bvh geoframe:georef locate:georef crs:georef scene_copies
 # On the way of a pulse core has no clock, no thread and no other process. Importing and the studio may have them. So may
 # these files, which prepare a scene before the first pulse: they measure how long that takes, and share it among threads.
 prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
-# Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers:
-#   protocol       itself, core/line.h, core/err.h
-#   socket         itself, core/err.h
-#   usb            itself, protocol (its data), socket, core/err.h
-#   link           itself, usb, socket, protocol's lines of HTTP, core/err.h, core/late.h, core/newfile.h
-#   host           itself, protocol, core/err.h, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
+# Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers all may use core/err.h,
+# bytes.h, date.h and monotonic.h, and besides:
+#   protocol       itself, core/line.h
+#   socket         itself
+#   usb            itself, protocol (its data), socket
+#   link           itself, usb, socket, protocol's lines of HTTP, core/late.h, core/newfile.h
+#   host           itself, protocol, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
 #   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, the studio's rooms mesh and picture
 # The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
 # There is at most one in core, one in firmware_sim and one in drivers.
@@ -76,12 +77,12 @@ rules='
             if (a == "firmware_sim/firmware_sim") return to ~ /^(core|drivers|firmware_sim)\//
             return b ~ /^(core|drivers)\// || (b in rank && b ~ /^firmware_sim\// && rank[b] < rank[a])
         }
-        if (to == "core/err.h") return 1
+        if (to ~ /^core\/(err|bytes|date|monotonic)\.h$/) return 1
         if (to == "core/colour.h" || to == "core/infile.h" || b == "core/studio/mesh" || b == "core/studio/picture") return a == "drivers/record"
         if (to == "core/late.h") return a == "drivers/link"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"
         if (a == "drivers/host" || a == "drivers/record")
-            return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|vecmath|grow)\.h$/ || \
+            return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|quat|vecmath|grow)\.h$/ || \
                 (a == "drivers/record" && to == "drivers/host/scanhead.h")
         if (a == "drivers/protocol") return to == "core/line.h"
         if (a == "drivers/link") return b == "drivers/usb" || b == "drivers/socket" || to == "drivers/protocol/http_head.h"

@@ -6,7 +6,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+
+#include "core/monotonic.h"
 
 #include "core/bvh/copies.h"
 #include "core/bvh/leaves.h"
@@ -76,13 +77,6 @@ static int build(struct bvh *bvh, unsigned threads, const struct sh_report *repo
     return rc;
 }
 
-static double seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* The most leaves that Embree may put at one node of its tree. Four, where it finds that cheaper, save a seventh of
  * the memory, and rays are as fast where surfaces are connected. In foliage a ray would try half as many leaves
  * more. */
@@ -117,14 +111,14 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
     }
     rtcSetDeviceMemoryMonitorFunction(bvh->device, embree_counts_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
-    double start = seconds();
+    const int64_t start_ns = monotonic_ns();
     int rc = build(bvh, threads, report, err);
     if (rc != SH_OK) {
         bvh_free(bvh);
         return rc;
     }
     bvh->info.packet = embree_packet(bvh->device);
-    bvh->info.build_s = seconds() - start;
+    bvh->info.build_s = 1e-9 * (double)(monotonic_ns() - start_ns);
     bvh->info.bytes += (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
                        (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf +
                        (uint64_t)scene->n_copies * sizeof *bvh->copy;

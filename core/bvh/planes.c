@@ -4,7 +4,6 @@
 #include "core/bvh/planes.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/copies.h"

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses of a moving head are turned and placed by the pose of their own time, as pose_between has it. */
-#include <math.h>
 
 #include "core/cast/kernels_moving.h"
 #include "core/vecmath.h"
@@ -14,8 +13,8 @@ void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0
         leg->position_m[i] = a->pose.position_m[i];
         leg->shift_m[i] = b->pose.position_m[i] - a->pose.position_m[i];
     }
-    pose_matrix(a->pose.quat, leg->rotation);
-    pose_turn(a->pose.quat, b->pose.quat, leg->axis, &angle_rad);
+    quat_matrix(a->pose.quat, leg->rotation);
+    quat_turn(a->pose.quat, b->pose.quat, leg->axis, &angle_rad);
     leg->turn = angle_rad / VEC_TURN_RAD;
 }
 

@@ -3,7 +3,6 @@
 #include "core/cast/optics.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "core/cast/nearest.h"
 #include "core/surface.h"

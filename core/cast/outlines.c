@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Outlines, probed by casting rays. */
-#include <string.h>
 
 #include "core/cast.h"
 

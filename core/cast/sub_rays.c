@@ -3,8 +3,6 @@
 #include "core/cast/sub_rays.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "core/cast/caster.h"
 #include "core/cast/chunk.h"

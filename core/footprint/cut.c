@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The parts that outlines cut a footprint into. */
-#include <math.h>
 #include <string.h>
 
 #include "core/footprint.h"

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/footprint/outlines.h"
+#include "core/grow.h"
 #include "core/vec3.h"
 
 enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
@@ -106,13 +107,7 @@ static double nearest_on(const double p[3], const double q[3])
 
 static int add_stretch(struct stretches *s, const double p[3], const double q[3], uint32_t edge)
 {
-    if (s->n == s->room) {
-        size_t room = s->room == 0 ? 4096 : 2 * s->room;
-        struct outline_stretch *more = realloc(s->at, room * sizeof *more);
-        if (more == NULL) return SH_ENOMEM;
-        s->at = more;
-        s->room = room;
-    }
+    if (!grow(&s->at, &s->room, s->n + 1, sizeof *s->at)) return SH_ENOMEM;
     struct outline_stretch *one = &s->at[s->n++];
     memcpy(one->p, p, sizeof one->p);
     memcpy(one->q, q, sizeof one->q);

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds the stretches of an outline that are visible steps, or the end of a kind of surface. */
 #include <math.h>
-#include <string.h>
 
 #include "core/footprint/outlines.h"
 #include "core/vec3.h"

@@ -5,7 +5,6 @@
  * edge, without a step in range; with triangles on one side only, it ends there. Where triangles on both
  * sides are of different kinds, one kind of surface ends there. This needs neither normals nor an order of
  * corners. Corners at the same place, bit by bit, are one. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The rotation in the map at its centre. */
-#include <math.h>
 #include <string.h>
 
 #include "core/georef/state.h"

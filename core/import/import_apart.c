@@ -3,16 +3,13 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <math.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/pidfd.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "core/geotiff.h"
@@ -21,18 +18,12 @@
 #include "core/import/import_assimp.h"
 #include "core/import/import_result.h"
 #include "core/import/readers.h"
+#include "core/monotonic.h"
 #include "core/late.h"
 
 enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
 
 #define LEAST_MORE_NS ((int64_t)10000000000) /* for a second reader, once the first has ended */
-
-static int64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
 
 uint64_t import_memory_of(pid_t pid, enum import_memory which)
 {
@@ -78,7 +69,7 @@ static int start_child(struct import_apart *a, struct sh_err *err)
     a->task.result_fd = a->result_fd;
     a->task.note_fd = a->note[1];
     a->most_bytes = import_memory_of(a->task.parent, IMPORT_RESIDENT) + ((uint64_t)limits->memory_mib << 20);
-    a->start_ns = now_ns();
+    a->start_ns = monotonic_ns();
     a->end_ns = a->start_ns + (int64_t)(1e9 * limits->time_s);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -148,7 +139,7 @@ static int reap(struct import_apart *a, int flags)
 static enum import_end must_end(const struct import_apart *a)
 {
     if (sh_stopped(a->task.b->report)) return IMPORT_STOPPED;
-    if (now_ns() > a->end_ns) return IMPORT_TIME;
+    if (monotonic_ns() > a->end_ns) return IMPORT_TIME;
     return import_memory_of(a->pid, IMPORT_RESIDENT) > a->most_bytes ? IMPORT_MEMORY : IMPORT_ENDED;
 }
 
@@ -173,7 +164,7 @@ static int look(struct import_apart *a)
 /* Shortens the other reader's time: one that hangs would else delay the finished result for minutes. */
 static void shorten(struct import_apart *a, const struct import_apart *done)
 {
-    const int64_t now = now_ns(), took = 10 * (now - done->start_ns);
+    const int64_t now = monotonic_ns(), took = 10 * (now - done->start_ns);
     const int64_t end_ns = now + (took > LEAST_MORE_NS ? took : LEAST_MORE_NS);
     if (done->status == 0 && done->end == IMPORT_ENDED && end_ns < a->end_ns) a->end_ns = end_ns;
 }

@@ -20,11 +20,7 @@ static size_t on_read(struct aiFile *file, char *data, size_t size, size_t count
 
 static size_t on_write(struct aiFile *file, const char *data, size_t size, size_t count)
 {
-    (void)file;
-    (void)data;
-    (void)size;
-    (void)count;
-    return 0; /* an import writes nothing */
+    return fwrite(data, size, count, stream_of(file));
 }
 
 static size_t on_tell(struct aiFile *file)
@@ -49,7 +45,12 @@ static enum aiReturn on_seek(struct aiFile *file, size_t offset, enum aiOrigin o
 
 static void on_flush(struct aiFile *file)
 {
-    (void)file;
+    fflush(stream_of(file));
+}
+
+struct aiFile import_open_stream(FILE *stream)
+{
+    return (struct aiFile){on_read, on_write, on_tell, on_size, on_seek, on_flush, (char *)(void *)stream};
 }
 
 /* Assimp asks for many names that need not exist. */
@@ -69,7 +70,7 @@ static struct aiFile *on_open(struct aiFileIO *io, const char *path, const char 
         fclose(stream);
         return NULL;
     }
-    *file = (struct aiFile){on_read, on_write, on_tell, on_size, on_seek, on_flush, (char *)(void *)stream};
+    *file = import_open_stream(stream);
     return file;
 }
 

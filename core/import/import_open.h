@@ -5,6 +5,7 @@
 #define CORE_IMPORT_IMPORT_OPEN_H
 
 #include <assimp/cfileio.h>
+#include <stdio.h>
 
 struct import_open {
     struct aiFileIO io; /* for Assimp; UserData is this struct */
@@ -12,5 +13,7 @@ struct import_open {
 };
 
 void import_open_set_up(struct import_open *open);
+/* A file as Assimp calls it, to read or to write (core/studio/mesh). The stream stays the caller's. */
+struct aiFile import_open_stream(FILE *stream);
 
 #endif

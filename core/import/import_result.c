@@ -144,8 +144,8 @@ static int take(struct result *r, void *data, size_t size)
 static int add_texture(struct result *r, const char *file, const void *bytes, const struct result_texture *size,
                        uint32_t i)
 {
-    const char *mesh = r->b->spec->file, *slash = strrchr(mesh, '/');
-    size_t folder = slash != NULL && file[0] != '/' ? (size_t)(slash - mesh) + 1 : 0;
+    const char *mesh = r->b->spec->file;
+    size_t folder = file[0] != '/' ? (size_t)(basename(mesh) - mesh) : 0;
     if (size->name_len < folder || memcmp(file, mesh, folder) != 0) return wrong(r, "the path of texture", i);
     if (size->wrap[0] > TEXTURE_DECAL || size->wrap[1] > TEXTURE_DECAL) return wrong(r, "the repetition of texture", i);
     const struct build_image image = {.name = {file + folder, size->name_len - folder},

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "core/bytes.h"
 #include "core/import/readers.h"
 #include "core/scene/build_surfaces.h"
 #include "core/scene/weld.h"
@@ -43,25 +44,9 @@ static int begin_solid(struct stl *s, struct text_span name, struct sh_err *err)
 
 /* ---- binary */
 
-static uint32_t load_u32(const char *p)
-{
-    uint32_t v = 0;
-    for (int i = 3; i >= 0; i--)
-        v = v << 8 | (unsigned char)p[i];
-    return v;
-}
-
-static double load_float(const char *p)
-{
-    const uint32_t bits = load_u32(p);
-    float v;
-    memcpy(&v, &bits, sizeof v);
-    return (double)v;
-}
-
 static uint64_t binary_size(const struct text *t)
 {
-    return t->size >= HEAD ? HEAD + FACET * (uint64_t)load_u32(t->data + COUNT_AT) : UINT64_MAX;
+    return t->size >= HEAD ? HEAD + FACET * (uint64_t)le_get32(t->data + COUNT_AT) : UINT64_MAX;
 }
 
 static int read_facet(struct stl *s, const char *p, struct sh_err *err)
@@ -69,7 +54,8 @@ static int read_facet(struct stl *s, const char *p, struct sh_err *err)
     int rc = SH_OK;
     for (size_t c = 0; c < 3 && rc == SH_OK; c++) {
         const char *at = p + 12 * (c + 1); /* after the normal */
-        rc = take_vertex(s, c, (const double[3]){load_float(at), load_float(at + 4), load_float(at + 8)}, err);
+        const double v[3] = {(double)le_get_float(at), (double)le_get_float(at + 4), (double)le_get_float(at + 8)};
+        rc = take_vertex(s, c, v, err);
     }
     return rc == SH_OK ? build_polygon(s->b, 3, s->label, err) : rc;
 }
@@ -77,7 +63,7 @@ static int read_facet(struct stl *s, const char *p, struct sh_err *err)
 /* Corners are floats: rounded when the file was written, and taken as they are. */
 static int read_binary(struct stl *s, struct sh_err *err)
 {
-    const uint32_t n = load_u32(s->t.data + COUNT_AT);
+    const uint32_t n = le_get32(s->t.data + COUNT_AT);
     int rc = begin_solid(s, (struct text_span){"", 0}, err);
     if (rc == SH_OK) rc = build_weld_begin(s->b, &s->weld, 3 * (uint64_t)n + 1, err);
     if (rc == SH_OK) rc = build_reserve(s->b, 0, n, err);
@@ -198,7 +184,7 @@ static int read_either(struct stl *s, struct sh_err *err)
     return build_fail(
         s->b, SH_EINPUT, err,
         "cut off: a binary STL of %u triangles has %llu bytes, but the file has %zu; it isn't a text either",
-        load_u32(s->t.data + COUNT_AT), (unsigned long long)size, s->t.size);
+        le_get32(s->t.data + COUNT_AT), (unsigned long long)size, s->t.size);
 }
 
 int read_stl(struct scene_build *b, struct sh_err *err)

@@ -2,7 +2,6 @@
 /* Chooses one of several options. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "core/plan.h"
 

@@ -2,7 +2,6 @@
 /* Whether a map of what the station sees pays. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "core/plan.h"
 #include "core/plan/cost.h"

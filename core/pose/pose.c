@@ -8,39 +8,13 @@
 #include "core/mat3.h"
 #include "core/vec3.h"
 
-void pose_multiply(const double a[4], const double b[4], double out[4])
-{
-    const double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
-    const double x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
-    const double y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
-    const double z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
-    out[0] = w;
-    out[1] = x;
-    out[2] = y;
-    out[3] = z;
-}
-
 void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, double quat[4])
 {
     const double qz[4] = {cos(0.5 * heading_rad), 0.0, 0.0, -sin(0.5 * heading_rad)};
     const double qx[4] = {cos(0.5 * pitch_rad), sin(0.5 * pitch_rad), 0.0, 0.0};
     const double qy[4] = {cos(0.5 * roll_rad), 0.0, sin(0.5 * roll_rad), 0.0};
-    pose_multiply(qz, qx, quat);
-    pose_multiply(quat, qy, quat);
-}
-
-void pose_matrix(const double quat[4], double r[9])
-{
-    const double w = quat[0], x = quat[1], y = quat[2], z = quat[3];
-    r[0] = 1.0 - 2.0 * (y * y + z * z);
-    r[1] = 2.0 * (x * y - w * z);
-    r[2] = 2.0 * (x * z + w * y);
-    r[3] = 2.0 * (x * y + w * z);
-    r[4] = 1.0 - 2.0 * (x * x + z * z);
-    r[5] = 2.0 * (y * z - w * x);
-    r[6] = 2.0 * (x * z - w * y);
-    r[7] = 2.0 * (y * z + w * x);
-    r[8] = 1.0 - 2.0 * (x * x + y * y);
+    quat_multiply(qz, qx, quat);
+    quat_multiply(quat, qy, quat);
 }
 
 /* R's middle column is (sin h cos p, cos h cos p, sin p). Turned back by the heading, its first row is (cos r, 0, sin r).
@@ -59,7 +33,7 @@ static void matrix_to_angles(const double r[9], double *heading_rad, double *pit
 void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad)
 {
     double r[9];
-    pose_matrix(quat, r);
+    quat_matrix(quat, r);
     matrix_to_angles(r, heading_rad, pitch_rad, roll_rad);
 }
 
@@ -74,37 +48,26 @@ void pose_rotate(const double quat[4], const double v[3], double out[3])
 {
     double r[9];
     const double from[3] = {v[0], v[1], v[2]};
-    pose_matrix(quat, r);
+    quat_matrix(quat, r);
     mat3_apply(r, from, out);
-}
-
-void pose_turn(const double a[4], const double b[4], double axis[3], double *angle_rad)
-{
-    const double inverse[4] = {a[0], -a[1], -a[2], -a[3]};
-    double d[4];
-    pose_multiply(inverse, b, d);
-    double sign = d[0] < 0.0 ? -1.0 : 1.0, sine = sqrt(d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
-    *angle_rad = 2.0 * atan2(sine, sign * d[0]);
-    for (int i = 0; i < 3; i++)
-        axis[i] = sine > 0.0 ? sign * d[1 + i] / sine : i == 0 ? 1.0 : 0.0;
 }
 
 double pose_angle_between(const double a[4], const double b[4])
 {
     double axis[3], angle;
-    pose_turn(a, b, axis, &angle);
+    quat_turn(a, b, axis, &angle);
     return angle;
 }
 
 void pose_between(const struct pose *a, const struct pose *b, double fraction, struct pose *out)
 {
     double axis[3], angle;
-    pose_turn(a->quat, b->quat, axis, &angle);
+    quat_turn(a->quat, b->quat, axis, &angle);
     const double half = 0.5 * fraction * angle, s = sin(half);
     const double turn[4] = {cos(half), s * axis[0], s * axis[1], s * axis[2]};
     for (int i = 0; i < 3; i++)
         out->position_m[i] = a->position_m[i] + fraction * (b->position_m[i] - a->position_m[i]);
-    pose_multiply(a->quat, turn, out->quat);
+    quat_multiply(a->quat, turn, out->quat);
 }
 
 void pose_mount(const struct pose *body, const struct pose *mount, struct pose *out)
@@ -112,7 +75,7 @@ void pose_mount(const struct pose *body, const struct pose *mount, struct pose *
     double arm[3];
     pose_rotate(body->quat, mount->position_m, arm);
     vec3_add(body->position_m, arm, out->position_m);
-    pose_multiply(body->quat, mount->quat, out->quat);
+    quat_multiply(body->quat, mount->quat, out->quat);
 }
 
 void pose_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9])

@@ -4,8 +4,6 @@
 #ifndef CORE_POSE_TRAJECTORY_H
 #define CORE_POSE_TRAJECTORY_H
 
-#include <math.h>
-
 #include "core/pose.h"
 #include "core/vec3.h"
 

@@ -239,7 +239,7 @@ static int put_sample(struct walk *w, double curve_s, double t_s, double d, stru
     pose_from_angles(w->heading_rad, 0.0, 0.0, w->frame != NULL ? turn : s->pose.quat);
     if (w->frame == NULL) return SH_OK;
     pose_from_matrix(level, level_quat);
-    pose_multiply(level_quat, turn, s->pose.quat);
+    quat_multiply(level_quat, turn, s->pose.quat);
     return SH_OK;
 }
 

@@ -31,11 +31,9 @@ void body_begin(struct body_sum *s, const double min_m[3], const double max_m[3]
 
 void body_add_triangle(struct body_sum *s, const double corner[3][3])
 {
-    double p[3], u[3], v[3], n[3];
+    double p[3], n[3];
     vec3_sub(corner[0], s->centre_m, p);
-    vec3_sub(corner[1], corner[0], u);
-    vec3_sub(corner[2], corner[0], v);
-    vec3_cross(u, v, n);
+    vec3_normal(corner[0], corner[1], corner[2], n);
     s->area_m2 += 0.5 * sqrt(vec3_dot(n, n));
     s->volume_m3 += vec3_dot(p, n) / 6.0;
 }

@@ -6,23 +6,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "core/grow.h"
 #include "core/huge.h"
+#include "core/monotonic.h"
 #include "core/scene/build_surfaces.h"
 #include "core/vec3.h"
 
-static int64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
-
 int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err)
 {
-    *b = (struct scene_build){.tolerance_m = tolerance_m, .report = report, .start_ns = now_ns()};
+    *b = (struct scene_build){.tolerance_m = tolerance_m, .report = report, .start_ns = monotonic_ns()};
     b->polygon.report = report;
     b->scene = calloc(1, sizeof *b->scene);
     if (b->scene == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scene");
@@ -57,14 +50,14 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->scene->says = (struct scene_says){0};
     b->has_uv = b->has_rgb = false;
     b->not_simple = b->n_rgb_limited = 0;
-    b->file_ns = now_ns();
+    b->file_ns = monotonic_ns();
 }
 
 static void report(struct scene_build *b, double fraction)
 {
     char what[sizeof b->name + 16];
     snprintf(what, sizeof what, "reading %s", b->name);
-    b->reported_ns = now_ns();
+    b->reported_ns = monotonic_ns();
     sh_progress(b->report, what, fraction);
 }
 
@@ -130,18 +123,10 @@ static int find_bounds(const struct scene_build *b, struct sh_err *err)
 {
     struct scene *s = b->scene;
     int rc = SH_OK;
-    for (int k = 0; k < 3; k++) {
-        s->min_m[k] = INFINITY;
-        s->max_m[k] = -INFINITY;
-    }
+    vec3_bound_nothing(s->min_m, s->max_m);
     for (uint32_t i = 0; i < s->n_triangles && rc == SH_OK; i++) {
-        for (int c = 0; c < 3; c++) {
-            const double *v = s->vertex_m[s->triangle[i][c]];
-            for (int k = 0; k < 3; k++) {
-                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
-                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
-            }
-        }
+        for (int c = 0; c < 3; c++)
+            vec3_bound(s->min_m, s->max_m, s->vertex_m[s->triangle[i][c]]);
         if ((i & 0xfffff) == 0) rc = sh_check_stop(b->report, err);
     }
     return rc;
@@ -363,7 +348,7 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
 int build_progress(void *build, double fraction, struct sh_err *err)
 {
     struct scene_build *b = build;
-    int64_t now = now_ns();
+    int64_t now = monotonic_ns();
     if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
     return sh_check_stop(b->report, err);
 }
@@ -375,7 +360,6 @@ void build_announce(struct scene_build *b)
 
 struct text_span build_base_name(const struct scene_build *b)
 {
-    const char *slash = strrchr(b->spec->file, '/'), *name = slash != NULL ? slash + 1 : b->spec->file;
-    const char *dot = strrchr(name, '.');
+    const char *name = basename(b->spec->file), *dot = strrchr(name, '.');
     return (struct text_span){name, dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name)};
 }

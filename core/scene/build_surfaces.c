@@ -167,10 +167,9 @@ int build_texture(struct scene_build *b, const struct build_image *image, uint16
         free(file);
         return build_fail(b, SH_EINPUT, err, "too many textures: a scene holds up to %d", UINT16_MAX);
     }
-    struct scene_texture *more = file != NULL ? realloc(s->texture, (s->n_textures + 1) * sizeof *s->texture) : NULL;
-    if (more != NULL) s->texture = more;
-    uint8_t *copy = more != NULL && image->bytes != NULL ? malloc(image->n_bytes + 1) : NULL;
-    if (more == NULL || (image->bytes != NULL && copy == NULL)) {
+    const bool room = file != NULL && resize(&s->texture, (size_t)s->n_textures + 1, sizeof *s->texture);
+    uint8_t *copy = room && image->bytes != NULL ? malloc(image->n_bytes + 1) : NULL;
+    if (!room || (image->bytes != NULL && copy == NULL)) {
         free(file);
         return build_fail(b, SH_ENOMEM, err, "no memory for a texture");
     }

@@ -8,8 +8,10 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/grow.h"
 #include "core/scene/build.h"
 #include "core/scene/hull.h"
+#include "core/vec3.h"
 
 void scene_find_part(const struct scene *scene, uint32_t triangle, struct scene_part *part)
 {
@@ -75,33 +77,26 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
     if (n > SCENE_MAX_SURFACES - scene->n_surfaces)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: %zu copies with %u surfaces each are too many: a scene holds up to %d, and has %u; allowed are "
-            "copies without surfaces of their own (copy_labels: off)",
+            "%s: %zu copies with %u surfaces each are too many: a scene holds up to %d, and has %u; allowed are copies without surfaces of their own (copy_labels: off)",
             places->says, places->n, mesh->n_surfaces, SCENE_MAX_SURFACES, scene->n_surfaces);
-    struct scene_surface *surface = realloc(scene->surface, (scene->n_surfaces + n + 1) * sizeof *surface);
-    if (surface != NULL) scene->surface = surface;
-    struct scene_texture *texture =
-        realloc(scene->texture, ((size_t)scene->n_textures + mesh->n_textures + 1) * sizeof *texture);
-    if (texture != NULL) scene->texture = texture;
-    if (surface == NULL || texture == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
+    if (!resize(&scene->surface, scene->n_surfaces + n, sizeof *scene->surface) ||
+        !resize(&scene->texture, (size_t)scene->n_textures + mesh->n_textures, sizeof *scene->texture) ||
+        (scene->cutout != NULL && !resize(&scene->cutout, scene->n_surfaces + n, sizeof(const struct texture_mask *))))
+        return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
     if (scene->n_textures + mesh->n_textures > UINT16_MAX)
         return sh_fail(err, SH_EINPUT, "%s: too many textures: a scene holds up to %d", places->says, UINT16_MAX);
-    if (scene->cutout != NULL) {
-        const struct texture_mask **more =
-            realloc(scene->cutout, (scene->n_surfaces + n + 1) * sizeof(const struct texture_mask *));
-        if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
-        scene->cutout = more;
-        memset(more + scene->n_surfaces, 0, n * sizeof(const struct texture_mask *)); /* the mesh has its own */
-    }
+    if (scene->cutout != NULL) /* the mesh has its own */
+        memset(scene->cutout + scene->n_surfaces, 0, n * sizeof(const struct texture_mask *));
     for (size_t i = 0; i < n; i++) {
-        struct scene_surface *to = &surface[scene->n_surfaces + i];
+        struct scene_surface *to = &scene->surface[scene->n_surfaces + i];
         *to = mesh->surface[i % mesh->n_surfaces];
         to->texture = (uint16_t)(to->texture != 0 ? to->texture + scene->n_textures : 0);
         to->opacity = (uint16_t)(to->opacity != 0 ? to->opacity + scene->n_textures : 0);
         if (places->own_surfaces) name_object(to->object, i / mesh->n_surfaces + 1);
     }
     scene->n_surfaces += (uint32_t)n;
-    if (mesh->n_textures > 0) memcpy(texture + scene->n_textures, mesh->texture, mesh->n_textures * sizeof *texture);
+    if (mesh->n_textures > 0)
+        memcpy(scene->texture + scene->n_textures, mesh->texture, mesh->n_textures * sizeof *mesh->texture);
     scene->n_textures += mesh->n_textures;
     mesh->n_textures = 0;
     return SH_OK;
@@ -151,11 +146,10 @@ static int set_copies(const struct scene *mesh, const struct scene_places *place
 
 void scene_widen(struct scene *scene, const struct scene_copy *copy, size_t n)
 {
-    for (size_t i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++) {
-            scene->min_m[k] = fmin(scene->min_m[k], copy[i].min_m[k]);
-            scene->max_m[k] = fmax(scene->max_m[k], copy[i].max_m[k]);
-        }
+    for (size_t i = 0; i < n; i++) {
+        vec3_bound(scene->min_m, scene->max_m, copy[i].min_m);
+        vec3_bound(scene->min_m, scene->max_m, copy[i].max_m);
+    }
 }
 
 static void keep_counts(struct scene *scene, const struct scene *mesh, const struct scene_copy *copy, size_t n)
@@ -172,9 +166,8 @@ static void keep_counts(struct scene *scene, const struct scene *mesh, const str
 /* The scene owns mesh and copies from here on. */
 static int keep_copies(struct scene *scene, struct scene *mesh, struct scene_copy *copy, size_t n, struct sh_err *err)
 {
-    struct scene_copied *more = realloc(scene->copied, (scene->n_copied + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for copies");
-    scene->copied = more;
+    if (!resize(&scene->copied, (size_t)scene->n_copied + 1, sizeof *scene->copied))
+        return sh_fail(err, SH_ENOMEM, "no memory for copies");
     scene->copied[scene->n_copied++] =
         (struct scene_copied){.mesh = mesh, .copy = copy, .n = (uint32_t)n, .first = scene->n_all};
     scene->n_copies += (uint32_t)n;

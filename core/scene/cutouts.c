@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "core/grow.h"
 #include "core/vec3.h"
 
 int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,
@@ -81,10 +82,8 @@ static int add_mask(struct scene *s, uint32_t i, const struct texture_image *ima
     int rc = texture_mask_create(image, s->texture[image_of(own) - 1].wrap, (double)own->solid, own->opacity != 0,
                                  &mask, err);
     if (rc != SH_OK || mask == NULL) return rc;
-    struct texture_mask **more = realloc(s->mask, (s->n_masks + 1) * sizeof(struct texture_mask *));
     if (s->cutout == NULL) s->cutout = calloc(s->n_surfaces, sizeof *s->cutout);
-    if (more != NULL) s->mask = more;
-    if (more == NULL || s->cutout == NULL) {
+    if (s->cutout == NULL || !resize(&s->mask, (size_t)s->n_masks + 1, sizeof(struct texture_mask *))) {
         free(mask);
         return sh_fail(err, SH_ENOMEM, "no memory for a texture's holes");
     }

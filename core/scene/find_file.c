@@ -19,8 +19,7 @@ static bool is_there(const char *path)
 
 struct text_span build_folder_of(const char *path)
 {
-    const char *slash = strrchr(path, '/');
-    return (struct text_span){path, slash != NULL ? (size_t)(slash - path) + 1 : 0};
+    return (struct text_span){path, (size_t)(basename(path) - path)};
 }
 
 char *build_join(struct text_span folder, struct text_span name)

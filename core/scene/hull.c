@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/scene/hull.h"
+#include "core/vec3.h"
 
 enum { WAYS = 8 };
 
@@ -95,18 +96,12 @@ void scene_free_hull(struct scene_hull *hull)
 
 void scene_set_copy_bounds(const struct scene *mesh, const struct scene_hull *hull, struct scene_copy *copy)
 {
-    for (int k = 0; k < 3; k++) {
-        copy->min_m[k] = INFINITY;
-        copy->max_m[k] = -INFINITY;
-    }
+    vec3_bound_nothing(copy->min_m, copy->max_m);
     for (uint32_t i = 0; i < hull->n; i++)
         for (int top = 0; top < 2; top++) {
             const double v[3] = {hull->point[i][0], hull->point[i][1], top ? mesh->max_m[2] : mesh->min_m[2]};
             double p[3];
             scene_copy_put(copy, v, p);
-            for (int k = 0; k < 3; k++) {
-                copy->min_m[k] = fmin(copy->min_m[k], p[k]);
-                copy->max_m[k] = fmax(copy->max_m[k], p[k]);
-            }
+            vec3_bound(copy->min_m, copy->max_m, p);
         }
 }

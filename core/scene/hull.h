@@ -3,8 +3,6 @@
 #ifndef CORE_SCENE_HULL_H
 #define CORE_SCENE_HULL_H
 
-#include <math.h>
-
 #include "core/scene.h"
 
 struct scene_hull {

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A scene without some of its surfaces. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/scene/copies.h"
+#include "core/vec3.h"
 
 /* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
 static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)
@@ -34,25 +35,6 @@ static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t 
             s->triangle[i][c] = vertex[s->triangle[i][c]];
 }
 
-static void find_bounds(struct scene *s)
-{
-    for (int k = 0; k < 3; k++) {
-        s->min_m[k] = INFINITY;
-        s->max_m[k] = -INFINITY;
-        for (uint32_t v = 0; v < s->n_vertices; v++) {
-            s->min_m[k] = fmin(s->min_m[k], s->vertex_m[v][k]);
-            s->max_m[k] = fmax(s->max_m[k], s->vertex_m[v][k]);
-        }
-    }
-}
-
-/* Gives unused memory back; where that fails, the array stays as it is. */
-static void shrink(void *array_of, size_t n, size_t size)
-{
-    void **array = array_of, *less = *array != NULL && n > 0 ? realloc(*array, n * size) : NULL;
-    if (less != NULL) *array = less;
-}
-
 int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
 {
     uint16_t *label = calloc((size_t)s->n_surfaces + 1, sizeof *label);
@@ -69,12 +51,15 @@ int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
         keep_triangles(s, keep, label, vertex);
         s->n_surfaces = n;
         s->n_all = s->n_triangles;
-        find_bounds(s);
-        shrink(&s->triangle, s->n_triangles, sizeof *s->triangle);
-        shrink(&s->label, s->n_triangles, sizeof *s->label);
-        shrink(&s->uv, s->n_triangles, sizeof *s->uv);
-        shrink(&s->rgb, s->n_triangles, sizeof *s->rgb);
-        shrink(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+        vec3_bound_nothing(s->min_m, s->max_m);
+        for (uint32_t v = 0; v < s->n_vertices; v++)
+            vec3_bound(s->min_m, s->max_m, s->vertex_m[v]);
+        /* Where memory can't be given back, it stays. */
+        resize(&s->triangle, s->n_triangles, sizeof *s->triangle);
+        resize(&s->label, s->n_triangles, sizeof *s->label);
+        if (s->uv != NULL) resize(&s->uv, s->n_triangles, sizeof *s->uv);
+        if (s->rgb != NULL) resize(&s->rgb, s->n_triangles, sizeof *s->rgb);
+        resize(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
         rc = scene_keep_copies(s, keep, label, err);
     }
     free(label);

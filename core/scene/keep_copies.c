@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Copies without some of their surfaces. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

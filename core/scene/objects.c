@@ -125,17 +125,10 @@ static int count_edges(struct work *w, const uint32_t *triangle, uint32_t n)
 
 static void bounds_of(const struct work *w, const uint32_t *triangle, uint32_t n, double min[3], double max[3])
 {
-    for (int k = 0; k < 3; k++) {
-        min[k] = INFINITY;
-        max[k] = -INFINITY;
-    }
+    vec3_bound_nothing(min, max);
     for (uint32_t i = 0; i < n; i++)
         for (int c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++) {
-                const double x = w->mesh->vertex_m[w->mesh->triangle[triangle[i]][c]][k];
-                min[k] = fmin(min[k], x);
-                max[k] = fmax(max[k], x);
-            }
+            vec3_bound(min, max, w->mesh->vertex_m[w->mesh->triangle[triangle[i]][c]]);
 }
 
 /* Edges without a counterpart may still cancel, where one side has more corners along the same edge. Else they leave an

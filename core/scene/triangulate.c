@@ -24,10 +24,8 @@ static void project(struct triangulate *t, uint32_t n)
 {
     double normal[3] = {0, 0, 0};
     for (uint32_t i = 1; i + 1 < n; i++) {
-        double a[3], b[3], across[3];
-        vec3_sub(t->at[i].p, t->at[0].p, a);
-        vec3_sub(t->at[i + 1].p, t->at[0].p, b);
-        vec3_cross(a, b, across);
+        double across[3];
+        vec3_normal(t->at[0].p, t->at[i].p, t->at[i + 1].p, across);
         vec3_add(normal, across, normal);
     }
     int axis = 0;

@@ -4,18 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/scene_copies.h"
-
-/* A larger array in place of *array. */
-static int enlarge(void *array, size_t n, size_t size)
-{
-    void *old, *more;
-    memcpy(&old, array, sizeof old);
-    more = realloc(old, (n + 1) * size);
-    if (more == NULL) return 0;
-    memcpy(array, &more, sizeof more);
-    return 1;
-}
 
 /* Texture coordinates of triangles that had none. */
 static void fill_uv(struct scene *scene, uint32_t from, uint32_t to)
@@ -28,15 +18,15 @@ static void fill_uv(struct scene *scene, uint32_t from, uint32_t to)
 static int make_room(struct scene *s, uint64_t vertices, uint64_t triangles, int uv, int rgb, int cutouts)
 {
     const int had_uv = s->uv != NULL, had_rgb = s->rgb != NULL, had_cutouts = s->cutout != NULL;
-    if (!enlarge(&s->vertex_m, vertices, sizeof *s->vertex_m) ||
-        !enlarge(&s->triangle, triangles, sizeof *s->triangle) || !enlarge(&s->label, triangles, sizeof *s->label))
+    if (!resize(&s->vertex_m, vertices, sizeof *s->vertex_m) || !resize(&s->triangle, triangles, sizeof *s->triangle) ||
+        !resize(&s->label, triangles, sizeof *s->label))
         return 0;
-    if ((uv || had_uv) && !enlarge(&s->uv, triangles, sizeof *s->uv)) return 0;
+    if ((uv || had_uv) && !resize(&s->uv, triangles, sizeof *s->uv)) return 0;
     if (uv && !had_uv) fill_uv(s, 0, s->n_triangles);
-    if ((rgb || had_rgb) && !enlarge(&s->rgb, triangles, sizeof *s->rgb)) return 0;
+    if ((rgb || had_rgb) && !resize(&s->rgb, triangles, sizeof *s->rgb)) return 0;
     if (rgb && !had_rgb) memset(s->rgb, 0, s->n_triangles * sizeof *s->rgb);
     if (!cutouts && !had_cutouts) return 1;
-    if (!enlarge(&s->cutout, s->n_surfaces, sizeof *s->cutout)) return 0;
+    if (!resize(&s->cutout, s->n_surfaces, sizeof *s->cutout)) return 0;
     if (!had_cutouts) memset(s->cutout, 0, s->n_surfaces * sizeof *s->cutout);
     return 1;
 }
@@ -64,7 +54,7 @@ static void write_copy(struct scene *s, const struct scene *mesh, const struct s
 static int take_masks(struct scene *s, struct scene *mesh)
 {
     if (mesh->n_masks == 0) return 1;
-    if (!enlarge(&s->mask, s->n_masks + mesh->n_masks, sizeof(struct texture_mask *))) return 0;
+    if (!resize(&s->mask, s->n_masks + mesh->n_masks, sizeof(struct texture_mask *))) return 0;
     memcpy(s->mask + s->n_masks, mesh->mask, mesh->n_masks * sizeof(struct texture_mask *));
     s->n_masks += mesh->n_masks;
     mesh->n_masks = 0;

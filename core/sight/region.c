@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Divides a region until its squares are leaves. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

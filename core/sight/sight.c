@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* A sight: made by several threads, region by region, and given back. */
-#include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "core/grow.h"
 #include "core/huge.h"
+#include "core/monotonic.h"
 #include "core/sight/build_inside.h"
+#include "core/together.h"
 
-enum { MAX_THREADS = 64, FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
+enum { FEW_RAYS = 4, TOO_FINE = 1, LARGE = 8 << 20 };
 
 int sight_possible(const struct scene *scene)
 {
@@ -79,10 +79,11 @@ static int is_too_fine(const struct build_shared *b)
     return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);
 }
 
-static void *thread_main(void *shared)
+static void build_some(void *shared, int reports)
 {
     struct build_shared *b = shared;
     struct build_work w = {0};
+    (void)reports;
     const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
     for (;;) {
         const uint32_t region = atomic_fetch_add(&b->next, 1);
@@ -92,28 +93,14 @@ static void *thread_main(void *shared)
     }
     atomic_fetch_add(&b->given_back, w.taken);
     build_work_free(&w);
-    return NULL;
 }
 
 static int build_all(struct build_shared *b, unsigned threads, struct sh_err *err)
 {
-    pthread_t other[MAX_THREADS];
-    unsigned n = 0;
     if (threads == 0) threads = (unsigned)sysconf(_SC_NPROCESSORS_ONLN);
-    while (n + 1 < threads && n < MAX_THREADS && pthread_create(&other[n], NULL, thread_main, b) == 0)
-        n++;
-    thread_main(b);
-    for (unsigned i = 0; i < n; i++)
-        pthread_join(other[i], NULL);
+    together(threads, build_some, b);
     if (b->failed == SH_ESTOPPED) return sh_fail_stopped(err);
     return b->failed != 0 ? sh_fail(err, SH_ENOMEM, "sight: no memory") : SH_OK;
-}
-
-/* Arrays shrink to what they hold; where that fails they stay. */
-static void *keep(void *array, uint64_t used, uint64_t size)
-{
-    void *kept = realloc(array, used * size + 1);
-    return kept != NULL ? kept : array;
 }
 
 /* Records begin at cache lines, which realloc does not promise. Room that is not given back is resident once the head
@@ -122,7 +109,7 @@ static int keep_records(struct build_shared *b, struct sh_err *err)
 {
     struct sight *s = b->sight;
     const uint64_t bytes = b->record.used * sizeof *s->record;
-    s->record = keep(s->record, b->record.used, sizeof *s->record);
+    resize(&s->record, b->record.used, sizeof *s->record);
     if ((uintptr_t)s->record % sizeof *s->record == 0) return SH_OK;
     struct sight_record *aligned = aligned_alloc(sizeof *s->record, bytes + sizeof *s->record);
     if (aligned == NULL)
@@ -138,8 +125,9 @@ static void finish(struct build_shared *b)
     struct sight *s = b->sight;
     struct sight_info *info = &s->info;
     double all = 0.0;
-    s->leaf = keep(s->leaf, b->leaf.used, sizeof *s->leaf);
-    s->list = keep(s->list, b->list.used, sizeof *s->list);
+    /* Where an array can't shrink, it stays. */
+    resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
+    resize(&s->list, b->list.used, sizeof *s->list);
     for (int i = 0; i < 4; i++)
         all += (double)b->cells[i];
     all = all > 0.0 ? all : 1.0;
@@ -207,9 +195,8 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
                  struct sh_err *err)
 {
     struct sight *s = *out = calloc(1, sizeof *s);
-    struct timespec from, to;
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
-    clock_gettime(CLOCK_MONOTONIC, &from);
+    const int64_t start_ns = monotonic_ns();
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     int rc = make(s, spec, threads, report, err);
@@ -218,8 +205,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
         *out = NULL;
         return rc;
     }
-    clock_gettime(CLOCK_MONOTONIC, &to);
-    s->info.build_s = (double)(to.tv_sec - from.tv_sec) + 1e-9 * (double)(to.tv_nsec - from.tv_nsec);
+    s->info.build_s = 1e-9 * (double)(monotonic_ns() - start_ns);
     return SH_OK;
 }
 

@@ -35,7 +35,7 @@ struct figures_in {
 
 enum { FIGURES_NO_GROUP = 0xffffffff };
 
-/* group(ctx, i): of point i, below n_groups or FIGURES_NO_GROUP. Takes 8 bytes a point while it works. */
+/* group(ctx, i): of point i, below n_groups or FIGURES_NO_GROUP; NULL: all points are one group. Takes 8 bytes a point while it works. */
 int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)(void *ctx, size_t i), void *ctx,
                struct figures *out, struct sh_err *err);
 

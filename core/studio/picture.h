@@ -11,7 +11,6 @@
 #ifndef CORE_STUDIO_PICTURE_H
 #define CORE_STUDIO_PICTURE_H
 
-#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 

@@ -174,22 +174,17 @@ static void fill_points(struct scanhead *sh, struct scanhead_frame *frame)
         (struct native_attributes){.pulse0 = points.pulse0, .line = points.line, .n_points = points.n_points};
 }
 
-static void fill_attributes(struct scanhead_frame *frame)
+/* Of attributes and colours. */
+static void fill_beside(struct scanhead_frame *frame)
 {
-    struct native_attributes attributes;
-    if (native_decode_attributes(frame->payload, frame->payload_len, &attributes) != 0) return;
-    frame->scan_line = attributes.line;
-    frame->n_points = attributes.n_points;
-    frame->pulse0 = attributes.pulse0;
-}
-
-static void fill_colours(struct scanhead_frame *frame)
-{
-    struct native_attributes colours;
-    if (native_decode_colours(frame->payload, frame->payload_len, &colours) != 0) return;
-    frame->scan_line = colours.line;
-    frame->n_points = colours.n_points;
-    frame->pulse0 = colours.pulse0;
+    struct native_attributes head;
+    const int rc = frame->type == SCANHEAD_COLOURS
+                       ? native_decode_colours(frame->payload, frame->payload_len, &head)
+                       : native_decode_attributes(frame->payload, frame->payload_len, &head);
+    if (rc != 0) return;
+    frame->scan_line = head.line;
+    frame->n_points = head.n_points;
+    frame->pulse0 = head.pulse0;
 }
 
 static void fill_event(struct scanhead_frame *frame)
@@ -220,8 +215,7 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
         .raw_len = native_frame_len(raw),
     };
     if (header.type == NATIVE_POINTS) fill_points(sh, frame);
-    if (header.type == NATIVE_ATTRIBUTES) fill_attributes(frame);
-    if (header.type == NATIVE_COLOURS) fill_colours(frame);
+    if (header.type == NATIVE_ATTRIBUTES || header.type == NATIVE_COLOURS) fill_beside(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
     return SCANHEAD_OK;

@@ -5,17 +5,14 @@
 #include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "core/monotonic.h"
 #include "drivers/host/exchange.h"
 
 int64_t host_deadline_ns(int timeout_ms)
 {
-    if (timeout_ms < 0) return INT64_MAX;
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec + (int64_t)timeout_ms * 1000000;
+    return timeout_ms < 0 ? INT64_MAX : monotonic_ns() + (int64_t)timeout_ms * 1000000;
 }
 
 static ssize_t fd_read(struct host_source *source, void *to, size_t len)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/mat3.h"
+#include "core/quat.h"
 #include "core/vec3.h"
 #include "drivers/host/host.h"
 
@@ -58,35 +59,12 @@ struct leg {
     double rotation[9], axis[3], angle_rad;
 };
 
-static void set_rotation(const double q[4], double r[9])
-{
-    const double w = q[0], x = q[1], y = q[2], z = q[3];
-    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                         2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                         2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-    memcpy(r, m, sizeof m);
-}
-
-static void multiply(const double a[4], const double b[4], double out[4])
-{
-    out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
-    out[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
-    out[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
-    out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
-}
-
 static void set_leg(struct leg *leg, const struct native_pose *a, const struct native_pose *b)
 {
-    const double back[4] = {a->quat[0], -a->quat[1], -a->quat[2], -a->quat[3]};
-    double d[4];
-    multiply(back, b->quat, d);
-    double sign = d[0] < 0 ? -1 : 1, sine = sqrt(d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
     leg->a = a;
     leg->b = b;
-    leg->angle_rad = 2 * atan2(sine, sign * d[0]);
-    for (int i = 0; i < 3; i++)
-        leg->axis[i] = sine > 0 ? sign * d[1 + i] / sine : i == 0;
-    set_rotation(a->quat, leg->rotation);
+    quat_turn(a->quat, b->quat, leg->axis, &leg->angle_rad);
+    quat_matrix(a->quat, leg->rotation);
 }
 
 static double fraction(const struct leg *leg, int64_t t_ns)
@@ -107,7 +85,7 @@ int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
     set_leg(&leg, a, b);
     double f = fraction(&leg, t_ns), s = sin(0.5 * f * leg.angle_rad);
     const double turn[4] = {cos(0.5 * f * leg.angle_rad), s * leg.axis[0], s * leg.axis[1], s * leg.axis[2]};
-    multiply(a->quat, turn, pose->quat);
+    quat_multiply(a->quat, turn, pose->quat);
     for (int i = 0; i < 3; i++)
         pose->position_m[i] = a->position_m[i] + f * (b->position_m[i] - a->position_m[i]);
     pose->t_ns = t_ns;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* The state that the stream describes: descriptor, anchor, names, losses, hash. */
 #include <math.h>
+#include <nettle/base16.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/grow.h"
 #include "drivers/host/host.h"
-#include "drivers/protocol/bytes.h"
 
 static int bad(struct scanhead *sh, const char *what)
 {
@@ -324,14 +325,10 @@ void scanhead_hash_start(struct scanhead *sh)
 
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65])
 {
-    static const char digits[] = "0123456789abcdef";
     struct sha256_ctx ctx = sh->sha256; /* a copy: taking the digest ends it */
     if (!sh->hashing) sha256_init(&ctx);
     uint8_t digest[SHA256_DIGEST_SIZE];
     sha256_digest(&ctx, sizeof digest, digest);
-    for (size_t i = 0; i < sizeof digest; i++) {
-        hex[2 * i] = digits[digest[i] >> 4];
-        hex[2 * i + 1] = digits[digest[i] & 15];
-    }
+    base16_encode_update(hex, sizeof digest, digest);
     hex[64] = 0;
 }

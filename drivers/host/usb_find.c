@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds the heads among the USB devices, and the one that is wanted. */
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

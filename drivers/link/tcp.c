@@ -7,7 +7,6 @@
  * A client that finds all sessions taken is accepted and closed at once, so that it does not wait. Where
  * clients come for one request, the session that has been silent for longest ends instead. A client that comes while
  * another client sends no more gets that one's session, as soon as what was sent has been read. */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

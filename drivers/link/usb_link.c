@@ -7,9 +7,9 @@
  * session is reported once what came in it has been read. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
+#include "core/monotonic.h"
 #include "drivers/link/link_poll.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
@@ -172,7 +172,7 @@ static int wait_ms(const struct usb_link *self, int timeout_ms)
 {
     const int64_t due_ns = self->ops->due_ns != NULL ? self->ops->due_ns(self->backend) : INT64_MAX;
     if (due_ns == INT64_MAX) return timeout_ms;
-    const int64_t ms = (due_ns - usb_now_ns()) / 1000000 + 1;
+    const int64_t ms = (due_ns - monotonic_ns()) / 1000000 + 1;
     if (ms <= 0) return 0;
     return timeout_ms >= 0 && timeout_ms < ms ? timeout_ms : ms > 60000 ? 60000 : (int)ms;
 }

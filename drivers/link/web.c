@@ -12,12 +12,9 @@
  * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is refused
  * (DNS rebinding: a name of the other site that leads here), and an Origin that is not this link gets no byte. Programs
  * that aren't browsers have no Origin. */
-#include <arpa/inet.h>
-#include <errno.h>
 #include <libwebsockets.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "drivers/link/link_events.h"

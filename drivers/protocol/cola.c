@@ -86,13 +86,6 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
         self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
 }
 
-/* Nothing to do: the scan itself shows what is missing in it. */
-static void pass_gap(void *protocol, uint32_t n_frames)
-{
-    (void)protocol;
-    (void)n_frames;
-}
-
 static void pass_time(void *protocol, int64_t t_ns)
 {
     struct cola *self = protocol;
@@ -166,8 +159,7 @@ const struct protocol_ops protocol_cola = {
     .create = create,
     .destroy = free,
     .open = open_at,
-    .frame = take_frame,
-    .gap = pass_gap,
+    .frame = take_frame, /* and no gap: the scan itself shows what is missing in it */
     .time = pass_time,
     .input = take_input,
     .owes = owes,

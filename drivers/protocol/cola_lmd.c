@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The telegram LMDscandata; COLA.md draws it. Both forms are this one sequence of values. */
-#include <math.h>
-#include <string.h>
 
 #include "drivers/protocol/cola.h"
 

@@ -2,6 +2,7 @@
 /* For injected faults: marks the values of LMDscandata, and corrects its check byte. COLA.md draws the telegram. */
 #include <string.h>
 
+#include "core/bytes.h"
 #include "drivers/protocol/cola.h"
 
 enum { B_HEAD = 8, CHANNEL_NAME = 5 };
@@ -14,7 +15,7 @@ enum { AT_NAME = B_HEAD + 4, AT_ENCODERS = 60, ENCODER_LEN = 6, CHANNEL_HEAD = C
 
 static size_t get16(const uint8_t *unit, size_t len, size_t at)
 {
-    return at + 2 <= len ? (size_t)unit[at] << 8 | unit[at + 1] : 0;
+    return at + 2 <= len ? be_get16(unit + at) : 0;
 }
 
 /* The channels of one width from `at` on, their number first. Returns where they end. */

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "core/bytes.h"
+
 enum { STX = 2, ETX = 3, B_HEAD = 8, B_MARKS = 4 };
 
 /* ---- reading */
@@ -148,7 +150,8 @@ void cola_put_u(struct cola_out *out, unsigned bytes, uint32_t v)
         put_hex(out, v & most(bytes), 1);
         return;
     }
-    const uint8_t wire[4] = {(uint8_t)(v >> 24), (uint8_t)(v >> 16), (uint8_t)(v >> 8), (uint8_t)v};
+    uint8_t wire[4];
+    be_put32(wire, v);
     put(out, wire + 4 - bytes, bytes);
 }
 
@@ -185,9 +188,7 @@ size_t cola_end(struct cola_out *out)
     if (out->form == COLA_A) {
         check = ETX;
     } else {
-        const size_t len = out->len - B_HEAD;
-        for (int i = 0; i < 4; i++)
-            out->buf[B_MARKS + i] = (uint8_t)(len >> (24 - 8 * i));
+        be_put32(out->buf + B_MARKS, (uint32_t)(out->len - B_HEAD));
         for (size_t i = B_HEAD; i < out->len; i++)
             check ^= out->buf[i];
     }
@@ -225,8 +226,7 @@ static enum found find_b(struct cola_input *in, struct cola_request *out)
 {
     uint8_t check = 0;
     if (in->len < B_HEAD) return NEED_MORE;
-    const uint32_t len =
-        (uint32_t)in->buf[4] << 24 | (uint32_t)in->buf[5] << 16 | (uint32_t)in->buf[6] << 8 | in->buf[7];
+    const uint32_t len = be_get32(in->buf + B_MARKS);
     if (len == 0 || len > COLA_MAX_REQUEST) return NOT_HERE;
     if (in->len < B_HEAD + len + 1) return NEED_MORE;
     for (size_t i = 0; i <= len; i++)

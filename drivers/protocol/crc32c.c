@@ -3,7 +3,7 @@
 
 #include <pthread.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 static uint32_t table[8][256];
 static pthread_once_t table_once = PTHREAD_ONCE_INIT;

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "core/bytes.h"
+
 enum {
     TYPE_IPV4 = 0x0800,
     TYPE_IPV6 = 0x86dd,
@@ -20,25 +22,13 @@ enum {
     WINDOW_SHIFT = 7,
 };
 
-static void put16(uint8_t *to, size_t v)
-{
-    to[0] = (uint8_t)(v >> 8);
-    to[1] = (uint8_t)v;
-}
-
-static void put32(uint8_t *to, uint32_t v)
-{
-    put16(to, v >> 16);
-    put16(to + 2, v & 0xffff);
-}
-
 /* ---- checksums: sums of 16-bit words, big-endian, carries added again (RFC 1071) */
 
 static uint64_t sum_words(const uint8_t *data, size_t len)
 {
     uint64_t sum = 0;
     for (size_t i = 0; i + 1 < len; i += 2)
-        sum += (uint32_t)data[i] << 8 | data[i + 1];
+        sum += be_get16(data + i);
     return len % 2 != 0 ? sum + ((uint32_t)data[len - 1] << 8) : sum;
 }
 
@@ -88,13 +78,13 @@ static void put_ipv4(uint8_t *to, const struct ethernet_end *from, const struct 
 {
     memset(to, 0, IPV4_LEN);
     to[0] = 0x45; /* version 4, five words */
-    put16(to + 2, IPV4_LEN + len);
-    put16(to + 6, DONT_FRAGMENT); /* so that packets need no number each (RFC 6864) */
+    be_put16(to + 2, IPV4_LEN + len);
+    be_put16(to + 6, DONT_FRAGMENT); /* so that packets need no number each (RFC 6864) */
     to[8] = TIME_TO_LIVE;
     to[9] = (uint8_t)protocol;
     memcpy(to + 12, from->address, 4);
     memcpy(to + 16, dest->address, 4);
-    put16(to + 10, complement(sum_words(to, IPV4_LEN)));
+    be_put16(to + 10, complement(sum_words(to, IPV4_LEN)));
 }
 
 static void put_ipv6(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, int protocol,
@@ -102,7 +92,7 @@ static void put_ipv6(uint8_t *to, const struct ethernet_end *from, const struct 
 {
     memset(to, 0, 8);
     to[0] = 0x60;
-    put16(to + 4, len);
+    be_put16(to + 4, len);
     to[6] = (uint8_t)protocol;
     to[7] = TIME_TO_LIVE;
     memcpy(to + 8, from->address, 16);
@@ -115,7 +105,7 @@ static uint8_t *put_front(uint8_t *to, const struct ethernet_end *from, const st
 {
     put_hardware(to, dest);
     put_hardware(to + 6, from);
-    put16(to + 12, from->is_v6 ? TYPE_IPV6 : TYPE_IPV4);
+    be_put16(to + 12, from->is_v6 ? TYPE_IPV6 : TYPE_IPV4);
     (from->is_v6 ? put_ipv6 : put_ipv4)(to + LINK_LEN, from, dest, protocol, len);
     return to + LINK_LEN + (from->is_v6 ? IPV6_LEN : IPV4_LEN);
 }
@@ -135,13 +125,13 @@ size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const stru
 {
     const size_t len = UDP_LEN + data_len;
     uint8_t *udp = put_front(to, from, dest, PROTOCOL_UDP, len);
-    put16(udp, from->port);
-    put16(udp + 2, dest->port);
-    put16(udp + 4, len);
-    put16(udp + 6, 0);
+    be_put16(udp, from->port);
+    be_put16(udp + 2, dest->port);
+    be_put16(udp + 4, len);
+    be_put16(udp + 6, 0);
     memcpy(udp + UDP_LEN, data, data_len);
     const uint16_t sum = checksum(udp, len, from, dest, PROTOCOL_UDP);
-    put16(udp + 6, sum != 0 ? sum : 0xffff); /* 0 means that there is none */
+    be_put16(udp + 6, sum != 0 ? sum : 0xffff); /* 0 means that there is none */
     return (size_t)(udp - to) + len;
 }
 
@@ -150,7 +140,7 @@ static void put_syn_options(uint8_t *to)
 {
     static const uint8_t options[SYN_OPTIONS_LEN] = {2, 4, 0, 0, 1, 3, 3, WINDOW_SHIFT};
     memcpy(to, options, sizeof options);
-    put16(to + 2, ETHERNET_MAX_SEGMENT);
+    be_put16(to + 2, ETHERNET_MAX_SEGMENT);
 }
 
 /* ---- a connection */
@@ -162,17 +152,17 @@ static size_t put_segment(struct tcp_talk *talk, int side, unsigned flags, const
     const uint32_t ack = (flags & TCP_ACK) != 0 ? talk->next[!side] : 0;
     const size_t head = TCP_LEN + ((flags & TCP_SYN) != 0 ? SYN_OPTIONS_LEN : 0);
     uint8_t *tcp = put_front(to, from, dest, PROTOCOL_TCP, head + len);
-    put16(tcp, from->port);
-    put16(tcp + 2, dest->port);
-    put32(tcp + 4, talk->next[side]);
-    put32(tcp + 8, ack);
+    be_put16(tcp, from->port);
+    be_put16(tcp + 2, dest->port);
+    be_put32(tcp + 4, talk->next[side]);
+    be_put32(tcp + 8, ack);
     tcp[12] = (uint8_t)(head / 4 << 4);
     tcp[13] = (uint8_t)flags;
-    put16(tcp + 14, WINDOW);
-    put32(tcp + 16, 0);
+    be_put16(tcp + 14, WINDOW);
+    be_put32(tcp + 16, 0);
     if ((flags & TCP_SYN) != 0) put_syn_options(tcp + TCP_LEN);
     if (len > 0) memcpy(tcp + head, data, len);
-    put16(tcp + 16, checksum(tcp, head + len, from, dest, PROTOCOL_TCP));
+    be_put16(tcp + 16, checksum(tcp, head + len, from, dest, PROTOCOL_TCP));
     talk->next[side] += (uint32_t)len + ((flags & (TCP_SYN | TCP_FIN)) != 0);
     if ((flags & TCP_ACK) != 0) talk->acked[side] = ack;
     return (size_t)(tcp - to) + head + len;

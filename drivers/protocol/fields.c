@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/err.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 
 #define UNIT_FIELD_32   4

@@ -11,8 +11,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/bytes.h"
 #include "core/line.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native_sequence.h"
 
 enum {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/err.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native.h"
 

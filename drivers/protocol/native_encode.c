@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/fields.h"
 

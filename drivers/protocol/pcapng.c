@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 enum {
     BLOCK_SECTION = 0x0a0d0d0a,

@@ -22,11 +22,6 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     return SH_OK;
 }
 
-static void destroy(void *protocol)
-{
-    free(protocol);
-}
-
 void scip_power_up(struct scip *s)
 {
     s->laser = s->time_mode = s->speed_changed = s->asleep = 0;
@@ -108,13 +103,6 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     if (news.whole || news.broken != 0) scip_scans_came(s, news);
 }
 
-/* Nothing to do: the times and steps of the turns show what is missing. */
-static void gap(void *protocol, uint32_t n_frames)
-{
-    (void)protocol;
-    (void)n_frames;
-}
-
 /* The second RB was a second ago. The power cycle ends this session, too. Where there can't be one, as with a
  * recording, only this session begins anew. */
 static void reboot(struct scip *s)
@@ -164,10 +152,9 @@ const struct protocol_ops protocol_scip = {
     .content = scip_content,
     .reseal = scip_reseal,
     .create = create,
-    .destroy = destroy,
+    .destroy = free,
     .open = open_session,
-    .frame = frame,
-    .gap = gap,
+    .frame = frame, /* and no gap: the times and steps of the turns show what is missing */
     .time = time_is,
     .input = input,
     .owes = owes,

@@ -79,11 +79,6 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     return SH_OK;
 }
 
-static void destroy(void *protocol)
-{
-    free(protocol);
-}
-
 /* The next pulse does not follow the last one, so the packet is dropped: the device has no packets with holes. The
  * reader was not too slow: the head never sent the pulses that would fill the packet. */
 static void fall_out_of_step(struct velodyne *v)
@@ -316,7 +311,7 @@ const struct protocol_ops protocol_velodyne = {
     .max_unit = VELODYNE_DATA_LEN,
     .content = mark_entries,
     .create = create,
-    .destroy = destroy,
+    .destroy = free,
     .open = nothing_at,
     .frame = frame,
     .gap = gap,

@@ -6,7 +6,6 @@
 #ifndef DRIVERS_PROTOCOL_VELODYNE_H
 #define DRIVERS_PROTOCOL_VELODYNE_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "drivers/protocol/protocol.h"

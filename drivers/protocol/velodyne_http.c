@@ -33,11 +33,6 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     return SH_OK;
 }
 
-static void destroy(void *protocol)
-{
-    free(protocol);
-}
-
 static const struct status {
     int number;
     const char *words, *text; /* where nothing more exact is known */
@@ -196,7 +191,7 @@ const struct protocol_ops protocol_velodyne_http = {
     .max_unit = MAX_ANSWER,
     .brief = 1,
     .create = create,
-    .destroy = destroy,
+    .destroy = free,
     .open = open_at,
     .time = at_time,
     .input = input,

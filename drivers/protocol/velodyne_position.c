@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/nmea.h"
 #include "drivers/protocol/velodyne.h"
@@ -43,11 +43,6 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     p->host = spec->host;
     *protocol = p;
     return SH_OK;
-}
-
-static void destroy(void *protocol)
-{
-    free(protocol);
 }
 
 /* Times are multiples of the period, so that sessions agree. */
@@ -117,7 +112,7 @@ const struct protocol_ops protocol_velodyne_position = {
     .content = nmea_content,
     .reseal = nmea_reseal,
     .create = create,
-    .destroy = destroy,
+    .destroy = free,
     .open = open_at,
     .time = at_time,
     .input = input,

@@ -12,7 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
+#include "core/grow.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_packet.h"
@@ -89,10 +90,9 @@ static int begin_scan(void *rec, struct sh_err *err)
                        e->base.file.path, info->scale_m);
     rc = station_pose_check(&e->base.track.pose, e->base.file.path, err);
     if (rc != 0) return rc;
-    struct e57_scan *more = realloc(e->facts.scan, (e->facts.n_scans + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", e->base.file.path);
-    e->facts.scan = more;
-    e->scan = &more[e->facts.n_scans++];
+    if (!resize(&e->facts.scan, e->facts.n_scans + (size_t)1, sizeof *e->facts.scan))
+        return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", e->base.file.path);
+    e->scan = &e->facts.scan[e->facts.n_scans++];
     memset(e->scan, 0, sizeof *e->scan);
     e->scan->number = e->facts.n_scans;
     e->scan->station = info->station;

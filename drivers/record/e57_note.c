@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 enum { HAS_GEOID = 1, HAS_EMPTY = 2, HAS_COLOURS = 4, HAS_START = 8, ALL_BITS = 15 };
 static const char MAGIC[16] = "scanhead e57 1";

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 
 static const unsigned stream_bits[E57_N_STREAMS] = {32, 32, 32, 2, 16, 1, 8, 8, 8, 64, 4, 4, 32, 32, 16};

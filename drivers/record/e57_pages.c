@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 
 uint64_t e57_logical(const struct e57_pages *pages)
@@ -20,9 +20,7 @@ uint64_t e57_physical(uint64_t logical)
 
 static void crc_of(const uint8_t *page, uint8_t out[4])
 {
-    const uint32_t crc = crc32c(0, page, E57_PAGE_CONTENT);
-    for (int i = 0; i < 4; i++)
-        out[i] = (uint8_t)(crc >> (24 - 8 * i));
+    be_put32(out, crc32c(0, page, E57_PAGE_CONTENT));
 }
 
 static void seal(uint8_t *page)

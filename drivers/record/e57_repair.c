@@ -10,8 +10,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "core/grow.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_packet.h"

@@ -5,7 +5,6 @@
 #include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/e57_note.h"

@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/las_header.h"
 #include "drivers/record/las_repair.h"

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 enum {
     ENCODING_GPS_STANDARD = 1 << 0,

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/record/las_repair.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/record/las_header.h"
 #include "drivers/record/scan_count.h"
 

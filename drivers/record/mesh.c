@@ -196,8 +196,8 @@ static int try_beside(const struct mesh_recorder *m, const char *ending, struct 
 /* glTF names files as URIs. Assimp's exporter writes their names as they are. */
 static int check_uri(const struct mesh_recorder *m, struct sh_err *err)
 {
-    const char *path = m->base.file.path, *slash = strrchr(path, '/'), *ending = m->base.ops->ending;
-    const char *c = strpbrk(slash != NULL ? slash + 1 : path, "%#?:\\");
+    const char *path = m->base.file.path, *ending = m->base.ops->ending;
+    const char *c = strpbrk(basename(path), "%#?:\\");
     if (strcmp(ending, ".gltf") != 0 || c == NULL) return SH_OK; /* .glb holds all */
     return sh_fail(
         err, SH_EINPUT,

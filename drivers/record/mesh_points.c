@@ -4,18 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/studio/mesh.h"
-
-/* One array: room for n elements. */
-static int resize(void *array, size_t n, size_t size)
-{
-    void *old, *bigger;
-    memcpy(&old, array, sizeof old);
-    bigger = realloc(old, n * size);
-    if (bigger == NULL) return 0;
-    memcpy(array, &bigger, sizeof bigger);
-    return 1;
-}
 
 static int grow_all(struct mesh_points *p, struct sh_err *err)
 {

@@ -13,7 +13,7 @@
 
 static void name_parts(struct mesh_recorder *m)
 {
-    const char *path = m->base.file.path, *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
+    const char *path = m->base.file.path, *name = basename(path);
     const int stem = (int)(strlen(name) - strlen(m->base.ops->ending));
     uint8_t seen[UINT16_MAX + 1] = {0}; /* stations */
     for (size_t i = 0; i < m->n_parts; i++) {

@@ -4,7 +4,6 @@
  * file of materials is written after them, so it is missing. */
 #include "drivers/record/obj_repair.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/recorder.h"
 #include "drivers/record/scan_count.h"

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/ply_columns.h"
 #include "drivers/record/ply_repair.h"

@@ -99,9 +99,15 @@ static int read_text(const struct repair *r, uint64_t len, struct place *p, stru
     return rc == SH_OK ? repair_check_rest(&front, end, LINE_MOST, err) : rc;
 }
 
-static int sync_file(const struct repair *r, struct sh_err *err)
+/* After the last write: the file ends there. rc: of the writes. */
+static int end_file(const struct repair *r, struct outfile *file, int rc, struct sh_err *err)
 {
-    if (fdatasync(r->fd) == 0) return SH_OK;
+    if (rc == SH_OK) rc = outfile_flush(file, err);
+    const uint64_t end = file->written;
+    outfile_leave(file);
+    if (rc == SH_OK && ftruncate(r->fd, (off_t)end) != 0)
+        rc = sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
+    if (rc != SH_OK || fdatasync(r->fd) == 0) return rc;
     return sh_fail(err, SH_EIO, "%s: cannot be synced: %s", r->path, strerror(errno));
 }
 
@@ -116,12 +122,7 @@ static int fill_column(const struct repair *r, const struct place *p, uint64_t n
     if (rc != SH_OK) return rc;
     for (uint64_t i = 0; rc == SH_OK && i < n; i++)
         rc = outfile_write(&file, line, strlen(line), err);
-    if (rc == SH_OK) rc = outfile_flush(&file, err);
-    const uint64_t end = file.written;
-    outfile_leave(&file);
-    if (rc == SH_OK && ftruncate(r->fd, (off_t)end) != 0)
-        rc = sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
-    return rc == SH_OK ? sync_file(r, err) : rc;
+    return end_file(r, &file, rc, err);
 }
 
 static int set_columns(const struct repair *r, const struct place *p, uint64_t columns, struct sh_err *err)
@@ -180,15 +181,9 @@ static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_he
         .file = &file, .grid = grid, .pose = &head->pose, .coloured = head->coloured != 0, .report = r->report};
     int rc = outfile_over(&file, r->fd, r->path, head->text_at, err);
     if (rc != SH_OK) return rc;
-    rc = ptx_text_put(&text, err);
-    if (rc == SH_OK) rc = outfile_flush(&file, err);
-    const uint64_t end = file.written;
-    outfile_leave(&file);
-    if (rc == SH_OK && ftruncate(r->fd, (off_t)end) != 0)
-        rc = sh_fail(err, SH_EIO, "%s: cannot be cut: %s", r->path, strerror(errno));
+    rc = end_file(r, &file, ptx_text_put(&text, err), err);
     p->n_points += text.n_points;
     p->n_grids++;
-    if (rc == SH_OK) rc = sync_file(r, err);
     if (rc != SH_EIO) return rc;
     return sh_fail(
         err, rc,

@@ -126,8 +126,6 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* For formats: reports "PATH: n what", unless n is 0. */
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
-/* For formats, in work of more than a tenth of a second: SH_ESTOPPED once the caller wants no more. */
-int recorder_check_stop(const struct recorder *rec, struct sh_err *err);
 /* For formats: SH_EFORMAT, for a coordinate that is too long to be written as text. */
 int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err);
 

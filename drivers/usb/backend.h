@@ -63,7 +63,7 @@ struct usb_backend_ops {
      * usb_device_read. */
     void (*flush)(void *backend);
 
-    /* Time of usb_now_ns(), in ns, at which handle() has work though no descriptor is ready; INT64_MAX: never. The
+    /* Monotonic time, in ns, at which handle() has work though no descriptor is ready; INT64_MAX: never. The
      * member itself is NULL for a back end that never has. */
     int64_t (*due_ns)(const void *backend);
 
@@ -75,9 +75,6 @@ struct usb_backend_ops {
     /* Unplugs. */
     void (*close)(void *backend);
 };
-
-/* CLOCK_MONOTONIC. backend.c */
-int64_t usb_now_ns(void);
 
 /* NULL for an unknown type. */
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);

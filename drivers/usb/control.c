@@ -3,9 +3,8 @@
  *
  * Not supported, and said so by stalling: remote wake-up, latency tolerance messages, test modes (there is no
  * transceiver to test), SET_DESCRIPTOR, SYNCH_FRAME (no isochronous endpoints). */
-#include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/usb_core.h"
 
 struct setup {

@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/functionfs_private.h"
 

@@ -10,7 +10,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/native_encode.h"
 #include "drivers/usb/functionfs_private.h"
 #include "drivers/usb/head_device.h"

@@ -5,7 +5,6 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "drivers/usb/gadget.h"
 #include "drivers/usb/sysfile.h"

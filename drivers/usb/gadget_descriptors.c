@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/gadget.h"
 
 static uint32_t count_descriptors(const uint8_t *bytes, size_t len)

@@ -4,7 +4,7 @@
 #include <linux/usb/cdc.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 enum { SERIAL_STATE_READY = 3, DTR = 1 }; /* carrier and data set ready */
 

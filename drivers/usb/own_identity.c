@@ -9,17 +9,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/* The first line of a file; 0: there is none. */
-static size_t read_line(const char *path, char *text, size_t len)
-{
-    FILE *file = fopen(path, "re");
-    text[0] = '\0';
-    if (file == NULL) return 0;
-    if (fgets(text, (int)len, file) == NULL) text[0] = '\0';
-    fclose(file);
-    text[strcspn(text, "\n")] = '\0';
-    return strlen(text);
-}
+#include "drivers/usb/sysfile.h"
 
 static void digest_text(const char *text, size_t len, uint8_t digest[SHA256_DIGEST_SIZE])
 {
@@ -33,10 +23,10 @@ static void digest_text(const char *text, size_t len, uint8_t digest[SHA256_DIGE
  * is hashed. */
 static void put_serial(struct usb_identity *id, const char *whose, unsigned place)
 {
-    char machine[64], text[400];
+    char machine[64] = "", text[400];
     uint8_t digest[SHA256_DIGEST_SIZE];
-    if (read_line("/etc/machine-id", machine, sizeof machine) == 0)
-        read_line("/proc/sys/kernel/random/boot_id", machine, sizeof machine);
+    if (sysfile_read("/etc", "machine-id", machine, sizeof machine) != 0 || machine[0] == '\0')
+        sysfile_read("/proc/sys/kernel/random", "boot_id", machine, sizeof machine);
     const int len = snprintf(text, sizeof text, "scanhead %s %u %.299s", machine, place, whose);
     digest_text(text, (size_t)len, digest);
     const size_t used = strnlen(id->serial, sizeof id->serial - 10);

@@ -6,7 +6,8 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
+#include "core/monotonic.h"
 #include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/usbip_private.h"
@@ -22,10 +23,10 @@ static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int statu
     enum { WIRE_EREMOTEIO = 121 };
     if (status == 0 && urb->in && urb->short_is_error && actual < urb->room) status = -WIRE_EREMOTEIO;
     memset(urb->wire, 0, URB_HEADER);
-    put_be32(urb->wire, RET_SUBMIT);
-    put_be32(urb->wire + 4, urb->seqnum);
-    put_be32(urb->wire + 20, (uint32_t)status);
-    put_be32(urb->wire + 24, actual);
+    be_put32(urb->wire, RET_SUBMIT);
+    be_put32(urb->wire + 4, urb->seqnum);
+    be_put32(urb->wire + 20, (uint32_t)status);
+    be_put32(urb->wire + 24, actual);
     usbip_queue(conn, urb, URB_HEADER + (urb->in ? actual : 0));
 }
 
@@ -80,7 +81,7 @@ static void run_control(struct usbip_conn *conn, struct usbip_urb *urb)
 /* Held requests are answered one after the other: each takes the delay that was asked for. */
 static void hold_control(struct usbip_conn *conn, struct usbip_urb *urb)
 {
-    const int64_t now_ns = usb_now_ns();
+    const int64_t now_ns = monotonic_ns();
     const int64_t from_ns =
         conn->slow_last != NULL && conn->slow_last->due_ns > now_ns ? conn->slow_last->due_ns : now_ns;
     urb->due_ns = from_ns + (int64_t)(usb_device_slow_ms(conn->device) * 1e6);
@@ -108,7 +109,7 @@ int64_t usbip_conn_due_ns(const struct usbip_conn *conn)
 
 void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
 {
-    while (conn->slow_first != NULL && !conn->broken && conn->slow_first->due_ns <= usb_now_ns() && go_on(ctx))
+    while (conn->slow_first != NULL && !conn->broken && conn->slow_first->due_ns <= monotonic_ns() && go_on(ctx))
         run_control(conn, let_go(conn, NULL));
 }
 
@@ -127,7 +128,7 @@ static int forget_control(struct usbip_conn *conn, uint32_t seqnum)
 /* All bytes of it are here. */
 static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 {
-    const unsigned number = get_be32(conn->head + 16);
+    const unsigned number = be_get32(conn->head + 16);
     if (number == 0) {
         memcpy(urb->setup, conn->head + 40, sizeof urb->setup);
         if (usb_device_slow_ms(conn->device) > 0.0 || conn->slow_first != NULL)
@@ -145,19 +146,19 @@ static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 
 static void take_submit(struct usbip_conn *conn)
 {
-    const uint32_t direction = get_be32(conn->head + 12), length = get_be32(conn->head + 24),
-                   packets = get_be32(conn->head + 32);
+    const uint32_t direction = be_get32(conn->head + 12), length = be_get32(conn->head + 24),
+                   packets = be_get32(conn->head + 32);
     struct usbip_urb *urb = NULL;
     if (direction <= DIR_IN && length <= MAX_URB_BYTES && (packets == 0 || packets == UINT32_MAX) &&
-        get_be32(conn->head + 16) <= 15)
+        be_get32(conn->head + 16) <= 15)
         urb = usbip_urb_new(conn, length);
     if (urb == NULL) {
         conn->broken = 1;
         return;
     }
-    urb->seqnum = get_be32(conn->head + 4);
+    urb->seqnum = be_get32(conn->head + 4);
     urb->in = direction == DIR_IN;
-    urb->short_is_error = (get_be32(conn->head + 20) & URB_SHORT_NOT_OK) != 0;
+    urb->short_is_error = (be_get32(conn->head + 20) & URB_SHORT_NOT_OK) != 0;
     if (urb->in || length == 0) {
         run_submit(conn, urb);
         return;
@@ -168,20 +169,20 @@ static void take_submit(struct usbip_conn *conn)
 
 static void take_unlink(struct usbip_conn *conn)
 {
-    const uint32_t seqnum = get_be32(conn->head + 4), victim = get_be32(conn->head + 20);
+    const uint32_t seqnum = be_get32(conn->head + 4), victim = be_get32(conn->head + 20);
     const int was_pending = forget_control(conn, victim) || usb_device_cancel(conn->device, victim);
     uint8_t *out = usbip_queue_plain(conn, URB_HEADER);
     if (out == NULL) return;
-    put_be32(out, RET_UNLINK);
-    put_be32(out + 4, seqnum);
-    put_be32(out + 20, (uint32_t)errno_of(was_pending ? USB_CANCELLED : USB_OK));
+    be_put32(out, RET_UNLINK);
+    be_put32(out + 4, seqnum);
+    be_put32(out + 20, (uint32_t)errno_of(was_pending ? USB_CANCELLED : USB_OK));
 }
 
 static void take_urb(struct usbip_conn *conn)
 {
-    const uint32_t command = get_be32(conn->head);
+    const uint32_t command = be_get32(conn->head);
     conn->head_len = 0;
-    if (get_be32(conn->head + 8) != usbip_devid(conn->device))
+    if (be_get32(conn->head + 8) != usbip_devid(conn->device))
         conn->broken = 1;
     else if (command == CMD_SUBMIT)
         take_submit(conn);

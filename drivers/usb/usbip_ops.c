@@ -32,12 +32,12 @@ static void describe_device(const struct usbip_conn *conn, uint8_t *out)
     put_bus_id(conn->device, bus_id, sizeof bus_id);
     snprintf((char *)out, 256, "/sys/devices/scanhead/%s", bus_id);
     snprintf((char *)out + 256, BUSID_LEN, "%s", bus_id);
-    put_be32(out + 288, USBIP_BUS);
-    put_be32(out + 292, usbip_devid(conn->device) & 0xffff);
-    put_be32(out + 296, speed[id->highest]);
-    put_be16(out + 300, id->vid);
-    put_be16(out + 302, id->pid);
-    put_be16(out + 304, model->bcd_device);
+    be_put32(out + 288, USBIP_BUS);
+    be_put32(out + 292, usbip_devid(conn->device) & 0xffff);
+    be_put32(out + 296, speed[id->highest]);
+    be_put16(out + 300, id->vid);
+    be_put16(out + 302, id->pid);
+    be_put16(out + 304, model->bcd_device);
     out[306] = model->class;
     out[307] = model->subclass;
     out[308] = model->protocol;
@@ -48,9 +48,9 @@ static void describe_device(const struct usbip_conn *conn, uint8_t *out)
 
 static void put_op(uint8_t *out, unsigned code, uint32_t status)
 {
-    put_be16(out, USBIP_VERSION);
-    put_be16(out + 2, code);
-    put_be32(out + 4, status);
+    be_put16(out, USBIP_VERSION);
+    be_put16(out + 2, code);
+    be_put32(out + 4, status);
 }
 
 static void list_devices(struct usbip_conn *conn)
@@ -59,7 +59,7 @@ static void list_devices(struct usbip_conn *conn)
     uint8_t *out = usbip_queue_plain(conn, OP_HEADER + 4 + OP_DEVICE + (uint32_t)model->n_interfaces * OP_INTERFACE);
     if (out == NULL) return;
     put_op(out, OP_REP_DEVLIST, OP_OK);
-    put_be32(out + 8, 1);
+    be_put32(out + 8, 1);
     describe_device(conn, out + 12);
     for (unsigned i = 0; i < model->n_interfaces; i++) {
         const struct usb_interface_row *row = usb_find_row(model, i, 0);
@@ -88,14 +88,14 @@ static void import_device(struct usbip_conn *conn, const uint8_t *busid)
 uint32_t usbip_op_need(const struct usbip_conn *conn)
 {
     if (conn->head_len < OP_HEADER) return OP_HEADER;
-    return get_be16(conn->head + 2) == OP_REQ_IMPORT ? OP_IMPORT : OP_HEADER;
+    return be_get16(conn->head + 2) == OP_REQ_IMPORT ? OP_IMPORT : OP_HEADER;
 }
 
 void usbip_op_take(struct usbip_conn *conn)
 {
-    const unsigned code = get_be16(conn->head + 2);
+    const unsigned code = be_get16(conn->head + 2);
     conn->head_len = 0;
-    if (get_be16(conn->head) != USBIP_VERSION || (code != OP_REQ_DEVLIST && code != OP_REQ_IMPORT))
+    if (be_get16(conn->head) != USBIP_VERSION || (code != OP_REQ_DEVLIST && code != OP_REQ_IMPORT))
         conn->broken = 1;
     else if (code == OP_REQ_DEVLIST)
         list_devices(conn);

@@ -3,9 +3,7 @@
 #ifndef DRIVERS_USB_USBIP_PRIVATE_H
 #define DRIVERS_USB_USBIP_PRIVATE_H
 
-#include <arpa/inet.h>
-#include <string.h>
-
+#include "core/bytes.h"
 #include "drivers/usb/usbip_conn.h"
 
 /* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut
@@ -27,30 +25,6 @@ struct usbip_urb {
     uint32_t room;
     uint8_t wire[]; /* URB_HEADER, then room bytes */
 };
-
-static inline void put_be16(uint8_t *at, unsigned v)
-{
-    const uint16_t be = htons((uint16_t)v);
-    memcpy(at, &be, sizeof be);
-}
-
-static inline void put_be32(uint8_t *at, uint32_t v)
-{
-    const uint32_t be = htonl(v);
-    memcpy(at, &be, sizeof be);
-}
-
-static inline uint32_t get_be32(const uint8_t *at)
-{
-    uint32_t be;
-    memcpy(&be, at, sizeof be);
-    return ntohl(be);
-}
-
-static inline unsigned get_be16(const uint8_t *at)
-{
-    return (unsigned)at[0] << 8 | at[1];
-}
 
 /* ---- usbip_queue.c */
 

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
+#include "core/monotonic.h"
 #include "drivers/usb/usbredir_private.h"
 
 /* ---- what the device is */
@@ -170,7 +171,7 @@ static void answer(struct usbredir *self, struct redir_request *r)
 /* Held requests are answered one after the other: each takes the delay that was asked for. */
 static void hold(struct usbredir *self, const struct redir_request *given)
 {
-    const int64_t now_ns = usb_now_ns();
+    const int64_t now_ns = monotonic_ns();
     const int64_t from_ns =
         self->slow_last != NULL && self->slow_last->due_ns > now_ns ? self->slow_last->due_ns : now_ns;
     struct redir_request *r = self->n_slow < MAX_SLOW ? malloc(sizeof *r) : NULL;
@@ -212,7 +213,7 @@ int64_t usbredir_slow_due_ns(const struct usbredir *self)
 
 void usbredir_answer_slow(struct usbredir *self)
 {
-    while (self->slow_first != NULL && !self->broken && self->slow_first->due_ns <= usb_now_ns() &&
+    while (self->slow_first != NULL && !self->broken && self->slow_first->due_ns <= monotonic_ns() &&
            self->go_on(self->go_on_ctx)) {
         struct redir_request *r = let_go(self, NULL);
         answer(self, r);

@@ -48,6 +48,8 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
  * are those of the command line, those of cfg (NULL: there is none), with its links where the command opens them, and
  * what meshes name. app_with_config calls it; commands without a configuration call it themselves. */
 int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err);
+/* Whether `name` is STEM-N.ENDING of a file of scans, whose ending has n_ending bytes. */
+int app_is_name_of_scan(const char *file, size_t n_ending, const char *name);
 
 /* From here to app_end_messages, a thread writes the messages of the reports below to standard error. So no thread of a
  * head waits for its reader. Messages that find no room in 64 KiB are dropped, and their number is printed.

@@ -8,8 +8,8 @@
 #include <strings.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
+#include "core/grow.h"
 #include "core/infile.h"
 #include "core/scene.h"
 #include "core/text.h"
@@ -69,8 +69,7 @@ static int find(const struct search *s, const char *name, char path[PATH_MAX])
 {
     char decoded[NAME_MAX_LEN + 1];
     decode(name, decoded);
-    const char *slash = strrchr(decoded, '/');
-    if (is_file(s, name, path) || is_file(s, decoded, path) || (slash != NULL && is_file(s, slash + 1, path))) return 1;
+    if (is_file(s, name, path) || is_file(s, decoded, path) || is_file(s, basename(decoded), path)) return 1;
     char *other = scene_find_file((const char *const[]){s->here, s->folder}, 2, decoded);
     const int is_found = other != NULL && is_file_in("", other, path);
     free(other);
@@ -88,9 +87,8 @@ static int search(struct search *s, const char *file, int depth);
 
 static int found(struct search *s, const char *name, const char *path, int depth)
 {
-    char **more = realloc(s->seen, (s->n_seen + 1) * sizeof *more);
-    if (more != NULL) s->seen = more;
-    if (more == NULL || (s->seen[s->n_seen] = strdup(path)) == NULL) return sh_fail(s->err, SH_ENOMEM, "no memory");
+    if (!resize(&s->seen, s->n_seen + 1, sizeof(char *)) || (s->seen[s->n_seen] = strdup(path)) == NULL)
+        return sh_fail(s->err, SH_ENOMEM, "no memory");
     s->n_seen++;
     int rc = s->take(s->ctx, name, path);
     if (rc != SH_OK || depth == DEEPEST || !app_ends_in(path, ".mtl")) return rc;
@@ -138,8 +136,7 @@ static int search_bytes(struct search *s, const char *bytes, size_t len, int dep
 
 static void set_folder(char folder[PATH_MAX], const char *file)
 {
-    const char *slash = strrchr(file, '/');
-    snprintf(folder, PATH_MAX, "%.*s", slash != NULL ? (int)(slash + 1 - file) : 0, file);
+    snprintf(folder, PATH_MAX, "%.*s", (int)(basename(file) - file), file);
 }
 
 /* Only the header of a .ply is text. */

@@ -171,22 +171,10 @@ static void warn(void *ctx, const char *text)
     app_report_stderr.warn(app_report_stderr.ctx, text);
 }
 
-static void progress(void *ctx, const char *what, double fraction)
-{
-    (void)ctx;
-    app_report_stderr.progress(app_report_stderr.ctx, what, fraction);
-}
-
-static int stop(void *ctx)
-{
-    (void)ctx;
-    return app_report_stderr.stop(app_report_stderr.ctx);
-}
-
 static int check(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct check_run *run = ctx;
-    const struct sh_report report = {.ctx = run, .warn = warn, .progress = progress, .stop = stop};
+    const struct sh_report report = {run, warn, app_report_stderr.progress, app_report_stderr.stop};
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
     int rc = sites_load(cfg, &report, &sites, err);

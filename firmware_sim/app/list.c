@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead list: head profiles, kinds of links, scenarios of faults, and the heads that USB shows. */
 #include <stdio.h>
-#include <string.h>
 
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/protocol.h"

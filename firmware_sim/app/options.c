@@ -71,6 +71,17 @@ static int parse_number(const struct app_command *command, const struct app_opti
                      whole ? "whole number" : "number", row->min, row->max);
 }
 
+int app_read_numbers(const char *text, char between, double *out, int n)
+{
+    for (int i = 0; i < n; i++) {
+        char *end;
+        out[i] = strtod(text, &end);
+        if (end == text || !isfinite(out[i]) || *end != (i < n - 1 ? between : '\0')) return 0;
+        text = end + 1;
+    }
+    return 1;
+}
+
 static int pass(const struct app_command *command, const struct app_option *row, const char *text,
                 struct app_words *words)
 {

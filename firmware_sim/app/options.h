@@ -136,6 +136,9 @@ int app_add_set(struct app_sets *sets, const char *set);
  * `names` has (ends with NULL), as APP_PASS to the struct app_words at `at`. A table that has such rows stays as it is. */
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
 
+/* n numbers with `between` between them, and nothing else. */
+int app_read_numbers(const char *text, char between, double *out, int n);
+
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */
 int app_usage(const struct app_command *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 

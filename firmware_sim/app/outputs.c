@@ -33,16 +33,14 @@ struct files {
 /* The folder of a path, and the name in it. */
 static int split(const char *path, struct stat *folder, const char **name)
 {
-    const char *slash = strrchr(path, '/');
     char dir[PATH_MAX] = ".";
-    *name = slash != NULL ? slash + 1 : path;
-    if (slash != NULL && slash + 1 - path >= PATH_MAX) return 0; /* no such file can be made */
-    if (slash != NULL) snprintf(dir, sizeof dir, "%.*s", (int)(slash + 1 - path), path);
+    *name = basename(path);
+    if (*name - path >= PATH_MAX) return 0; /* no such file can be made */
+    if (*name != path) snprintf(dir, sizeof dir, "%.*s", (int)(*name - path), path);
     return stat(dir, folder) == 0;
 }
 
-/* Whether `name` is STEM-N.ENDING of a file of scans. */
-static int is_name_of_scan(const char *file, size_t n_ending, const char *name)
+int app_is_name_of_scan(const char *file, size_t n_ending, const char *name)
 {
     const size_t len = strlen(file), stem = len > n_ending ? len - n_ending : len;
     if (n_ending == 0 || strncmp(name, file, stem) != 0 || name[stem] != '-') return 0;
@@ -58,8 +56,8 @@ static int is_same_name(const struct named *a, const struct named *b)
     const int has_a = split(a->path, &folder[0], &name[0]), has_b = split(b->path, &folder[1], &name[1]);
     if (!has_a || !has_b) return strcmp(a->path, b->path) == 0;
     if (folder[0].st_dev != folder[1].st_dev || folder[0].st_ino != folder[1].st_ino) return 0;
-    return strcmp(name[0], name[1]) == 0 || is_name_of_scan(name[0], a->n_ending, name[1]) ||
-           is_name_of_scan(name[1], b->n_ending, name[0]);
+    return strcmp(name[0], name[1]) == 0 || app_is_name_of_scan(name[0], a->n_ending, name[1]) ||
+           app_is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
 /* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */
@@ -194,9 +192,8 @@ static int check(const struct files *f, struct sh_err *err)
         for (size_t k = 0; k < f->n && out->is_written; k++) {
             const struct named *other = &f->file[k];
             if (!other->is_written && is_there(other) && is_same(out, other))
-                return sh_fail(err, SH_EINPUT,
-                               "%s %s: is also read as %s, and would be overwritten; name another file", out->who,
-                               out->path, other->who);
+                return sh_fail(err, SH_EINPUT, "%s %s: is also read as %s, and would be overwritten; name another file",
+                               out->who, out->path, other->who);
             if (other->is_written && k < i && !(out->is_beside && other->is_beside) && is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: %s writes the same file; name another one", out->who, out->path,
                                other->who);

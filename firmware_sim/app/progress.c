@@ -2,7 +2,6 @@
 #include "firmware_sim/app/progress.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "drivers/protocol/native.h"

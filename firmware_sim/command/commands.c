@@ -9,7 +9,6 @@
 #include "firmware_sim/command/site_pose.h"
 #include "firmware_sim/command/step.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* clang-format off */

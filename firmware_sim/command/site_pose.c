@@ -22,7 +22,7 @@ static const struct {
 } parts[6] = {{"x", "M", 1e9},           {"y", "M", 1e9},      {"z", "M", 1e9},
               {"heading", "DEG", 360.0}, {"pitch", "DEG", 90}, {"roll", "DEG", 180.0}};
 
-enum { PARTS = 6, MAX_FIELDS = 1 + PARTS, FIELD_LEN = 64 };
+enum { PARTS = 6, FIELD_LEN = 64 };
 
 /* The next field of a list, without blanks around it. Returns what follows its comma, or NULL at the end. */
 static const char *take_field(const char *text, char field[FIELD_LEN], size_t *len)

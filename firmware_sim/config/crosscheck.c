@@ -78,10 +78,9 @@ static void check_mesh(struct cfg_reader *rd, const struct config_mesh *mesh, ui
                                           ".fbx", ".dae", ".ifc", ".tif",  ".tiff"};
     static const char path[] = "scene.meshes[].file";
     char shown[CFG_SHOW_MAX];
-    const char *slash = strrchr(mesh->file, '/'), *dot = strrchr(mesh->file, '.'), *why;
+    const char *dot = strrchr(basename(mesh->file), '.'), *why;
     size_t known = 0;
-    while (known < CFG_LEN(endings) &&
-           (dot == NULL || (slash != NULL && dot < slash) || strcasecmp(dot, endings[known]) != 0))
+    while (known < CFG_LEN(endings) && (dot == NULL || strcasecmp(dot, endings[known]) != 0))
         known++;
     if (known == CFG_LEN(endings)) {
         cfg_fail_key(rd, path, i,

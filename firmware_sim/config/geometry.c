@@ -7,7 +7,6 @@
 #include "firmware_sim/config/table/value.h"
 
 #include <stdio.h>
-#include <string.h>
 
 void config_set_steps(struct config_profile *p, uint32_t steps)
 {

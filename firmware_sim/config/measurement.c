@@ -5,7 +5,6 @@
 #include "firmware_sim/config/table/given.h"
 
 #include <math.h>
-#include <string.h>
 
 void config_signal_spec(const struct config_profile *p, const struct config_program *program,
                         struct detect_signal_spec *spec)

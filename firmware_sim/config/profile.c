@@ -16,7 +16,6 @@
 #include "firmware_sim/config/table/value.h"
 
 #include <dirent.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -162,8 +161,7 @@ static void check_profile(struct cfg_reader *rd, struct config_profile *p)
 /* The profile is named by its file: a second name inside could differ. */
 static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 {
-    const char *slash = strrchr(rd->file, '/');
-    const char *base = slash == NULL ? rd->file : slash + 1;
+    const char *base = basename(rd->file);
     size_t stem = strlen(base) - 5;
     if (stem >= sizeof profile->name)
         return cfg_fail_file(rd, SH_EINPUT, 0,

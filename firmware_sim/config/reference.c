@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "firmware_sim/base/nearest.h"
 #include "firmware_sim/config/reference.h"

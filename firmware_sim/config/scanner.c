@@ -6,7 +6,6 @@
 #include "firmware_sim/config/scanners.h"
 #include "firmware_sim/config/table/diagnostics.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

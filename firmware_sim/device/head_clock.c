@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/device/head_clock.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

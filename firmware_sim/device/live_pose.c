@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The head's pose: the end of a trajectory, and a live platform's poses. */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

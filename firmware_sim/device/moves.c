@@ -9,9 +9,7 @@
  *
  * A caster may go on for a while with a tick that was given up as too late. So a tick holds the site that it was
  * claimed with. */
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/config/places.h"

@@ -4,8 +4,6 @@
  * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a
  * battery. All else is as at power-up. A reboot by command is a power cycle of one tick. Protocols whose devices count
  * from power-up count from device_power_ns(). */
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"

@@ -13,8 +13,6 @@
 #ifndef FIRMWARE_SIM_LOOP_LOOP_H
 #define FIRMWARE_SIM_LOOP_LOOP_H
 
-#include <stdatomic.h>
-
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/loop/lateness.h"

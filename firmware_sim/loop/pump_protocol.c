@@ -6,8 +6,6 @@
  * Answers are lost only where they have no room. In the paces that wait for readers nothing is lost: the
  * session takes no further tick until there is room. */
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Colours of points: the quantity of output.colour, and its limits where the configuration gives none. */
 #include <math.h>
-#include <stdio.h>
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/colours.h"

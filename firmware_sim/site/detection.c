@@ -3,7 +3,6 @@
 #include "firmware_sim/site/site.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

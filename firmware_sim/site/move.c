@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Moving a station: makes the site that a configuration with the new place would have, beside the present one. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

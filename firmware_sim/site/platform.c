@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/grow.h"
 #include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 
@@ -117,9 +118,8 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     if (site->n_stretches == CONFIG_MAX_STATIONS)
         return sh_fail(err, SH_EINPUT, "%s: platform: the path is too long; allowed %d stretches of %.0f m across",
                        site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_STRETCH_M);
-    struct site_stretch *more = realloc(site->stretch, (site->n_stretches + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
-    site->stretch = more;
+    if (!resize(&site->stretch, site->n_stretches + 1, sizeof *site->stretch))
+        return sh_fail(err, SH_ENOMEM, "no memory for the path");
     struct site_stretch *stretch = &site->stretch[site->n_stretches++];
     *stretch = (struct site_stretch){.until_ns = until_ns, .reach_m = reach_m};
     memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
@@ -197,7 +197,7 @@ static int anchor_scene(struct site *site, struct sh_err *err)
 static int place(const struct site *site, const struct pose *head, struct placement *at, struct sh_err *err)
 {
     memcpy(at->position_m, head->position_m, sizeof at->position_m);
-    pose_matrix(head->quat, at->rotation);
+    quat_matrix(head->quat, at->rotation);
     at->floor_m = NAN;
     at->on_earth = site->anchor.known;
     return at->on_earth ? geoframe_locate(&site->anchor.frame, at->position_m, &at->place, err) : SH_OK;

@@ -5,9 +5,7 @@
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/view.h"
 
-#include <math.h>
 #include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

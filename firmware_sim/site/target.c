@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* scene.target: scans objects by name. The others are left out of the scene, or stay in it and give no echo. */
 #include <fnmatch.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "firmware_sim/app/studio/record/files.h"
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/record/recording.h"

@@ -10,9 +10,9 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
-#include "drivers/protocol/bytes.h"
 #include "tests/fuzz/rig.h"
 
 enum { HELLO = 0, HELLO_LEN = 64 + 4, PIECE = 4096 };

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native_encode.h"

@@ -115,7 +115,6 @@ static void a_scan_with_a_hole_is_not_sent(void **state)
     cola_turn(0, 1.0);
     part_of_turn(1, 0, 200); /* of 811 pulses one is missing */
     part_of_turn(1, 200, 200);
-    cola.ops->gap(cola.protocol, 1);
     part_of_turn(1, 401, 200);
     part_of_turn(1, 601, 210);
     cola_turn(2, 1.0);

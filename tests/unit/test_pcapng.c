@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* pcapng, block by block: every frame is a packet with its bytes and its device time. Files are read back whole, cut
  * and damaged. */
+#include "core/bytes.h"
 #include "core/rng.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/pcapng.h"
 #include "tests/unit/recorder_rig.h"
 

@@ -29,7 +29,7 @@ static void test_convention(void **state)
         double heading = 2.0 * M_PI * case_unit(&random), pitch = (case_unit(&random) - 0.5) * 3.0,
                roll = (case_unit(&random) - 0.5) * 6.0, quat[4], got[9], want[9], back[3];
         pose_from_angles(heading, pitch, roll, quat);
-        pose_matrix(quat, got);
+        quat_matrix(quat, got);
         matrix_by_hand(heading, pitch, roll, want);
         for (int i = 0; i < 9; i++) /* products of a dozen roundings */
             assert_true(fabs(got[i] - want[i]) < 2e-15);
@@ -37,7 +37,7 @@ static void test_convention(void **state)
         /* pitch stays 0.07 rad from the pole: errors grow by 1 / cos, 14 times */
         assert_true(fabs(back[0] - heading) < 1e-13 && fabs(back[1] - pitch) < 1e-13 && fabs(back[2] - roll) < 1e-13);
         pose_from_matrix(want, quat);
-        pose_matrix(quat, got);
+        quat_matrix(quat, got);
         for (int i = 0; i < 9; i++)
             assert_true(fabs(got[i] - want[i]) < 1e-13);
     }
@@ -121,13 +121,13 @@ static void test_short_way(void **state)
         for (int k = 0; k < 4; k++)
             b.quat[k] = -b.quat[k];
         pose_between(&a, &b, 0.25, &other);
-        pose_matrix(mid.quat, want);
-        pose_matrix(other.quat, r);
+        quat_matrix(mid.quat, want);
+        quat_matrix(other.quat, r);
         assert_true(turn <= M_PI && fabs(pose_angle_between(a.quat, b.quat) - turn) < 1e-12);
         assert_true(fabs(pose_angle_between(a.quat, other.quat) - 0.25 * turn) < 1e-12);
         for (int i = 0; i < 9; i++)
             assert_true(fabs(r[i] - want[i]) < 1e-12);
-        pose_turn(a.quat, b.quat, axis, r);
+        quat_turn(a.quat, b.quat, axis, r);
         assert_true(fabs(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2] - 1.0) < 1e-12);
     }
 }
@@ -142,14 +142,14 @@ static void test_straight_up(void **state)
             const double heading = (25 + 30 * n) * DEG, roll = (n % 3) * 10 * DEG, pitch = (up ? 90 : -90) * DEG;
             double quat[4], said[3], r[9], want[9];
             pose_from_angles(heading, pitch, roll, quat);
-            pose_matrix(quat, want);
+            quat_matrix(quat, want);
             pose_to_angles(quat, &said[0], &said[1], &said[2]);
             /* The cosine of the pitch is a rounding error, and the pitch's error is its root: 2e-8. */
             assert_true(fabs(said[1] - pitch) < 5e-8 && said[2] == 0.0);
             const double off = said[0] - (up ? heading - roll : heading + roll);
             assert_true(fabs(remainder(off, 2.0 * M_PI)) < 1e-12);
             pose_from_matrix(want, quat);
-            pose_matrix(quat, r);
+            quat_matrix(quat, r);
             for (int i = 0; i < 9; i++)
                 assert_true(fabs(r[i] - want[i]) < 5e-8);
         }

@@ -247,7 +247,7 @@ static void test_level_waypoints(void **state)
         write_file(text);
         if (trajectory_read_waypoints(path, &ecef, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
         trajectory_at(tr, i == 1 ? 1e4 : 2.0, &p, &frame);
-        pose_matrix(p.quat, r);
+        quat_matrix(p.quat, r);
         for (int k = 0; k < 3; k++) {
             assert_true(fabs(r[3 * k + 2] - up[k]) < 1e-9);
             /* These are differences of coordinates that are right to 1e-9 m, over 1 mm, or 0.1 mm when it is slow. */

@@ -2,7 +2,7 @@
 /* USB faults on request over usbredir, as a virtual machine's end sees them. */
 #ifdef HAVE_USBREDIR
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/unit/usbredir_guest.h"
 
 enum { STREAM = 1, STREAM_IN = 0x83 };

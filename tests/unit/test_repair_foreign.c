@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "core/newfile.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/record/repair.h"
 #include "tests/unit/repair_rig.h"
 

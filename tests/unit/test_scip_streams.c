@@ -205,7 +205,6 @@ static void lost_frames(void **state)
     scip_open("UTM-30LX");
     scip_ask("MD0000108000003\n", "MD0000108000003\n00P\n\n");
     scip_part(0, 0, 500);
-    rig.ops->gap(rig.protocol, 1);
     scip_part(0, 502, 1080);
     scip_line_end(0, 0);
     scip_line_time(0);
@@ -214,14 +213,12 @@ static void lost_frames(void **state)
     scip_turn(1);
     scip_decode_only(&got, 3, 0);
     assert_string_equal(got.echo + 13, "02");
-    scip_part(2, 0, 900);
-    rig.ops->gap(rig.protocol, 20); /* the rest of turn 2, turns 3 and 4, the begin of turn 5 */
+    scip_part(2, 0, 900); /* without the rest of turn 2, turns 3 and 4, the begin of turn 5 */
     scip_part(5, 100, 1080);
     scip_line_end(5, 0);
     scip_expect("");
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 5);
-    rig.ops->gap(rig.protocol, 1); /* all points of turn 6 */
-    scip_line_end(6, 0);
+    scip_line_end(6, 0); /* without all points of turn 6 */
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 6);
     scip_turn(7);
     scip_decode_only(&got, 3, 0);
@@ -298,8 +295,7 @@ static void turns_are_not_mixed(void **state)
     scip_turn(1);
     protocol_rig_clear(&rig);
     scip_part(2, 0, 600);
-    rig.ops->gap(rig.protocol, 1000); /* the rest of this scan, and the begin of the next one */
-    rig.scan_t0_ns = 10000000000;
+    rig.scan_t0_ns = 10000000000; /* without the rest of this scan, and the begin of the next one */
     scip_part(2, 601, 1080);
     scip_line_end(2, 0);
     scip_expect("");

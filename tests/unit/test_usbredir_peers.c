@@ -8,7 +8,7 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 static void test_silent(void **state)
 {

@@ -13,7 +13,7 @@
 
 #include <cmocka.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "firmware_sim/app/studio/view/encode.h"
 #include "firmware_sim/app/studio/view/serve.h"
 

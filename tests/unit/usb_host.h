@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/usb/usb.h"
 
 enum { HOST_MAX_DONE = 64, GUARD = 0xa5 };

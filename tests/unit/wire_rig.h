@@ -13,8 +13,8 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "core/bytes.h"
 #include "core/err.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/fault/wire.h"

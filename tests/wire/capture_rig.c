@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "drivers/protocol/pcapng.h"
 
 enum { SNAP_LEN = 1 << 18, ETHERNET_LEN = 14, IP_LEN = 20, TCP_LEN = 20, USBMON_LEN = 64, PACKET_NS = 1000 };

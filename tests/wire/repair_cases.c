@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/wire/repair_cases.h"
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 /* Returns the place after this text; 0: it is not there. */
 static size_t behind(const struct bytes *b, const char *text)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Links that are cut, refused and unplugged on request, by the program. The truth says where. The client sees it there,
  * comes back and goes on, and its neighbour's stream is the clean one. */
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usbip_host.h"
 

@@ -9,7 +9,7 @@
 #include <net/if.h>
 #include <sys/ioctl.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/wire/captured.h"
 #include "tests/wire/grabber.h"
 #include "tests/wire/room.h"

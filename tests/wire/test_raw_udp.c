@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* `record --raw` of UDP: each datagram is captured whole and in order, of a test's socket and of a VLP-16. Those that
  * the kernel has no room for are counted. Wrong command lines are refused. */
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/wire/captured.h"
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"

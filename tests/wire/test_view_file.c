@@ -4,7 +4,7 @@
  * room, whose mesh has no hole. */
 #include <netinet/in.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 #include "tests/wire/room.h"
 
 /* A pole is one shot. */

@@ -156,21 +156,21 @@ static void same(const char *what, double value, double expected, double toleran
  * cells: to a float's digits. */
 static void check_figures(const char *quality, const char *report)
 {
-    static const char *const key[4][2] = {{"mean", "mean_m"}, {"rms", "rms_m"}, {"p95", "p95_m"}, {"max", "max_m"}};
+    static const char *const key[] = {"mean_m", "rms_m", "p95_m", "max_m"};
     same("every", number(quality, "{", "every"), 1, 0);
     same("points", number(quality, "{", "points"), number(report, "{", "points"), 0);
     same("sampled", number(quality, "{", "sampled_points"), number(report, "{", "points"), 0);
     const double shots = number(quality, "{", "shots");
     same("empty", number(quality, "{", "empty_share") * shots, number(report, "{", "empty"), 1e-6);
     for (int k = 0; k < 4; k++)
-        same(key[k][0], number(quality, "deviation_m", key[k][0]), number(report, "{", key[k][1]), 4e-9);
-    same("bound", number(quality, "deviation_m", "bound"), number(report, "\"verdict\"", "bound_m"), 1e-12);
-    same("p50", number(quality, "density", "p50"), number(report, "density", "p50_m2"),
+        same(key[k], number(quality, "\"all\"", key[k]), number(report, "{", key[k]), 4e-9);
+    same("bound", number(quality, "\"verdict\"", "bound_m"), number(report, "\"verdict\"", "bound_m"), 1e-12);
+    same("p50", number(quality, "density", "p50_m2"), number(report, "density", "p50_m2"),
          1e-6 * number(report, "density", "p50_m2"));
-    same("cell", number(quality, "density", "cell_m"), number(report, "\"all\"", "density_cell_m"), 0);
+    same("cell", number(quality, "\"all\"", "density_cell_m"), number(report, "\"all\"", "density_cell_m"), 0);
     /* The RMS is within the report's bound: the plan's bound and half a count an axis. */
-    assert_true(number(quality, "deviation_m", "rms") <= number(report, "\"verdict\"", "bound_m"));
-    assert_true(number(quality, "deviation_m", "max") <= number(report, "\"verdict\"", "bound_m"));
+    assert_true(number(quality, "\"all\"", "rms_m") <= number(report, "\"verdict\"", "bound_m"));
+    assert_true(number(quality, "\"all\"", "max_m") <= number(report, "\"verdict\"", "bound_m"));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));
     same("lost", number(quality, "{", "lost_frames"), 0, 0);
 }
@@ -202,7 +202,7 @@ static void check_move(const struct head *head, struct scanhead *sh)
     assert_non_null(strstr(json, "\"judgement\":\"within\""));
     same("sampled", number(json, "{", "sampled_points"), number(json, "{", "points"), 0);
     assert_true(number(json, "{", "points") > 2500);
-    assert_true(number(json, "deviation_m", "max") <= number(json, "deviation_m", "bound"));
+    assert_true(number(json, "\"all\"", "max_m") <= number(json, "\"verdict\"", "bound_m"));
     assert_true(number(json, "along_beam", "points") > 0.9 * number(json, "{", "points"));
     free(json);
 }
@@ -271,15 +271,15 @@ static void noise_is_expected(void **state)
     client_tell(sh, "HEAD:NOIS ON");
     client_tell(sh, "HEAD:NOIS:SIGM 3 MM");
     char *quality = scan_from(&head, sh, 1, 1);
-    const double n = number(quality, "along_beam", "judged"), rms_m = number(quality, "along_beam", "judged_rms");
+    const double n = number(quality, "along_beam", "judged"), rms_m = number(quality, "along_beam", "judged_rms_m");
     /* The RMS of n normal deviations has a standard error of sigma / sqrt(2 n). Six of them are allowed, and 1 %: sigma
      * is of first order, and smooth faces are found by the noisy points themselves. */
     assert_true(n > 1000);
-    same("sigma", number(quality, "deviation_m", "sigma_expected"), 0.003, 3e-6);
+    same("sigma", number(quality, "along_beam", "expected_rms_m"), 0.003, 3e-6);
     same("rms", rms_m, 0.003, 0.003 * (6.0 / sqrt(2.0 * n) + 0.01));
-    assert_true(isnan(number(quality, "deviation_m", "bound")));
+    assert_true(isnan(number(quality, "\"verdict\"", "bound_m")));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));
-    assert_non_null(strstr(quality, "\"of\":\"along_beam\""));
+    assert_non_null(strstr(quality, "\"along_beam\":{\"from_m\":"));
     free(quality);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
@@ -348,7 +348,7 @@ static void scene_is_the_scene(void **state)
     assert_memory_equal(json, "{\"text\":\"", 9);
     free(json);
     json = get(&head, "/quality", &len);
-    assert_true(isnan(number(json, "{", "scan")) && isnan(number(json, "{", "deviation_m")));
+    assert_true(isnan(number(json, "{", "scan")) && isnan(number(json, "{", "all")));
     same("share", number(json, "\"coverage\"", "share"), 0, 0);
     free(json);
     head_end(&head, SIGTERM);

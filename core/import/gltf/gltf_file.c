@@ -5,12 +5,12 @@
  *          whole numbers of 32 bits, little-endian; chunks are padded to 4 bytes */
 #include "core/import/gltf/gltf_file.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "core/import/gltf/gltf.h"
 #include "core/import/gltf/gltf_at.h"
 #include "core/import/gltf/gltf_json.h"
@@ -21,24 +21,18 @@ enum { GLB_HEAD = 12, CHUNK_HEAD = 8, MAX_ENTRIES = 1 << 26 };
 #define CHUNK_JSON 0x4e4f534aU
 #define CHUNK_BIN  0x004e4942U
 
-static uint32_t u32_at(const char *p)
-{
-    const uint8_t *b = (const uint8_t *)p;
-    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
-}
-
 static int find_chunks(struct gltf *g, struct gltf_bytes *json)
 {
     const struct text *t = &g->file;
-    const size_t length = u32_at(t->data + 8);
+    const size_t length = le_get32(t->data + 8);
     if (length > t->size) return gltf_fail(g, "cut off: it has %zu bytes, but its header says %zu", t->size, length);
     if (length < t->size)
         sh_warn(g->b->report, "%s: %zu bytes after its end are not read", g->b->name, t->size - length);
     for (size_t at = GLB_HEAD; at < length;) {
-        if (length - at < CHUNK_HEAD || u32_at(t->data + at) > length - at - CHUNK_HEAD)
+        if (length - at < CHUNK_HEAD || le_get32(t->data + at) > length - at - CHUNK_HEAD)
             return gltf_fail(g, "the chunk at byte %zu goes beyond its end, byte %zu", at, length);
-        const struct gltf_bytes chunk = {(const uint8_t *)t->data + at + CHUNK_HEAD, u32_at(t->data + at)};
-        const uint32_t type = u32_at(t->data + at + 4);
+        const struct gltf_bytes chunk = {(const uint8_t *)t->data + at + CHUNK_HEAD, le_get32(t->data + at)};
+        const uint32_t type = le_get32(t->data + at + 4);
         if (type == CHUNK_JSON && json->p == NULL) *json = chunk;
         if (type == CHUNK_BIN && g->bin.p == NULL) g->bin = chunk;
         at += CHUNK_HEAD + chunk.n;
@@ -54,7 +48,7 @@ static int find_json(struct gltf *g, struct gltf_bytes *json)
         *json = (struct gltf_bytes){(const uint8_t *)t->data + mark, t->size - mark};
         return SH_OK;
     }
-    const uint32_t version = u32_at(t->data + 4);
+    const uint32_t version = le_get32(t->data + 4);
     g->by_assimp = version == 1;
     if (version == 1 || version == 2) return version == 1 ? SH_OK : find_chunks(g, json);
     return gltf_fail(g, "it is a .glb of version %u; allowed are 1 and 2", version);
@@ -143,9 +137,9 @@ void gltf_close(struct gltf *g)
 
 static char *beside(const struct gltf *g, const char *name)
 {
-    const char *mesh = g->b->spec->file, *slash = strrchr(mesh, '/');
+    const char *mesh = g->b->spec->file;
     char *path = NULL;
-    const int folder = slash != NULL && name[0] != '/' ? (int)(slash - mesh) + 1 : 0;
+    const int folder = name[0] != '/' ? (int)(basename(mesh) - mesh) : 0;
     return asprintf(&path, "%.*s%s", folder, mesh, name) >= 0 ? path : NULL;
 }
 

@@ -125,7 +125,6 @@ static int add_file(struct gltf *g, const char *uri, struct build_image *image, 
 /* An image that lies within is named after the mesh's file, with its number. */
 static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint16_t *number)
 {
-    const char *slash = strrchr(g->b->spec->file, '/');
     const struct gltf_at at = gltf_at("images[%u]", i);
     json_t *object;
     uint32_t view;
@@ -139,7 +138,7 @@ static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint
     if (rc == SH_OK && uri != NULL) rc = gltf_uri_data(g->b, uri, at.text, &own, &bytes, g->err);
     if (rc == SH_OK && uri == NULL) rc = gltf_index(g, object, "bufferView", at.text, &view);
     if (rc == SH_OK && uri == NULL) rc = gltf_buffer_view(g, view, &bytes, &stride);
-    const int len = asprintf(&name, "%s*%u", slash != NULL ? slash + 1 : g->b->spec->file, i);
+    const int len = asprintf(&name, "%s*%u", basename(g->b->spec->file), i);
     if (rc == SH_OK && len < 0) rc = build_fail(g->b, SH_ENOMEM, g->err, "no memory for a name");
     if (rc == SH_OK) {
         image->name = (struct text_span){name, (size_t)len};

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The two readers, each a program of node in a process of its own (core/import/import_apart.h). */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

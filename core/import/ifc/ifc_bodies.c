@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/grow.h"
+#include "core/import/ifc/ifc_index.h"
 
 #define MOST_M 1e9
 
@@ -100,16 +101,9 @@ static int read_product(struct reading *r)
     return rc == SH_OK ? 1 : rc;
 }
 
-static int compare_bodies(const void *a, const void *b)
-{
-    const struct ifc_body *x = a, *y = b;
-    return (x->id > y->id) - (x->id < y->id);
-}
-
 const struct ifc_body *ifc_bodies_find(const struct ifc_bodies *b, uint64_t id)
 {
-    const struct ifc_body key = {.id = id};
-    return b->n > 0 ? bsearch(&key, b->body, b->n, sizeof key, compare_bodies) : NULL;
+    return b->n > 0 ? bsearch(&id, b->body, b->n, sizeof *b->body, ifc_compare) : NULL;
 }
 
 static int read_file(struct ifc_bodies *b, int fd, struct sh_err *err)
@@ -140,7 +134,7 @@ int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err)
     while ((rc = read_product(&r)) == 1)
         continue;
     if (rc != SH_OK) return rc;
-    qsort(b->body, b->n, sizeof *b->body, compare_bodies);
+    qsort(b->body, b->n, sizeof *b->body, ifc_compare);
     for (size_t i = 0; i < b->n; i++) {
         if (i > 0 && b->body[i].id == b->body[i - 1].id) return wrong(&r, "a product twice");
         ifc_figures(&b->part[b->body[i].first], b->body[i].n_parts, &b->body[i].figures);

@@ -1,28 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /* Area, volume, box, and whether a body is closed: core/body.h over all its edges. */
-#include <float.h>
-#include <math.h>
 #include <string.h>
 
 #include "core/body.h"
 #include "core/import/ifc/ifc_bodies.h"
+#include "core/vec3.h"
 
 #define CLOSED_SHARE 1e-5 /* of the area: rounding leaves 1e-7, and a face that lacks more than this shows */
 
 static void box_of(const struct ifc_part *part, size_t n_parts, struct ifc_figures *f)
 {
-    for (int k = 0; k < 3; k++) {
-        f->min_m[k] = DBL_MAX;
-        f->max_m[k] = -DBL_MAX;
-    }
+    vec3_bound_nothing(f->min_m, f->max_m);
     for (size_t i = 0; i < n_parts; i++)
         for (uint32_t t = 0; t < part[i].n_triangles; t++)
             for (int c = 0; c < 3; c++)
-                for (int k = 0; k < 3; k++) {
-                    const double x = part[i].vertex_m[part[i].triangle[t][c]][k];
-                    f->min_m[k] = fmin(f->min_m[k], x);
-                    f->max_m[k] = fmax(f->max_m[k], x);
-                }
+                vec3_bound(f->min_m, f->max_m, part[i].vertex_m[part[i].triangle[t][c]]);
 }
 
 void ifc_figures(const struct ifc_part *part, size_t n_parts, struct ifc_figures *f)

@@ -7,16 +7,15 @@
 
 #include "core/grow.h"
 
-static int compare_records(const void *a, const void *b)
+int ifc_compare(const void *a, const void *b)
 {
-    const struct step_record *one = a, *other = b;
-    return (one->id > other->id) - (one->id < other->id);
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
 }
 
 const struct step_record *ifc_index_find(const struct ifc_index *x, uint64_t id)
 {
-    const struct step_record key = {.id = id};
-    return x->n > 0 ? bsearch(&key, x->record, x->n, sizeof key, compare_records) : NULL;
+    return x->n > 0 ? bsearch(&id, x->record, x->n, sizeof *x->record, ifc_compare) : NULL;
 }
 
 int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, struct sh_err *err, const char *what)
@@ -56,7 +55,7 @@ static int read_all(struct ifc_index *x, struct sh_err *err)
         x->record[x->n++] = record;
     }
     if (rc < 0) return rc;
-    if (!sorted) qsort(x->record, x->n, sizeof *x->record, compare_records);
+    if (!sorted) qsort(x->record, x->n, sizeof *x->record, ifc_compare);
     for (size_t i = 1; i < x->n; i++)
         if (x->record[i].id == x->record[i - 1].id)
             return text_fail(&x->text, x->record[i].line, SH_EINPUT, err, "a second record #%llu; allowed one",

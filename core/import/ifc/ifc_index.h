@@ -28,7 +28,9 @@ int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, stru
 /* The next record number in a list of attributes, from *p on; texts are passed over. 0: there is none. */
 uint64_t ifc_next_reference(const char **p, const char *end);
 
-/* The place of the first entry of a sorted list whose number, its first member, is id or above; n: there is none. */
+/* Compares entries whose first member is their number, or such a number itself. */
+int ifc_compare(const void *a, const void *b);
+/* The place of the first entry of such a list, sorted, whose number is id or above; n: there is none. */
 size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id);
 
 #endif

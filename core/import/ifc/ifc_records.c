@@ -13,16 +13,9 @@
 /* Attributes of an IfcProduct: GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement, Representation. */
 enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_PLACEMENT = 5, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
 
-static int compare_products(const void *a, const void *b)
-{
-    const struct ifc_product *x = a, *y = b;
-    return (x->id > y->id) - (x->id < y->id);
-}
-
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id)
 {
-    const struct ifc_product key = {.id = id};
-    return r->n_products > 0 ? bsearch(&key, r->product, r->n_products, sizeof key, compare_products) : NULL;
+    return r->n_products > 0 ? bsearch(&id, r->product, r->n_products, sizeof *r->product, ifc_compare) : NULL;
 }
 
 static int no_memory(const struct ifc_records *r, struct sh_err *err)

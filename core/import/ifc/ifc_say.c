@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Reports findings as lines that name their products. */
 #include <stdio.h>
-#include <string.h>
 
 #include "core/import/ifc/ifc_read.h"
 #include "core/import/ifc/ifc_records.h"

@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/grow.h"
 #include "core/import/ifc/ifc_records.h"
@@ -77,12 +76,6 @@ static bool collect_from(struct ifc_records *r, uint64_t item, const struct step
     return done;
 }
 
-static int compare_styles(const void *a, const void *b)
-{
-    const struct ifc_style *x = a, *y = b;
-    return (x->item > y->item) - (x->item < y->item);
-}
-
 int ifc_styles_collect(struct ifc_records *r, struct sh_err *err)
 {
     bool done = true;
@@ -95,7 +88,7 @@ int ifc_styles_collect(struct ifc_records *r, struct sh_err *err)
         done = collect_from(r, item, &r->index.record[i], 0);
     }
     if (!done) return text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its styles");
-    if (r->n_styles > 0) qsort(r->style, r->n_styles, sizeof *r->style, compare_styles);
+    if (r->n_styles > 0) qsort(r->style, r->n_styles, sizeof *r->style, ifc_compare);
     return SH_OK;
 }
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* A cloud's memory, and which reader a file gets. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -40,27 +39,15 @@ int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *er
     return SH_OK;
 }
 
-/* False where the file can't be read: the reader then says why. */
-static bool is_neither(const char *path)
-{
-    char magic[3] = "";
-    const char *why;
-    FILE *in = infile_open(path, &why);
-    if (in == NULL) return false;
-    size_t n = fread(magic, 1, sizeof magic, in);
-    fclose(in);
-    return (n != sizeof magic || memcmp(magic, "ply", sizeof magic) != 0) && !cloud_is_las(path);
-}
-
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err)
 {
     *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
-    if (is_neither(path))
+    if (infile_begins(path, "ply") == 0 && infile_begins(path, "LASF") == 0) /* else the reader says why */
         return sh_fail(err, SH_EINPUT,
                        "%s: not a PLY file and not a LAS file; allowed are point clouds of these two formats", path);
-    int rc = cloud_is_las(path) ? cloud_read_las(path, columns, report, out, err)
-                                : cloud_read_ply(path, columns, report, out, err);
+    int rc = infile_begins(path, "LASF") == 1 ? cloud_read_las(path, columns, report, out, err)
+                                              : cloud_read_ply(path, columns, report, out, err);
     if (rc != SH_OK) cloud_free(out);
     return rc;
 }

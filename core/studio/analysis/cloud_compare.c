@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include <math.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <string.h>
 
 #include "core/studio/cloud.h"
+#include "core/together.h"
 
-enum { CHUNK = 4096, MAX_THREADS = 256 };
+enum { CHUNK = 4096 };
 
 /* The search starts with this and grows tenfold: its cost grows with the reach, and points of a scan lie on
  * the scene but for the head's noise. */
@@ -82,8 +82,9 @@ static void compare_point(const struct work *w, size_t i)
     if (body == NULL) w->triangle[i] = hit.triangle;
 }
 
-static void work_on(struct work *w, int reports)
+static void work_on(void *ctx, int reports)
 {
+    struct work *w = ctx;
     size_t n = w->cloud->n, first;
     while ((first = atomic_fetch_add(&w->next, CHUNK)) < n && !sh_stopped(w->report)) {
         size_t end = n - first < CHUNK ? n : first + CHUNK;
@@ -93,22 +94,9 @@ static void work_on(struct work *w, int reports)
     }
 }
 
-static void *helper_main(void *work)
-{
-    work_on(work, 0);
-    return NULL;
-}
-
-/* With fewer threads than asked for it takes longer; nothing else changes. */
 static int work_together(struct work *w, struct sh_err *err)
 {
-    pthread_t helper[MAX_THREADS];
-    unsigned n = 0;
-    while (n + 1 < w->site->threads && n < MAX_THREADS && pthread_create(&helper[n], NULL, helper_main, w) == 0)
-        n++;
-    work_on(w, 1);
-    while (n > 0)
-        pthread_join(helper[--n], NULL);
+    together(w->site->threads, work_on, w);
     return sh_check_stop(w->report, err);
 }
 

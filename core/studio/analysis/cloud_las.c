@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
+#include "core/bytes.h"
 #include "core/studio/analysis/cloud_readers.h"
-#include "core/infile.h"
 #include "core/text.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,33 +26,6 @@ struct las {
     size_t n_no_station;
 };
 
-static uint64_t get(const uint8_t *p, int bytes)
-{
-    uint64_t v = 0;
-    for (int i = bytes - 1; i >= 0; i--)
-        v = v << 8 | p[i];
-    return v;
-}
-
-static double get_double(const uint8_t *p)
-{
-    uint64_t v = get(p, 8);
-    double d;
-    memcpy(&d, &v, sizeof d);
-    return d;
-}
-
-bool cloud_is_las(const char *path)
-{
-    char magic[4] = "";
-    const char *why;
-    FILE *in = infile_open(path, &why);
-    if (in == NULL) return false;
-    size_t n = fread(magic, 1, sizeof magic, in);
-    fclose(in);
-    return n == sizeof magic && memcmp(magic, "LASF", 4) == 0;
-}
-
 static int fail(const struct las *las, struct sh_err *err, const char *what)
 {
     return text_fail(&las->t, 0, SH_EINPUT, err, "%s", what);
@@ -63,14 +35,14 @@ static int read_header(struct las *las, struct sh_err *err)
 {
     const uint8_t *d = las->data;
     if (las->t.size < HEADER_MIN) return fail(las, err, "shorter than a LAS header");
-    unsigned header_len = (unsigned)get(d + 94, 2);
+    unsigned header_len = le_get16(d + 94);
     if (d[24] != 1 || d[25] < 2 || d[25] > 4) return fail(las, err, "not of LAS version 1.2 to 1.4");
     if ((d[104] & 0xc0) != 0) return fail(las, err, "compressed (LAZ), which is not read; write it as LAS");
     las->format = d[104];
-    las->record_len = (unsigned)get(d + 105, 2);
-    las->points_at = get(d + 96, 4);
+    las->record_len = le_get16(d + 105);
+    las->points_at = le_get32(d + 96);
     bool is_14 = d[25] == 4 && header_len >= HEADER_14 && las->t.size >= HEADER_14;
-    las->n = is_14 ? get(d + 247, 8) : get(d + 107, 4);
+    las->n = is_14 ? le_get64(d + 247) : le_get32(d + 107);
     if (las->format >= N_FORMATS) return fail(las, err, "an unknown point data record format; known are 0 to 10");
     if (las->record_len < standard_len[las->format]) return fail(las, err, "point records shorter than their format");
     if (las->points_at > las->t.size || las->n > (las->t.size - las->points_at) / las->record_len)
@@ -113,13 +85,13 @@ static void read_extra(struct las *las, const uint8_t *p, size_t len)
 
 static int read_vlrs(struct las *las, struct sh_err *err)
 {
-    uint64_t at = get(las->data + 94, 2), n = get(las->data + 100, 4);
+    uint64_t at = le_get16(las->data + 94), n = le_get32(las->data + 100);
     for (; n > 0; n--) {
         const uint8_t *vlr = las->data + at;
-        size_t len = at + VLR_HEAD <= las->points_at ? get(vlr + 20, 2) : 0;
+        size_t len = at + VLR_HEAD <= las->points_at ? le_get16(vlr + 20) : 0;
         if (at + VLR_HEAD + len > las->points_at)
             return fail(las, err, "its variable length records run into the points");
-        unsigned record = (unsigned)get(vlr + 18, 2);
+        unsigned record = le_get16(vlr + 18);
         if (strncmp((const char *)vlr + 2, "LASF_Projection", 16) == 0 && record == 2112) {
             char *wkt = strndup((const char *)vlr + VLR_HEAD, len);
             if (wkt == NULL) return text_fail(&las->t, 0, SH_ENOMEM, err, "no memory for its CRS");
@@ -141,8 +113,8 @@ static float reflectance_db(unsigned intensity)
 static void read_columns(const struct las *las, size_t i, const uint8_t *p)
 {
     struct cloud *c = las->cloud;
-    if (c->time_s != NULL) c->time_s[i] = get_double(p + time_at[las->format]);
-    if (c->reflectance_db != NULL) c->reflectance_db[i] = reflectance_db((unsigned)get(p + 12, 2));
+    if (c->time_s != NULL) c->time_s[i] = le_get_double(p + time_at[las->format]);
+    if (c->reflectance_db != NULL) c->reflectance_db[i] = reflectance_db(le_get16(p + 12));
     if (c->echo_count != NULL) c->echo_count[i] = las->format >= 6 ? p[14] >> 4 : p[14] >> 3 & 7;
 }
 
@@ -167,7 +139,7 @@ static double count_m(const struct las *las)
     const double to_m = las->cloud->epsg == 4979 ? 111320.0 : 1.0; /* a degree */
     double scale[3];
     for (int k = 0; k < 3; k++)
-        scale[k] = get_double(las->data + 131 + 8 * k);
+        scale[k] = le_get_double(las->data + 131 + 8 * k);
     return fmax(fmax(scale[0], scale[1]) * to_m, scale[2]);
 }
 
@@ -178,8 +150,8 @@ static int read_points(struct las *las, struct sh_err *err)
     for (size_t i = 0; i < c->n; i++) {
         const uint8_t *p = las->data + las->points_at + i * las->record_len;
         for (int k = 0; k < 3; k++) {
-            double scale = get_double(las->data + 131 + 8 * k), offset = get_double(las->data + 155 + 8 * k);
-            c->xyz_m[i][k] = (int32_t)(uint32_t)get(p + 4 * k, 4) * scale + offset;
+            double scale = le_get_double(las->data + 131 + 8 * k), offset = le_get_double(las->data + 155 + 8 * k);
+            c->xyz_m[i][k] = (int32_t)le_get32(p + 4 * k) * scale + offset;
             if (!isfinite(c->xyz_m[i][k])) return fail(las, err, "scales and offsets that give no position");
         }
         if (c->epsg == 4979) { /* x is longitude in a LAS file, latitude here */
@@ -188,9 +160,9 @@ static int read_points(struct las *las, struct sh_err *err)
             c->xyz_m[i][1] = remainder(lon_deg, 360);
         }
         c->echo[i] = p[14] & (is_new ? 15 : 7);
-        c->station[i] = (uint16_t)get(p + (is_new ? 20 : 18), 2);
+        c->station[i] = le_get16(p + (is_new ? 20 : 18));
         if (c->station[i] == 0) las->n_no_station++;
-        if (c->label != NULL) c->label[i] = (uint16_t)get(p + las->label_at, 2);
+        if (c->label != NULL) c->label[i] = le_get16(p + las->label_at);
         for (unsigned k = 0; c->rgb != NULL && k < 3; k++)
             c->rgb[i][k] = p[colours_at[las->format] + 2 * k + 1];
         read_columns(las, i, p);

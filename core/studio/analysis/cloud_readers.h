@@ -4,8 +4,6 @@
 #ifndef CORE_STUDIO_ANALYSIS_CLOUD_READERS_H
 #define CORE_STUDIO_ANALYSIS_CLOUD_READERS_H
 
-#include <stdbool.h>
-
 #include "core/studio/cloud.h"
 
 /* Beside enum cloud_column. */
@@ -13,9 +11,6 @@ enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
 
 /* Arrays for n points: positions, and those named in `has`. */
 int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
-
-/* Does the file begin as a LAS file? */
-bool cloud_is_las(const char *path);
 
 /* As cloud_read_columns; on failure the caller frees out. */
 int cloud_read_las(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,

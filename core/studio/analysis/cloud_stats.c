@@ -12,11 +12,12 @@ static uint64_t bits_of(double v)
     return bits;
 }
 
-/* The value of that rank (from 1) among those that are finite: 8 bits at a time, it is the one whose leading
- * bits are reached by that many. Eight passes whatever the values are, and the array stays as it is. */
-static double value_of_rank(const double *v, size_t n, size_t rank)
+/* 8 bits at a time, it is the value whose leading bits are reached by that many. Eight passes whatever the values are. */
+double cloud_percentile(const double *v, size_t n, size_t n_finite, unsigned permille)
 {
+    size_t rank = n_finite / 1000 * permille + (n_finite % 1000 * permille + 999) / 1000; /* rounded up */
     uint64_t prefix = 0;
+    if (n_finite == 0) return (double)NAN;
     for (int shift = 56; shift >= 0; shift -= 8) {
         size_t count[256] = {0};
         for (size_t i = 0; i < n; i++) {
@@ -31,12 +32,6 @@ static double value_of_rank(const double *v, size_t n, size_t rank)
     double value;
     memcpy(&value, &prefix, sizeof value);
     return value;
-}
-
-/* ceil(n * permille / 1000) */
-static size_t rank_of(size_t n, unsigned permille)
-{
-    return n / 1000 * permille + (n % 1000 * permille + 999) / 1000;
 }
 
 static void count_far(struct cloud_stats *s, size_t i)
@@ -73,9 +68,9 @@ void cloud_stats(const double *distance_m, size_t n, double tolerance_m, struct 
     if (near > 0) {
         s.mean_m = (double)(sum / (long double)near);
         s.rms_m = (double)sqrtl(sum2 / (long double)near);
-        s.p50_m = value_of_rank(distance_m, n, rank_of(near, 500));
-        s.p95_m = value_of_rank(distance_m, n, rank_of(near, 950));
-        s.p999_m = value_of_rank(distance_m, n, rank_of(near, 999));
+        s.p50_m = cloud_percentile(distance_m, n, near, 500);
+        s.p95_m = cloud_percentile(distance_m, n, near, 950);
+        s.p999_m = cloud_percentile(distance_m, n, near, 999);
     } else {
         s.mean_m = s.rms_m = s.p50_m = s.p95_m = s.p999_m = s.max_m = NAN;
     }

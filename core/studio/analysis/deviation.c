@@ -3,14 +3,14 @@
 #include "core/studio/deviation.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/together.h"
 #include "core/vec3.h"
 
-enum { CHUNK = 16 * BVH_CHUNK, MAX_THREADS = 256, PLACES_AROUND = 12 };
+enum { CHUNK = 16 * BVH_CHUNK, PLACES_AROUND = 12 };
 
 /* As core/studio/deviation.h has it: what may differ where the nearest surface is the one that the beam meets. */
 static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
@@ -71,18 +71,14 @@ void deviation_points_free(struct deviation_points *points)
 static int crosses(const struct scene *scene, uint32_t triangle, const double at_m[3])
 {
     const double *corner[3];
-    double e[2][3], n[3];
+    double n[3];
     for (int k = 0; k < 3; k++)
         corner[k] = scene->vertex_m[scene->triangle[triangle][k]];
-    vec3_sub(corner[1], corner[0], e[0]);
-    vec3_sub(corner[2], corner[0], e[1]);
-    vec3_cross(e[0], e[1], n);
+    vec3_normal(corner[0], corner[1], corner[2], n);
     const double least = -1e-9 * vec3_dot(n, n);
     for (int k = 0; k < 3; k++) {
-        double side[3], to[3], c[3];
-        vec3_sub(corner[(k + 1) % 3], corner[k], side);
-        vec3_sub(at_m, corner[k], to);
-        vec3_cross(side, to, c);
+        double c[3];
+        vec3_normal(corner[k], corner[(k + 1) % 3], at_m, c);
         if (!(vec3_dot(c, n) >= least)) return 0;
     }
     return 1;
@@ -258,8 +254,9 @@ static void add(const struct work *w, struct batch *b, size_t i, const struct de
     b->range_m[k] = range_m;
 }
 
-static void work_on(struct work *w, int reports)
+static void work_on(void *ctx, int reports)
 {
+    struct work *w = ctx;
     struct batch *b = malloc(sizeof *b);
     const size_t n = w->of->cloud->n;
     size_t first;
@@ -285,12 +282,6 @@ static void work_on(struct work *w, int reports)
     free(b);
 }
 
-static void *helper_main(void *work)
-{
-    work_on(work, 0);
-    return NULL;
-}
-
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err)
 {
@@ -299,13 +290,7 @@ int deviation_along(const struct cloud_compared *compared, const struct deviatio
                      .out = out,
                      .report = report,
                      .every = (compared->cloud->n + DEVIATION_SAMPLE - 1) / DEVIATION_SAMPLE};
-    pthread_t helper[MAX_THREADS];
-    unsigned n = 0;
-    while (n + 1 < compared->site->threads && n < MAX_THREADS && pthread_create(&helper[n], NULL, helper_main, &w) == 0)
-        n++;
-    work_on(&w, 1);
-    while (n > 0)
-        pthread_join(helper[--n], NULL);
+    together(compared->site->threads, work_on, &w);
     if (atomic_load(&w.failed)) return sh_fail(err, SH_ENOMEM, "no memory to follow the beams");
     return sh_check_stop(report, err);
 }

@@ -67,31 +67,6 @@ static void finish(struct figures *f, const struct sums *s)
     f->z_counts = sqrt(mean(s->c2, f->noisy));
 }
 
-/* The value of rank k (from 0), by Hoare's selection; v is reordered. */
-static double select_rank(double *v, size_t n, size_t k)
-{
-    size_t low = 0, high = n - 1;
-    while (low < high) {
-        const double pivot = v[low + (high - low) / 2];
-        size_t i = low, j = high;
-        for (;;) {
-            while (v[i] < pivot)
-                i++;
-            while (v[j] > pivot)
-                j--;
-            if (i >= j) break;
-            const double kept = v[i];
-            v[i++] = v[j];
-            v[j--] = kept;
-        }
-        if (k <= j)
-            high = j;
-        else
-            low = j + 1;
-    }
-    return v[k];
-}
-
 /* As figures_by is given them. */
 struct groups {
     uint32_t n;
@@ -99,8 +74,8 @@ struct groups {
     void *ctx;
 };
 
-/* Distances sorted by group, then the 95th percentile of each. at: [by->n + 1] where each begins. */
-static void find_p95(const struct figures_in *in, const struct groups *by, double *sorted, size_t *at,
+/* Distances by group, then the 95th percentile of each. at: [by->n + 1] where each begins. */
+static void find_p95(const struct figures_in *in, const struct groups *by, double *by_group, size_t *at,
                      struct figures *out)
 {
     size_t sum = 0;
@@ -110,12 +85,12 @@ static void find_p95(const struct figures_in *in, const struct groups *by, doubl
     }
     for (size_t i = 0; i < in->n; i++) {
         if (!isfinite(in->distance_m[i])) continue;
-        const uint32_t g = by->group(by->ctx, i);
-        if (g < by->n) sorted[at[g]++] = in->distance_m[i];
+        const uint32_t g = by->group != NULL ? by->group(by->ctx, i) : 0;
+        if (g < by->n) by_group[at[g]++] = in->distance_m[i];
     }
     for (uint32_t g = 0; g < by->n; g++) {
-        const size_t n = out[g].points - out[g].far, rank = n / 100 * 95 + (n % 100 * 95 + 99) / 100;
-        out[g].p95_m = n > 0 ? select_rank(sorted + at[g] - n, n, rank - 1) : (double)NAN;
+        const size_t n = out[g].points - out[g].far;
+        out[g].p95_m = cloud_percentile(by_group + at[g] - n, n, n, 950);
     }
 }
 
@@ -123,25 +98,25 @@ int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)
                struct figures *out, struct sh_err *err)
 {
     struct sums *sums = calloc((size_t)n_groups + 1, sizeof *sums);
-    double *sorted = malloc((in->n + 1) * sizeof *sorted);
+    double *by_group = malloc((in->n + 1) * sizeof *by_group);
     size_t *at = calloc((size_t)n_groups + 1, sizeof *at);
     int rc = SH_OK;
-    if (sums == NULL || sorted == NULL || at == NULL) {
+    if (sums == NULL || by_group == NULL || at == NULL) {
         rc = sh_fail(err, SH_ENOMEM, "no memory for figures of %zu points", in->n);
         goto done;
     }
     for (uint32_t g = 0; g < n_groups; g++)
         out[g] = (struct figures){.max_m = (double)NAN, .along_max_m = (double)NAN}; /* fmax passes them over */
     for (size_t i = 0; i < in->n; i++) {
-        const uint32_t g = group(ctx, i);
+        const uint32_t g = group != NULL ? group(ctx, i) : 0;
         if (g < n_groups) add_point(in, i, &out[g], &sums[g]);
     }
     for (uint32_t g = 0; g < n_groups; g++)
         finish(&out[g], &sums[g]);
-    find_p95(in, &(struct groups){n_groups, group, ctx}, sorted, at, out);
+    find_p95(in, &(struct groups){n_groups, group, ctx}, by_group, at, out);
 done:
     free(sums);
-    free(sorted);
+    free(by_group);
     free(at);
     return rc;
 }

@@ -2,7 +2,6 @@
 /* How dense points lie: cells of surfaces in a hash table. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/figures.h"
 #include "core/vec3.h"
@@ -49,10 +48,8 @@ static uint64_t key_of(const struct cutter *cut, uint32_t triangle, const double
 {
     const uint32_t *corner = cut->scene->triangle[triangle];
     const double *a = cut->scene->vertex_m[corner[0]];
-    double e1[3], e2[3], n[3];
-    vec3_sub(cut->scene->vertex_m[corner[1]], a, e1);
-    vec3_sub(cut->scene->vertex_m[corner[2]], a, e2);
-    vec3_cross(e1, e2, n);
+    double n[3];
+    vec3_normal(a, cut->scene->vertex_m[corner[1]], cut->scene->vertex_m[corner[2]], n);
     int w = fabs(n[0]) > fabs(n[1]) ? 0 : 1;
     if (fabs(n[2]) > fabs(n[w])) w = 2;
     const int u = (w + 1) % 3, v = (w + 2) % 3;

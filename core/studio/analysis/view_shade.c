@@ -2,7 +2,6 @@
 /* Depths as surfaces, and light on them. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/analysis/view_inside.h"
 

@@ -61,15 +61,6 @@ uint32_t coverage_bits(double value)
     return bits;
 }
 
-/* Twice the area as a vector. */
-static void normal_of(const double corner[3][3], double n[3])
-{
-    double a[3], b[3];
-    vec3_sub(corner[1], corner[0], a);
-    vec3_sub(corner[2], corner[0], b);
-    vec3_cross(a, b, n);
-}
-
 /* The largest component, and its sign: 0..5. */
 static uint32_t side_of(const double n[3])
 {
@@ -190,7 +181,7 @@ static void cut_triangle(struct build *b, uint32_t t)
     double corner[3][3], n[3];
     struct cut cut;
     coverage_corners(c, t, corner);
-    normal_of((const double(*)[3])corner, n);
+    vec3_normal(corner[0], corner[1], corner[2], n);
     const double area_m2 = 0.5 * vec3_length(n);
     if (c->first[t] == NO_CELL) {
         *(is_silent(c, t) ? &c->silent_m2 : &c->twin_m2) += area_m2;
@@ -301,12 +292,10 @@ uint32_t coverage_cell_at(const struct coverage *c, uint32_t triangle, const dou
     struct cut cut;
     uint32_t column, row;
     coverage_corners(c, triangle, corner);
-    normal_of((const double(*)[3])corner, n);
+    vec3_normal(corner[0], corner[1], corner[2], n);
     for (int i = 0; i < 3; i++) {
-        double edge[3], to[3], across[3];
-        vec3_sub(corner[(i + 2) % 3], corner[(i + 1) % 3], edge);
-        vec3_sub(p_m, corner[(i + 1) % 3], to);
-        vec3_cross(edge, to, across);
+        double across[3];
+        vec3_normal(corner[(i + 1) % 3], corner[(i + 2) % 3], p_m, across);
         weight[i] = fmax(vec3_dot(n, across), 0.0);
     }
     cut_set_up((const double(*)[3])corner, c->spec.cell_m, &cut);

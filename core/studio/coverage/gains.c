@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The area that heads at other places would see and that no station has seen. */
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/coverage/inside.h"
+#include "core/together.h"
 #include "core/vec3.h"
 
-enum { MAX_THREADS = 256 };
 static const double LEAST_COSINE = 0.02;
 
 struct gains {
@@ -115,8 +113,9 @@ static struct gain_worker *make_worker(struct gains *g)
     return NULL;
 }
 
-static void work_on(struct gains *g, int reports)
+static void work_on(void *ctx, int reports)
 {
+    struct gains *g = ctx;
     struct gain_worker *w = make_worker(g);
     uint32_t place;
     if (w == NULL) atomic_store(&g->failed, 1);
@@ -125,12 +124,6 @@ static void work_on(struct gains *g, int reports)
         if (reports) sh_progress(g->report, "comparing places", (double)(place + 1) / g->places->n);
     }
     free_worker(w);
-}
-
-static void *helper_main(void *gains)
-{
-    work_on(gains, 0);
-    return NULL;
 }
 
 int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,
@@ -143,14 +136,7 @@ int coverage_gains(const struct coverage *coverage, const struct coverage_direct
                       .places = places,
                       .report = report,
                       .gain = gain};
-    pthread_t helper[MAX_THREADS];
-    unsigned helpers = 0;
-    while (helpers + 1 < coverage->spec.threads && helpers < MAX_THREADS &&
-           pthread_create(&helper[helpers], NULL, helper_main, &g) == 0)
-        helpers++;
-    work_on(&g, 1);
-    while (helpers > 0)
-        pthread_join(helper[--helpers], NULL);
+    together(coverage->spec.threads, work_on, &g);
     int rc = sh_check_stop(report, err);
     if (rc == SH_OK && atomic_load(&g.next) < places->n && atomic_load(&g.failed))
         return sh_fail(err, SH_ENOMEM, "no memory to compare places");

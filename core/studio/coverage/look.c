@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Casting a scan onto the cells, on several threads. Sums of whole numbers and the larger of two do not depend on the
  * order, so results don't depend on how the work is shared out. */
-#include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/studio/coverage/inside.h"
+#include "core/together.h"
 
-enum { BLOCK = 1 << 15, MAX_THREADS = 256, ROOM = BVH_CHUNK * (1 + CAST_MAX_DEPTH) };
+enum { BLOCK = 1 << 15, ROOM = BVH_CHUNK * (1 + CAST_MAX_DEPTH) };
 
 struct look {
     struct coverage *c;
@@ -92,8 +91,9 @@ static void cast_block(struct worker *w, uint64_t block)
     }
 }
 
-static void work_on(struct look *look, int reports)
+static void work_on(void *ctx, int reports)
 {
+    struct look *look = ctx;
     struct sh_err err;
     struct worker *w = malloc(sizeof *w);
     uint64_t block;
@@ -112,28 +112,15 @@ static void work_on(struct look *look, int reports)
     free(w);
 }
 
-static void *helper_main(void *look)
-{
-    work_on(look, 0);
-    return NULL;
-}
-
 int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err)
 {
     const uint64_t fired = scan->segment.end_pulse - scan->segment.k0;
     struct look look = {
         .c = coverage, .scan = scan, .what = what, .report = report, .n_blocks = (fired + BLOCK - 1) / BLOCK};
-    pthread_t helper[MAX_THREADS];
-    unsigned n = 0;
+    const unsigned threads = coverage->spec.threads;
     coverage_drop(coverage);
-    /* With fewer threads than asked for it takes longer; nothing else changes. */
-    while (n + 1 < coverage->spec.threads && n < MAX_THREADS && n + 1 < look.n_blocks &&
-           pthread_create(&helper[n], NULL, helper_main, &look) == 0)
-        n++;
-    work_on(&look, 1);
-    while (n > 0)
-        pthread_join(helper[--n], NULL);
+    together(threads < look.n_blocks ? threads : (unsigned)look.n_blocks, work_on, &look);
     *pulses = (struct coverage_pulses){look.cast, look.met, look.hits, look.front};
     if (atomic_load(&look.next) < look.n_blocks && !sh_stopped(report) && look.failed)
         return sh_fail(err, SH_ENOMEM, "no memory to cast for coverage");

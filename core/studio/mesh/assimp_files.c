@@ -7,47 +7,7 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
-/* Assimp's callbacks carry a char pointer. */
-static struct mesh_file *file_of(struct aiFile *handle)
-{
-    return (struct mesh_file *)(void *)handle->UserData;
-}
-
-static size_t on_write(struct aiFile *handle, const char *data, size_t size, size_t count)
-{
-    return fwrite(data, size, count, file_of(handle)->file);
-}
-
-static size_t on_read(struct aiFile *handle, char *data, size_t size, size_t count)
-{
-    return fread(data, size, count, file_of(handle)->file);
-}
-
-static size_t on_tell(struct aiFile *handle)
-{
-    return (size_t)ftello(file_of(handle)->file);
-}
-
-static size_t on_size(struct aiFile *handle)
-{
-    FILE *file = file_of(handle)->file;
-    const off_t at = ftello(file);
-    fseeko(file, 0, SEEK_END);
-    const off_t end = ftello(file);
-    fseeko(file, at, SEEK_SET);
-    return (size_t)end;
-}
-
-static enum aiReturn on_seek(struct aiFile *handle, size_t offset, enum aiOrigin origin)
-{
-    const int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
-    return fseeko(file_of(handle)->file, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS : aiReturn_FAILURE;
-}
-
-static void on_flush(struct aiFile *handle)
-{
-    fflush(file_of(handle)->file);
-}
+#include "core/import/import_open.h"
 
 static int open_file(struct exporter *e, const char *path)
 {
@@ -67,17 +27,15 @@ struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mo
     if (e->rc != SH_OK || strchr(mode, 'w') == NULL) return NULL;
     e->rc = open_file(e, path);
     if (e->rc != SH_OK) return NULL;
-    struct aiFile *handle = &e->handle[e->n_files];
-    *handle = (struct aiFile){on_read, on_write, on_tell, on_size, on_seek, on_flush, NULL};
-    handle->UserData = (char *)(void *)e->file[e->n_files++];
-    return handle;
+    e->handle[e->n_files] = import_open_stream(e->file[e->n_files]->file);
+    return &e->handle[e->n_files++];
 }
 
 /* What is written is kept or dropped at the end. */
 void assimp_close(struct aiFileIO *io, struct aiFile *handle)
 {
     (void)io;
-    fflush(file_of(handle)->file);
+    handle->FlushProc(handle);
 }
 
 /* Finds writes that failed: Assimp itself does not check them, or gives no reason. */

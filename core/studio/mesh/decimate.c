@@ -171,22 +171,16 @@ static double pass(struct work *w, double cell_m, struct sh_err *err)
 static void measure(struct work *w)
 {
     const struct decimate_mesh *m = w->mesh;
-    double high_m[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int i = 0; i < 3; i++)
-        w->low_m[i] = INFINITY;
+    double high_m[3];
+    vec3_bound_nothing(w->low_m, high_m);
     for (uint32_t t = 0; t < m->n_triangles; t++) {
         const double *corner[3];
-        double e[2][3], n[3];
+        double n[3];
         for (int k = 0; k < 3; k++) {
             corner[k] = m->vertex_m[m->triangle[t][k]];
-            for (int i = 0; i < 3; i++) {
-                if (corner[k][i] < w->low_m[i]) w->low_m[i] = corner[k][i];
-                if (corner[k][i] > high_m[i]) high_m[i] = corner[k][i];
-            }
+            vec3_bound(w->low_m, high_m, corner[k]);
         }
-        vec3_sub(corner[1], corner[0], e[0]);
-        vec3_sub(corner[2], corner[0], e[1]);
-        vec3_cross(e[0], e[1], n);
+        vec3_normal(corner[0], corner[1], corner[2], n);
         w->area_m2 += 0.5 * vec3_length(n);
     }
     for (int i = 0; i < 3; i++)

@@ -6,16 +6,7 @@
 
 #include "core/rng.h"
 #include "core/studio/scan_mesh.h"
-
-/* Twice the area, along the normal. */
-static void cross_of(const double (*xyz_m)[3], const uint32_t face[3], double n[3])
-{
-    const double *a = xyz_m[face[0]], *b = xyz_m[face[1]], *c = xyz_m[face[2]];
-    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    n[0] = u[1] * v[2] - u[2] * v[1];
-    n[1] = u[2] * v[0] - u[0] * v[2];
-    n[2] = u[0] * v[1] - u[1] * v[0];
-}
+#include "core/vec3.h"
 
 void scan_normals(const double (*xyz_m)[3], uint32_t n_points, const uint32_t (*face)[3], uint32_t n_faces,
                   float (*normal)[3])
@@ -23,7 +14,7 @@ void scan_normals(const double (*xyz_m)[3], uint32_t n_points, const uint32_t (*
     memset(normal, 0, (size_t)n_points * sizeof *normal);
     for (uint32_t i = 0; i < n_faces; i++) {
         double n[3];
-        cross_of(xyz_m, face[i], n);
+        vec3_normal(xyz_m[face[i][0]], xyz_m[face[i][1]], xyz_m[face[i][2]], n);
         for (int corner = 0; corner < 3; corner++)
             for (int k = 0; k < 3; k++)
                 normal[face[i][corner]][k] += (float)n[k];
@@ -66,7 +57,7 @@ int scan_sampler_start(struct scan_sampler *s, const double (*xyz_m)[3], const u
     if (s->sum_m2 == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the areas of %u triangles", n_faces);
     for (uint32_t i = 0; i < n_faces; i++) {
         double n[3];
-        cross_of(xyz_m, face[i], n);
+        vec3_normal(xyz_m[face[i][0]], xyz_m[face[i][1]], xyz_m[face[i][2]], n);
         s->area_m2 += 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         s->sum_m2[i] = s->area_m2;
     }

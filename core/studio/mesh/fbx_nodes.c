@@ -8,6 +8,7 @@
  * the same bytes. */
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/studio/mesh/inside.h"
 
 enum {
@@ -31,20 +32,6 @@ struct node {
     uint8_t name_len;
 };
 
-static uint64_t get64(const uint8_t *p)
-{
-    uint64_t v = 0;
-    for (int i = 7; i >= 0; i--)
-        v = v << 8 | p[i];
-    return v;
-}
-
-static void put64(uint8_t *p, uint64_t v)
-{
-    for (int i = 0; i < 8; i++)
-        p[i] = (uint8_t)(v >> (8 * i));
-}
-
 static int fail(const struct nodes *n, uint64_t at, struct sh_err *err)
 {
     return sh_fail(err, SH_EIO, "%s: byte %llu of what Assimp exported is not FBX as known here (version 7500)",
@@ -57,8 +44,8 @@ static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct no
     if (at > end || end - at < NODE_LEN) return fail(n, at, err);
     const uint8_t *p = n->raw + at;
     node->at = at;
-    node->end = get64(p);
-    const uint64_t bytes = get64(p + 16);
+    node->end = le_get64(p);
+    const uint64_t bytes = le_get64(p + 16);
     node->name_len = p[24];
     node->name = p + NODE_LEN;
     if (node->end == 0) return 0;
@@ -121,7 +108,7 @@ static int put_node(struct nodes *n, const struct node *node, int is_time, int d
     const int64_t len = length_of(n, node, depth, err);
     if (len < 0) return (int)len;
     memcpy(head, n->raw + node->at, NODE_LEN);
-    put64(head, n->out + (uint64_t)len);
+    le_put64(head, n->out + (uint64_t)len);
     const uint64_t properties = node->inside - node->at - NODE_LEN - node->name_len;
     int rc = put(n, head, NODE_LEN, err);
     if (rc == SH_OK) rc = put(n, node->name, node->name_len, err);
@@ -153,7 +140,7 @@ int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct
     struct nodes n = {.raw = raw, .n_raw = n_raw, .to = to};
     uint64_t at = HEAD_LEN;
     if (n_raw < HEAD_LEN || memcmp(raw, "Kaydara FBX Binary  ", 21) != 0 ||
-        (get64(raw + HEAD_LEN - 8) >> 32) < VERSION_LEAST)
+        (le_get64(raw + HEAD_LEN - 8) >> 32) < VERSION_LEAST)
         return fail(&n, 0, err);
     int rc = put(&n, raw, HEAD_LEN, err);
     while (rc == SH_OK) {

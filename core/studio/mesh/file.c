@@ -178,11 +178,10 @@ int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err)
 
 static int put_image(struct mesh_output *out, const struct mesh_part *part, struct sh_err *err)
 {
-    const char *slash = strrchr(out->path, '/');
     struct mesh_file *file;
     struct sh_err why = {0};
     char *path;
-    if (asprintf(&path, "%.*s%s", slash != NULL ? (int)(slash + 1 - out->path) : 0, out->path, part->texture) < 0)
+    if (asprintf(&path, "%.*s%s", (int)(basename(out->path) - out->path), out->path, part->texture) < 0)
         return sh_fail(err, SH_ENOMEM, "%s: no memory to write its texture", out->path);
     int rc = mesh_output_open(out, path, &file, err);
     free(path);
@@ -233,7 +232,7 @@ size_t mesh_put_number(char *to, double v)
 
 const char *mesh_stem(const char *path, size_t *len)
 {
-    const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path, *dot = strrchr(name, '.');
+    const char *name = basename(path), *dot = strrchr(name, '.');
     *len = dot != NULL && dot != name ? (size_t)(dot - name) : strlen(name);
     return name;
 }

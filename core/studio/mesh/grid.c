@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/studio/scan_mesh.h"
+#include "core/vec3.h"
 
 /* Marks of a point: edges that triangles use. */
 enum { TO_NEXT_ROW = 1, TO_NEXT_COLUMN = 2, TO_POLE_BEFORE = 4 };
@@ -43,21 +45,13 @@ static double distance2(const struct scan_grid *g, uint32_t p, uint32_t q)
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-static void normal_of(const double *a, const double *b, const double *c, double n[3])
-{
-    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    n[0] = u[1] * v[2] - u[2] * v[1];
-    n[1] = u[2] * v[0] - u[0] * v[2];
-    n[2] = u[0] * v[1] - u[1] * v[0];
-}
-
 /* Edges count also where the triangle is left out since it faces nowhere. */
 static void put_triangle(struct build *b, uint32_t p, uint32_t q, uint32_t r)
 {
     const struct scan_grid *g = b->grid;
     const double *a = g->xyz_m[p];
     double n[3], facing = 0;
-    normal_of(a, g->xyz_m[q], g->xyz_m[r], n);
+    vec3_normal(a, g->xyz_m[q], g->xyz_m[r], n);
     for (int k = 0; k < 3; k++)
         facing += n[k] * (g->to_head_m != NULL ? (double)g->to_head_m[p][k] : g->head_m[k] - a[k]);
     if (facing == 0) {
@@ -240,8 +234,7 @@ int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, cons
     if (rc == SH_OK && faces->n_edges > 0) faces->mean_edge_m = b.sum_m / (double)faces->n_edges;
     if (rc == SH_OK && grid->long_edge > 0) filter(grid, faces);
     free(b.mark);
-    void *less = faces->n_faces > 0 ? realloc(faces->face, faces->n_faces * sizeof *faces->face) : NULL;
-    if (less != NULL) faces->face = less;
+    if (faces->n_faces > 0) resize(&faces->face, faces->n_faces, sizeof *faces->face); /* gives back what is too much */
     return rc;
 }
 

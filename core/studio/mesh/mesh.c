@@ -6,6 +6,7 @@
 #include <strings.h>
 
 #include "core/studio/mesh/inside.h"
+#include "core/vec3.h"
 
 static const struct mesh_format formats[] = {
     {.ending = ".ply", .takes_points = 1, .write = mesh_write_ply},
@@ -66,16 +67,14 @@ int mesh_check_box(const char *path, const double low[3], const double high[3], 
 
 static int check_vertices(const char *path, const struct mesh *mesh, struct sh_err *err)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double low[3], high[3];
+    vec3_bound_nothing(low, high);
     for (uint32_t i = 0; i < mesh->n_vertices; i++) {
         const double *v = mesh->xyz_m[i];
         if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]))
             return sh_fail(err, SH_EINPUT, "%s: vertex %u of %u is not finite: %g %g %g", path, i + 1, mesh->n_vertices,
                            v[0], v[1], v[2]);
-        for (int k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], v[k]);
-            high[k] = fmax(high[k], v[k]);
-        }
+        vec3_bound(low, high, v);
         if (mesh->normal != NULL && !(isfinite(mesh->normal[i][0] + mesh->normal[i][1] + mesh->normal[i][2])))
             return sh_fail(err, SH_EINPUT, "%s: the normal of vertex %u is not finite", path, i + 1);
         if (mesh->uv != NULL && !isfinite(mesh->uv[i][0] + mesh->uv[i][1]))

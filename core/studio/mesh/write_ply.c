@@ -84,8 +84,7 @@ static void put_whole(struct row *r, uint32_t v, size_t size)
     if (r->ascii)
         put_text(r, text, (size_t)snprintf(text, sizeof text, "%u", v));
     else
-        for (size_t i = 0; i < size; i++)
-            r->byte[r->n++] = (uint8_t)(v >> (8 * i));
+        put_bytes(r, &v, size);
 }
 
 static void put_scalar(struct row *r, const struct mesh_scalar *s, uint32_t i)

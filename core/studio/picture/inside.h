@@ -3,8 +3,7 @@
 #ifndef CORE_STUDIO_PICTURE_INSIDE_H
 #define CORE_STUDIO_PICTURE_INSIDE_H
 
-#include <stdio.h>
-
+#include "core/newfile.h"
 #include "core/studio/picture.h"
 
 /* Strokes of a character, in units of 1/28 of a capital's height, y up from the baseline; NULL: there are none.
@@ -16,10 +15,8 @@ const char *glyph_strokes(uint32_t code);
  * accent that begins with _ has the same height on a capital. */
 uint32_t glyph_base(uint32_t code, const char **accent);
 
-/* The rest of a file after the stream was made; writes nothing to what is not its own. */
-typedef int picture_encoder(const void *what, FILE *file, struct sh_err *why);
-int picture_write_file(picture_encoder *encode, const void *source, const char *what, const char *path,
-                       struct sh_err *err);
+/* newfile_write; what: the name of the picture in messages. */
+int picture_write_file(newfile_put *encode, const void *source, const char *what, const char *path, struct sh_err *err);
 
 /* A struct picture_part as a PNG. */
 int picture_encode_png(const void *part, FILE *file, struct sh_err *why);

@@ -2,11 +2,8 @@
 /* An image as a PNG, and files that appear whole. */
 #include <errno.h>
 #include <png.h>
-#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-#include "core/newfile.h"
 #include "core/studio/picture/inside.h"
 
 /* libpng reports by a callback that must not return. */
@@ -54,29 +51,10 @@ int picture_encode_png(const void *part, FILE *file, struct sh_err *why)
     return rc;
 }
 
-/* fd is taken in any case. */
-static int write_part(picture_encoder *encoder, const void *source, const char *path, const char *part, int fd,
-                      struct sh_err *err)
+int picture_write_file(newfile_put *encoder, const void *source, const char *what, const char *path, struct sh_err *err)
 {
     struct sh_err why = {0};
-    FILE *file = fdopen(dup(fd), "wb");
-    int rc = file != NULL ? encoder(source, file, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
-    if (file != NULL && fclose(file) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
-    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
-    newfile_drop(part, fd);
-    return sh_fail(err, rc, "%s: cannot be written: %s", path, why.text);
-}
-
-int picture_write_file(picture_encoder *encoder, const void *source, const char *what, const char *path,
-                       struct sh_err *err)
-{
-    struct sh_err why = {0};
-    char *part;
-    int fd;
-    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s %s: no memory", what, path);
-    int rc = newfile_part(path, part, &fd, &why);
-    if (rc == SH_OK) rc = write_part(encoder, source, path, part, fd, &why);
-    free(part);
+    const int rc = newfile_write(path, encoder, source, &why);
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s %s", what, why.text);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* SVG 1.1: a text that grows in memory, written at the end. Numbers don't depend on the locale. */
 #include <math.h>
+#include <nettle/base64.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/studio/picture/inside.h"
 
@@ -176,21 +176,6 @@ struct pen svg_pen(struct svg *svg)
 
 /* ---- images and the file */
 
-/* RFC 4648. */
-static void put_base64(FILE *out, const char *bytes, size_t n)
-{
-    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    const unsigned char *p = (const unsigned char *)bytes;
-    for (size_t i = 0; i < n; i += 3) {
-        const size_t left = n - i;
-        const uint32_t v = (uint32_t)p[i] << 16 | (left > 1 ? (uint32_t)p[i + 1] << 8 : 0) | (left > 2 ? p[i + 2] : 0);
-        fputc(digit[v >> 18], out);
-        fputc(digit[v >> 12 & 63], out);
-        fputc(left > 1 ? digit[v >> 6 & 63] : '=', out);
-        fputc(left > 2 ? digit[v & 63] : '=', out);
-    }
-}
-
 static int put_uri(FILE *out, const struct picture_part *part, struct sh_err *err)
 {
     char *bytes = NULL;
@@ -199,10 +184,15 @@ static int put_uri(FILE *out, const struct picture_part *part, struct sh_err *er
     if (file == NULL) return sh_fail(err, SH_ENOMEM, "no memory for an image");
     int rc = picture_encode_png(part, file, err);
     if (fclose(file) != 0 && rc == SH_OK) rc = sh_fail(err, SH_ENOMEM, "no memory for an image");
+    const size_t len = BASE64_ENCODE_RAW_LENGTH(n);
+    char *text = rc == SH_OK ? malloc(len) : NULL;
+    if (rc == SH_OK && text == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for an image");
     if (rc == SH_OK) {
+        base64_encode_raw(text, n, (const uint8_t *)bytes);
         fputs("data:image/png;base64,", out);
-        put_base64(out, bytes, n);
+        fwrite(text, 1, len, out);
     }
+    free(text);
     free(bytes);
     return rc;
 }

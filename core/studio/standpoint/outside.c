@@ -2,7 +2,6 @@
 /* Places around the scene, from which it is looked at. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/angle.h"
 #include "core/studio/standpoint/survey.h"
@@ -111,11 +110,9 @@ static uint32_t cell_of(const struct survey *s, const struct cells *c, const dou
 static void fill(const struct survey *s, struct cells *c)
 {
     for (uint32_t i = 0; i < s->scene->n_all; i++) {
-        double corner[3][3], u[3], v[3], n[3];
+        double corner[3][3], n[3];
         scene_corners(s->scene, i, corner);
-        vec3_sub(corner[1], corner[0], u);
-        vec3_sub(corner[2], corner[0], v);
-        vec3_cross(u, v, n);
+        vec3_normal(corner[0], corner[1], corner[2], n);
         c->area_m2[cell_of(s, c, (const double(*)[3])corner)] += 0.5 * vec3_length(n);
     }
 }
@@ -139,16 +136,14 @@ static uint32_t find_fullest(const struct cells *c)
 /* From here on the survey has the bounds of the surface in that cell. */
 static void narrow(struct survey *s, const struct cells *c, uint32_t cell)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double low[3], high[3];
+    vec3_bound_nothing(low, high);
     for (uint32_t i = 0; i < s->scene->n_all; i++) {
         double corner[3][3];
         scene_corners(s->scene, i, corner);
         if (cell_of(s, c, (const double(*)[3])corner) != cell) continue;
         for (int v = 0; v < 3; v++)
-            for (int k = 0; k < 3; k++) {
-                low[k] = fmin(low[k], corner[v][k]);
-                high[k] = fmax(high[k], corner[v][k]);
-            }
+            vec3_bound(low, high, corner[v]);
     }
     vec3_sub(high, low, s->size_m);
     for (int k = 0; k < 3; k++)

@@ -2,7 +2,6 @@
 /* Places on a grid where a tripod can stand. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/grow.h"
 #include "core/studio/standpoint/survey.h"

@@ -31,6 +31,11 @@ const PAGE = [
   ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
 ];
 
+// Of these rows any count but 0 is bad: their names among a head's figures.
+const LOSSES = {'lost-frames': 'lost_frames', 'repeated': 'repeated_frames', 'late-frames': 'late_frames',
+  'restarts': 'jumps_back', 'lost-pulses': 'left_out_pulses', 'dropped': 'dropped_pulses',
+  'unplaced': 'unplaced_pulses', 'bad': 'bad_bytes'};
+
 const SPARK_POINTS = 120; // seconds
 
 const number = (value) => (value === null || value === undefined ? NaN : Number(value));
@@ -126,25 +131,13 @@ export class Figures {
       Object.assign(this.#texts, {received: short(rate('points')), bytes: short(rate('bytes'), 'B')});
     }
     Object.assign(this.#texts, {
-      'lost-frames': grouped(number(f.lost_frames)),
-      'repeated': grouped(number(f.repeated_frames)),
-      'late-frames': grouped(number(f.late_frames)),
-      'restarts': grouped(number(f.jumps_back)),
-      'lost-pulses': grouped(number(f.left_out_pulses)),
-      'dropped': grouped(number(f.dropped_pulses)),
-      'unplaced': grouped(number(f.unplaced_pulses)),
       'past': pastText(f),
-      'bad': grouped(number(f.bad_bytes)),
       'decode': number(f.decode_ns_per_point) > 0 ? duration(number(f.decode_ns_per_point) / 1e9) : NONE,
     });
-    mark('lost-frames', number(f.lost_frames) > 0);
-    mark('repeated', number(f.repeated_frames) > 0);
-    mark('late-frames', number(f.late_frames) > 0);
-    mark('restarts', number(f.jumps_back) > 0);
-    mark('lost-pulses', number(f.left_out_pulses) > 0);
-    mark('dropped', number(f.dropped_pulses) > 0);
-    mark('unplaced', number(f.unplaced_pulses) > 0);
-    mark('bad', number(f.bad_bytes) > 0);
+    for (const [key, name] of Object.entries(LOSSES)) {
+      this.#texts[key] = grouped(number(f[name]));
+      mark(key, number(f[name]) > 0);
+    }
   }
 
   drawn({frames_per_s: rate, points}) {

@@ -53,24 +53,26 @@ export class Quality {
   }
 
   show(q) {
-    const d = q.deviation_m ?? {}, density = q.points ? q.density_per_m2 ?? {} : {};
+    const d = q.all ?? {}, density = d.density ?? {}, along = d.along_beam ?? {}, verdict = q.verdict ?? {};
+    const bound = verdict.judged > 0 && verdict.bound_m > 0 ? verdict.bound_m : null;
+    const isBeyond = verdict.judgement === 'beyond';
     say(this.#aside, q.scan ? `scan ${q.scan}${q.station ? `, station ${q.station}` : ''}` : '');
     this.#set({
       'sampled': q.points ? `${short(q.sampled_points)} of ${short(q.points)}` : NONE,
       'empty': percent(q.empty_share),
-      'density': perSquare(density.p50),
-      'density-range': Number.isFinite(density.p5) ? `${count(density.p5)} to ${count(density.p95)}` : NONE,
+      'density': perSquare(density.p50_m2),
+      'density-range': Number.isFinite(density.p5_m2) ? `${count(density.p5_m2)} to ${count(density.p95_m2)}` : NONE,
     }, {
-      'dev-mean': metres(d.mean), 'dev-rms': metres(d.rms), 'dev-p95': metres(d.p95), 'dev-max': metres(d.max),
-      'dev-bound': metres(d.bound), 'dev-sigma': metres(d.sigma_expected),
-      'dev-far': d.far === undefined ? NONE : short(d.far), 'dev-along': metres(d.along_beam?.judged_rms),
+      'dev-mean': metres(d.mean_m), 'dev-rms': metres(d.rms_m), 'dev-p95': metres(d.p95_m), 'dev-max': metres(d.max_m),
+      'dev-bound': metres(bound), 'dev-sigma': along.noisy > 0 ? metres(along.expected_rms_m) : NONE,
+      'dev-far': d.far === undefined ? NONE : short(d.far), 'dev-along': metres(along.judged_rms_m),
     });
-    byId('figure-dev-max').classList.toggle('bad', Number.isFinite(d.bound) && d.max > d.bound && q.verdict?.judgement === 'beyond');
-    this.#histogram(d);
-    const verdict = q.verdict?.text ?? '';
-    say(this.#verdict, verdict.split(/(?<=\.) /)[0]);
-    this.#verdict.title = verdict;
-    this.#verdict.classList.toggle('refusal', q.verdict?.judgement === 'beyond');
+    byId('figure-dev-max').classList.toggle('bad', bound && d.max_m > bound && isBeyond);
+    this.#histogram(q.along_beam ?? q.distances, q.along_beam ? ' along the beam' : '', bound);
+    const words = verdict.text ?? '';
+    say(this.#verdict, words.split(/(?<=\.) /)[0]);
+    this.#verdict.title = words;
+    this.#verdict.classList.toggle('refusal', isBeyond);
     this.#cover(q.coverage);
   }
 
@@ -79,29 +81,29 @@ export class Quality {
     say(this.#coverage, c ? `${percent(c.share)} seen, of ${short(c.cells)} cells of ${metres(c.cell_m)}` : NONE);
   }
 
-  #histogram({histogram: h, bound}) {
+  #histogram(h, along, bound) {
     const parts = [];
     const text = (x, anchor, words) => makeSvg('text', {x, y: HEIGHT - 4, 'text-anchor': anchor}, words);
-    const sum = h?.counts?.reduce((a, b) => a + b, 0) ?? 0;
+    const sum = h?.counts.reduce((a, b) => a + b, 0) ?? 0;
+    const to_m = sum > 0 ? h.from_m + h.width_m * h.counts.length : 0;
     if (sum > 0) {
       const most = Math.max(...h.counts), wide = WIDTH / h.counts.length;
-      const x = (m) => ((m - h.from_m) / (h.to_m - h.from_m)) * WIDTH;
+      const x = (m) => ((m - h.from_m) / (to_m - h.from_m)) * WIDTH;
       h.counts.forEach((n, i) => n > 0 && parts.push(makeSvg('rect', {class: 'count', x: i * wide + 0.25,
         width: Math.max(0.5, wide - 0.5), y: BASE - (n / most) * (BASE - 6), height: (n / most) * (BASE - 6)})));
-      for (const at of Number.isFinite(bound) ? [-bound, bound] : []) {
+      for (const at of bound ? [-bound, bound] : []) {
         if (x(at) > 0 && x(at) < WIDTH) parts.push(makeSvg('line', {class: 'bound', x1: x(at), x2: x(at), y1: 2, y2: BASE}));
       }
       if (x(0) > 40 && x(0) < WIDTH - 40) parts.push(text(x(0), 'middle', '0'));
-      parts.push(text(0, 'start', metres(h.from_m)), text(WIDTH, 'end', metres(h.to_m)));
+      parts.push(text(0, 'start', metres(h.from_m)), text(WIDTH, 'end', metres(to_m)));
     } else {
       parts.push(makeSvg('text', {x: WIDTH / 2, y: BASE / 2 + 4, 'text-anchor': 'middle'}, 'No points yet'));
     }
     parts.push(makeSvg('line', {class: 'axis', x1: 0, x2: WIDTH, y1: BASE + 0.5, y2: BASE + 0.5}));
     this.#svg.replaceChildren(...parts);
-    const along = h?.of === 'along_beam' ? ' along the beam' : '';
     this.#svg.setAttribute('aria-label', sum > 0
-      ? `Histogram of the deviation${along}, ${metres(h.from_m)} to ${metres(h.to_m)}, ${grouped(sum)} points, `
-        + `${grouped(h.below ?? 0)} below, ${grouped(h.above ?? 0)} above` : 'Histogram of the deviation: no points yet');
+      ? `Histogram of the deviation${along}, ${metres(h.from_m)} to ${metres(to_m)}, ${grouped(sum)} points, `
+        + `${grouped(h.below)} below, ${grouped(h.above)} above` : 'Histogram of the deviation: no points yet');
   }
 }
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead run: serves the head on its links. */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -309,7 +309,6 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
 
 const char *cfg_dir_of(const char *path, char *buf)
 {
-    const char *slash = strrchr(path, '/');
-    snprintf(buf, CONFIG_PATH_LEN, "%.*s", slash == NULL ? 0 : (int)(slash - path) + 1, path);
+    snprintf(buf, CONFIG_PATH_LEN, "%.*s", (int)(basename(path) - path), path);
     return buf;
 }

@@ -13,7 +13,6 @@
 #include "firmware_sim/config/table/yaml.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 struct walk {

@@ -7,111 +7,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/infile.h"
 #include "core/newfile.h"
 #include "firmware_sim/app/app.h"
-
-void batch_entry_free(struct batch_entry *entry)
-{
-    free(entry->file);
-    *entry = (struct batch_entry){0};
-}
-
-/* ---- a line, as batch_manifest_add writes it: the same members in the same order, texts without escapes */
-
-static int take_literal(const char **p, const char *literal)
-{
-    const size_t n = strlen(literal);
-    if (strncmp(*p, literal, n) != 0) return 0;
-    *p += n;
-    return 1;
-}
-
-static int take_key(const char **p, const char *key)
-{
-    return take_literal(p, "\"") && take_literal(p, key) && take_literal(p, "\":");
-}
-
-static int take_uint(const char **p, const char *key, uint64_t *value)
-{
-    char *end;
-    if (!take_key(p, key) || **p < '0' || **p > '9') return 0;
-    errno = 0;
-    *value = strtoull(*p, &end, 10);
-    *p = end;
-    return errno == 0;
-}
-
-static int take_text(const char **p, const char *key, char *buf, size_t len)
-{
-    if (!take_key(p, key) || !take_literal(p, "\"")) return 0;
-    const char *end = strchr(*p, '"');
-    if (end == NULL || (size_t)(end - *p) >= len || memchr(*p, '\\', (size_t)(end - *p)) != NULL) return 0;
-    memcpy(buf, *p, (size_t)(end - *p));
-    buf[end - *p] = '\0';
-    *p = end + 1;
-    return 1;
-}
-
-static int take_made(const char **p, struct batch_made *made)
-{
-    return take_key(p, "made_with") && take_literal(p, "{") &&
-           take_text(p, "program", made->program, sizeof made->program) && take_literal(p, ",") &&
-           take_text(p, "engine", made->engine, sizeof made->engine) && take_literal(p, ",") &&
-           take_text(p, "configuration_sha256", made->configuration, BATCH_SHA_LEN) && take_literal(p, ",") &&
-           take_text(p, "inputs_sha256", made->inputs, BATCH_SHA_LEN) && take_literal(p, ",") &&
-           take_text(p, "job_sha256", made->job, BATCH_SHA_LEN) && take_literal(p, "},");
-}
-
-/* A name in the folder, and in no other. */
-static int take_file(const char **p, struct batch_file *file)
-{
-    return take_literal(p, "{") && take_text(p, "name", file->name, sizeof file->name) && take_literal(p, ",") &&
-           take_uint(p, "bytes", &file->bytes) && take_literal(p, ",") &&
-           take_text(p, "sha256", file->sha, BATCH_SHA_LEN) && take_literal(p, "}") && strchr(file->name, '/') == NULL;
-}
-
-static int take_files(const char **p, struct batch_entry *entry)
-{
-    if (!take_key(p, "files") || !take_literal(p, "[")) return 0;
-    do {
-        struct batch_file *more = realloc(entry->file, (entry->n_files + 1) * sizeof *more);
-        if (more == NULL) return 0;
-        entry->file = more;
-        if (!take_file(p, &more[entry->n_files])) return 0;
-        entry->n_files++;
-    } while (take_literal(p, ","));
-    return take_literal(p, "]");
-}
-
-static int take_seconds(const char **p, double *seconds)
-{
-    char *end;
-    if (!take_key(p, "seconds")) return 0;
-    *seconds = strtod(*p, &end);
-    const int some = end != *p;
-    *p = end;
-    return some;
-}
-
-int batch_entry_read(const char *p, struct batch_entry *entry)
-{
-    uint64_t job = 0;
-    *entry = (struct batch_entry){0};
-    if (take_literal(&p, "{") && take_uint(&p, "job", &job) && take_literal(&p, ",") && take_made(&p, &entry->made) &&
-        take_uint(&p, "pulses", &entry->pulses) && take_literal(&p, ",") && take_uint(&p, "points", &entry->points) &&
-        take_literal(&p, ",") && take_text(&p, "stream_sha256", entry->stream_sha, BATCH_SHA_LEN) &&
-        take_literal(&p, ",") && take_seconds(&p, &entry->seconds) && take_literal(&p, ",") && take_files(&p, entry) &&
-        take_literal(&p, "}") && *p == '\0' && job > 0 && job <= BATCH_MAX_JOBS) {
-        entry->job = (uint32_t)job;
-        return 1;
-    }
-    batch_entry_free(entry);
-    return 0;
-}
 
 /* ---- all manifests of a folder */
 

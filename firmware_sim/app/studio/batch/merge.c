@@ -6,11 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "core/newfile.h"
 #include "firmware_sim/app/studio/batch/batch.h"
-#include "firmware_sim/base/clock.h"
 
 enum { MOST_LINES = 20 };
 
@@ -59,13 +57,10 @@ static int check_engines(const struct batch *b, struct sh_err *err)
 
 static int check_jobs(struct batch *b, struct gaps *gaps, struct sh_err *err)
 {
-    int64_t next_ns = clock_now_ns() + 1000000000;
     for (uint32_t i = 0; i < b->n_jobs; i++) {
         int rc = check_job(b, i, gaps, err);
         if (rc != SH_OK) return rc;
-        if (b->quiet || clock_now_ns() < next_ns) continue;
-        next_ns = clock_now_ns() + 1000000000;
-        sh_progress(&app_report_stderr, "checking files", (double)i / b->n_jobs);
+        if (!b->quiet) sh_progress(&app_report_seconds, "checking files", (double)i / b->n_jobs);
     }
     return SH_OK;
 }
@@ -125,11 +120,10 @@ static void put_job(struct json *json, const struct batch *b, uint32_t i)
 static void put_all(struct json *json, const struct batch *b)
 {
     const struct batch_made *made = &b->job[0].entry.made;
-    const char *slash = strrchr(b->in.operand[0], '/');
     json_open_object(json, NULL);
     json_string(json, "program", made->program);
     json_string(json, "engine", made->engine);
-    json_string(json, "configuration", slash != NULL ? slash + 1 : b->in.operand[0]);
+    json_string(json, "configuration", basename(b->in.operand[0]));
     json_string(json, "configuration_sha256", made->configuration);
     json_open_array(json, "set");
     for (int i = 0; i < b->in.sets.n; i++)
@@ -146,29 +140,19 @@ static void put_all(struct json *json, const struct batch *b)
     json_close_object(json);
 }
 
+static int put_whole(const void *batch, FILE *out, struct sh_err *err)
+{
+    struct json json;
+    json_begin(&json, out);
+    put_all(&json, batch);
+    return json_end(&json, err);
+}
+
 static int write_whole(const struct batch *b, struct sh_err *err)
 {
-    char path[PATH_MAX], part[PATH_MAX];
-    struct json json;
-    int fd;
+    char path[PATH_MAX];
     snprintf(path, sizeof path, "%s/manifest.json", b->dir);
-    snprintf(part, sizeof part, "%s/manifest.json.part", b->dir);
-    int rc = newfile_part(path, part, &fd, err);
-    if (rc != SH_OK) return rc;
-    const int copy = dup(fd);
-    FILE *out = copy >= 0 ? fdopen(copy, "w") : NULL;
-    if (out == NULL) {
-        if (copy >= 0) close(copy);
-        newfile_drop(part, fd);
-        return sh_fail(err, SH_EIO, "%s: cannot be written", path);
-    }
-    json_begin(&json, out);
-    put_all(&json, b);
-    rc = json_end(&json, err);
-    if (fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: cannot be written", path);
-    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
-    newfile_drop(part, fd);
-    return rc;
+    return newfile_write(path, put_whole, b, err);
 }
 
 static int check_folder(const struct batch *b, struct sh_err *err)

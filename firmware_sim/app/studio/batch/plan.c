@@ -202,7 +202,6 @@ static int plan_combination(struct batch *b, uint32_t combination)
 int batch_plan(struct batch *b)
 {
     struct sh_err err = {0};
-    int64_t next_ns = clock_now_ns() + 1000000000;
     if (batch_sweeps_count(&b->sweeps, &b->n_combinations, &err) != SH_OK) return app_fail(&err);
     b->made = calloc(b->n_combinations, sizeof *b->made);
     if (b->made == NULL) return app_fail(&(struct sh_err){SH_ENOMEM, "no memory for the combinations"});
@@ -211,9 +210,7 @@ int batch_plan(struct batch *b)
         const int status = plan_combination(b, i);
         if (status != APP_OK) return status;
         if (sh_check_stop(&app_report_stderr, &err) != SH_OK) return app_fail(&err);
-        if (b->quiet || clock_now_ns() < next_ns) continue;
-        next_ns = clock_now_ns() + 1000000000;
-        sh_progress(&app_report_stderr, "checking the configurations", (double)i / b->n_combinations);
+        if (!b->quiet) sh_progress(&app_report_seconds, "checking the configurations", (double)i / b->n_combinations);
     }
     b->digits = 4;
     for (uint32_t n = b->n_jobs; n >= 10000; n /= 10)

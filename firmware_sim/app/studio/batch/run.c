@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/grow.h"
 #include "firmware_sim/app/beside.h"
 #include "firmware_sim/app/studio/batch/load.h"
 #include "firmware_sim/base/clock.h"
@@ -37,10 +38,9 @@ static int add_file(struct listing *l, const char *path)
     struct batch_entry *entry = l->entry;
     for (uint32_t i = 0; i < entry->n_files; i++)
         if (strcmp(entry->file[i].name, name) == 0) return SH_OK;
-    struct batch_file *more = realloc(entry->file, (entry->n_files + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(l->err, SH_ENOMEM, "no memory for a job's files");
-    entry->file = more;
-    struct batch_file *file = &more[entry->n_files++];
+    if (!resize(&entry->file, entry->n_files + (size_t)1, sizeof *entry->file))
+        return sh_fail(l->err, SH_ENOMEM, "no memory for a job's files");
+    struct batch_file *file = &entry->file[entry->n_files++];
     snprintf(file->name, sizeof file->name, "%s", name);
     return batch_sha_file(path, file->sha, &file->bytes, NULL, l->err);
 }
@@ -142,10 +142,9 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
 {
     struct stat folder, here;
     for (size_t i = 0; i < b->cache.n; i++) {
-        const char *path = b->cache.known[i].path, *slash = strrchr(path, '/'),
-                   *file = slash != NULL ? slash + 1 : path;
+        const char *path = b->cache.known[i].path, *file = basename(path);
         char dir[PATH_MAX] = ".", name[BATCH_NAME_LEN];
-        if (slash != NULL) snprintf(dir, sizeof dir, "%.*s", (int)(slash + 1 - path), path);
+        if (file != path) snprintf(dir, sizeof dir, "%.*s", (int)(file - path), path);
         const unsigned long job = strtoul(file, NULL, 10);
         if (job == 0 || job > b->n_jobs || stat(b->dir, &folder) != 0 || stat(dir, &here) != 0) continue;
         if (folder.st_dev != here.st_dev || folder.st_ino != here.st_ino) continue;
@@ -164,7 +163,6 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
 static int check_done(struct runner *r, struct sh_err *err)
 {
     struct batch *b = r->b;
-    int64_t next_ns = clock_now_ns() + 1000000000;
     for (uint32_t i = 0; i < b->n_jobs; i++) {
         struct sh_err why = {0};
         if (!batch_is_mine(b, i)) continue;
@@ -174,9 +172,7 @@ static int check_done(struct runner *r, struct sh_err *err)
         if (rc != SH_OK) sh_warn(&app_report_stderr, "%s; job %u is done again", why.text, i + 1);
         if (rc != SH_OK) b->job[i].is_done = 0;
         r->n_todo += !b->job[i].is_done;
-        if (b->quiet || clock_now_ns() < next_ns) continue;
-        next_ns = clock_now_ns() + 1000000000;
-        sh_progress(&app_report_stderr, "checking what is done", (double)i / b->n_jobs);
+        if (!b->quiet) sh_progress(&app_report_seconds, "checking what is done", (double)i / b->n_jobs);
     }
     return SH_OK;
 }

@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "drivers/protocol/crc32c.h"
+#include "firmware_sim/app/options.h"
 
 enum { NAME_KEPT = 96 };
 
@@ -15,9 +17,8 @@ enum { NAME_KEPT = 96 };
 
 static int add_value(struct batch_sweep *s, const char *value, size_t len, struct sh_err *err)
 {
-    char **grown = realloc(s->set, (s->n + 1) * sizeof *s->set), *set = NULL;
-    if (grown != NULL) s->set = grown;
-    if (grown == NULL || asprintf(&set, "%s=%.*s", s->key, (int)len, value) < 0)
+    char *set = NULL;
+    if (!resize(&s->set, s->n + (size_t)1, sizeof(char *)) || asprintf(&set, "%s=%.*s", s->key, (int)len, value) < 0)
         return sh_fail(err, SH_ENOMEM, "no memory for the values of %s", s->key);
     for (uint32_t i = 0; i < s->n; i++) {
         if (strcmp(s->set[i], set) != 0) continue;
@@ -65,19 +66,6 @@ static int add_list(struct batch_sweep *s, const char *values, struct sh_err *er
         if (rc != SH_OK || *end == '\0') return rc;
         p = end;
     }
-}
-
-/* FIRST:LAST:STEP, three numbers. */
-static int is_range(const char *values, double range[3])
-{
-    const char *p = values;
-    for (int i = 0; i < 3; i++) {
-        char *end;
-        range[i] = strtod(p, &end);
-        if (end == p || isspace((unsigned char)*p) || *end != (i < 2 ? ':' : '\0')) return 0;
-        p = end + 1;
-    }
-    return isfinite(range[0]) && isfinite(range[1]) && isfinite(range[2]);
 }
 
 /* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Twelve digits: 0.3 and not
@@ -138,7 +126,8 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
                            "--sweep %s: it would replace the values of --sweep %s; allowed is the other order", s->key,
                            sweeps->sweep[i].key);
     }
-    return is_range(equals + 1, range) ? add_range(s, equals + 1, range, err) : add_list(s, equals + 1, err);
+    return app_read_numbers(equals + 1, ':', range, 3) ? add_range(s, equals + 1, range, err)
+                                                       : add_list(s, equals + 1, err);
 }
 
 void batch_sweeps_free(struct batch_sweeps *sweeps)

@@ -3,10 +3,10 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/grow.h"
 #include "core/studio/cloud.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
 #include "firmware_sim/app/studio/record/heads.h"
@@ -102,13 +102,14 @@ static int scan(struct scanning *s, struct config *cfg, struct sh_err *err)
                                         .frame = add_frame,
                                         .ctx = s,
                                         .interrupted = app_interrupted};
-    struct picturing_bounds bounds = PICTURING_NO_BOUNDS;
+    struct picturing_bounds bounds;
     app_catch_signals();
     cfg->output.layout = LINE_GEO;
     int rc = heads_load(cfg, &s->heads, err);
     if (rc == SH_OK) rc = heads_open(&s->heads, NULL, 0.0, &app_report_stderr, err);
     if (rc != SH_OK) return rc;
     const struct site *site = s->p->site = s->heads.first->site;
+    vec3_bound_nothing(bounds.min_m, bounds.max_m);
     picturing_include(&bounds, site->scene->min_m);
     picturing_include(&bounds, site->scene->max_m);
     include_stations(site, &bounds);
@@ -145,23 +146,8 @@ struct showing {
     struct cloud cloud;
     struct site *site;
     const char *path;
-    int64_t reported_ns;
+    const struct sh_report *report;
 };
-
-static void report_each_second(void *ctx, const char *what, double fraction)
-{
-    struct showing *s = ctx;
-    const int64_t now_ns = clock_now_ns();
-    if (s->p->quiet || now_ns - s->reported_ns < 1000000000) return;
-    s->reported_ns = now_ns;
-    sh_progress(&app_report_stderr, what, fraction);
-}
-
-static int stop(void *ctx)
-{
-    (void)ctx;
-    return app_interrupted();
-}
 
 /* Points of the geo layout are in output.crs; they are brought to the scene's frame, one by one. */
 static int to_scene(struct showing *s, const struct config *cfg, struct sh_err *err)
@@ -182,7 +168,7 @@ static int to_scene(struct showing *s, const struct config *cfg, struct sh_err *
         double d_crs[3];
         georef_difference(georef, c->xyz_m[i], d_crs);
         georef_reverse(georef, d_crs, c->xyz_m[i]);
-        if ((i & 0xfff) == 0) report_each_second(s, "bringing the points to the scene", (double)i / (double)c->n);
+        if ((i & 0xfff) == 0) sh_progress(s->report, "bringing the points to the scene", (double)i / (double)c->n);
         if ((i & 0xfff) == 0 && app_interrupted()) return sh_fail_stopped(err);
     }
     return SH_OK;
@@ -206,10 +192,9 @@ static int check_columns(const struct showing *s, struct sh_err *err)
 
 static int show(struct showing *s, struct config *cfg, struct sh_err *err)
 {
-    const struct sh_report report = {s, app_report_stderr.warn, report_each_second, stop};
-    struct picturing_bounds bounds = PICTURING_NO_BOUNDS;
+    struct picturing_bounds bounds;
     app_catch_signals();
-    int rc = cloud_read_columns(s->path, CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, &report, &s->cloud, err);
+    int rc = cloud_read_columns(s->path, CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, s->report, &s->cloud, err);
     if (rc == SH_OK && cfg != NULL) rc = site_load(cfg, &app_report_stderr, &s->site, err);
     s->p->site = s->site;
     if (rc == SH_OK) rc = check_columns(s, err);
@@ -217,6 +202,7 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
     if (rc == SH_OK && s->site != NULL) rc = to_scene(s, cfg, err);
     if (rc != SH_OK) return rc;
     const struct cloud *c = &s->cloud;
+    vec3_bound_nothing(bounds.min_m, bounds.max_m);
     for (size_t i = 0; i < c->n; i++)
         picturing_include(&bounds, c->xyz_m[i]);
     if (!(bounds.max_m[0] >= bounds.min_m[0]))
@@ -232,8 +218,8 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
             .rgb = c->rgb != NULL ? c->rgb[i] : NULL,
         };
         picturing_add(s->p, c->xyz_m[i], &f);
-        if ((i & 0xffff) == 0) report_each_second(s, "drawing the points", (double)i / (double)c->n);
-        if ((i & 0xffff) == 0) rc = sh_check_stop(&report, err);
+        if ((i & 0xffff) == 0) sh_progress(s->report, "drawing the points", (double)i / (double)c->n);
+        if ((i & 0xffff) == 0) rc = sh_check_stop(s->report, err);
     }
     return rc == SH_OK ? picturing_finish(s->p, err) : rc;
 }
@@ -241,7 +227,7 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
 int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, const char *output,
                    int quiet, struct sh_err *err)
 {
-    struct showing s = {.path = cloud, .reported_ns = clock_now_ns()};
+    struct showing s = {.path = cloud, .report = quiet ? &app_report_quiet : &app_report_seconds};
     int rc = picturing_begin(plan, output, quiet, &s.p, err);
     if (rc != SH_OK) return rc;
     rc = show(&s, cfg, err);

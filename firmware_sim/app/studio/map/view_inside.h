@@ -31,13 +31,6 @@ void picturing_end(struct picturing *p);
 struct picturing_bounds {
     double min_m[3], max_m[3];
 };
-#define PICTURING_NO_BOUNDS                 \
-    {                                       \
-        {INFINITY, INFINITY, INFINITY},     \
-        {                                   \
-            -INFINITY, -INFINITY, -INFINITY \
-        }                                   \
-    }
 /* What is not finite is left out. */
 void picturing_include(struct picturing_bounds *b, const double p_m[3]);
 

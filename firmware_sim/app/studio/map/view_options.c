@@ -2,10 +2,10 @@
 /* The options of map --perspective: words and numbers into a plan. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
+#include "firmware_sim/app/options.h"
 #include "firmware_sim/app/studio/map/view.h"
 
 const struct map_view_options map_view_default = {.elevation_deg = 40,
@@ -31,24 +31,12 @@ static int find_word(const char *option, const char *word, const char *const *wo
     return sh_fail(err, SH_EINPUT, "--%s %s: allowed are %s", option, word, allowed);
 }
 
-/* n numbers with `between` between them, and nothing else. */
-static int read_numbers(const char *text, char between, double *out, int n)
-{
-    for (int i = 0; i < n; i++) {
-        char *end;
-        out[i] = strtod(text, &end);
-        if (end == text || !isfinite(out[i]) || *end != (i < n - 1 ? between : '\0')) return 0;
-        text = end + 1;
-    }
-    return 1;
-}
-
 /* A point of the compass, or degrees clockwise from north. */
 static int read_direction(const char *text, double *azimuth_rad, struct sh_err *err)
 {
     double azimuth_deg;
     if (text == NULL) text = "south-west";
-    if (!read_numbers(text, ',', &azimuth_deg, 1) || fabs(azimuth_deg) > 360) {
+    if (!app_read_numbers(text, ',', &azimuth_deg, 1) || fabs(azimuth_deg) > 360) {
         const int wind = find_word("from", text, map_view_winds, 8, err);
         if (wind < 0)
             return sh_fail(err, SH_EINPUT, "%s, and degrees clockwise from north, -360 to 360", strdupa(err->text));
@@ -62,7 +50,8 @@ static int read_place(const char *option, const char *text, double place_m[3], i
 {
     *has = text != NULL;
     if (text == NULL) return SH_OK;
-    if (read_numbers(text, ',', place_m, 3) && fmax(fmax(fabs(place_m[0]), fabs(place_m[1])), fabs(place_m[2])) <= 1e9)
+    if (app_read_numbers(text, ',', place_m, 3) &&
+        fmax(fmax(fabs(place_m[0]), fabs(place_m[1])), fabs(place_m[2])) <= 1e9)
         return SH_OK;
     return sh_fail(err, SH_EINPUT, "--%s %s: allowed are X,Y,Z in metres, each within 1e9, as in --%s 10,-5,8.5",
                    option, text, option);
@@ -71,8 +60,9 @@ static int read_place(const char *option, const char *text, double place_m[3], i
 static int read_size(const char *text, struct view_camera *camera, struct sh_err *err)
 {
     double size[2] = {1200, 800};
-    if (text != NULL && (!read_numbers(text, 'x', size, 2) || size[0] != floor(size[0]) || size[1] != floor(size[1]) ||
-                         !(fmin(size[0], size[1]) >= VIEW_MIN_PX && fmax(size[0], size[1]) <= VIEW_MAX_SIDE_PX)))
+    if (text != NULL &&
+        (!app_read_numbers(text, 'x', size, 2) || size[0] != floor(size[0]) || size[1] != floor(size[1]) ||
+         !(fmin(size[0], size[1]) >= VIEW_MIN_PX && fmax(size[0], size[1]) <= VIEW_MAX_SIDE_PX)))
         return sh_fail(err, SH_EINPUT, "--size %s: allowed are WIDTHxHEIGHT in pixels, %d to %d each, as in 1200x800",
                        text, VIEW_MIN_PX, VIEW_MAX_SIDE_PX);
     if (size[0] * size[1] > VIEW_MAX_PIXELS)
@@ -87,7 +77,7 @@ static int read_limits(const struct map_view_options *o, struct map_view_plan *p
 {
     plan->has_limits = o->limits != NULL;
     if (o->limits == NULL) return SH_OK;
-    if (!read_numbers(o->limits, ',', plan->limit, 2) || !(plan->limit[1] > plan->limit[0]))
+    if (!app_read_numbers(o->limits, ',', plan->limit, 2) || !(plan->limit[1] > plan->limit[0]))
         return sh_fail(err, SH_EINPUT, "--limits %s: allowed are LOW,HIGH, the second larger than the first",
                        o->limits);
     if (plan->colour > MAP_VIEW_RANGE)

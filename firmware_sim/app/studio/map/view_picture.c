@@ -8,6 +8,7 @@
 #include "core/colour.h"
 #include "core/newfile.h"
 #include "core/studio/cloud.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
 #include "firmware_sim/config/places.h"
@@ -59,10 +60,7 @@ void picturing_add(struct picturing *p, const double xyz_m[3], const struct pict
 void picturing_include(struct picturing_bounds *b, const double p_m[3])
 {
     if (!isfinite(p_m[0]) || !isfinite(p_m[1]) || !isfinite(p_m[2])) return;
-    for (int i = 0; i < 3; i++) {
-        b->min_m[i] = fmin(b->min_m[i], p_m[i]);
-        b->max_m[i] = fmax(b->max_m[i], p_m[i]);
-    }
+    vec3_bound(b->min_m, b->max_m, p_m);
 }
 
 int picturing_look(struct picturing *p, const struct picturing_bounds *bounds, struct sh_err *err)

@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
+#include "firmware_sim/app/app.h"
 
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err)
 {
@@ -22,13 +24,9 @@ int record_files_add(struct record_files *files, const char *path, struct sh_err
     return SH_OK;
 }
 
-/* STEM-N.ENDING of a path STEM.ENDING. */
 static int is_name_of_scan(const struct record_file *file, const char *path)
 {
-    const size_t stem = strlen(file->path) - strlen(file->ops->ending);
-    if (strncmp(path, file->path, stem) != 0 || path[stem] != '-') return 0;
-    const size_t digits = strspn(path + stem + 1, "0123456789");
-    return digits > 0 && strcmp(path + stem + 1 + digits, file->path + stem) == 0;
+    return app_is_name_of_scan(file->path, strlen(file->ops->ending), path);
 }
 
 int record_files_check_each(const struct record_files *files, struct sh_err *err)
@@ -181,10 +179,10 @@ static char *present_path(const struct record_files *files, const struct record_
 /* The frames of another head are another stream. */
 static int add_spool(struct record_files *files, struct sh_err *err)
 {
-    struct colour_spool **more = realloc(files->spool, (files->n_spools + 1) * sizeof *more);
-    if (more != NULL) files->spool = more;
-    struct colour_spool *spool = more != NULL ? calloc(1, sizeof *spool) : NULL;
-    if (spool == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to keep its frames", files->file[0].path);
+    struct colour_spool *spool = NULL;
+    if (!resize(&files->spool, files->n_spools + (size_t)1, sizeof(struct colour_spool *)) ||
+        (spool = calloc(1, sizeof *spool)) == NULL)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to keep its frames", files->file[0].path);
     files->spool[files->n_spools++] = spool;
     return colour_spool_open(spool, files->file[0].now, files->recorder.colour.scale.mode, err);
 }
@@ -211,8 +209,7 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
 /* What is left of the files of single scans: a later one would stop the recording at its scan. */
 static int check_parts_of_scans(const struct record_file *file, struct sh_err *err)
 {
-    const char *slash = strrchr(file->path, '/');
-    const int folder = slash != NULL ? (int)(slash - file->path) + 1 : 0;
+    const int folder = (int)(basename(file->path) - file->path);
     char *name = folder > 0 ? strndup(file->path, (size_t)folder) : strdup(".");
     DIR *dir = name != NULL ? opendir(name) : NULL;
     int rc = SH_OK;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/studio/record/heads.h"
 
+#include <nettle/base16.h>
 #include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -89,33 +90,18 @@ int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err)
     return offline_prepare(&heads->at->offline, station, heads->report, err);
 }
 
+/* All of them are counts of 64 bits. */
 static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *more)
 {
-    sum->bytes += more->bytes;
-    sum->frames += more->frames;
-    sum->bad_payload += more->bad_payload;
-    sum->bad_bytes += more->bad_bytes;
-    sum->seq_gaps += more->seq_gaps;
-    sum->seq_lost += more->seq_lost;
-    sum->dropped += more->dropped;
-    sum->reader_lost += more->reader_lost;
-    sum->pulses_lost += more->pulses_lost;
-    sum->repeated += more->repeated;
-    sum->late += more->late;
-    sum->restarts += more->restarts;
-    sum->cuts += more->cuts;
-    sum->bad_unseen += more->bad_unseen;
-    sum->echoes += more->echoes;
-    sum->late_replies += more->late_replies;
-    sum->unasked += more->unasked;
-    sum->closed += more->closed;
-    sum->reattached += more->reattached;
+    uint64_t *to = (uint64_t *)(void *)sum;
+    const uint64_t *from = (const uint64_t *)(const void *)more;
+    for (size_t i = 0; i < sizeof *sum / sizeof *to; i++)
+        to[i] += from[i];
 }
 
 /* Of several streams: the hash of their hashes, as text, in the order of their heads. */
 static void add_streams(const struct heads *heads, int hash, struct recording_result *sum)
 {
-    static const char digits[] = "0123456789abcdef";
     struct sha256_ctx ctx;
     uint8_t digest[SHA256_DIGEST_SIZE];
     char hex[65];
@@ -130,10 +116,7 @@ static void add_streams(const struct heads *heads, int hash, struct recording_re
         sha256_update(&ctx, 64, (const uint8_t *)hex);
     }
     sha256_digest(&ctx, sizeof digest, digest);
-    for (size_t i = 0; i < sizeof digest && hash; i++) {
-        sum->sha256[2 * i] = digits[digest[i] >> 4];
-        sum->sha256[2 * i + 1] = digits[digest[i] & 15];
-    }
+    if (hash) base16_encode_update(sum->sha256, sizeof digest, digest);
 }
 
 /* Between the parts of a long recording, about once a second; within them recording_run says it. */

@@ -90,16 +90,6 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
-/* Of completing a file: a line a second, and none for short work. */
-static void print_completing(void *ctx, const char *what, double fraction)
-{
-    struct record_job *r = ctx;
-    const int64_t now_ns = clock_now_ns();
-    if (!r->recording.progress || now_ns - r->reported_ns < 1000000000) return;
-    r->reported_ns = now_ns;
-    sh_progress(&app_report_stderr, what, fraction);
-}
-
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
 static int follow(struct record_job *r, struct scanhead *sh, struct sh_err *err)
@@ -113,7 +103,6 @@ static int follow(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     const int whole = rc == SH_OK && recording_check_complete(result, NULL) == SH_OK;
     const int keep = r->only_whole ? whole : result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
-    r->reported_ns = clock_now_ns();
     int after = close_files(r, keep, &why);
     if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
@@ -140,7 +129,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result *result = &r->result;
     r->recording.hash = (r->hash || r->stats != NULL) && !r->no_hash;
-    r->notes = (struct sh_report){r, print_note, print_completing, gives_up};
+    r->notes = (struct sh_report){r, print_note, r->recording.progress ? app_report_seconds.progress : NULL, gives_up};
     r->files.recorder.report = &r->notes;
     int rc = open_files(r, err);
     if (rc != SH_OK) {

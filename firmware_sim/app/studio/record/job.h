@@ -29,7 +29,6 @@ struct record_job {
     struct recording_result result;     /* out */
     /* inner state */
     struct sh_report notes; /* of the recorders */
-    int64_t reported_ns;    /* when their progress was printed last */
     struct heads *heads;    /* of a configuration */
     struct record_files parts;
     struct recorder_scan first; /* of the scans, as the configuration says it */

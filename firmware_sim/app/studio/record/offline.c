@@ -10,13 +10,23 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop.h"
 
-static int connect_client(struct offline *off, int fd, struct sh_err *err)
+int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err)
 {
+    int fd[2];
     char source[32], why[256];
-    snprintf(source, sizeof source, "fd:%d", fd);
-    int rc = scanhead_open(source, &off->sh, why, sizeof why);
-    if (rc != SCANHEAD_OK) close(fd);
-    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "off line: %s", why);
+    link->type = LINK_FD;
+    link->fd = -1;
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
+        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
+    snprintf(source, sizeof source, "fd:%d", fd[1]);
+    const int rc = scanhead_open(source, sh, why, sizeof why);
+    if (rc == SCANHEAD_OK) {
+        link->fd = fd[0];
+        return fd[1];
+    }
+    close(fd[0]);
+    close(fd[1]);
+    return sh_fail(err, rc, "%s: %s", who, why);
 }
 
 int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
@@ -30,22 +40,16 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
 /* A head at off->site. */
 static int power_up(struct offline *off, double scan_s, const struct sh_report *report, struct sh_err *err)
 {
-    int fd[2];
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
-        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
-    struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
+    struct link_spec spec = {.fd = -1};
     struct device_options device = {.scan_s = scan_s, .truth = off->truth};
     struct loop_options options = {.extra = &spec, .report = report};
+    off->fd = offline_connect("off line", &spec, &off->sh, err);
+    if (off->fd < 0) return off->fd;
     int rc = device_create(off->site, &device, &off->device, err);
     if (rc == SH_OK) rc = loop_create(off->site, off->device, &options, &off->loop, err);
-    if (rc != SH_OK) {
-        close(fd[0]);
-        close(fd[1]);
-        return rc;
-    }
-    off->fd = fd[1];
-    rc = connect_client(off, fd[1], err);
-    return rc == SH_OK ? loop_start(off->loop, err) : rc;
+    if (rc == SH_OK) return loop_start(off->loop, err);
+    close(spec.fd);
+    return rc;
 }
 
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *off,

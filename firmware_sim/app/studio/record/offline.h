@@ -8,6 +8,7 @@
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/site/site.h"
 
+struct link_spec;
 struct config;
 
 struct offline {
@@ -43,5 +44,9 @@ int offline_finish(struct offline *offline, struct sh_err *err);
 /* Makes ready for a scan from a station, from 1; 0: where the head stands at power-up. While none is on. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
+
+/* A client of a head in this process: link becomes the head's end, and is to be one of its links. Returns the client's
+ * descriptor, which is the handle's, or an error; then link has none (-1). who: for errors. */
+int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err);
 
 #endif

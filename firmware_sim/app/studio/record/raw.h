@@ -7,7 +7,6 @@
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 
 #include <poll.h>
-#include <stdio.h>
 
 #include "drivers/protocol/ethernet.h"
 #include "drivers/record/capture.h"

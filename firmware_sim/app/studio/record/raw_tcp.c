@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* `record --raw` of TCP: a connection of this program's own, or those of clients that it passes on. */
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

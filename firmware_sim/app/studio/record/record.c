@@ -2,7 +2,6 @@
 /* scanhead record: the points of scans to files. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/app/app.h"
@@ -66,23 +65,11 @@ static int take_colour(void *values, const char *text)
     return APP_OK;
 }
 
-/* n numbers with commas between them, and nothing else. */
-static int read_numbers(const char *text, int n, double *v)
-{
-    for (int i = 0; i < n; i++) {
-        char *end;
-        v[i] = strtod(text, &end);
-        if (end == text || !isfinite(v[i]) || *end != (i + 1 < n ? ',' : '\0')) return 0;
-        text = end + 1;
-    }
-    return 1;
-}
-
 static int take_colour_rgb(void *values, const char *text)
 {
     struct record_line *r = values;
     double v[3];
-    int good = read_numbers(text, 3, v);
+    int good = app_read_numbers(text, ',', v, 3);
     for (int i = 0; i < 3 && good; i++)
         good = v[i] >= 0 && v[i] <= 255 && v[i] == floor(v[i]);
     if (!good)
@@ -98,7 +85,7 @@ static int take_colour_limits(void *values, const char *text)
 {
     struct record_line *r = values;
     double v[2];
-    if (!read_numbers(text, 2, v) || !(v[0] < v[1]))
+    if (!app_read_numbers(text, ',', v, 2) || !(v[0] < v[1]))
         return app_usage(&app_record,
                          "--colour-limits %s: allowed are two numbers, the second one above the first: 0,30", text);
     r->job.files.recorder.colour.scale.low = v[0];

@@ -2,7 +2,6 @@
 /* Charts of a page, as SVG. All places are in units of a picture of 640 by 272. The names of axes and series are text
  * below, which wraps. On a narrow page letters are larger (page.c), so every second figure of an axis is left out. */
 #include <math.h>
-#include <string.h>
 
 #include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
@@ -61,7 +60,7 @@ static void put_bin_axis(FILE *out, const struct figures_histogram *h, char *nam
 }
 
 static void put_curve(FILE *out, const struct figures_histogram *h, double most,
-                      double (*curve)(void *ctx, double from, double to), void *ctx)
+                      double (*curve)(const void *ctx, double from, double to), const void *ctx)
 {
     fputs("<polyline class=\"mark\" points=\"", out);
     for (uint32_t k = 0; k < h->bins; k++) {
@@ -72,7 +71,7 @@ static void put_curve(FILE *out, const struct figures_histogram *h, double most,
 }
 
 void page_histogram(FILE *out, const char *title, const struct figures_histogram *h,
-                    double (*curve)(void *ctx, double from, double to), void *ctx)
+                    double (*curve)(const void *ctx, double from, double to), const void *ctx)
 {
     double most = 1.0;
     char name[96];

@@ -2,7 +2,6 @@
 /* The deviations that a recording's configuration lets expect, and whether its points have them. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/config/config.h"
@@ -34,12 +33,6 @@ static void count_beyond(struct report *r)
     }
 }
 
-static void say(struct report_verdict *v, enum report_judgement judgement, const char *text)
-{
-    v->judgement = judgement;
-    snprintf(v->text, sizeof v->text, "%s", text);
-}
-
 static void judge_station(const struct report *r, struct report_station *s)
 {
     const struct report_subject subject = {&s->figures, &s->head, r->site->moving, "--max-m"};
@@ -64,7 +57,7 @@ static void judge_all(struct report *r)
     }
     all->judgement = n[REPORT_BEYOND] > 0 ? REPORT_BEYOND : n[REPORT_NONE] > 0 ? REPORT_NONE : REPORT_WITHIN;
     if (n_with_points == 0)
-        say(all, REPORT_NONE, "Not judged: there are no points.");
+        *all = (struct report_verdict){.judgement = REPORT_NONE, .text = "Not judged: there are no points."};
     else if (n_with_points == 1)
         *all = *only;
     else if (all->judgement == REPORT_WITHIN)

@@ -1,24 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* The report as a page: its sections in their order. */
 #include <ctype.h>
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "core/newfile.h"
 #include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/config/config.h"
-
-static const char *file_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
 
 static void put_fact(FILE *out, const char *what, const char *text)
 {
@@ -57,7 +48,7 @@ static void put_top(FILE *out, const struct report *r)
     char text[CONFIG_PATH_LEN + 64];
     struct tm day;
     fputs("<h1>Scan report: ", out);
-    picture_put_escaped(out, file_name(r->cloud_path));
+    picture_put_escaped(out, basename(r->cloud_path));
     fputs("</h1>\n<dl class=\"facts\">\n", out);
     put_fact(out, "Recording", r->cloud_path);
     if (gmtime_r(&r->modified.tv_sec, &day) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &day) > 0)
@@ -135,7 +126,7 @@ static void put_cards(FILE *out, const struct report *r)
 }
 
 /* Points that are expected between two deviations: of each station's judged ones, by their RMS sigma. */
-static double expected_within(void *ctx, double from, double to)
+static double expected_within(const void *ctx, double from, double to)
 {
     const struct report *r = ctx;
     double n = 0.0;
@@ -156,7 +147,7 @@ static void put_beyond(FILE *out, const struct figures_histogram *h)
     fputs(" points.", out);
 }
 
-static void put_histograms(FILE *out, struct report *r)
+static void put_histograms(FILE *out, const struct report *r)
 {
     const struct report_figures *f = &r->f;
     const int noisy = f->all.judged > 0 && !isfinite(f->verdict.bound_m);
@@ -275,10 +266,11 @@ static void put_words(FILE *out, const struct report *r)
         r->f.density.cell_m);
 }
 
-static int put_page(struct report *r, FILE *out, struct sh_err *err)
+static int put_page(const void *report, FILE *out, struct sh_err *err)
 {
+    const struct report *r = report;
     char title[300];
-    snprintf(title, sizeof title, "Scan report: %.250s", file_name(r->cloud_path));
+    snprintf(title, sizeof title, "Scan report: %.250s", basename(r->cloud_path));
     page_begin(out, title);
     put_top(out, r);
     put_verdict(out, &r->f.verdict);
@@ -299,25 +291,7 @@ static int put_page(struct report *r, FILE *out, struct sh_err *err)
     return SH_OK;
 }
 
-/* fd is taken in any case. */
-static int write_part(struct report *r, const char *part, int fd, struct sh_err *err)
+int report_write_html(const struct report *r, struct sh_err *err)
 {
-    struct sh_err why = {0};
-    FILE *out = fdopen(dup(fd), "wb");
-    int rc = out != NULL ? put_page(r, out, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
-    if (out != NULL && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
-    if (rc == SH_OK) return newfile_keep(r->html_path, part, fd, err);
-    newfile_drop(part, fd);
-    return sh_fail(err, rc, "%s: cannot be written: %.300s", r->html_path, why.text);
-}
-
-int report_write_html(struct report *r, struct sh_err *err)
-{
-    char *part;
-    int fd;
-    if (asprintf(&part, "%s.part", r->html_path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", r->html_path);
-    int rc = newfile_part(r->html_path, part, &fd, err);
-    if (rc == SH_OK) rc = write_part(r, part, fd, err);
-    free(part);
-    return rc;
+    return newfile_write(r->html_path, put_page, r, err);
 }

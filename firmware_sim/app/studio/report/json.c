@@ -19,8 +19,7 @@ static void put_worst(struct json *json, const struct report *r)
     json_close_object(json);
 }
 
-/* Members of an object that is open. */
-static void put_group(struct json *json, const struct figures *f)
+void report_put_figures(struct json *json, const struct figures *f)
 {
     json_uint(json, "points", f->points);
     json_uint(json, "far", f->far);
@@ -44,7 +43,7 @@ static void put_group(struct json *json, const struct figures *f)
     json_close_object(json);
 }
 
-static void put_density(struct json *json, const struct figures_density_row *d)
+void report_put_density(struct json *json, const struct figures_density_row *d)
 {
     json_open_object(json, "density");
     json_uint(json, "cells", d->cells);
@@ -54,7 +53,7 @@ static void put_density(struct json *json, const struct figures_density_row *d)
     json_close_object(json);
 }
 
-static void put_verdict(struct json *json, const struct report_verdict *v)
+void report_put_verdict(struct json *json, const struct report_verdict *v)
 {
     json_open_object(json, "verdict");
     json_string(json, "judgement", report_judgement_name(v->judgement));
@@ -90,10 +89,10 @@ static void put_stations(struct json *json, const struct report *r)
         json_open_object(json, NULL);
         json_uint(json, "station", s + 1);
         json_string(json, "name", r->site->station[s].station->name);
-        put_group(json, &st->figures);
-        put_density(json, &st->density);
+        report_put_figures(json, &st->figures);
+        report_put_density(json, &st->density);
         if (r->cloud.time_s != NULL) put_times(json, &st->times, st->gap_s);
-        put_verdict(json, &st->verdict);
+        report_put_verdict(json, &st->verdict);
         json_close_object(json);
     }
     json_close_array(json);
@@ -107,8 +106,8 @@ static void put_bins(struct json *json, const struct report *r)
         json_open_object(json, NULL);
         json_double(json, "from_m", k * r->f.range_step_m);
         json_double(json, "to_m", (k + 1) * r->f.range_step_m);
-        put_group(json, &r->f.range[k]);
-        put_density(json, &r->f.density_range[k]);
+        report_put_figures(json, &r->f.range[k]);
+        report_put_density(json, &r->f.density_range[k]);
         json_close_object(json);
     }
     json_close_array(json);
@@ -117,7 +116,7 @@ static void put_bins(struct json *json, const struct report *r)
         json_open_object(json, NULL);
         json_double(json, "from_deg", most_deg / REPORT_INCIDENCES * k);
         json_double(json, "to_deg", most_deg / REPORT_INCIDENCES * (k + 1));
-        put_group(json, &r->f.incidence[k]);
+        report_put_figures(json, &r->f.incidence[k]);
         json_close_object(json);
     }
     json_close_array(json);
@@ -132,13 +131,13 @@ static void put_labels(struct json *json, const struct report *r)
         json_open_object(json, NULL);
         json_string(json, "object", s != NULL ? s->object : NULL);
         json_string(json, "material", s != NULL ? s->material : NULL);
-        put_group(json, &r->f.label[i]);
+        report_put_figures(json, &r->f.label[i]);
         json_close_object(json);
     }
     json_close_array(json);
 }
 
-static void put_histogram(struct json *json, const char *key, const struct figures_histogram *h)
+void report_put_histogram(struct json *json, const char *key, const struct figures_histogram *h)
 {
     json_open_object(json, key);
     json_double(json, "from_m", h->from);
@@ -179,17 +178,17 @@ void report_put_json(struct json *json, const void *report)
     json_open_object(json, NULL);
     put_totals(json, r);
     put_worst(json, r);
-    put_verdict(json, &r->f.verdict);
+    report_put_verdict(json, &r->f.verdict);
     json_open_object(json, "all");
-    put_group(json, &r->f.all);
-    put_density(json, &r->f.density_all);
+    report_put_figures(json, &r->f.all);
+    report_put_density(json, &r->f.density_all);
     json_double(json, "density_cell_m", r->f.density.cell_m);
     json_close_object(json);
     put_stations(json, r);
     put_bins(json, r);
     put_labels(json, r);
-    put_histogram(json, "distances", &r->f.distances);
-    put_histogram(json, "along_beam", &r->f.along);
+    report_put_histogram(json, "distances", &r->f.distances);
+    report_put_histogram(json, "along_beam", &r->f.along);
     if (r->f.has_echoes) {
         json_open_array(json, "shots_by_echoes");
         for (int k = 0; k <= FIGURES_MAX_ECHOES; k++)

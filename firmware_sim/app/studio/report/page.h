@@ -27,7 +27,7 @@ const char *page_unit(double largest_m, double *per_m);
 
 /* Bars. curve(ctx, from, to): how many are expected from..to, drawn as a line; NULL: none. */
 void page_histogram(FILE *out, const char *title, const struct figures_histogram *h,
-                    double (*curve)(void *ctx, double from, double to), void *ctx);
+                    double (*curve)(const void *ctx, double from, double to), const void *ctx);
 
 /* Groups of bars side by side, one group for each place on the axis. value: [n_groups][n_series], NaN: none. The last
  * series is drawn as a line across its group, as what is expected. */

@@ -5,7 +5,6 @@
 #include <stdio.h>
 
 #include "firmware_sim/app/studio/report/report.h"
-#include "firmware_sim/base/clock.h"
 
 static int write_all(struct report *r, struct sh_err *err)
 {
@@ -26,7 +25,6 @@ static int report(struct config *cfg, void *ctx, struct sh_err *err)
     struct report *r = ctx;
     app_catch_signals();
     r->cfg = cfg;
-    r->reported_ns = clock_now_ns();
     r->cloud_path = r->in.operand[1];
     int rc = report_work(r, err);
     if (rc == SH_OK) rc = write_all(r, err);

@@ -50,8 +50,6 @@ struct report {
     const char *cloud_path, *html_path;
     int json;
     double tolerance_m, max_m, cell_m;
-    int64_t reported_ns; /* when progress was reported last */
-    struct sh_report progress;
     struct timespec modified; /* of the cloud's file */
     struct config *cfg;
     struct sites sites;
@@ -92,7 +90,7 @@ void report_name_surface(const struct scene_surface *surface, char name[REPORT_S
 /* Three coordinates of the worst point, each after a space. */
 void report_put_worst(FILE *out, const struct report *r);
 void report_put_json(struct json *json, const void *report);
-int report_write_html(struct report *r, struct sh_err *err);
+int report_write_html(const struct report *r, struct sh_err *err);
 /* tables.c: names of bins, tables of the page. */
 void report_name_ranges(const struct report *r, char (*name)[32]);
 void report_name_incidences(char (*name)[32]);

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Whether the deviations of points are as expected of configuration and plan: of a recording's station (expect.c), and
  * of a scan that is still on (firmware_sim/app/studio/watch). In: what the station's head is, and the figures of its points
- * (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. */
+ * (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. Also the JSON of both, which
+ * `report --json` and /quality share (json.c). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 
 #include "core/studio/deviation.h"
 #include "core/studio/figures.h"
+#include "firmware_sim/base/json.h"
 #include "firmware_sim/site/site.h"
 
 enum report_judgement { REPORT_NONE, REPORT_WITHIN, REPORT_BEYOND };
@@ -37,5 +39,11 @@ struct report_subject {
     const char *reach; /* how far the scene was looked for: "10 m" */
 };
 void report_judge_one(const struct report_subject *subject, struct report_verdict *v);
+
+/* Members of an open object; the others are one member each. */
+void report_put_figures(struct json *json, const struct figures *f);
+void report_put_density(struct json *json, const struct figures_density_row *d);
+void report_put_verdict(struct json *json, const struct report_verdict *v);
+void report_put_histogram(struct json *json, const char *key, const struct figures_histogram *h);
 
 #endif

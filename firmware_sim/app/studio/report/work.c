@@ -7,20 +7,8 @@
 
 #include "core/mat3.h"
 #include "firmware_sim/app/studio/report/report.h"
-#include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-
-/* core/studio/analysis reports every piece of its work. A line a second is enough for a terminal, and none for short
- * work. */
-static void report_each_second(void *ctx, const char *what, double fraction)
-{
-    struct report *r = ctx;
-    const int64_t now_ns = clock_now_ns();
-    if (now_ns - r->reported_ns < 1000000000) return;
-    r->reported_ns = now_ns;
-    sh_progress(&app_report_stderr, what, fraction);
-}
 
 /* Ghosts are counted, and become shots without echo. */
 static void leave_out_ghosts(struct report *r)
@@ -53,7 +41,7 @@ static int load(struct report *r, struct sh_err *err)
 {
     struct stat file;
     const unsigned columns = CLOUD_TIME | CLOUD_ECHO_COUNT | (config_head_moves(&r->cfg->platform) ? CLOUD_RANGE : 0u);
-    int rc = cloud_read_columns(r->cloud_path, columns, &r->progress, &r->cloud, err);
+    int rc = cloud_read_columns(r->cloud_path, columns, &app_report_seconds, &r->cloud, err);
     if (rc == SH_OK && stat(r->cloud_path, &file) == 0) r->modified = file.st_mtim;
     if (rc == SH_OK) rc = sites_load_written_out(r->cfg, &app_report_stderr, &r->sites, err);
     r->site = r->sites.first;
@@ -139,12 +127,12 @@ static int compare(struct report *r, struct sh_err *err)
     if (rc == SH_OK) rc = check_bodies(r, err);
     if (rc != SH_OK) return rc;
     report_heads(r);
-    rc = cloud_compare(&r->cloud, &r->cloud_site, &r->progress, r->distance_m, r->triangle, &why);
+    rc = cloud_compare(&r->cloud, &r->cloud_site, &app_report_seconds, r->distance_m, r->triangle, &why);
     if (rc == SH_OK) {
         cloud_stats(r->distance_m, r->cloud.n, r->tolerance_m, &r->f.stats);
         if (r->f.stats.points > 0) memcpy(r->f.worst, r->cloud.xyz_m[r->f.stats.worst], sizeof r->f.worst);
         r->f.epsg = r->cloud.epsg;
-        rc = cloud_into_scene(&r->cloud, &r->cloud_site, &r->progress, &why);
+        rc = cloud_into_scene(&r->cloud, &r->cloud_site, &app_report_seconds, &why);
     }
     if (rc == SH_OK) rc = cloud_cover(&r->cloud, site->scene, site->n_surfaces, r->triangle, &r->f.coverage, &why);
     if (rc == SH_OK && site->moving) without_beams(r);
@@ -154,17 +142,10 @@ static int compare(struct report *r, struct sh_err *err)
         for (uint32_t s = 0; s < site->n_stations && head != NULL; s++)
             head[s] = r->f.station[s].head;
         rc = head == NULL ? sh_fail(&why, SH_ENOMEM, "no memory")
-                          : deviation_along(&compared, head, &r->progress, &r->points, &why);
+                          : deviation_along(&compared, head, &app_report_seconds, &r->points, &why);
         free(head);
     }
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
-}
-
-static uint32_t everything(void *ctx, size_t i)
-{
-    (void)ctx;
-    (void)i;
-    return 0;
 }
 
 static uint32_t by_station(void *ctx, size_t i)
@@ -222,14 +203,14 @@ static int tables(struct report *r, struct sh_err *err)
         uint32_t n;
         uint32_t (*group)(void *ctx, size_t i);
         struct figures *out;
-    } table[] = {{1, everything, &f->all},
+    } table[] = {{1, NULL, &f->all},
                  {n_stations, by_station, station},
                  {n_labels, by_label, f->label},
                  {f->n_ranges, by_range, f->range},
                  {REPORT_INCIDENCES, by_incidence, f->incidence}};
     for (size_t t = 0; t < sizeof table / sizeof table[0] && rc == SH_OK; t++) {
-        report_each_second(r, "working out tables", (double)t / (sizeof table / sizeof table[0]));
-        rc = sh_check_stop(&r->progress, err);
+        sh_progress(&app_report_seconds, "working out tables", (double)t / (sizeof table / sizeof table[0]));
+        rc = sh_check_stop(&app_report_seconds, err);
         if (rc == SH_OK) rc = figures_by(&in, table[t].n, table[t].group, r, table[t].out, err);
     }
     for (uint32_t s = 0; s < n_stations && rc == SH_OK; s++)
@@ -245,8 +226,8 @@ static int densities(struct report *r, struct sh_err *err)
     struct report_figures *f = &r->f;
     const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
     const struct figures_on_scene in = {&compared, r->site->scene, r->points.range_m};
-    int rc = r->cell_m > 0.0 ? figures_density_of(&in, r->cell_m, &r->progress, &f->density, err)
-                             : figures_density_fit(&in, CELL_M, &r->progress, &f->density, &f->density_all, err);
+    int rc = r->cell_m > 0.0 ? figures_density_of(&in, r->cell_m, &app_report_seconds, &f->density, err)
+                             : figures_density_fit(&in, CELL_M, &app_report_seconds, &f->density, &f->density_all, err);
     if (rc != SH_OK) return rc;
     figures_density_within(&f->density, 0, 0.0, (double)INFINITY, &f->density_all);
     for (uint32_t k = 0; k < f->n_ranges; k++)
@@ -286,11 +267,10 @@ static const double SHOWN = 0.995;
 
 int report_work(struct report *r, struct sh_err *err)
 {
-    r->progress = (struct sh_report){r, app_report_stderr.warn, report_each_second, app_report_stderr.stop};
     int rc = load(r, err);
     if (rc == SH_OK) rc = compare(r, err);
     if (rc != SH_OK) return rc;
-    rc = sh_check_stop(&r->progress, err);
+    rc = sh_check_stop(&app_report_seconds, err);
     if (rc == SH_OK) rc = tables(r, err);
     if (rc == SH_OK) rc = densities(r, err);
     if (rc == SH_OK) rc = times(r, err);

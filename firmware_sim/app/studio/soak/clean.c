@@ -1,15 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The clean stream: a reader within the head's own process, which faults of links don't reach. */
-#include <errno.h>
 #include <stdlib.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
+#include "core/bytes.h"
 #include "drivers/host/scanhead.h"
 #include "drivers/link/link.h"
-#include "drivers/protocol/bytes.h"
 #include "firmware_sim/app/studio/soak/clean.h"
+#include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 
@@ -97,22 +94,12 @@ static void *read_clean(void *arg)
 int soak_clean_open(struct soak *soak, struct sh_err *err)
 {
     struct soak_clean *c = &soak->clean;
-    int fd[2];
-    char source[32], why[256];
     pthread_mutex_init(&c->lock, NULL);
     c->ring = calloc(SOAK_RING, sizeof *c->ring);
     if (c->ring == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the clean stream");
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
-        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
-    c->link = (struct link_spec){.type = LINK_FD, .fd = fd[0], .waits = LINK_WAITS_YES};
-    snprintf(source, sizeof source, "fd:%d", fd[1]);
-    const int rc = scanhead_open(source, &c->sh, why, sizeof why);
-    if (rc != SCANHEAD_OK) {
-        close(fd[0]);
-        close(fd[1]);
-        return sh_fail(err, rc, "the clean reader: %s", why);
-    }
-    c->fd = fd[1];
+    c->link.waits = LINK_WAITS_YES;
+    const int fd = offline_connect("the clean reader", &c->link, &c->sh, err);
+    if (fd < 0) return fd;
     scanhead_hash_start(c->sh);
     return SH_OK;
 }

@@ -22,7 +22,6 @@ struct soak_clean {
     uint64_t frames, points_frames;
     /* the thread's own */
     struct link_spec link;
-    int fd; /* the reader's end; the handle's */
     struct scanhead *sh;
     pthread_t thread;
     int running;

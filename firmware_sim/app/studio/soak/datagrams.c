@@ -5,12 +5,10 @@
  * was before faults met it. A reader of its own has no numbers: it notices what is missing, doubled or late by the
  * times in the packets, and what is cut by their length. Datagrams wait a moment here, so that the clean one is there
  * first. */
-#include <errno.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 

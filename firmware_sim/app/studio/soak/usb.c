@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "drivers/link/link.h"
-#include "drivers/protocol/bytes.h"
 #include "drivers/usb/backend.h"
 #include "firmware_sim/app/studio/soak/row.h"
 #include "firmware_sim/app/studio/soak/usb.h"

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
+#include "core/bytes.h"
 
 const struct view_column view_columns[VIEWED_COLUMNS] = {
     [VIEWED_RANGE] = {"range", "m", VIEW_FLOAT32, 1},

@@ -2,7 +2,6 @@
 /* The description of a recording, as JSON. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
@@ -75,9 +74,8 @@ static void put_meshes(const struct viewed *v, struct json *json)
 
 static void put_recording(const struct viewed *v, struct json *json)
 {
-    const char *slash = strrchr(v->path, '/');
     json_open_object(json, "recording");
-    json_string(json, "file", slash != NULL ? slash + 1 : v->path);
+    json_string(json, "file", basename(v->path));
     json_string(json, "format", v->format);
     put_frame(v, json);
     json_uint(json, "points", v->points.n);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "firmware_sim/app/studio/view/viewed.h"
 
 /* A column's array, wherever it points to, and the bytes of a value. */
@@ -39,23 +40,13 @@ const void *viewed_array(const struct viewed_points *points, enum viewed_column 
     return pointer_at(place_of(&copy, column, size));
 }
 
-static int resize(void *place, size_t n, size_t size)
-{
-    if (n > SIZE_MAX / size) return 0;
-    void *bigger = realloc(pointer_at(place), n * size);
-    if (bigger == NULL) return 0;
-    memcpy(place, &bigger, sizeof bigger);
-    return 1;
-}
-
 int viewed_points_room(struct viewed_points *p, size_t n, unsigned has, struct sh_err *err)
 {
-    const size_t room = n > 0 ? n : 1;
-    int ok = resize(&p->xyz_m, room, sizeof *p->xyz_m);
+    bool ok = resize(&p->xyz_m, n, sizeof *p->xyz_m);
     for (int c = 0; c < VIEWED_COLUMNS && ok; c++) {
         size_t size;
         void *place = place_of(p, (enum viewed_column)c, &size);
-        if ((has >> c & 1u) != 0) ok = resize(place, room, size);
+        if ((has >> c & 1u) != 0) ok = resize(place, n, size);
     }
     return ok ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %zu points", n);
 }

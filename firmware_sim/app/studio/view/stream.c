@@ -3,7 +3,6 @@
  * drivers/record/mesh.c. */
 #include "firmware_sim/app/studio/view/stream.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

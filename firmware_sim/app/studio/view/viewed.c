@@ -13,6 +13,7 @@
 #include "core/infile.h"
 #include "core/mat3.h"
 #include "core/pose.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 
 enum { EPSG_ECEF = 4978, EPSG_GEODETIC = 4979 };
@@ -99,7 +100,7 @@ static void turn_station(const struct geoframe *frame, struct viewed_station *s)
 {
     double quat[4], in_ecef[9], back[9], turned[9];
     pose_from_angles(s->heading_rad, s->pitch_rad, s->roll_rad, quat);
-    pose_matrix(quat, in_ecef);
+    quat_matrix(quat, in_ecef);
     mat3_transpose(frame->rotation, back);
     mat3_multiply(back, in_ecef, turned);
     pose_from_matrix(turned, quat);
@@ -178,15 +179,9 @@ static void measure_column(struct viewed *v, enum viewed_column column)
 
 void viewed_measure(struct viewed *v)
 {
-    for (int k = 0; k < 3; k++) {
-        v->min_m[k] = INFINITY;
-        v->max_m[k] = -INFINITY;
-    }
+    vec3_bound_nothing(v->min_m, v->max_m);
     for (uint32_t i = 0; i < v->points.n; i++)
-        for (int k = 0; k < 3; k++) {
-            v->min_m[k] = fmin(v->min_m[k], v->points.xyz_m[i][k]);
-            v->max_m[k] = fmax(v->max_m[k], v->points.xyz_m[i][k]);
-        }
+        vec3_bound(v->min_m, v->max_m, v->points.xyz_m[i]);
     for (int k = 0; k < 3; k++)
         v->origin_m[k] = round(0.5 * v->min_m[k] + 0.5 * v->max_m[k]);
     for (int c = 0; c < VIEWED_COLUMNS; c++)

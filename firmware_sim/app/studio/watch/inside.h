@@ -21,8 +21,8 @@
 #include "firmware_sim/app/studio/watch/past.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 
-/* Points kept of a scan, at most; points compared at a time; the largest `every`; bins of a histogram. */
-enum { WATCH_MOST_POINTS = 1 << 17, WATCH_BATCH = 1024, WATCH_LEAST_SHARE = 1 << 20, WATCH_BINS = 64 };
+/* Points kept of a scan, at most; points compared at a time; the largest `every`. */
+enum { WATCH_MOST_POINTS = 1 << 17, WATCH_BATCH = 1024, WATCH_LEAST_SHARE = 1 << 20 };
 
 /* Points of the scan at hand that are looked at, in the scene's frame. */
 struct watch_sample {
@@ -37,13 +37,6 @@ struct watch_sample {
     double cell_m;             /* of densities */
 };
 
-struct watch_histogram {
-    double from_m, to_m;
-    uint64_t below, above, count[WATCH_BINS];
-    uint32_t bins; /* 0: no value */
-    int along;     /* of deviations along the beam; 0: of distances */
-};
-
 /* The figures of one scan. */
 struct watch_scan {
     uint32_t scan, station; /* both from 1; 0: none */
@@ -56,7 +49,7 @@ struct watch_scan {
     struct figures figures;
     struct figures_density_row density; /* of the points looked at, times `every` */
     double density_cell_m;
-    struct watch_histogram histogram;
+    struct figures_histogram histogram; /* of deviations along the beam, or of distances where there are none */
     struct report_verdict verdict;
     uint32_t cells_seen;
     double seen_share;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* /quality: the observer stores figures, and each request gets the latest ones. */
 #include <math.h>
-#include <string.h>
 
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/watch/inside.h"
@@ -51,56 +50,6 @@ static void put_uint_or_null(struct json *json, const char *key, uint64_t value,
         json_string(json, key, NULL);
 }
 
-static void put_histogram(struct json *json, const struct watch_histogram *h)
-{
-    if (h->bins == 0) {
-        json_string(json, "histogram", NULL);
-        return;
-    }
-    json_open_object(json, "histogram");
-    json_string(json, "of", h->along ? "along_beam" : "distance");
-    json_double(json, "from_m", h->from_m);
-    json_double(json, "to_m", h->to_m);
-    json_open_array(json, "counts");
-    for (uint32_t k = 0; k < h->bins; k++)
-        json_uint(json, NULL, h->count[k]);
-    json_close_array(json);
-    json_uint(json, "below", h->below);
-    json_uint(json, "above", h->above);
-    json_close_object(json);
-}
-
-static void put_deviation(struct json *json, const struct watch_scan *s)
-{
-    const struct figures *f = &s->figures;
-    json_open_object(json, "deviation_m");
-    json_double(json, "mean", f->mean_m);
-    json_double(json, "rms", f->rms_m);
-    json_double(json, "p95", f->p95_m);
-    json_double(json, "max", f->max_m);
-    json_double(json, "bound", s->verdict.judged > 0 && s->verdict.bound_m > 0.0 ? s->verdict.bound_m : (double)NAN);
-    json_double(json, "sigma_expected", f->noisy > 0 ? f->expected_rms_m : (double)NAN);
-    json_uint(json, "far", f->far);
-    json_open_object(json, "along_beam");
-    json_uint(json, "points", f->along);
-    json_double(json, "mean", f->along_mean_m);
-    json_double(json, "rms", f->along_rms_m);
-    json_double(json, "max", f->along_max_m);
-    json_uint(json, "judged", f->judged);
-    json_double(json, "judged_rms", f->judged_rms_m);
-    json_close_object(json);
-    put_histogram(json, &s->histogram);
-    json_close_object(json);
-}
-
-static void put_verdict(struct json *json, const struct watch_scan *s)
-{
-    json_open_object(json, "verdict");
-    json_string(json, "judgement", report_judgement_name(s->verdict.judgement));
-    json_string(json, "text", s->verdict.text);
-    json_close_object(json);
-}
-
 static void put_counts(struct json *json, const struct watch_scan *s)
 {
     const int known = s->scan != 0;
@@ -115,22 +64,21 @@ static void put_counts(struct json *json, const struct watch_scan *s)
     json_double(json, "empty_share", s->shots > 0 ? (double)s->empty / (double)s->shots : (double)NAN);
 }
 
+/* Members of an open object, as `report` has them of a file. */
 static void put_scan(struct json *json, const struct watch_scan *s)
 {
     put_counts(json, s);
-    json_open_object(json, "density_per_m2");
-    json_double(json, "p5", s->density.p5);
-    json_double(json, "p50", s->density.p50);
-    json_double(json, "p95", s->density.p95);
-    json_double(json, "cell_m", s->density_cell_m > 0.0 ? s->density_cell_m : (double)NAN);
-    json_close_object(json);
     if (s->sampled_points == 0) {
-        json_string(json, "deviation_m", NULL);
+        json_string(json, "all", NULL);
         json_string(json, "verdict", NULL);
         return;
     }
-    put_deviation(json, s);
-    put_verdict(json, s);
+    json_open_object(json, "all");
+    report_put_figures(json, &s->figures);
+    report_put_density(json, &s->density);
+    json_double(json, "density_cell_m", s->density_cell_m);
+    json_close_object(json);
+    report_put_verdict(json, &s->verdict);
 }
 
 static void put_coverage(struct json *json, const struct watch *w)
@@ -157,13 +105,7 @@ static void put_stations(struct json *json, const struct watch *w)
         json_open_object(json, NULL);
         json_uint(json, "number", i + 1);
         json_string(json, "name", w->site->station[i].station->name);
-        put_counts(json, s);
-        json_double(json, "density_p50_per_m2", s->density.p50);
-        json_double(json, "mean_m", s->sampled_points > 0 ? s->figures.mean_m : (double)NAN);
-        json_double(json, "rms_m", s->sampled_points > 0 ? s->figures.rms_m : (double)NAN);
-        json_double(json, "p95_m", s->sampled_points > 0 ? s->figures.p95_m : (double)NAN);
-        json_double(json, "max_m", s->sampled_points > 0 ? s->figures.max_m : (double)NAN);
-        json_string(json, "judgement", report_judgement_name(s->verdict.judgement));
+        put_scan(json, s);
         json_double(json, "seen_share", s->seen_share);
         json_close_object(json);
     }
@@ -176,6 +118,7 @@ static void put_quality(struct json *json, const void *ctx)
     const struct watch *w = ctx;
     json_open_object(json, NULL);
     put_scan(json, &w->shown);
+    report_put_histogram(json, w->shown.figures.along > 0 ? "along_beam" : "distances", &w->shown.histogram);
     put_coverage(json, w);
     json_uint(json, "lost_frames", w->shown_lost);
     put_stations(json, w);

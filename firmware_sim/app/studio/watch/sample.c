@@ -154,26 +154,6 @@ int watch_sample_compare(struct watch *w, struct sh_err *err)
 
 /* ---- figures */
 
-static uint32_t everything(void *ctx, size_t i)
-{
-    (void)ctx;
-    (void)i;
-    return 0;
-}
-
-/* Two bins become one where there are too many. */
-static void put_histogram(const struct figures_histogram *h, int along, struct watch_histogram *out)
-{
-    const uint32_t of = h->bins > WATCH_BINS ? 2 : 1;
-    *out = (struct watch_histogram){
-        .from_m = h->from, .bins = (h->bins + of - 1) / of, .below = h->below, .above = h->above, .along = along};
-    out->to_m = h->from + h->width * of * out->bins;
-    for (uint32_t k = 0; k < h->bins; k++)
-        out->count[k / of] += h->count[k];
-}
-
-_Static_assert((int)FIGURES_MAX_BINS <= 2 * (int)WATCH_BINS, "two bins become one, not more");
-
 static int density(struct watch *w, const struct cloud *cloud, struct sh_err *err)
 {
     struct watch_sample *s = &w->sample;
@@ -210,16 +190,13 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
     struct watch_sample *s = &w->sample;
     const struct figures_in in = {.n = s->n, .distance_m = s->distance_m, .points = &s->points};
     const struct cloud cloud = {.n = s->n, .xyz_m = s->xyz_m, .epsg = CLOUD_EPSG_UNKNOWN};
-    struct figures_histogram h;
-    int rc = figures_by(&in, 1, everything, NULL, &w->at.figures, err);
+    int rc = figures_by(&in, 1, NULL, NULL, &w->at.figures, err);
     if (rc == SH_OK) rc = density(w, &cloud, err);
     if (rc != SH_OK) return rc;
-    const int along = w->at.figures.along > 0;
-    if (along)
-        figures_histogram_of_signed(s->points.along_m, s->n, SHOWN, &h);
+    if (w->at.figures.along > 0)
+        figures_histogram_of_signed(s->points.along_m, s->n, SHOWN, &w->at.histogram);
     else
-        figures_histogram_of(s->distance_m, s->n, SHOWN, &h);
-    put_histogram(&h, along, &w->at.histogram);
+        figures_histogram_of(s->distance_m, s->n, SHOWN, &w->at.histogram);
     judge(w);
     w->at.every = s->every;
     w->at.sampled_points = s->n;

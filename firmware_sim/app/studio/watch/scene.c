@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/mat3.h"
 #include "core/studio/decimate.h"
 #include "core/vec3.h"
@@ -51,28 +52,6 @@ static int make_parts(const struct watch *w, struct parts *parts, struct sh_err 
     return rc;
 }
 
-static void put_u32(char **to, uint32_t v)
-{
-    for (int i = 0; i < 4; i++)
-        *(*to)++ = (char)(v >> (8 * i) & 0xff);
-}
-
-static void put_float(char **to, double v)
-{
-    const float f = (float)v;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    put_u32(to, bits);
-}
-
-static void put_double(char **to, double v)
-{
-    uint64_t bits;
-    memcpy(&bits, &v, sizeof bits);
-    put_u32(to, (uint32_t)bits);
-    put_u32(to, (uint32_t)(bits >> 32));
-}
-
 static int put_scene(struct watch *w, const struct parts *parts, struct sh_err *err)
 {
     const struct scene *scene = w->site->scene;
@@ -86,20 +65,22 @@ static int put_scene(struct watch *w, const struct parts *parts, struct sh_err *
     char *to = w->scene_bytes = malloc(w->scene_len);
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the coarse scene");
     memcpy(to, "SHSC", 4);
-    to += 4;
-    put_u32(&to, VERSION);
-    put_u32(&to, n_vertices);
-    put_u32(&to, n_triangles);
-    for (int i = 0; i < 3; i++)
-        put_double(&to, origin_m[i] = 0.5 * scene->min_m[i] + 0.5 * scene->max_m[i]);
+    le_put32(to + 4, VERSION);
+    le_put32(to + 8, n_vertices);
+    le_put32(to + 12, n_triangles);
+    for (int i = 0; i < 3; i++) {
+        origin_m[i] = 0.5 * scene->min_m[i] + 0.5 * scene->max_m[i];
+        le_put_double(to + 16 + 8 * i, origin_m[i]);
+    }
+    to += HEAD_BYTES;
     for (uint32_t k = 0; k < parts->n; k++)
         for (uint32_t v = 0; v < parts->part[k].n_vertices; v++)
-            for (int i = 0; i < 3; i++)
-                put_float(&to, parts->part[k].vertex_m[v][i] - origin_m[i]);
+            for (int i = 0; i < 3; i++, to += 4)
+                le_put_float(to, (float)(parts->part[k].vertex_m[v][i] - origin_m[i]));
     for (uint32_t k = 0; k < parts->n; first += parts->part[k++].n_vertices)
         for (uint32_t t = 0; t < parts->part[k].n_triangles; t++)
-            for (int i = 0; i < 3; i++)
-                put_u32(&to, first + parts->part[k].triangle[t][i]);
+            for (int i = 0; i < 3; i++, to += 4)
+                le_put32(to, first + parts->part[k].triangle[t][i]);
     return SH_OK;
 }
 
@@ -166,12 +147,6 @@ static void put_surfaces(struct json *json, const struct site *site)
     json_close_array(json);
 }
 
-static const char *base_of(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 static void put_head(struct json *json, const void *ctx)
 {
     static const char *const paces[] = {[PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"};
@@ -185,7 +160,7 @@ static void put_head(struct json *json, const void *ctx)
     json_string(json, "model", cfg->profile.model);
     json_string(json, "profile", cfg->profile.name);
     json_string(json, "serial", cfg->head.serial);
-    json_string(json, "config", base_of(cfg->file));
+    json_string(json, "config", basename(cfg->file));
     json_string(json, "pace", paces[cfg->loop.pace]);
     json_open_array(json, "stations");
     for (uint32_t i = 0; i < w->site->n_stations; i++)

@@ -18,10 +18,8 @@ static double area_of(const struct scene *scene)
     double area_m2 = 0.0;
     for (uint32_t t = 0; t < scene->n_triangles; t++) {
         const uint32_t *c = scene->triangle[t];
-        double a[3], b[3], n[3];
-        vec3_sub(scene->vertex_m[c[1]], scene->vertex_m[c[0]], a);
-        vec3_sub(scene->vertex_m[c[2]], scene->vertex_m[c[0]], b);
-        vec3_cross(a, b, n);
+        double n[3];
+        vec3_normal(scene->vertex_m[c[0]], scene->vertex_m[c[1]], scene->vertex_m[c[2]], n);
         area_m2 += 0.5 * vec3_length(n);
     }
     return area_m2;

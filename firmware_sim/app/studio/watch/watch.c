@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The watch as a whole: opens, starts and closes it, and answers requests. */
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/config/config.h"
 
@@ -20,21 +19,6 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
     if (strcmp(path, "/head") == 0) return watch_get_head(w, out, err);
     if (strcmp(path, "/plan") == 0) return watch_get_plan(w, out, err);
     return SH_EINPUT;
-}
-
-static int connect_observer(struct watch *w, struct sh_err *err)
-{
-    int fd[2];
-    char source[32], why[256];
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
-        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
-    w->link =
-        (struct link_spec){.type = LINK_FD, .fd = fd[0], .waits = w->options.waits ? LINK_WAITS_YES : LINK_WAITS_NO};
-    snprintf(source, sizeof source, "fd:%d", fd[1]);
-    const int rc = scanhead_open(source, &w->sh, why, sizeof why);
-    if (rc != SCANHEAD_OK) close(fd[1]);
-    w->fd = rc == SCANHEAD_OK ? fd[1] : -1;
-    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "the observer: %s", why);
 }
 
 static int make_room(struct watch *w, struct sh_err *err)
@@ -90,7 +74,9 @@ static int open_watch(const struct config *cfg, const struct site *site, const s
     if (rc == SH_OK) rc = watch_make_scene(w, err);
     if (rc == SH_OK) rc = watch_sample_open(w, err);
     if (rc == SH_OK) rc = watch_seen_open(w, err);
-    if (rc == SH_OK) rc = connect_observer(w, err);
+    w->link.waits = options->waits ? LINK_WAITS_YES : LINK_WAITS_NO;
+    if (rc == SH_OK) w->fd = offline_connect("the observer", &w->link, &w->sh, err);
+    if (rc == SH_OK && w->fd < 0) rc = w->fd;
     w->shown_share = w->seen.coverage != NULL ? 0.0 : (double)NAN;
     if (rc == SH_OK) return SH_OK;
     close_watch(w);

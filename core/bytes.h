@@ -1,36 +1,27 @@
 /* SPDX-License-Identifier: MIT */
-/* Little-endian loads and stores at any alignment. One instruction each on little-endian machines. */
-#ifndef DRIVERS_PROTOCOL_BYTES_H
-#define DRIVERS_PROTOCOL_BYTES_H
+/* Little-endian and big-endian loads and stores at any alignment. One or two instructions each. */
+#ifndef CORE_BYTES_H
+#define CORE_BYTES_H
 
+#include <endian.h>
 #include <stdint.h>
 #include <string.h>
 
-#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-#define LE16(v) __builtin_bswap16(v)
-#define LE32(v) __builtin_bswap32(v)
-#define LE64(v) __builtin_bswap64(v)
-#else
-#define LE16(v) (v)
-#define LE32(v) (v)
-#define LE64(v) (v)
-#endif
-
 static inline void le_put16(void *dst, uint16_t v)
 {
-    v = LE16(v);
+    v = htole16(v);
     memcpy(dst, &v, sizeof v);
 }
 
 static inline void le_put32(void *dst, uint32_t v)
 {
-    v = LE32(v);
+    v = htole32(v);
     memcpy(dst, &v, sizeof v);
 }
 
 static inline void le_put64(void *dst, uint64_t v)
 {
-    v = LE64(v);
+    v = htole64(v);
     memcpy(dst, &v, sizeof v);
 }
 
@@ -52,21 +43,29 @@ static inline uint16_t le_get16(const void *src)
 {
     uint16_t v;
     memcpy(&v, src, sizeof v);
-    return LE16(v);
+    return le16toh(v);
 }
 
 static inline uint32_t le_get32(const void *src)
 {
     uint32_t v;
     memcpy(&v, src, sizeof v);
-    return LE32(v);
+    return le32toh(v);
 }
 
 static inline uint64_t le_get64(const void *src)
 {
     uint64_t v;
     memcpy(&v, src, sizeof v);
-    return LE64(v);
+    return le64toh(v);
+}
+
+static inline float le_get_float(const void *src)
+{
+    const uint32_t v = le_get32(src);
+    float f;
+    memcpy(&f, &v, sizeof f);
+    return f;
 }
 
 static inline double le_get_double(const void *src)
@@ -75,6 +74,33 @@ static inline double le_get_double(const void *src)
     double d;
     memcpy(&d, &v, sizeof d);
     return d;
+}
+
+/* Stores the low 16 bits. */
+static inline void be_put16(void *dst, size_t v)
+{
+    const uint16_t be = htobe16((uint16_t)v);
+    memcpy(dst, &be, sizeof be);
+}
+
+static inline void be_put32(void *dst, uint32_t v)
+{
+    v = htobe32(v);
+    memcpy(dst, &v, sizeof v);
+}
+
+static inline uint16_t be_get16(const void *src)
+{
+    uint16_t v;
+    memcpy(&v, src, sizeof v);
+    return be16toh(v);
+}
+
+static inline uint32_t be_get32(const void *src)
+{
+    uint32_t v;
+    memcpy(&v, src, sizeof v);
+    return be32toh(v);
 }
 
 #endif
