@@ -374,7 +374,7 @@ static void a_map_conversion_goes_before_a_site(void **state)
     /* Heading 0 is the model's y, 30 deg left of grid north; the second angle is from the grid. */
     read_azimuths(&azimuth_deg, &from_grid_deg);
     assert_near(remainder(from_grid_deg + 30, 360), 0, 1e-6);
-    assert_non_null(strstr(warned, "OrthogonalHeight counts from the sea"));
+    assert_non_null(strstr(warned, "OrthogonalHeight counts from sea level"));
     assert_non_null(strstr(warned, "km from the place that its IFCMAPCONVERSION gives"));
 }
 

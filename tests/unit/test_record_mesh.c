@@ -378,8 +378,8 @@ static void what_can_be_no_mesh(void **state)
     refused("a.obj", mesh, SH_EINPUT, "a.mtl: is a symbolic link");
     remove_file("a.mtl");
 
-    refused("a#b.gltf", mesh, SH_EINPUT, "as URIs, where # means something else");
-    refused("a%b.gltf", mesh, SH_EINPUT, "as URIs, where % means something else");
+    refused("a#b.gltf", mesh, SH_EINPUT, "by URIs, where # has a special meaning");
+    refused("a%b.gltf", mesh, SH_EINPUT, "by URIs, where % has a special meaning");
 
     rig_begin();
     begin_scan(1, 1);

@@ -116,7 +116,7 @@ static const struct {
     {"map @cloud.ply --perspective --output=@o.png", "cloud.ply", "o.png", "--output", "the operand"},
     {"map @c.yaml --perspective --cloud=@cloud.ply --output=@o.png", "cloud.ply", "o.png", "--output", "--cloud"},
     {"batch @c.yaml --output=@ --format=obj --set=scene.meshes[0].file=@0001_station-1.obj", "room.obj",
-     "0001_station-1.obj", "--output", "job 1,"},
+     "0001_station-1.obj", "--output", "an input"},
 };
 
 /* Two that are written, where their names say what they are. */

@@ -153,7 +153,8 @@ static int check_inputs(const struct batch *b, struct sh_err *err)
         if (strncmp(file, name, strlen(name)) == 0 && file[strlen(name)] == '.')
             return sh_fail(
                 err, SH_EINPUT,
-                "--output %s: %s is a file of job %lu and also an input, and would be overwritten; name another folder",
+                "--output %s: %s, a file of job %lu, is also read as an input, and would be overwritten; name "
+                "another folder",
                 b->dir, file, job);
     }
     return SH_OK;
