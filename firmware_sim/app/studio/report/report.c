@@ -82,7 +82,7 @@ static const char NOTES[] =
     "distances, which are never negative.\n"
     "\n"
     "Along the beam: the line from the station through a point is followed to the scene. Measured minus exact\n"
-    "range is given for points on smooth faces, away from edges. Beside it is the RMS expected from noise and counts.\n"
+    "range is given for points on smooth faces, away from edges. Beside it is the RMS of noise and counts.\n"
     "The last line says whether the points are within that: without noise each point must be within its bound (that\n"
     "of the plan, and half a count on each axis); with noise the RMS of deviation over sigma must be 1. For heads\n"
     "that moved there are only distances, which are not judged. Where only smooth faces are judged (noise, a\n"
