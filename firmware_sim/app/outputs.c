@@ -192,9 +192,8 @@ static int check(const struct files *f, struct sh_err *err)
         for (size_t k = 0; k < f->n && out->is_written; k++) {
             const struct named *other = &f->file[k];
             if (!other->is_written && is_there(other) && is_same(out, other))
-                return sh_fail(err, SH_EINPUT,
-                               "%s %s: is also read as %s, and would be overwritten; name another file", out->who,
-                               out->path, other->who);
+                return sh_fail(err, SH_EINPUT, "%s %s: is also read as %s, and would be overwritten; name another file",
+                               out->who, out->path, other->who);
             if (other->is_written && k < i && !(out->is_beside && other->is_beside) && is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: %s writes the same file; name another one", out->who, out->path,
                                other->who);

@@ -57,8 +57,7 @@ static void test_same_file(void **state)
                    "--output writes the same file");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--truth", b, NULL},
                    "--output writes the same file");
-    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL},
-                   "is also read as");
+    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--stats", config, NULL}, "is also read as");
     /* what a recording that was killed has left is not overwritten: it may be all that there is of it */
     snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
     const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};
