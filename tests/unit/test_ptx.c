@@ -219,7 +219,7 @@ static void test_far(void **state)
         if (two) expect_head(1, 1, "10.000000000 20.000000000 30.000000000");
         expect_line(WALL);
         assert_int_equal(*at, 0);
-        assert_int_equal(strstr(rig_notes, "1 grids begun within a scan") != NULL, two);
+        assert_int_equal(strstr(rig_notes, "1 additional grids begun within a scan") != NULL, two);
     }
 }
 
@@ -233,7 +233,7 @@ static void test_shared_padding(void **state)
         put_shots(0, (const uint32_t[]){0, 40}, (const uint32_t[]){0, 0}, 2);
         struct recorder_options options = {.padding = i == 0 ? NULL : &padding};
         assert_int_equal(rig_record(rig_path("a.ptx"), options, RIG_KEEP, &err), SH_OK);
-        assert_int_equal(strstr(rig_notes, "1 grids begun within a scan") != NULL, i);
+        assert_int_equal(strstr(rig_notes, "1 additional grids begun within a scan") != NULL, i);
         unlink(rig_path("a.ptx"));
     }
     assert_int_equal(padding.n_shots, 2);

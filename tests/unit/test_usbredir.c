@@ -206,7 +206,7 @@ static void test_reset_is_no_unplugging(void **state)
     bench_expect(&bench, LINK_OPENED, 0);
     guest_configure(g); /* a host with a reset of its own does this here */
     bench_expect(&bench, LINK_CLOSED, 0);
-    expect_notice(&bench, "configured the device anew");
+    expect_notice(&bench, "configured the device again");
     guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
     bench_expect(&bench, LINK_OPENED, 0);
     guest_free(g);

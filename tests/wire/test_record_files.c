@@ -91,7 +91,7 @@ static void test_no_file(void **state)
     }
     snprintf(path, sizeof path, "%s", wire_path(wire, "a.xyz"));
     expect_refusal(wire, (const char *const[]){"record", config, "-o", path, NULL},
-                   "known are .ply .las .ptx .e57 .poses.csv .pcapng .shs");
+                   "allowed are .ply .las .ptx .e57 .poses.csv .pcapng .shs");
 }
 
 /* Formats with rigid poses take no degrees, and report that before the scan. */
@@ -216,7 +216,7 @@ static void test_lines_far_apart(void **state)
     assert_int_equal(stat(ptx, &st), 0);
     assert_in_range(st.st_size, 1, 2000);
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    assert_non_null(strstr(err, "1 grids begun within a scan"));
+    assert_non_null(strstr(err, "1 additional grids begun within a scan"));
     free(err);
 }
 

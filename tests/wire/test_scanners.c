@@ -143,7 +143,7 @@ static void test_what_a_file_cannot_hold(void **state)
     expect_refusal(wire, "a.shs", all, "the stations have several scanners; allowed with --split");
     expect_refusal(wire, "a.pcapng", all, "the stations have several scanners; allowed with --split");
     expect_refusal(wire, "a.ptx", all, "this head fires beams in turn");
-    expect_refusal(wire, "a.ply", (const char *const[]){"--split", "--each", NULL}, "allowed one of them");
+    expect_refusal(wire, "a.ply", (const char *const[]){"--split", "--each", NULL}, "allowed is one of them");
     assert_int_equal(record(wire, "a.ptx", (const char *const[]){"--station", "1", NULL}), 0);
     /* Each stream by itself belongs to one head. */
     char ply[352];

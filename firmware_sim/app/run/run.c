@@ -234,10 +234,10 @@ static const char NOTES[] =
     "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"
     "\n"
-    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, with their\n"
-    "recorded timing, from the first one on each time that a client commands SCAN:STARt. With --start they are\n"
-    "served at once, and the run ends with them. Queries are answered from the recording's descriptor; settings can't\n"
-    "change. Faults on the wire and of links apply.\n";
+    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, with\n"
+    "their recorded timing, from the first one on each time that a client commands SCAN:STARt. With --start they\n"
+    "are served at once, and the run ends with them. Queries are answered from the recording's descriptor;\n"
+    "settings can't change. Faults on the wire and of links apply.\n";
 
 const struct app_command app_run = {
     .name = "run",
