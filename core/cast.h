@@ -94,7 +94,7 @@ struct cast_colour {
 
 /* Disturbances of a head, for the runs that are cast with it. Its encoders read the wobbles; the head doesn't notice
  * the others. All 0, with a share of 1: none. */
-struct cast_upset {
+struct cast_disturbance {
     int dark;         /* the laser does not fire: every shot is empty */
     double slip_turn; /* the beam goes so much farther in pan than its encoder reads */
     /* The share of the optical power that a clean window lets through, both ways together. With a signal model each
@@ -110,7 +110,7 @@ struct cast_upset {
 };
 
 /* Adds the wobbles at t_ns to scheduled angles. */
-void cast_wobble(const struct cast_upset *upset, int64_t t_ns, double *mirror_turn, double *pan_turn);
+void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, double *mirror_turn, double *pan_turn);
 
 /* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
@@ -150,7 +150,7 @@ struct cast_setup {
     /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const struct cast_detect *detect;
     const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
-    const struct cast_upset *upset;   /* NULL: no disturbance. Not for caster_meet */
+    const struct cast_disturbance *disturbance; /* NULL: no disturbance. Not for caster_meet */
 };
 
 /* Counts of what became of pulses. */

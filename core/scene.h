@@ -208,7 +208,8 @@ int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
 /* Marks duplicate faces: triangles with the same three corners, in any order, and the same holes, as one with a lower
  * number. Triangle i has bit i % 64 of (*twin)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
-int scene_find_twins(const struct scene *scene, const struct sh_report *report, uint64_t **twin, struct sh_err *err);
+int scene_find_duplicate_faces(const struct scene *scene, const struct sh_report *report, uint64_t **duplicate,
+                               struct sh_err *err);
 
 /* (*same)[i] is the first of the scene's own vertices at the place of vertex i, bit for bit; to be freed. SH_ENOMEM,
  * SH_ESTOPPED. */

@@ -9,7 +9,7 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
-#include "core/huge.h"
+#include "core/huge_pages.h"
 #include "core/infile.h"
 
 /* Read, not mapped: a file that shrinks while it is mapped would end the process. */
@@ -18,7 +18,7 @@ static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ct
     struct stat st;
     if (fstat(fileno(f), &st) != 0) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
     t->size = (size_t)st.st_size;
-    t->data = huge_alloc(t->size + 1);
+    t->data = huge_pages_alloc(t->size + 1);
     if (t->data == NULL) return text_fail(t, 0, SH_ENOMEM, err, "no memory for %zu bytes", t->size);
     const size_t step = (size_t)16 << 20;
     for (size_t at = 0; at < t->size;) {

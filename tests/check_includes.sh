@@ -13,7 +13,7 @@ studio='^(core/studio/|drivers/record/|firmware_sim/app/studio/|firmware_sim/mai
 # In core and in firmware_sim a room may use itself and the rooms before it in this list, so that no rooms form a circle.
 # Files that lie in core itself are the first room, `core`: errors, lines, vectors, angles, random numbers.
 core_order='core texture georef scene import schedule pose surface instrument detect bvh sight footprint cast plan
-    studio/picture studio/mesh studio/analysis studio/standpoint studio/coverage'
+    studio/picture studio/mesh studio/analysis studio/viewpoint studio/coverage'
 firmware_order='base command fault config site device loop replay app app/help app/run app/studio app/studio/record app/studio/report
     app/studio/map app/studio/coverage app/studio/init app/studio/batch app/studio/soak app/studio/view app/studio/watch'
 # The folders of core/import are one room: it calls them, and they fill what it hands out. So are those of firmware_sim/config.
@@ -357,7 +357,7 @@ expect_call 0 drivers/record/mesh.c core/studio/mesh/file.c
 expect_call 0 firmware_sim/main.c firmware_sim/app/studio/map/map.c
 expect_call 1 firmware_sim/scanheadd.c firmware_sim/app/studio/map/map.c
 expect_call 1 firmware_sim/app/run/run.c firmware_sim/app/studio/watch/watch.c
-expect_call 1 firmware_sim/site/doubts.c core/studio/analysis/distance.c
+expect_call 1 firmware_sim/site/plausibility.c core/studio/analysis/distance.c
 expect_call 1 firmware_sim/loop/loop.c drivers/record/shs.c
 
 expect_system() { # violations caller symbol

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
-#include "core/huge.h"
+#include "core/huge_pages.h"
 
 /* The corner of a triangle that is not on its common edge with another one; 3: they share no edge. */
 static int odd_corner(const uint32_t a[3], const uint32_t b[3])
@@ -151,7 +151,7 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     const uint32_t n = scene->n_triangles;
     uint32_t leaves = 0;
     measure(bvh);
-    bvh->leaf = huge_alloc(((size_t)n + 1) * sizeof *bvh->leaf);
+    bvh->leaf = huge_pages_alloc(((size_t)n + 1) * sizeof *bvh->leaf);
     uint64_t *taken = calloc((size_t)n / 64 + 1, sizeof *taken);
     int rc = bvh->leaf != NULL && taken != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
     for (uint32_t i = 0; i < n && rc == SH_OK; i++) {

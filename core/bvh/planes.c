@@ -7,7 +7,7 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/copies.h"
-#include "core/huge.h"
+#include "core/huge_pages.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
@@ -41,7 +41,7 @@ static void set_plane(struct bvh *bvh, uint32_t triangle)
 int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t n = bvh->scene->n_triangles;
-    bvh->plane = huge_alloc(((size_t)n + 1) * sizeof *bvh->plane);
+    bvh->plane = huge_pages_alloc(((size_t)n + 1) * sizeof *bvh->plane);
     if (bvh->plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
     for (uint32_t i = 0; i < n; i++) {
         if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;

@@ -10,7 +10,7 @@
 #include "core/cast/kernels_aim.h"
 #include "core/cast/kernels_moving.h"
 #include "core/cast/kernels_sweep.h"
-#include "core/cast/upset.h"
+#include "core/cast/disturbance.h"
 #include "core/mat3.h"
 
 /* The rotation from socs to the frame of positions: to the CRS where that is a rotation, else to prcs.
@@ -52,8 +52,8 @@ static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_n
 static const double *slipped_rotation(const struct cast_setup *s, const double rotation[9], double out[9])
 {
     double slip[9];
-    if (s->upset == NULL || s->upset->slip_turn == 0.0) return rotation;
-    caster_slip(s->upset, slip);
+    if (s->disturbance == NULL || s->disturbance->slip_turn == 0.0) return rotation;
+    caster_slip(s->disturbance, slip);
     mat3_multiply(rotation, slip, out);
     return out;
 }
@@ -63,7 +63,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
 {
     const struct cast_setup *s = k->s;
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
-    const int wobbles = s->upset != NULL && s->upset->n_wobbles != 0;
+    const int wobbles = s->disturbance != NULL && s->disturbance->n_wobbles != 0;
     double slipped[9];
     const double *rotation = slipped_rotation(s, moves ? mat3_unit : s->rotation, slipped);
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
@@ -91,8 +91,8 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
 static void slip_bent(struct caster *c, const struct chunk *k, int offset)
 {
     double slip[9], back[9];
-    if (k->s->upset == NULL || k->s->upset->slip_turn == 0.0) return;
-    caster_slip(k->s->upset, slip);
+    if (k->s->disturbance == NULL || k->s->disturbance->slip_turn == 0.0) return;
+    caster_slip(k->s->disturbance, slip);
     mat3_transpose(slip, back);
     kernel_turn_back(&VEC3_IN(c->socs, 0), back, k->n, &VEC3_OUT(c->socs, 0));
     if (offset) kernel_turn_back(&VEC3_IN(c->read, 0), back, k->n, &VEC3_OUT(c->read, 0));
@@ -134,7 +134,7 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
 static void wobble(const struct chunk *k, struct echo_list *l)
 {
     for (uint32_t i = 0; i < k->n; i++)
-        cast_wobble(k->s->upset, k->run->t0_ns + (int64_t)k->dt_ns[i], &l->mirror_turn[i], &l->pan_turn[i]);
+        cast_wobble(k->s->disturbance, k->run->t0_ns + (int64_t)k->dt_ns[i], &l->mirror_turn[i], &l->pan_turn[i]);
 }
 
 void caster_aim(struct caster *c, struct chunk *k)
@@ -146,7 +146,7 @@ void caster_aim(struct caster *c, struct chunk *k)
         kernel_angles_table(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
     else
         kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
-    if (s->upset != NULL && s->upset->n_wobbles != 0) wobble(k, l);
+    if (s->disturbance != NULL && s->disturbance->n_wobbles != 0) wobble(k, l);
     k->from = (struct bvh_origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
     if (s->n_knots != 0) k->from.own = VEC3_IN(l->p, 0);
     k->linear = 0;
@@ -182,9 +182,9 @@ void caster_aim_read(struct caster *c, struct chunk *k)
     if (k->s->layout != LINE_GEO) return;
     k->linear = k->s->n_knots == 0 && reading_rotation(k->s, to_crs);
     read_part(c, k, 0, k->n, k->dt_ns);
-    for (uint32_t g = 0; g < l->n_further && l->n > k->n; g++)
-        for (uint32_t i = 0; i < l->further[g].n; i++) {
-            dt_ns[n++] = k->dt_ns[l->further[g].pulse];
+    for (uint32_t g = 0; g < l->n_secondary && l->n > k->n; g++)
+        for (uint32_t i = 0; i < l->secondary[g].n; i++) {
+            dt_ns[n++] = k->dt_ns[l->secondary[g].pulse];
             if (n < CHUNK) continue;
             read_part(c, k, done, n, dt_ns);
             done += n;

@@ -8,7 +8,7 @@
  *     optics     optics.c         where that is glass or a mirror: what is seen there (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
- *     upset      upset.c          where the head has a fault: wobbles and a slipped pan within aim, a dark laser after
+ *     upset      disturbance.c          where the head has a fault: wobbles and a slipped pan within aim, a dark laser after
  *                                 it, a soiled window within echoes
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
  *     points     points.c         positions, and entries of the block
@@ -27,7 +27,7 @@
 #include "core/cast/points.h"
 #include "core/cast/sub_rays.h"
 #include "core/cast/tripod.h"
-#include "core/cast/upset.h"
+#include "core/cast/disturbance.h"
 
 void caster_set_profile(struct caster *caster, struct bvh_profile *profile)
 {
@@ -84,7 +84,7 @@ void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_
 static void begin_echoes(struct echo_list *l, const struct chunk *k)
 {
     l->n = k->n;
-    l->n_further = 0;
+    l->n_secondary = 0;
     if (k->s->detect != NULL || k->s->noise_on) memset(l->number, 0, k->n);
     for (uint32_t i = 0; i < k->n && k->attributes; i++)
         l->width_m[i] = (float)k->s->pulse_m;
@@ -122,7 +122,7 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
-    if (s->upset != NULL && s->upset->dark) {
+    if (s->disturbance != NULL && s->disturbance->dark) {
         caster_darken(&c->list);
         return caster_points(c, k);
     }

@@ -25,7 +25,7 @@ struct caster {
     struct chunk_vectors socs, read; /* directions, socs: of the beam; as the encoders read it, or its origin */
     struct chunk_vectors origin;     /* of beams that don't begin where the head is, prcs */
     struct path_rays paths;          /* touched only where there is glass or a mirror */
-    uint32_t further_a[CAST_LIST], further_b[CAST_LIST], further_c[CAST_LIST]; /* on their way into the block */
+    uint32_t secondary_a[CAST_LIST], secondary_b[CAST_LIST], secondary_c[CAST_LIST]; /* on their way into the block */
 };
 
 #endif

@@ -84,7 +84,7 @@ void caster_colours(const struct chunk *k, const double *d_z, struct echo_list *
     const struct coloured coloured = {k, d_z, l};
     for (uint32_t i = 0; i < k->n; i++)
         set_colour(&coloured, i, i);
-    for (uint32_t g = 0; g < l->n_further; g++)
-        for (uint32_t j = 0; j < l->further[g].n; j++)
-            set_colour(&coloured, l->further[g].at + j, l->further[g].pulse);
+    for (uint32_t g = 0; g < l->n_secondary; g++)
+        for (uint32_t j = 0; j < l->secondary[g].n; j++)
+            set_colour(&coloured, l->secondary[g].at + j, l->secondary[g].pulse);
 }

@@ -10,14 +10,14 @@
 #include "core/cast/caster.h"
 #include "core/cast/chunk.h"
 #include "core/cast/kernels_points.h"
-#include "core/cast/upset.h"
+#include "core/cast/disturbance.h"
 #include "core/rng.h"
 #include "core/surface.h"
 
-uint32_t echoes_further(struct echo_list *l, uint32_t pulse, uint32_t n)
+uint32_t echoes_secondary(struct echo_list *l, uint32_t pulse, uint32_t n)
 {
     uint32_t first = l->n;
-    l->further[l->n_further++] = (struct further){pulse, first, n};
+    l->secondary[l->n_secondary++] = (struct secondary){pulse, first, n};
     l->n += n;
     return first;
 }
@@ -32,7 +32,7 @@ static void list_paths(struct caster *c, const struct chunk *k)
         for (uint32_t j = p->first[i]; j != CAST_NO_PATH; j = p->found[j].next)
             n++;
         if (n == 0) continue;
-        uint32_t at = echoes_further(l, i, n), number = 1;
+        uint32_t at = echoes_secondary(l, i, n), number = 1;
         for (uint32_t j = p->first[i]; j != CAST_NO_PATH; j = p->found[j].next, at++) {
             const struct path_hit *hit = &p->found[j];
             l->range_m[at] = hit->range_m;
@@ -47,7 +47,7 @@ static void list_paths(struct caster *c, const struct chunk *k)
 }
 
 /* Index of a pulse's echo j: its first one is in the pulse's place. */
-static uint32_t place_of(const struct further *f, uint32_t j)
+static uint32_t place_of(const struct secondary *f, uint32_t j)
 {
     return j == 0 ? f->pulse : f->at + j - 1;
 }
@@ -70,7 +70,7 @@ static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const st
 
 /* Returns of a pulse that are nearer to each other than the range resolution make one echo. A return without
  * power stays apart, and keeps its number. */
-static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct further *f, int texels)
+static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct secondary *f, int texels)
 {
     const uint32_t n = f->n + 1;
     struct beam_return r[LINE_MAX_ECHOES];
@@ -123,8 +123,8 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
         if (caster_is_bare(k->s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
     for (uint32_t i = k->n; i < l->n; i++)
         l->label[i] += l->ghost[i] ? d->ghost_label : 0;
-    for (uint32_t g = 0; g < l->n_further && d->separation_m > 0.0; g++)
-        l->further[g].n = merge_pulse(l, &how, &l->further[g], k->texels);
+    for (uint32_t g = 0; g < l->n_secondary && d->separation_m > 0.0; g++)
+        l->secondary[g].n = merge_pulse(l, &how, &l->secondary[g], k->texels);
 }
 
 static uint32_t count_echoes(const struct echo_list *l)
@@ -150,7 +150,7 @@ static void detect(struct caster *c, const struct chunk *k)
                                          .scan_key = k->s->scan_key};
     uint32_t before = count_echoes(l);
     if (d->signal != NULL) {
-        if (k->s->upset != NULL) caster_weaken(k->s->upset, l->n, l->rho);
+        if (k->s->disturbance != NULL) caster_weaken(k->s->disturbance, l->n, l->rho);
         detect_by_signal(d->signal, &echoes);
         if (k->attributes) detect_amplitudes(d->signal, &echoes, l->amplitude_cdb);
     }
@@ -165,7 +165,7 @@ static void detect(struct caster *c, const struct chunk *k)
 static double fixed_sigma_m(const struct cast_setup *s)
 {
     const int is_modelled = s->detect != NULL && s->detect->signal != NULL;
-    return s->upset != NULL && !is_modelled ? s->range_sigma_m / s->upset->share : s->range_sigma_m;
+    return s->disturbance != NULL && !is_modelled ? s->range_sigma_m / s->disturbance->share : s->range_sigma_m;
 }
 
 /* Noise is keyed by scan, pulse and echo, so that it doesn't depend on which others are sent. */
@@ -186,8 +186,8 @@ static void add_noise(struct caster *c, const struct cast_setup *s)
 static void make_keys(struct echo_list *l, const struct chunk *k)
 {
     kernel_keys(k->pulse0, l->number, k->n, l->key);
-    for (uint32_t g = 0; g < l->n_further; g++) {
-        const struct further *f = &l->further[g];
+    for (uint32_t g = 0; g < l->n_secondary; g++) {
+        const struct secondary *f = &l->secondary[g];
         for (uint32_t i = f->at; i < f->at + f->n; i++)
             l->key[i] = rng_echo(k->pulse0 + f->pulse, l->number[i]);
     }
@@ -203,7 +203,7 @@ struct heard {
     uint32_t colour;
 };
 
-static uint32_t hear(const struct echo_list *l, const double *strength, const struct further *f, struct heard *h)
+static uint32_t hear(const struct echo_list *l, const double *strength, const struct secondary *f, struct heard *h)
 {
     uint32_t n = 0;
     for (uint32_t j = 0; j <= f->n; j++) {
@@ -260,15 +260,15 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
     const double *strength = s->detect != NULL && s->detect->signal != NULL ? l->amplitude : l->rho;
     const uint32_t most = caster_max_echoes(s);
     uint32_t end = k->n;
-    for (uint32_t g = 0; g < l->n_further; g++) {
+    for (uint32_t g = 0; g < l->n_secondary; g++) {
         struct heard h[LINE_MAX_ECHOES];
-        struct further *f = &l->further[g];
+        struct secondary *f = &l->secondary[g];
         uint32_t n = hear(l, strength, f, h);
         for (; n > most && n > 1; c->counters.crowded++)
             n = drop_weakest(h, n);
         if (s->detect != NULL && s->detect->ambiguity == DETECT_FOLDED) sort_heard(h, n);
         n = choose(h, n, s->echoes);
-        *f = (struct further){f->pulse, end, n > 1 ? n - 1 : 0};
+        *f = (struct secondary){f->pulse, end, n > 1 ? n - 1 : 0};
         end += f->n;
         if (n == 0) l->range_m[f->pulse] = (double)NAN;
         for (uint32_t j = 0; j < n; j++) {
@@ -309,5 +309,5 @@ void caster_echoes(struct caster *c, const struct chunk *k)
     bvh_stage_ends(c->profile, CAST_DETECT);
     add_noise(c, s);
     bvh_stage_ends(c->profile, CAST_NOISE);
-    if (l->n_further > 0) choose_echoes(c, k);
+    if (l->n_secondary > 0) choose_echoes(c, k);
 }

@@ -6,7 +6,7 @@
 #include "core/cast/chunk_arrays.h"
 
 /* Echoes of a pulse after its first one: entries at .. at + n of the list. */
-struct further {
+struct secondary {
     uint32_t pulse, at, n;
 };
 
@@ -15,8 +15,8 @@ struct further {
  * range. */
 struct echo_list {
     uint32_t n;
-    uint32_t n_further; /* pulses with further echoes, in order */
-    struct further further[CHUNK];
+    uint32_t n_secondary; /* pulses with further echoes, in order */
+    struct secondary secondary[CHUNK];
     double range_m[CAST_LIST]; /* NaN: no echo */
     uint32_t label[CAST_LIST];
     double mirror_turn[CAST_LIST], pan_turn[CAST_LIST]; /* as the encoders read them */
@@ -39,7 +39,7 @@ struct caster;
 struct chunk;
 
 /* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
-uint32_t echoes_further(struct echo_list *list, uint32_t pulse, uint32_t n);
+uint32_t echoes_secondary(struct echo_list *list, uint32_t pulse, uint32_t n);
 /* The list has a place for each pulse. */
 void caster_echoes(struct caster *c, const struct chunk *k);
 /* How many echoes a pulse may send. */

@@ -120,7 +120,7 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
         chunk.n = CHUNK < run->n - first ? CHUNK : run->n - first;
         chunk.pulse0 = run->pulse0 + first;
         caster->list.n = chunk.n;
-        caster->list.n_further = 0;
+        caster->list.n_secondary = 0;
         caster_aim(caster, &chunk);
         meet_chunk(caster, &chunk, &m);
     }

@@ -19,8 +19,8 @@
 static void follow_pulse(struct caster *c, const struct chunk *k)
 {
     struct echo_list *l = &c->list;
-    for (uint32_t g = 0; g < l->n_further; g++) {
-        const struct further *f = &l->further[g];
+    for (uint32_t g = 0; g < l->n_secondary; g++) {
+        const struct secondary *f = &l->secondary[g];
         const double e[3] = VEC3_AT(l->e, f->pulse), p[3] = VEC3_AT(l->p, f->pulse);
         for (uint32_t i = f->at; i < f->at + f->n; i++) {
             l->mirror_turn[i] = l->mirror_turn[f->pulse];
@@ -95,14 +95,14 @@ static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint3
 }
 
 /* Echo i of the list, number `echo` of its pulse, becomes entry `to`. */
-static void write_further(struct caster *c, const struct chunk *k, uint32_t to, uint32_t i, uint8_t echo)
+static void write_secondary(struct caster *c, const struct chunk *k, uint32_t to, uint32_t i, uint8_t echo)
 {
     const struct echo_list *l = &c->list;
     struct line_block *b = k->block;
     const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
-    b->a[to] = c->further_a[i - k->n];
-    b->b[to] = c->further_b[i - k->n];
-    b->c[to] = c->further_c[i - k->n];
+    b->a[to] = c->secondary_a[i - k->n];
+    b->b[to] = c->secondary_b[i - k->n];
+    b->c[to] = c->secondary_c[i - k->n];
     b->refl_cdb[to] = signal ? l->refl_cdb[i] : (int16_t)LINE_REFL_NONE;
     b->label[to] = (uint16_t)l->label[i];
     b->echo[to] = echo;
@@ -114,18 +114,18 @@ static void write_further(struct caster *c, const struct chunk *k, uint32_t to, 
 
 /* Inserts further echoes after the first ones of their pulses, beginning with the last, which moves
  * furthest. */
-static void insert_further(struct caster *c, const struct chunk *k)
+static void insert_secondary(struct caster *c, const struct chunk *k)
 {
     struct line_block *b = k->block;
     uint32_t to = k->at + c->list.n, end = k->n;
-    for (uint32_t g = c->list.n_further; g-- > 0;) {
-        const struct further *f = &c->list.further[g];
+    for (uint32_t g = c->list.n_secondary; g-- > 0;) {
+        const struct secondary *f = &c->list.secondary[g];
         const uint32_t count = f->n + 1, after = end - f->pulse - 1;
         if (f->n == 0) continue;
         to -= after;
         move_entries(b, to, k->at + f->pulse + 1, after);
         for (uint32_t j = f->n; j-- > 0;)
-            write_further(c, k, --to, f->at + j, (uint8_t)((j + 2) | count << 4));
+            write_secondary(c, k, --to, f->at + j, (uint8_t)((j + 2) | count << 4));
         to--;
         end = f->pulse;
         move_entries(b, to, k->at + end, 1);
@@ -138,8 +138,8 @@ static void insert_further(struct caster *c, const struct chunk *k)
 static void write_times(const struct echo_list *l, const struct chunk *k)
 {
     uint32_t *to = k->block->dt_ns + k->at, from = 0;
-    for (uint32_t g = 0; g < l->n_further; g++) {
-        const struct further *f = &l->further[g];
+    for (uint32_t g = 0; g < l->n_secondary; g++) {
+        const struct secondary *f = &l->secondary[g];
         uint32_t dt_ns = k->dt_ns[f->pulse];
         memmove(to, k->dt_ns + from, (f->pulse - from) * sizeof *to);
         to += f->pulse - from;
@@ -196,20 +196,20 @@ uint32_t caster_points(struct caster *c, struct chunk *k)
     const struct cast_detect *d = k->s->detect;
     struct echo_list *l = &c->list;
     const struct line_block *b = k->block;
-    const uint32_t further = l->n - k->n;
+    const uint32_t secondary = l->n - k->n;
     uint32_t entries = l->n;
-    if (further > 0) follow_pulse(c, k);
+    if (secondary > 0) follow_pulse(c, k);
     if (k->colours) caster_colours(k, c->d.z, l);
     if (d != NULL && d->ball != NULL) {
         const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn, k->s->scan_key};
         detect_move_in_ball(d->ball, k->s->rotation, &points);
         caster_aim_read(c, k);
     }
-    uint32_t echoes = write_firsts(c, k) + further;
+    uint32_t echoes = write_firsts(c, k) + secondary;
     uint32_t unfit = place(c, k, 0, k->n, &(struct kernel_wire){b->a + k->at, b->b + k->at, b->c + k->at});
-    if (further > 0) {
-        unfit += place(c, k, k->n, further, &(struct kernel_wire){c->further_a, c->further_b, c->further_c});
-        insert_further(c, k);
+    if (secondary > 0) {
+        unfit += place(c, k, k->n, secondary, &(struct kernel_wire){c->secondary_a, c->secondary_b, c->secondary_c});
+        insert_secondary(c, k);
     }
     write_times(l, k);
     if (unfit != 0) entries = drop_unfit(c, k->block, k->at, l->n, &echoes);

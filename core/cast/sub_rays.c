@@ -70,7 +70,7 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
 }
 
 /* Outlines beyond the centre's hit count, too, where another part of the footprint sees past it. */
-static void look_further(struct caster *c, const struct chunk *k)
+static void look_secondary(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     struct sub_ray_work *w = c->sub_rays;
@@ -188,7 +188,7 @@ static void run_jobs(struct caster *c, const struct chunk *k)
     struct sub_ray_work *w = c->sub_rays;
     cast_pool(c, k, 0);
     for (int pass = 0; pass < MAX_PASSES && k->s->beam->mode == BEAM_ADAPTIVE; pass++)
-        look_further(c, k);
+        look_secondary(c, k);
     for (uint32_t j = 0; j < w->n_jobs; j++)
         finish_job(c, k, &w->job[j]);
     w->n_jobs = w->pool.n = 0;
@@ -288,7 +288,7 @@ static void list_echoes(struct caster *c, const struct chunk *k)
     for (uint32_t i = 0; i < w->n_near; i++) {
         const uint32_t pulse = w->near[i], n = w->echoes_of[pulse].n;
         const struct beam_echo *e = &w->echo[w->echoes_of[pulse].first];
-        uint32_t rest = n > 1 ? echoes_further(l, pulse, n - 1) : 0;
+        uint32_t rest = n > 1 ? echoes_secondary(l, pulse, n - 1) : 0;
         if (n == 0) l->range_m[pulse] = (double)NAN;
         for (uint32_t j = 0; j < n; j++) {
             uint32_t at = j == 0 ? pulse : rest + j - 1;

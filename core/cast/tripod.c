@@ -17,8 +17,8 @@ uint32_t caster_hide(const struct cast_tripod *t, const struct vec3_in *d, uint3
         n += hidden[i];
         if (hidden[i]) l->range_m[i] = (double)NAN;
     }
-    for (uint32_t g = 0; g < l->n_further && n > 0; g++) {
-        const struct further *f = &l->further[g];
+    for (uint32_t g = 0; g < l->n_secondary && n > 0; g++) {
+        const struct secondary *f = &l->secondary[g];
         for (uint32_t i = f->at; i < f->at + f->n && hidden[f->pulse]; i++)
             l->range_m[i] = (double)NAN;
     }

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "core/grow.h"
-#include "core/huge.h"
+#include "core/huge_pages.h"
 #include "core/monotonic.h"
 #include "core/scene/build_surfaces.h"
 #include "core/vec3.h"
@@ -93,7 +93,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
 static int settle(const struct scene_build *b, void **array, size_t n, size_t size, struct sh_err *err)
 {
     const size_t step = (size_t)16 << 20;
-    char *last = huge_alloc(n * size);
+    char *last = huge_pages_alloc(n * size);
     if (last == NULL) return SH_OK;
     for (size_t at = 0; at < n * size; at += step) {
         if (sh_check_stop(b->report, err) != SH_OK) {

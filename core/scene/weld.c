@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/huge.h"
+#include "core/huge_pages.h"
 #include "core/rng.h"
 #include "core/scene/build.h"
 
@@ -39,7 +39,7 @@ static uint32_t *find(const struct scene_build *b, const struct build_weld *w, u
 /* A table of so many slots, with what the old one holds. */
 static int make_table(struct scene_build *b, struct build_weld *w, size_t size, struct sh_err *err)
 {
-    uint32_t *old = w->slot, *slot = huge_alloc(size * sizeof *slot);
+    uint32_t *old = w->slot, *slot = huge_pages_alloc(size * sizeof *slot);
     const size_t before = w->size;
     if (slot == NULL) return build_fail(b, SH_ENOMEM, err, "no memory to compare vertices");
     memset(slot, 0xff, size * sizeof *slot);

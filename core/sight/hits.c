@@ -47,7 +47,7 @@ static void do_few(struct sight_work *w, const struct sight *s, const struct bvh
                    const struct sight_run *run, uint32_t *asked)
 {
     const uint32_t *list = s->list + (run->leaf & SIGHT_NUMBER), from = run->from, to = run[1].from;
-    const int open = few_decide(s, rays, list, from, to, w->triangle);
+    const int open = candidate_list_decide(s, rays, list, from, to, w->triangle);
     bvh_ranges_each(s->bvh, w->triangle, rays, from, to);
     for (uint32_t i = from; i < to && open; i++) {
         if (w->triangle[i - from] == FEW_OPEN) ask(w, i, i + 1, asked);

@@ -22,11 +22,11 @@ struct sight_places {
 uint32_t sight_find_runs(const struct sight *sight, const struct vec3_in *dir, uint32_t n, struct sight_places *places,
                          struct sight_run *run);
 
-/* ---- few.c */
+/* ---- candidate_list.c */
 /* Decides rays from .. to - 1, which have that list, into triangle[0 ..]: BVH_NO_TRIANGLE for nothing,
  * FEW_OPEN where the records can't decide. Returns whether any of them has that. */
 enum { FEW_OPEN = 0xfffffffe };
-int few_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
-               uint32_t *triangle);
+int candidate_list_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from,
+                          uint32_t to, uint32_t *triangle);
 
 #endif

@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "core/grow.h"
-#include "core/huge.h"
+#include "core/huge_pages.h"
 #include "core/monotonic.h"
 #include "core/sight/build_inside.h"
 #include "core/together.h"
@@ -54,7 +54,7 @@ static void *take_array(struct build_shared *b, struct build_arena *arena, uint6
     arena->room = most < within ? most : within;
     if (arena->room > SIGHT_NUMBER) arena->room = SIGHT_NUMBER;
     const uint64_t bytes = (arena->room * size + 127) / 128 * 128;
-    return bytes < LARGE ? aligned_alloc(128, bytes) : huge_alloc(bytes);
+    return bytes < LARGE ? aligned_alloc(128, bytes) : huge_pages_alloc(bytes);
 }
 
 static int take_arrays(struct build_shared *b, struct sh_err *err)

@@ -29,7 +29,7 @@
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
  *   the square, the triangle's nearest point is further away than what covers the square is anywhere.
  * The leaf holds the triangles that are left: one that covers the square (SIGHT_ONE), none (SIGHT_NOTHING), or a
- * few. A few are decided ray by ray with the same doubts (few.c). Where a doubt remains, core/bvh decides. Planes
+ * few. A few are decided ray by ray with the same doubts (candidate_list.c). Where a doubt remains, core/bvh decides. Planes
  * seen at a sine below SIGHT_GRAZE neither cover nor hide. A doubt bounds the rounding error of such a function,
  * per unit length of a ray. A ray whose largest component is 1 is up to sqrt(3) long: over squares they count
  * twice. */

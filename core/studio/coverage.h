@@ -12,7 +12,7 @@
  *
  * A cell is seen where the centre of a pulse hits one of its pieces, from either side, and the head can report it
  * (caster_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
- * Triangles with the same corners are one surface: all but one are left out (scene_find_twins). Moving bodies hide
+ * Triangles with the same corners are one surface: all but one are left out (scene_find_duplicate_faces). Moving bodies hide
  * the surfaces behind them, and have no cells. Faces between bodies, such as the inner faces of a wall's layers,
  * count as surface that is never seen.
  *
@@ -76,11 +76,11 @@ struct coverage_spread {
 struct coverage_sums {
     uint32_t stations, cells;
     uint64_t pieces, triangles;
-    double area_m2, twin_m2, silent_m2;   /* of all cells; of duplicate faces, and faces without echo: left out */
-    double none_m2, one_m2, several_m2;   /* by how many stations see it */
-    struct coverage_spread density_1_m2;  /* pulses per area, of all stations; over the area that is seen */
-    struct coverage_spread incidence_rad; /* the smallest of each cell, likewise */
-    struct coverage_spread range_m;       /* the smallest of each cell, likewise */
+    double area_m2, duplicate_m2, silent_m2; /* of all cells; of duplicate faces, and faces without echo: left out */
+    double none_m2, one_m2, several_m2;      /* by how many stations see it */
+    struct coverage_spread density_1_m2;     /* pulses per area, of all stations; over the area that is seen */
+    struct coverage_spread incidence_rad;    /* the smallest of each cell, likewise */
+    struct coverage_spread range_m;          /* the smallest of each cell, likewise */
 };
 int coverage_sum(const struct coverage *coverage, struct coverage_sums *sums, struct sh_err *err);
 

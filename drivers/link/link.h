@@ -46,7 +46,7 @@ struct link_spec {
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
     int attach, retry_ms, vid, pid;
-    int look; /* enum usb_look_id: the device it shows itself as, apart from vid, pid and serial */
+    int personality; /* enum usb_personality_id: the device it shows itself as, apart from vid, pid and serial */
     char udc[64];
     char serial[64]; /* empty: no serial number string */
     int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest, */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The usb link: the head as a USB device, with the sessions of its look (drivers/usb/looks.h): console and stream,
+/* The usb link: the head as a USB device, with the sessions of its look (drivers/usb/personalities.h): console and stream,
  * or one alone.
  *
  * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
@@ -29,7 +29,7 @@ struct usb_link {
 
 static const struct usb_session_row *row_of(const struct usb_link *self, int i)
 {
-    return &self->head.look->session[i];
+    return &self->head.personality->session[i];
 }
 
 static void free_link(struct usb_link *self)
@@ -55,14 +55,14 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
     snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
     self->ops = usb_backend_ops_get(backend.type);
-    const struct usb_look *look = usb_look_get((enum usb_look_id)spec->look);
-    if (look != NULL) self->n = look->n_sessions;
-    int rc = look != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such USB identity");
+    const struct usb_personality *personality = usb_personality_get((enum usb_personality_id)spec->personality);
+    if (personality != NULL) self->n = personality->n_sessions;
+    int rc = personality != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such USB identity");
     if (rc == SH_OK)
         rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build does not have that back end");
     if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, spec->whose, &self->claims, err);
-    if (rc == SH_OK && spec->own_serial && !look->has_serial) id.serial[0] = '\0';
-    if (rc == SH_OK) rc = scanhead_usb_create(look, &id, &self->head, err);
+    if (rc == SH_OK && spec->own_serial && !personality->has_serial) id.serial[0] = '\0';
+    if (rc == SH_OK) rc = scanhead_usb_create(personality, &id, &self->head, err);
     if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);
     if (rc != SH_OK) {
         free_link(self);

@@ -93,7 +93,7 @@ uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
 /* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
 void cola_put_scan(const struct cola *self, struct cola_out *out);
 
-/* cola_seal.c: for protocol_ops of the same names */
+/* cola_checksum.c: for protocol_ops of the same names */
 
 /* Distances and signals of LMDscandata. */
 void cola_content(const uint8_t *unit, size_t len, uint8_t *mask);

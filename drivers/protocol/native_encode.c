@@ -17,10 +17,10 @@ static size_t put_header(uint8_t *dst, enum native_type type, int flags, size_t 
     le_put32(dst + 4, (uint32_t)payload_len);
     le_put32(dst + 12, crc32c(0, dst + NATIVE_HEADER_LEN, payload_len));
     le_put64(dst + 16, (uint64_t)t_ns);
-    return native_seal(dst, 0);
+    return native_finish_frame(dst, 0);
 }
 
-size_t native_seal(uint8_t *frame, uint32_t seq)
+size_t native_finish_frame(uint8_t *frame, uint32_t seq)
 {
     le_put32(frame + 8, seq);
     le_put32(frame + 24, crc32c(0, frame, 24));

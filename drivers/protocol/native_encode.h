@@ -4,7 +4,7 @@
  * Each function writes one whole frame at dst (points: as many frames as needed) and returns the length. It
  * returns 0 when cap is too small, or when the input breaks a limit of the wire: a block's dt_ns of 2^24 or
  * more, a name of more than 255 bytes. t_ns is the device time in the header, flags are enum native_flags.
- * Frames have sequence number 0 until native_seal. Pure; writes only into dst; allocates nothing; real-time
+ * Frames have sequence number 0 until native_finish_frame. Pure; writes only into dst; allocates nothing; real-time
  * safe; any thread. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_ENCODE_H
 #define DRIVERS_PROTOCOL_NATIVE_ENCODE_H
@@ -41,7 +41,7 @@ size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, stru
 
 /* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's
  * length. */
-size_t native_seal(uint8_t *frame, uint32_t seq);
+size_t native_finish_frame(uint8_t *frame, uint32_t seq);
 
 /* Makes both checksums of a frame of len bytes right, whatever is in it. */
 void native_reseal(uint8_t *frame, size_t len);

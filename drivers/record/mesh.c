@@ -175,7 +175,7 @@ static int end_grid(struct mesh_recorder *m, struct sh_err *err)
 /* ---- points come */
 
 /* Checks before the scan that a file beside the mesh can be written at the end. */
-static int try_beside(const struct mesh_recorder *m, const char *ending, struct sh_err *err)
+static int try_sidecar(const struct mesh_recorder *m, const char *ending, struct sh_err *err)
 {
     const char *path = m->base.file.path;
     const int stem = (int)(strlen(path) - strlen(m->base.ops->ending));
@@ -211,9 +211,9 @@ static int mesh_begin(void *rec, struct sh_err *err)
     const struct mesh_recorder *m = rec;
     int rc = check_uri(m, err);
     const int has_image = is_textured(m) && strcmp(m->base.ops->ending, ".glb") != 0;
-    if (rc == SH_OK && has_image) rc = try_beside(m, ".png", err);
-    if (rc == SH_OK && is_textured(m) && strcmp(m->base.ops->ending, ".obj") == 0) rc = try_beside(m, ".mtl", err);
-    return rc == SH_OK && strcmp(m->base.ops->ending, ".gltf") == 0 ? try_beside(m, ".bin", err) : rc;
+    if (rc == SH_OK && has_image) rc = try_sidecar(m, ".png", err);
+    if (rc == SH_OK && is_textured(m) && strcmp(m->base.ops->ending, ".obj") == 0) rc = try_sidecar(m, ".mtl", err);
+    return rc == SH_OK && strcmp(m->base.ops->ending, ".gltf") == 0 ? try_sidecar(m, ".bin", err) : rc;
 }
 
 static int mesh_scan(void *rec, struct sh_err *err)

@@ -59,16 +59,16 @@ int mesh_texture_draw(const struct mesh_grid *g, struct mesh_points *points, str
 struct unwrap {
     const struct mesh_grid *grid;
     struct mesh_points *points;
-    uint32_t *twin; /* of each point of the grid: its double beyond the seam, or SCAN_MESH_NONE */
+    uint32_t *seam_copy; /* of each point of the grid: its double beyond the seam, or SCAN_MESH_NONE */
 };
 
-static int add_twin(struct unwrap *w, uint32_t point, float du, float dv, uint32_t *twin, struct sh_err *err)
+static int add_seam_copy(struct unwrap *w, uint32_t point, float du, float dv, uint32_t *seam_copy, struct sh_err *err)
 {
     struct mesh_point copy;
     mesh_points_get(w->points, point, &copy);
     copy.uv[0] += du;
     copy.uv[1] += dv;
-    *twin = w->points->n;
+    *seam_copy = w->points->n;
     return mesh_points_add(w->points, &copy, err);
 }
 
@@ -82,10 +82,10 @@ static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3
         if (place[k] > most) most = place[k];
     for (int k = 0; k < 3; k++) {
         if (most - place[k] <= turn / 2) continue;
-        uint32_t *twin = &w->twin[face[k] - w->grid->first];
-        int rc = *twin == SCAN_MESH_NONE ? add_twin(w, face[k], by[0], by[1], twin, err) : SH_OK;
+        uint32_t *seam_copy = &w->seam_copy[face[k] - w->grid->first];
+        int rc = *seam_copy == SCAN_MESH_NONE ? add_seam_copy(w, face[k], by[0], by[1], seam_copy, err) : SH_OK;
         if (rc != SH_OK) return rc;
-        face[k] = *twin;
+        face[k] = *seam_copy;
     }
     return SH_OK;
 }
@@ -96,8 +96,9 @@ static int split_pole(struct unwrap *w, uint32_t face[3], int pole, struct sh_er
     float(*uv)[2] = w->points->uv;
     const uint32_t p = face[pole];
     const float v = (uv[face[(pole + 1) % 3]][1] + uv[face[(pole + 2) % 3]][1]) / 2;
-    if (w->twin[p - w->grid->first] != SCAN_MESH_NONE) return add_twin(w, p, 0, v - uv[p][1], &face[pole], err);
-    w->twin[p - w->grid->first] = p;
+    if (w->seam_copy[p - w->grid->first] != SCAN_MESH_NONE)
+        return add_seam_copy(w, p, 0, v - uv[p][1], &face[pole], err);
+    w->seam_copy[p - w->grid->first] = p;
     uv[p][1] = v;
     return SH_OK;
 }
@@ -124,13 +125,13 @@ int mesh_texture_unwrap(const struct mesh_grid *g, struct mesh_points *points, u
 {
     struct unwrap w = {.grid = g, .points = points};
     if (g->n == 0) return SH_OK;
-    w.twin = malloc(g->n * sizeof *w.twin);
-    if (w.twin == NULL) return sh_fail(err, SH_ENOMEM, "no memory for texture coordinates");
+    w.seam_copy = malloc(g->n * sizeof *w.seam_copy);
+    if (w.seam_copy == NULL) return sh_fail(err, SH_ENOMEM, "no memory for texture coordinates");
     for (uint32_t i = 0; i < g->n; i++)
-        w.twin[i] = SCAN_MESH_NONE;
+        w.seam_copy[i] = SCAN_MESH_NONE;
     int rc = SH_OK;
     for (uint32_t i = 0; rc == SH_OK && i < n_faces; i++)
         rc = unwrap_face(&w, face[i], err);
-    free(w.twin);
+    free(w.seam_copy);
     return rc;
 }

@@ -10,7 +10,7 @@ enum { SERIAL_STATE_READY = 3, DTR = 1 }; /* carrier and data set ready */
 
 static void set_open(struct scanhead_usb *head, int index, int open)
 {
-    const struct usb_session_row *row = &head->look->session[index];
+    const struct usb_session_row *row = &head->personality->session[index];
     struct scanhead_usb_session *session = &head->session[index];
     if (session->open == open && !session->again) return;
     session->open = open;
@@ -72,7 +72,7 @@ static int stream_request(struct scanhead_usb *head, int index, const struct usb
     if ((setup->bRequestType & USB_DIR_IN) != 0 || setup->bRequest != SCANHEAD_USB_STREAM) return USB_STALL;
     if (value > 1 || le_get16(&setup->wLength) != 0) return USB_STALL;
     const int again = value == 1 && head->session[index].open;
-    usb_device_set_gone_due(head->device, head->look->session[index].in, 0);
+    usb_device_set_gone_due(head->device, head->personality->session[index].in, 0);
     set_open(head, index, value == 1 && !again);
     head->session[index].again = again;
     return 0;
@@ -82,8 +82,8 @@ static int on_request(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *d
 {
     struct scanhead_usb *head = ctx;
     const unsigned type = setup->bRequestType & ~(unsigned)USB_DIR_IN, index = le_get16(&setup->wIndex);
-    for (int i = 0; i < head->look->n_sessions; i++) {
-        const struct usb_session_row *row = &head->look->session[i];
+    for (int i = 0; i < head->personality->n_sessions; i++) {
+        const struct usb_session_row *row = &head->personality->session[i];
         if (index != row->interface) continue;
         if (type == (USB_TYPE_CLASS | USB_RECIP_INTERFACE) && (row->begins & USB_BEGINS_DTR) != 0)
             return port_request(head, i, setup, data);
@@ -101,8 +101,8 @@ static const uint8_t line_coding_at_rest[7] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8};
 static void on_interface(void *ctx, unsigned interface, int active)
 {
     struct scanhead_usb *head = ctx;
-    for (int i = 0; i < head->look->n_sessions; i++) {
-        const struct usb_session_row *row = &head->look->session[i];
+    for (int i = 0; i < head->personality->n_sessions; i++) {
+        const struct usb_session_row *row = &head->personality->session[i];
         struct scanhead_usb_session *session = &head->session[i];
         if (interface != row->interface && interface != row->also) continue;
         if (interface == row->interface && row->notify != 0) {
@@ -131,13 +131,13 @@ const char *scanhead_usb_cut(struct scanhead_usb *head)
 
 /* ---- the head */
 
-int scanhead_usb_create(const struct usb_look *look, const struct usb_identity *id, struct scanhead_usb *head,
-                        struct sh_err *err)
+int scanhead_usb_create(const struct usb_personality *personality, const struct usb_identity *id,
+                        struct scanhead_usb *head, struct sh_err *err)
 {
     static const struct usb_hooks hooks = {.request = on_request, .interface = on_interface};
-    head->look = look;
+    head->personality = personality;
     memcpy(head->line_coding, line_coding_at_rest, sizeof head->line_coding);
-    return usb_device_create(look->model, id, &hooks, head, &head->device, err);
+    return usb_device_create(personality->model, id, &hooks, head, &head->device, err);
 }
 
 void scanhead_usb_ended(struct scanhead_usb *head, int session)
@@ -147,7 +147,7 @@ void scanhead_usb_ended(struct scanhead_usb *head, int session)
 
 static void send_state(struct scanhead_usb *head, int index)
 {
-    const struct usb_session_row *row = &head->look->session[index];
+    const struct usb_session_row *row = &head->personality->session[index];
     const uint8_t notice[] = {
         USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
         USB_CDC_NOTIFY_SERIAL_STATE,
@@ -173,8 +173,8 @@ static int has_data(const struct scanhead_usb *head, const struct usb_session_ro
 
 void scanhead_usb_update(struct scanhead_usb *head)
 {
-    for (int i = 0; i < head->look->n_sessions; i++) {
-        const struct usb_session_row *row = &head->look->session[i];
+    for (int i = 0; i < head->personality->n_sessions; i++) {
+        const struct usb_session_row *row = &head->personality->session[i];
         if (head->session[i].state_due) send_state(head, i);
         if (!head->session[i].open && (row->begins & USB_BEGINS_DATA) != 0 && has_data(head, row)) set_open(head, i, 1);
     }

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The head as a USB device, with one of its USB identities, called looks (looks.h). Requests and data of the host begin
+/* The head as a USB device, with one of its USB identities, called looks (personalities.h). Requests and data of the host begin
  * and end sessions; requests to a CDC-ACM port are answered.
  *
  * Native: both the console and the stream take commands and give replies and stream frames. Sessions end when their
- * interface goes away; looks.h says what else ends them. The request that begins the stream ends an open one first. */
+ * interface goes away; personalities.h says what else ends them. The request that begins the stream ends an open one first. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 
-#include "drivers/usb/looks.h"
+#include "drivers/usb/personalities.h"
 #include "drivers/usb/usb.h"
 
 /* A session as the host sees it. */
@@ -18,7 +18,7 @@ struct scanhead_usb_session {
 };
 
 struct scanhead_usb {
-    const struct usb_look *look;
+    const struct usb_personality *personality;
     struct usb_device *device;
     struct scanhead_usb_session session[USB_MAX_SESSIONS]; /* look->n_sessions of them */
     uint8_t line_coding[7];
@@ -27,8 +27,8 @@ struct scanhead_usb {
 };
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
-int scanhead_usb_create(const struct usb_look *look, const struct usb_identity *id, struct scanhead_usb *head,
-                        struct sh_err *err);
+int scanhead_usb_create(const struct usb_personality *personality, const struct usb_identity *id,
+                        struct scanhead_usb *head, struct sh_err *err);
 /* Does what follows from the host's transfers rather than from its requests: begins a session by data, sends the
  * notification of a port. To be called after each transfer. */
 void scanhead_usb_update(struct scanhead_usb *head);

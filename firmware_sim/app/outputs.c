@@ -8,7 +8,7 @@
 
 #include "core/grow.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/beside.h"
+#include "firmware_sim/app/sidecars.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/files.h"
 #include "firmware_sim/config/load.h"
@@ -126,7 +126,7 @@ static int add_of_meshes(struct files *f)
             struct sh_err why = {0};
             if (f->file[i].is_written || !app_ends_in(f->file[i].path, endings[k])) continue;
             f->prefix = f->file[i].who;
-            rc = app_beside(f->file[i].path, add_of_mesh, f, &why);
+            rc = app_sidecars(f->file[i].path, add_of_mesh, f, &why);
             if (rc == SH_ENOMEM) sh_fail(f->err, rc, "no memory for the names of files");
             if (rc != SH_ENOMEM) rc = SH_OK; /* its reader says what is wrong with it */
         }

@@ -121,7 +121,7 @@ static void set_rates(struct device_beam *beam, uint64_t pulse)
     schedule_change(seg, seg, &spec, pulse);
 }
 
-static void add_wobble(const struct device_beam *beam, const struct device_beam_fault *f, struct cast_upset *to)
+static void add_wobble(const struct device_beam *beam, const struct device_beam_fault *f, struct cast_disturbance *to)
 {
     _Static_assert((int)FAULT_MAX <= (int)CAST_MAX_WOBBLES, "room for all");
     const double turn = f->entry.fault.deg / TURN_DEG;
@@ -135,9 +135,9 @@ static void add_wobble(const struct device_beam *beam, const struct device_beam_
 /* Adds up the faults that strike. A stuck mirror does not wobble. Of several stuck faults the first one counts. */
 static void add_up(struct device_beam *beam)
 {
-    struct device_upset *now = &beam->now;
-    struct cast_upset *cast = &now->cast;
-    *now = (struct device_upset){.cast.share = 1.0};
+    struct device_disturbance *now = &beam->now;
+    struct cast_disturbance *cast = &now->cast;
+    *now = (struct device_disturbance){.cast.share = 1.0};
     for (uint32_t i = 0; i < beam->n; i++) {
         const struct device_beam_fault *f = &beam->fault[i];
         if (!f->strikes) continue;
@@ -156,7 +156,7 @@ static void add_up(struct device_beam *beam)
 /* The turn of the mirror, or of the rotor, at a pulse. */
 static double find_turn(const struct device_beam *beam, uint64_t pulse, int64_t t_ns)
 {
-    const struct device_upset *now = &beam->now;
+    const struct device_disturbance *now = &beam->now;
     double mirror_turn = 0.0, pan_turn = 0.0;
     if (now->on && now->stuck) return now->stuck_turn;
     if (now->on) cast_wobble(&now->cast, t_ns, &mirror_turn, &pan_turn);

@@ -26,8 +26,8 @@ struct device_beam {
         int64_t begin_ns; /* time of its first pulse, since the scan's start */
         double turn;      /* mirror_stuck: where the mirror, or the rotor, stands */
     } fault[FAULT_MAX];
-    uint64_t edge;           /* the next pulse at which one begins or ends; UINT64_MAX: none */
-    struct device_upset now; /* the disturbance by all that strike together */
+    uint64_t edge;                 /* the next pulse at which one begins or ends; UINT64_MAX: none */
+    struct device_disturbance now; /* the disturbance by all that strike together */
 };
 
 /* The schedule of a site's head with the present settings, slowed by faults of its mirror. Sets the scan's rates. */

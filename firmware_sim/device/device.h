@@ -43,11 +43,11 @@ struct device_counters {
 enum device_power_change { DEVICE_POWER_STAYS, DEVICE_POWER_GOES, DEVICE_POWER_COMES };
 
 /* The disturbance of the beam in a tick, by injected faults. */
-struct device_upset {
+struct device_disturbance {
     int on;            /* 0: there is none, and the rest is not set */
     int stuck;         /* the mirror, or the rotor, stands at stuck_turn */
     double stuck_turn; /* turns */
-    struct cast_upset cast;
+    struct cast_disturbance cast;
 };
 
 /* The work of one tick. All members are copies, so that no thread waits for another. Frames leave in the
@@ -72,12 +72,12 @@ struct device_work {
     struct device_variant *variant; /* NULL: that of the version */
     int64_t scan_t0_ns;             /* device time of the scan's start */
     struct schedule_segment segment;
-    int64_t prr_uhz;            /* as it is set */
-    struct device_upset upset;  /* of all its pulses */
-    uint32_t scan;              /* its number */
-    uint64_t pulse0, pulse_end; /* pulses of this tick */
-    uint64_t n_cast, cast0;     /* how many of these are cast, and the first of them; UINT64_MAX: none */
-    int cut_short;              /* the scan stops at pulse_end, within a line */
+    int64_t prr_uhz;                       /* as it is set */
+    struct device_disturbance disturbance; /* of all its pulses */
+    uint32_t scan;                         /* its number */
+    uint64_t pulse0, pulse_end;            /* pulses of this tick */
+    uint64_t n_cast, cast0;                /* how many of these are cast, and the first of them; UINT64_MAX: none */
+    int cut_short;                         /* the scan stops at pulse_end, within a line */
     uint32_t station;
     uint32_t station_scan; /* number of the scan among that station's since power-up, from 1 */
     size_t stretch;        /* of a trajectory: the one of the last anchor */

@@ -128,8 +128,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     device_turn_beam(&device->beam, until_ns);
     work->segment = *seg;
     work->prr_uhz = device->scan.prr_uhz;
-    work->upset.on = device->beam.now.on;
-    if (work->upset.on) work->upset = device->beam.now;
+    work->disturbance.on = device->beam.now.on;
+    if (work->disturbance.on) work->disturbance = device->beam.now;
     uint64_t due = schedule_pulse_at(seg, until_ns);
     const uint64_t edge = device->beam.edge, room_end = tick_room_end(device), most = edge < room_end ? edge : room_end;
     if (due > most) {

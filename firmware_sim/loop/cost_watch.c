@@ -16,7 +16,7 @@ static const int64_t EVERY_NS = 1000000000;
 struct cost_watch {
     struct loop *loop;
     struct cost_figures figures;
-    struct bell bell;
+    struct wakeup wakeup;
     _Atomic int ending;
     pthread_t thread;
     uint32_t n;
@@ -72,7 +72,7 @@ static void *watch_main(void *arg)
     double ns = 0.0;
     while (ns == 0.0) {
         const int64_t until_ns = clock_now_ns() + EVERY_NS;
-        while (!atomic_load(&watch->ending) && !bell_sleep_until(&watch->bell, until_ns))
+        while (!atomic_load(&watch->ending) && !wakeup_sleep_until(&watch->wakeup, until_ns))
             continue;
         if (atomic_load(&watch->ending) || !take_sample(watch, &sample)) return NULL;
         ns = cost_add(&watch->figures, &sample);
@@ -94,10 +94,10 @@ struct cost_watch *cost_watch_start(struct loop *loop)
     int rc = 0;
     for (uint32_t i = 0; i < watch->n && rc == 0; i++)
         rc = pthread_getcpuclockid(casters->caster[i].thread, &watch->clock[i]);
-    bell_create(&watch->bell);
+    wakeup_create(&watch->wakeup);
     if (rc == 0) rc = pthread_create(&watch->thread, NULL, watch_main, watch);
     if (rc == 0) return watch;
-    bell_free(&watch->bell);
+    wakeup_free(&watch->wakeup);
     free(watch);
     return NULL;
 }
@@ -106,8 +106,8 @@ void cost_watch_join(struct cost_watch *watch)
 {
     if (watch == NULL) return;
     atomic_store(&watch->ending, 1);
-    bell_ring(&watch->bell, 1);
+    wakeup_signal(&watch->wakeup, 1);
     pthread_join(watch->thread, NULL);
-    bell_free(&watch->bell);
+    wakeup_free(&watch->wakeup);
     free(watch);
 }

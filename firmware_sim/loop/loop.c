@@ -48,7 +48,7 @@ static void keep_description(struct loop *loop)
         tick = worker_fill(loop->casters.caster[0].worker, &work);
     }
     for (uint32_t at = 0; at < tick->len; at += (uint32_t)native_frame_len(tick->bytes + at))
-        kept_put(&loop->stream.kept, tick->bytes + at);
+        latched_put(&loop->stream.latched, tick->bytes + at);
 }
 
 /* A new loop, with nothing open. */

@@ -104,12 +104,12 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
 /* Gives the protocol the descriptor, emitter and anchor from before the tick at the cursor. */
 static void greet(struct pump *pump, struct session *s)
 {
-    static _Thread_local uint8_t frames[KEPT_MAX_BYTES];
+    static _Thread_local uint8_t frames[LATCHED_MAX_BYTES];
     uint32_t len, version, before;
     do { /* a frame latched between copy and cursor would be missed: then copy again */
-        kept_copy(&pump->stream->kept, frames, &before);
+        latched_copy(&pump->stream->latched, frames, &before);
         s->cursor = stream_released(pump->stream);
-        len = kept_copy(&pump->stream->kept, frames, &version);
+        len = latched_copy(&pump->stream->latched, frames, &version);
     } while (version != before);
     pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     give_frames(pump->protocol, s, frames, len);

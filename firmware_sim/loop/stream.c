@@ -17,16 +17,16 @@ int stream_create(struct stream *stream, const struct ring_size *size, int64_t t
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);
     atomic_store(&stream->awaited, UINT64_MAX);
-    bell_create(&stream->work);
-    bell_create(&stream->pace);
+    wakeup_create(&stream->work);
+    wakeup_create(&stream->pace);
     return ring_create(&stream->ring, size, err);
 }
 
 void stream_free(struct stream *stream)
 {
     ring_free(&stream->ring);
-    bell_free(&stream->work);
-    bell_free(&stream->pace);
+    wakeup_free(&stream->work);
+    wakeup_free(&stream->pace);
 }
 
 /* Real time: wakes the listeners that wait for this tick. */
@@ -46,7 +46,7 @@ static void wake_readers(struct stream *stream, uint64_t tick, int frames)
 
 static void wake_casters(struct stream *stream)
 {
-    bell_ring(&stream->work, stream->unsaid < stream->n_casters ? (uint32_t)stream->unsaid : stream->n_casters);
+    wakeup_signal(&stream->work, stream->unsaid < stream->n_casters ? (uint32_t)stream->unsaid : stream->n_casters);
     stream->unsaid = 0;
 }
 
@@ -170,9 +170,9 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
             stream->seq += (frame[3] & NATIVE_LOCAL) == 0;
         } else {
             complete_counts(stream, frame);
-            at += (uint32_t)native_seal(frame, stream->seq++);
+            at += (uint32_t)native_finish_frame(frame, stream->seq++);
         }
-        kept_put(&stream->kept, frame);
+        latched_put(&stream->latched, frame);
     }
     slot->n_frames = stream->seq - slot->first_seq;
     const int frames = made->len != 0; /* a released slot is no longer ours */
@@ -193,7 +193,7 @@ int stream_lose(struct stream *stream, uint64_t tick)
 void stream_await(struct stream *stream, uint64_t tick, int64_t until_ns)
 {
     atomic_store(&stream->awaited, tick);
-    if (ring_peek(&stream->ring, tick) == NULL) bell_sleep_until(&stream->pace, until_ns);
+    if (ring_peek(&stream->ring, tick) == NULL) wakeup_sleep_until(&stream->pace, until_ns);
     atomic_store(&stream->awaited, UINT64_MAX);
 }
 
@@ -213,7 +213,7 @@ int stream_has_room(const struct stream *stream, uint64_t tick)
 void stream_wait_for_casters(struct stream *stream)
 {
     say_released(stream);
-    bell_sleep(&stream->pace);
+    wakeup_sleep(&stream->pace);
 }
 
 /* A reader that gets to `wanted` rings at once; one that does not rings before it sleeps. */
@@ -224,8 +224,8 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick)
     if (stream_has_room(stream, tick)) {
         /* the reader went on meanwhile */
     } else if (!atomic_load(&stream->ending)) {
-        bell_sleep(&stream->pace);
-    } else if (bell_sleep_until(&stream->pace, clock_now_ns() + PATIENCE_NS)) {
+        wakeup_sleep(&stream->pace);
+    } else if (wakeup_sleep_until(&stream->pace, clock_now_ns() + PATIENCE_NS)) {
         for (int i = 0; i < RING_MAX_READERS; i++)
             if (holds_back(stream, i, tick)) atomic_store(&stream->reader[i].active, 0);
     }
@@ -235,7 +235,7 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick)
 void stream_wait_for_files(struct stream *stream)
 {
     say_released(stream);
-    bell_sleep_until(&stream->pace, clock_now_ns() + STREAM_FILES_NS);
+    wakeup_sleep_until(&stream->pace, clock_now_ns() + STREAM_FILES_NS);
 }
 
 void stream_end(struct stream *stream)
@@ -282,7 +282,7 @@ void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
 {
     const uint64_t from = atomic_exchange(&stream->reader[reader].cursor, cursor);
     const uint64_t wanted = atomic_load(&stream->wanted);
-    if (from < wanted && wanted <= cursor) bell_ring(&stream->pace, 1);
+    if (from < wanted && wanted <= cursor) wakeup_signal(&stream->pace, 1);
 }
 
 void stream_note_written(struct stream *stream, int reader, uint64_t cursor)
@@ -305,22 +305,22 @@ int stream_has_written(struct stream *stream, struct stream_listener *listener, 
 
 void stream_rest_reader(struct stream *stream)
 {
-    if (atomic_load(&stream->wanted) != UINT64_MAX) bell_ring(&stream->pace, 1);
+    if (atomic_load(&stream->wanted) != UINT64_MAX) wakeup_signal(&stream->pace, 1);
 }
 
 void stream_wait_for_work(struct stream *stream)
 {
-    bell_sleep(&stream->work);
+    wakeup_sleep(&stream->work);
 }
 
 void stream_say_ready(struct stream *stream)
 {
-    bell_ring(&stream->pace, 1);
+    wakeup_signal(&stream->pace, 1);
 }
 
 void stream_say_late(struct stream *stream, uint64_t tick)
 {
-    if (atomic_load(&stream->awaited) == tick) bell_ring(&stream->pace, 1);
+    if (atomic_load(&stream->awaited) == tick) wakeup_signal(&stream->pace, 1);
 }
 
 uint64_t stream_released(const struct stream *stream)
@@ -362,6 +362,6 @@ uint64_t stream_pass(struct stream *stream, uint64_t total_ns)
 
 void stream_poke(struct stream *stream)
 {
-    bell_ring(&stream->work, stream->n_casters);
-    bell_ring(&stream->pace, 1);
+    wakeup_signal(&stream->work, stream->n_casters);
+    wakeup_signal(&stream->pace, 1);
 }

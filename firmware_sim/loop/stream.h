@@ -23,8 +23,8 @@
 #include "drivers/link/link.h"
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/device/device.h"
-#include "firmware_sim/loop/bell.h"
-#include "firmware_sim/loop/kept.h"
+#include "firmware_sim/loop/wakeup.h"
+#include "firmware_sim/loop/latched.h"
 #include "firmware_sim/loop/ring.h"
 
 enum {
@@ -57,7 +57,7 @@ struct stream_listener {
 
 struct stream {
     struct ring ring;
-    struct kept kept; /* the frames that a client needs first when it joins */
+    struct latched latched; /* the frames that a client needs first when it joins */
     int64_t tick_ns;
     uint32_t tick_bytes; /* no tick is longer */
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
@@ -89,8 +89,8 @@ struct stream {
     _Atomic int ending;          /* the run is to end: nobody waits any longer for readers that stand still */
     _Atomic int over;            /* nothing will be released any more */
 
-    struct bell work;         /* for casters: a tick may be claimed */
-    struct bell pace;         /* for the pacing thread: a tick it waits for is ready, or a reader went on */
+    struct wakeup work;       /* for casters: a tick may be claimed */
+    struct wakeup pace;       /* for the pacing thread: a tick it waits for is ready, or a reader went on */
     _Atomic uint64_t awaited; /* real time: the pacing thread waits for this late tick; UINT64_MAX: for none */
     _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
     /* of the pacing thread alone */

@@ -260,7 +260,8 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
         uint64_t stop = enter_stretch(worker, work, k, end);
         uint64_t n = stop - k < longest ? stop - k : longest;
         schedule_get_run(&work->segment, &part->line, k, (uint32_t)n, &run);
-        if (work->upset.on && work->upset.stuck) schedule_hold_run(&work->segment, work->upset.stuck_turn, &run);
+        if (work->disturbance.on && work->disturbance.stuck)
+            schedule_hold_run(&work->segment, work->disturbance.stuck_turn, &run);
         count_hits(worker, caster_cast(worker->caster, &worker->setup, &run, &worker->block));
         added(worker, native_encode_points(end_of(worker), room_of(worker), &worker->block, work->scan_t0_ns));
         worker->tick.n_cast += n;
@@ -272,16 +273,16 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
 static void find_angles(const struct device_work *work, uint64_t k, double *mirror_turn, double *pan_turn)
 {
     const struct schedule_segment *seg = &work->segment;
-    const struct device_upset *upset = &work->upset;
+    const struct device_disturbance *disturbance = &work->disturbance;
     *mirror_turn = schedule_mirror_turn(seg, k);
     *pan_turn = schedule_pan_turn(seg, k);
-    if (!upset->on) return;
-    cast_wobble(&upset->cast, schedule_time_ns(seg, k), mirror_turn, pan_turn);
-    if (!upset->stuck) return;
+    if (!disturbance->on) return;
+    cast_wobble(&disturbance->cast, schedule_time_ns(seg, k), mirror_turn, pan_turn);
+    if (!disturbance->stuck) return;
     if (seg->spec.emitter != NULL) /* beams */
-        *pan_turn = upset->stuck_turn + seg->spec.emitter->firing[k % seg->spec.emitter->n_beams].pan_turn;
+        *pan_turn = disturbance->stuck_turn + seg->spec.emitter->firing[k % seg->spec.emitter->n_beams].pan_turn;
     else
-        *mirror_turn = upset->stuck_turn;
+        *mirror_turn = disturbance->stuck_turn;
 }
 
 /* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several
@@ -333,7 +334,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     worker->setup.sight = worker->site->station[work->station].sight; /* it may be new since the last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
     site_set_program(work->site, work->prr_uhz, &worker->setup);
-    worker->setup.upset = work->upset.on ? &work->upset.cast : NULL;
+    worker->setup.disturbance = work->disturbance.on ? &work->disturbance.cast : NULL;
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
     if (worker->site->n_movers != 0)
         site_move(worker->site,

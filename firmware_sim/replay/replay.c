@@ -63,7 +63,7 @@ static void renumber(struct replay *r, uint8_t *frame)
     r->restarts = 0;
     r->last_seq = header.seq + r->seq_shift;
     r->has_seq = 1;
-    if (r->seq_shift != 0) native_seal(frame, r->last_seq);
+    if (r->seq_shift != 0) native_finish_frame(frame, r->last_seq);
 }
 
 static void add(struct replay *r, const uint8_t *frame, uint32_t len, uint64_t tick)
@@ -85,7 +85,7 @@ static void add_front(struct replay *r, uint64_t tick)
         if (r->front.len[i] == 0) continue;
         memcpy(frame, r->front.bytes[i], r->front.len[i]);
         frame[3] |= NATIVE_REPEAT | NATIVE_LOCAL;
-        native_seal(frame, 0);
+        native_finish_frame(frame, 0);
         add(r, frame, r->front.len[i], tick);
     }
 }

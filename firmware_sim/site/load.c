@@ -13,11 +13,11 @@
 #include "firmware_sim/site/copies.h"
 #include "firmware_sim/site/create.h"
 #include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/doubts.h"
+#include "firmware_sim/site/plausibility.h"
 #include "firmware_sim/site/georeference.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/platform.h"
-#include "firmware_sim/site/said.h"
+#include "firmware_sim/site/warnings.h"
 #include "firmware_sim/site/sights.h"
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/target.h"
@@ -188,7 +188,8 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
-    if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* before beams: little in view makes these slow */
+    if (rc == SH_OK)
+        rc = site_check_plausibility(site, report, err); /* before beams: little in view makes these slow */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     if (rc == SH_OK) rc = site_plan_sight(site, report, err);
@@ -262,7 +263,7 @@ void site_free(struct site *site)
     site_free_detect(site);
     free(site->legs);
     surface_colours_free(&site->colours.surfaces);
-    site_free_said(&site->said);
+    site_free_warnings(&site->said);
     free(site->own_cfg);
     free(site);
 }

@@ -117,7 +117,7 @@ struct site_stretch {
 
 /* Warnings given while loading, so that a site beside this one only gives new ones. */
 enum { SITE_MAX_SAID = 64 };
-struct site_said {
+struct site_warnings {
     char *text[SITE_MAX_SAID];
     uint32_t n;
     uint32_t n_new;  /* warnings that the site before did not have */
@@ -127,7 +127,7 @@ struct site_said {
 struct site {
     const struct config *cfg;
     struct config *own_cfg; /* of site_load_moved; else NULL */
-    struct site_said said;
+    struct site_warnings said;
     struct emitter emitter; /* the profile's, with its list of directions */
     struct emitter_firing *direction;
     struct site_world *world;

@@ -177,7 +177,7 @@ static void give(struct protocol_rig *rig, uint8_t *frame, size_t len)
 {
     assert_true(len != 0);
     for (size_t at = 0, n; at < len; at += n) {
-        n = native_seal(frame + at, rig->seq++);
+        n = native_finish_frame(frame + at, rig->seq++);
         if (rig->ops->frame != NULL) rig->ops->frame(rig->protocol, frame + at, n);
     }
 }

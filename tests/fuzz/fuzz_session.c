@@ -121,7 +121,7 @@ static void give_event(unsigned how, int64_t t_ns)
     uint8_t frame[256];
     const struct native_event event = {.code = 1 + how % 12, .a = how >> 4, .b = (uint64_t)t_ns, .c = how & 3};
     const size_t len = native_encode_event(frame, sizeof frame, &event, t_ns, 0);
-    native_seal(frame, rig.seq++);
+    native_finish_frame(frame, rig.seq++);
     if (event.code == NATIVE_EV_SCAN_START) rig.scan_t0_ns = t_ns;
     if (rig.ops->frame != NULL) rig.ops->frame(rig.protocol, frame, len);
 }

@@ -82,7 +82,8 @@ static void submit(struct host *host, struct fuzz_bytes *in)
 /* This is the function's side: it reads the bytes that have come, and writes. */
 static void serve(struct host *host, unsigned how)
 {
-    const struct usb_session_row *row = &host->head.look->session[how % (unsigned)host->head.look->n_sessions];
+    const struct usb_session_row *row =
+        &host->head.personality->session[how % (unsigned)host->head.personality->n_sessions];
     uint8_t bytes[1500];
     uint32_t epoch = 0;
     memset(bytes, 'x', sizeof bytes);
@@ -96,7 +97,7 @@ static void serve(struct host *host, unsigned how)
     if (how & 2) usb_device_drop(host->head.device, row->out, epoch);
     scanhead_usb_update(&host->head);
     scanhead_usb_cut(&host->head);
-    if (how & 4) scanhead_usb_ended(&host->head, (int)(how % (unsigned)host->head.look->n_sessions));
+    if (how & 4) scanhead_usb_ended(&host->head, (int)(how % (unsigned)host->head.personality->n_sessions));
 }
 
 static void act(struct host *host, struct fuzz_bytes *in)
@@ -158,8 +159,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct usb_identity id = {
         .vid = 0x1209, .pid = 1, .serial = "S1", .highest = (enum usb_rate)((how >> 2) % USB_N_RATES)};
     struct sh_err err = {0};
-    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &host.head, &err) !=
-        SH_OK) {
+    if (scanhead_usb_create(usb_personality_get((enum usb_personality_id)((how & 3) % USB_N_PERSONALITIES)), &id,
+                            &host.head, &err) != SH_OK) {
         fuzz_must_be_line(&err);
         return 0;
     }

@@ -22,8 +22,8 @@ static int go_on(void *ctx)
 static void serve(struct scanhead_usb *head)
 {
     uint8_t bytes[600];
-    for (int i = 0; i < head->look->n_sessions; i++) {
-        const struct usb_session_row *row = &head->look->session[i];
+    for (int i = 0; i < head->personality->n_sessions; i++) {
+        const struct usb_session_row *row = &head->personality->session[i];
         const size_t n = usb_device_read(head->device, row->out, bytes, sizeof bytes);
         usb_device_write(head->device, row->in, bytes, n > 0 ? n : 512);
     }
@@ -64,7 +64,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct usbip_conn conn;
     struct sh_err err = {0};
     int pair[2], taken = 0;
-    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &head, &err) != SH_OK)
+    if (scanhead_usb_create(usb_personality_get((enum usb_personality_id)((how & 3) % USB_N_PERSONALITIES)), &id, &head,
+                            &err) != SH_OK)
         return 0;
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, pair) != 0) abort();
     usbip_conn_start(&conn, pair[0], head.device, &taken);

@@ -39,8 +39,8 @@ static void turn(const struct usb_backend_ops *ops, void *backend, struct scanhe
     const int n = ops->prepare(backend, fds);
     poll(fds, (nfds_t)n, 0);
     ops->handle(backend, fds, n, go_on, NULL);
-    for (int i = 0; i < head->look->n_sessions; i++) {
-        const struct usb_session_row *row = &head->look->session[i];
+    for (int i = 0; i < head->personality->n_sessions; i++) {
+        const struct usb_session_row *row = &head->personality->session[i];
         const size_t got = usb_device_read(head->device, row->out, bytes, sizeof bytes);
         usb_device_write(head->device, row->in, bytes, got > 0 ? got : 512);
     }
@@ -78,7 +78,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct scanhead_usb head = {0};
     struct sh_err err = {0};
     void *backend;
-    if (scanhead_usb_create(usb_look_get((enum usb_look_id)((how & 3) % USB_N_LOOKS)), &id, &head, &err) != SH_OK)
+    if (scanhead_usb_create(usb_personality_get((enum usb_personality_id)((how & 3) % USB_N_PERSONALITIES)), &id, &head,
+                            &err) != SH_OK)
         return 0;
     snprintf(spec.path, sizeof spec.path, "%s/usb", fuzz_folder());
     fuzz_must(ops->open(&spec, head.device, &backend, &err) == SH_OK, "the socket opens");

@@ -85,7 +85,7 @@ uint32_t rig_next_seq(void)
 /* Sends the frame in `out`, with the next number. */
 static void put_frame(int fd, size_t len)
 {
-    native_seal(out, (out[3] & NATIVE_LOCAL) != 0 ? 0 : rig_next_seq());
+    native_finish_frame(out, (out[3] & NATIVE_LOCAL) != 0 ? 0 : rig_next_seq());
     put_all(fd, out, len);
 }
 

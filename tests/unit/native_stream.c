@@ -10,7 +10,7 @@ static uint32_t next_seq;
 static void add_frame(size_t len)
 {
     next_seq = (stream[stream_len + 3] & NATIVE_LOCAL) != 0 ? next_seq : next_seq + 1;
-    native_seal(stream + stream_len, (stream[stream_len + 3] & NATIVE_LOCAL) != 0 ? 0 : next_seq - 1);
+    native_finish_frame(stream + stream_len, (stream[stream_len + 3] & NATIVE_LOCAL) != 0 ? 0 : next_seq - 1);
     /* a frame that ends like the next begins can't be told from one that lost its first byte */
     assert_int_not_equal(stream[stream_len + len - 1], NATIVE_SYNC);
     piece[n_pieces++] = (struct piece){stream_len, len, 0};

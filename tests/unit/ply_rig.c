@@ -24,7 +24,7 @@ static uint32_t next_seq;
 void put(size_t len)
 {
     assert_true(len > 0);
-    if (le_get32(out + 8) == 0) native_seal(out, next_seq++);
+    if (le_get32(out + 8) == 0) native_finish_frame(out, next_seq++);
     assert_int_equal(fwrite(out, 1, len, shs), len);
 }
 

@@ -20,7 +20,7 @@ void rig_put(const uint8_t *frame, size_t len)
     uint8_t header[NATIVE_HEADER_LEN];
     assert_true(len >= sizeof header);
     memcpy(header, frame, sizeof header);
-    if (le_get32(header + 8) == 0) native_seal(header, rig_seq++);
+    if (le_get32(header + 8) == 0) native_finish_frame(header, rig_seq++);
     assert_int_equal(fwrite(header, 1, sizeof header, rig_stream), sizeof header);
     assert_int_equal(fwrite(frame + sizeof header, 1, len - sizeof header, rig_stream), len - sizeof header);
 }

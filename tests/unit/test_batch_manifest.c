@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/beside.h"
+#include "firmware_sim/app/sidecars.h"
 #include "firmware_sim/app/studio/batch/manifest.h"
 #include "firmware_sim/config/config.h"
 
@@ -82,7 +82,7 @@ static int note(void *ctx, struct batch_entry *entry, struct sh_err *err)
     const struct batch_entry want = an_entry(entry->job, file);
     (void)err;
     seen->job[seen->n++] = entry->job;
-    assert_null(batch_made_differs(&want.made, &entry->made));
+    assert_null(batch_provenance_differs(&want.made, &entry->made));
     assert_true(entry->pulses == want.pulses && entry->points == 17 && entry->n_files == 2);
     assert_string_equal(entry->file[1].name, "0001_a.las");
     assert_true(entry->file[0].bytes == 1234);
@@ -213,7 +213,7 @@ static void expect_beside(const char *mesh, const char *want)
 {
     char all[512] = "";
     struct sh_err err;
-    assert_int_equal(app_beside(path_of(mesh), list_name, all, &err), SH_OK);
+    assert_int_equal(app_sidecars(path_of(mesh), list_name, all, &err), SH_OK);
     assert_string_equal(all, want);
 }
 
@@ -246,14 +246,14 @@ static void test_beside(void **state)
 static void test_job_texts(void **state)
 {
     static const char *const a[] = {"head.prr_hz=1", "0001", "x"}, *const b[] = {"head.prr_hz=10", "001", "x"};
-    struct batch_made one, other;
+    struct batch_provenance one, other;
     (void)state;
-    batch_made_job(&one, a, 3);
-    batch_made_job(&other, b, 3);
+    batch_provenance_job(&one, a, 3);
+    batch_provenance_job(&other, b, 3);
     assert_string_not_equal(one.job, other.job);
-    batch_made_job(&other, a, 2);
+    batch_provenance_job(&other, a, 2);
     assert_string_not_equal(one.job, other.job);
-    batch_made_job(&other, a, 3);
+    batch_provenance_job(&other, a, 3);
     assert_string_equal(one.job, other.job);
 }
 
@@ -262,7 +262,7 @@ static void test_inputs(void **state)
 {
     static const char *const inputs[] = {"m.obj", "first.mtl", "a.png", "faults.yaml", "head.yaml"};
     struct config *cfg = calloc(1, sizeof *cfg);
-    struct batch_made before, after;
+    struct batch_provenance before, after;
     struct sh_err err;
     (void)state;
     assert_non_null(cfg);
@@ -279,9 +279,9 @@ static void test_inputs(void **state)
     cfg->scene.n_meshes = 1;
     for (size_t i = 0; i < sizeof inputs / sizeof inputs[0]; i++) {
         struct batch_cache cache = {0};
-        assert_int_equal(batch_made_of(cfg, &cache, &before, &REPORT, &err), SH_OK);
+        assert_int_equal(batch_provenance_of(cfg, &cache, &before, &REPORT, &err), SH_OK);
         write_file(inputs[i], "a", "\n");
-        assert_int_equal(batch_made_of(cfg, &cache, &after, &REPORT, &err), SH_OK);
+        assert_int_equal(batch_provenance_of(cfg, &cache, &after, &REPORT, &err), SH_OK);
         batch_cache_free(&cache);
         if (strcmp(before.inputs, after.inputs) == 0) fail_msg("%s is no input", inputs[i]);
         assert_string_equal(before.configuration, after.configuration);

@@ -337,7 +337,7 @@ static void test_twins(void **state)
     cover_look(c, (const double[3]){0, 0, 0}, &cover_everywhere, &pulses);
     sums_of(c, &sums);
     assert_near("area", sums.area_m2, 2.0, 1e-12);
-    assert_near("the other face", sums.twin_m2, 2.0, 1e-12);
+    assert_near("the other face", sums.duplicate_m2, 2.0, 1e-12);
     assert_near("seen", sums.one_m2, 2.0, 1e-12);
     cover_close(c);
 }

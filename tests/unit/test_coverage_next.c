@@ -2,7 +2,7 @@
 /* The next station: places where a tripod can stand, and the gain of each. */
 #include "tests/unit/coverage_rig.h"
 
-#include "core/studio/standpoint.h"
+#include "core/studio/viewpoint.h"
 
 static const double RIGHT[3] = {5.0, 1.0, 1.2};
 static const double HEIGHT_M = 1.2;
@@ -10,13 +10,13 @@ static const double HEIGHT_M = 1.2;
 /* ---- places */
 
 /* The roof does not count. */
-static uint32_t find_places(const struct cover *c, double step_m, double height_m, struct standpoint_place **place)
+static uint32_t find_places(const struct cover *c, double step_m, double height_m, struct viewpoint_place **place)
 {
-    const struct standpoint_grid grid = {
+    const struct viewpoint_grid grid = {
         step_m, height_m, {0.0, 0.0, -INFINITY}, {c->scene->max_m[0], c->scene->max_m[1], 1.5}};
     uint32_t n;
     struct sh_err err;
-    if (standpoint_places(c->bvh, &grid, NULL, place, &n, &err) != 0) fail_msg("%s", err.text);
+    if (viewpoint_places(c->bvh, &grid, NULL, place, &n, &err) != 0) fail_msg("%s", err.text);
     return n;
 }
 
@@ -27,7 +27,7 @@ static void test_places(void **state)
 {
     (void)state;
     struct cover *c = cover_open(cover_l_room(), 0.5, 1);
-    struct standpoint_place *place;
+    struct viewpoint_place *place;
     const uint32_t n = find_places(c, 0.5, HEIGHT_M, &place);
     assert_int_equal(n, 20 + 3 + 10);
     for (uint32_t i = 0; i < n; i++) {
@@ -67,7 +67,7 @@ static void test_no_floors(void **state)
                                      {4.5 - x, 4.5 + y, z}};
         static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
         struct scene *scene;
-        struct standpoint_place *place;
+        struct viewpoint_place *place;
         struct sh_err err;
         uint32_t high = 0;
         assert_int_equal(scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err),
@@ -86,11 +86,11 @@ static void test_too_many(void **state)
 {
     (void)state;
     struct cover *c = cover_open(cover_l_room(), 0.5, 1);
-    const struct standpoint_grid grid = {1e-3, 1.6, {0, 0, 0}, {6, 5, 1}};
-    struct standpoint_place *place;
+    const struct viewpoint_grid grid = {1e-3, 1.6, {0, 0, 0}, {6, 5, 1}};
+    struct viewpoint_place *place;
     uint32_t n;
     struct sh_err err;
-    assert_int_equal(standpoint_places(c->bvh, &grid, NULL, &place, &n, &err), SH_EINPUT);
+    assert_int_equal(viewpoint_places(c->bvh, &grid, NULL, &place, &n, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "6000 by 5000"));
     assert_null(place);
     cover_close(c);
@@ -221,7 +221,7 @@ static void test_the_other_leg(void **state)
     (void)state;
     struct cover *c = cover_open(cover_l_room(), 0.5, 3);
     const struct cover_sweep sweep = {0.5, -90.0, 90.0, 0.0, 360.0, 1000.0};
-    struct standpoint_place *place;
+    struct viewpoint_place *place;
     struct coverage_pulses pulses;
     struct coverage_gain gain[33];
     struct coverage_scan scan;

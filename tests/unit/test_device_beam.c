@@ -59,9 +59,9 @@ static void a_tick_ends_where_a_fault_does(void **state)
         next = work->pulse_end;
         const uint64_t last = next - 1;
         const int is_dark = work->pulse0 == 100001 && last == 100001, slips = work->pulse0 >= 100777 && last <= 200002;
-        assert_int_equal(work->upset.on, is_dark || slips);
-        if (is_dark) assert_true(work->upset.cast.dark);
-        if (slips) assert_true(work->upset.cast.slip_turn == 1.0 / 360.0);
+        assert_int_equal(work->disturbance.on, is_dark || slips);
+        if (is_dark) assert_true(work->disturbance.cast.dark);
+        if (slips) assert_true(work->disturbance.cast.slip_turn == 1.0 / 360.0);
         if (next % 16 != 0 && cut_tick == 0) cut_tick = work->tick;
         if (work->tick > cut_tick + 24 && next < 150000) assert_true(next + 32 > due);
         rig_fill(rig);
@@ -104,7 +104,7 @@ static void faults_end_with_their_scan(void **state)
     const char *const sets[] = {"head.frames=0"}, *const faults[] = {"{kind: mirror_stuck, from_pulse: 999}"};
     struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
     rig_go_to(rig, rig->next + 100);
-    assert_true(rig->work.upset.stuck);
+    assert_true(rig->work.disturbance.stuck);
     rig_tell(rig, "SCAN:STOP", rig->next - 1);
     rig_wait(rig, NATIVE_EV_SCAN_END, 10);
     assert_note(0, 1, 0, 999);
@@ -113,11 +113,11 @@ static void faults_end_with_their_scan(void **state)
     rig_tell(rig, "SCAN:STAR", rig->next - 1);
     rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
     rig_go_to(rig, rig->next + 50);
-    assert_true(rig->work.upset.stuck);
+    assert_true(rig->work.disturbance.stuck);
     const uint64_t cleared = rig->work.pulse_end;
     rig_tell(rig, "FAUL:CLE ALL", rig->next - 1);
     rig_claim(rig);
-    assert_false(rig->work.upset.on);
+    assert_false(rig->work.disturbance.on);
     assert_int_equal(rig->work.pulse0, cleared);
     assert_int_equal(n_notes, 4);
     assert_note(2, 1, 0, 999);
@@ -138,10 +138,10 @@ static void what_stands_does_not_wobble(void **state)
         const struct device_work *work = &rig->work;
         const int stuck = work->pulse0 >= 6000 && work->pulse_end <= 12001;
         const int wobbles = !stuck && work->pulse0 >= 3000;
-        assert_int_equal(work->upset.on, stuck || wobbles);
-        if (!work->upset.on) continue;
-        assert_int_equal(work->upset.stuck, stuck);
-        assert_int_equal(work->upset.cast.n_wobbles, wobbles);
+        assert_int_equal(work->disturbance.on, stuck || wobbles);
+        if (!work->disturbance.on) continue;
+        assert_int_equal(work->disturbance.stuck, stuck);
+        assert_int_equal(work->disturbance.cast.n_wobbles, wobbles);
         n_stuck += stuck;
         n_wobbling += wobbles;
     }
@@ -176,16 +176,17 @@ static void another_fault_leaves_it_as_it_is(void **state)
     const char *const sets[] = {"head.frames=0"}, *const faults[] = {"{kind: mirror_stuck, from_pulse: 999}"};
     struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
     rig_go_to(rig, rig->next + 20);
-    const double turn = rig->work.upset.stuck_turn;
+    const double turn = rig->work.disturbance.stuck_turn;
     rig_tell(rig, "FAUL:ADD {kind: laser_off}", rig->next - 1);
     rig_go_to(rig, rig->next + 20);
-    assert_true(rig->work.upset.cast.dark && rig->work.upset.stuck && rig->work.upset.stuck_turn == turn);
+    assert_true(rig->work.disturbance.cast.dark && rig->work.disturbance.stuck &&
+                rig->work.disturbance.stuck_turn == turn);
     assert_int_equal(n_notes, 2);
     assert_note(0, 1, 0, 999);
     assert_int_equal(notes[1].fault, 2);
     rig_tell(rig, "FAUL:CLE 2", rig->next - 1);
     rig_go_to(rig, rig->next + 20);
-    assert_true(!rig->work.upset.cast.dark && rig->work.upset.stuck_turn == turn);
+    assert_true(!rig->work.disturbance.cast.dark && rig->work.disturbance.stuck_turn == turn);
     assert_int_equal(n_notes, 3);
     assert_int_equal(notes[2].fault, 2);
     rig_close(rig);

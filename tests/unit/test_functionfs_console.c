@@ -42,7 +42,8 @@ static int open_port(void **state)
     int pair[2];
     memset(&port, 0, sizeof port);
     *state = &port;
-    if (scanhead_usb_create(usb_look_get(USB_LOOK_NATIVE), &id, &port.head, &err) != SH_OK) fail_msg("%s", err.text);
+    if (scanhead_usb_create(usb_personality_get(USB_PERSONALITY_NATIVE), &id, &port.head, &err) != SH_OK)
+        fail_msg("%s", err.text);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
     port.console.device = port.head.device;
     port.console.fd = pair[0];

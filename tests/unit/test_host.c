@@ -149,7 +149,7 @@ static void put_surfaces(int fd, const char *const (*names)[2], uint32_t first, 
     struct native_names labels = {first, n, name_of, (void *)(uintptr_t)names};
     size_t len = native_encode_surfaces(out, sizeof out, 4096, &labels, 1);
     assert_int_equal(labels.n, 0);
-    native_seal(out, rig_next_seq());
+    native_finish_frame(out, rig_next_seq());
     put_all(fd, out, len);
 }
 
@@ -198,7 +198,7 @@ static void test_file(void **state)
     /* The stream has a frame cut at its end, and a whole one hidden in its length. */
     struct line_block block = make_block(100, 1);
     native_encode_points(out, sizeof out, &block, 0);
-    native_seal(out, rig_next_seq());
+    native_finish_frame(out, rig_next_seq());
     put_all(fd, out, 200);
     put_points(fd, 2, 1);
     close(fd);

@@ -55,7 +55,7 @@ static void act(struct script *s)
         if (i == s->frames_before) s->ok &= give(s->fd, s->reply, strlen(s->reply));
         struct line_block block = make_block(s->big ? MAX_POINTS : 1, (uint64_t)i);
         size_t len = native_encode_points(frame, sizeof frame, &block, 0);
-        native_seal(frame, rig_next_seq());
+        native_finish_frame(frame, rig_next_seq());
         if (!give(s->fd, frame, len)) return;
     }
     if (s->frames_after == 0 && s->reply != NULL) s->ok &= give(s->fd, s->reply, strlen(s->reply));

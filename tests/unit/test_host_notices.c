@@ -37,7 +37,7 @@ static size_t make_event(uint8_t *to, uint32_t seq)
 {
     struct native_event e = {.code = NATIVE_EV_ERROR, .a = seq};
     assert_int_equal(native_encode_event(to, EVENT, &e, 10 + (int64_t)seq, 0), EVENT);
-    native_seal(to, seq);
+    native_finish_frame(to, seq);
     return EVENT;
 }
 
@@ -357,7 +357,7 @@ static void test_reattach(void **state)
     len += make_event(rest + len, 106) / 2; /* it is cut, and its length hides the next one */
     memset(rest + len, 0, NATIVE_HEADER_LEN);
     memcpy(rest + len, (uint8_t[]){NATIVE_SYNC, 200, NATIVE_VERSION}, 3);
-    len += native_seal(rest + len, 107);
+    len += native_finish_frame(rest + len, 107);
     put_all(head, rest, len);
     assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_reattach(sh, WAIT_MS), 0);

@@ -11,7 +11,7 @@ static void put(int fd, size_t len, int lost)
     uint32_t seq = rig_next_seq();
     while (lost-- > 0)
         seq = rig_next_seq();
-    native_seal(out, seq);
+    native_finish_frame(out, seq);
     put_all(fd, out, len);
 }
 
@@ -99,7 +99,7 @@ static void put_with_attributes(int fd, int lost)
     for (size_t at = 0, len; at < all; at += len, number++) {
         len = native_frame_len(copy + at);
         memcpy(out, copy + at, len);
-        native_seal(out, rig_next_seq());
+        native_finish_frame(out, rig_next_seq());
         if (number != lost) put_all(fd, out, len);
     }
     assert_int_equal(number, 3);

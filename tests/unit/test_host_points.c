@@ -145,7 +145,7 @@ static void test_geodetic_points(void **state)
         }
         put_descriptor(head, 1, 1, 0);
         const size_t len = native_encode_anchor(out, sizeof out, &anchor, 0, 0);
-        native_seal(out, rig_next_seq());
+        native_finish_frame(out, rig_next_seq());
         put_all(head, out, len);
         put_points(head, 4, 0);
         for (int i = 0; i < 3; i++)
@@ -178,7 +178,7 @@ static void test_scales(void **state)
     echo[0] = 0x11;
     put_descriptor(head, 1, 1, 0);
     const size_t len = native_encode_anchor(out, sizeof out, &anchor, 0, 0);
-    native_seal(out, rig_next_seq());
+    native_finish_frame(out, rig_next_seq());
     put_all(head, out, len);
     put_points(head, 1, 0);
     for (int i = 0; i < 3; i++)
@@ -208,7 +208,7 @@ static void test_poses(void **state)
                                            .flags = 2}};
         put_descriptor(head, 0, 1, 0);
         const size_t len = native_encode_poses(out, sizeof out, at, 2, 0, 0);
-        native_seal(out, rig_next_seq());
+        native_finish_frame(out, rig_next_seq());
         put_all(head, out, len);
         for (int i = 0; i < 2; i++)
             assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);

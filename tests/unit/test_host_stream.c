@@ -16,7 +16,7 @@ static void test_stats(void **state)
     put_event(head, NATIVE_EV_OVERRUN, 1000, 20, 1, 0);
     struct native_event e = {.code = NATIVE_EV_OVERRUN, .b = 22};
     size_t len = native_encode_event(out, sizeof out, &e, 1, 0);
-    native_seal(out, 4); /* after 0: three are missing */
+    native_finish_frame(out, 4); /* after 0: three are missing */
     put_all(head, out, len);
     out[30] ^= 1;
     put_all(head, out, len);
@@ -45,11 +45,11 @@ static void test_version_and_types(void **state)
     struct native_event e = {.code = 1};
     size_t len = native_encode_event(out, sizeof out, &e, 1, 0);
     out[2] = 2;
-    native_seal(out, 0);
+    native_finish_frame(out, 0);
     put_all(head, out, len);
     out[2] = 1;
     out[1] = 99; /* an unknown type of later times is passed on unchanged */
-    native_seal(out, 1);
+    native_finish_frame(out, 1);
     put_all(head, out, len);
     assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_EFORMAT);
     assert_non_null(strstr(scanhead_error(sh), "version 2"));
@@ -89,7 +89,7 @@ static void test_hash(void **state)
         if (part == 2) len = native_encode_points(out, sizeof out, &block, 5);
         if (part == 3) len = native_encode_line_end(out, sizeof out, &end, 5);
         hash_frame(&ctx, out, len);
-        native_seal(out, rig_next_seq());
+        native_finish_frame(out, rig_next_seq());
         put_all(head, out, len);
         put_event(head, 1, 2, 3, 4, 0);            /* outside */
         put_descriptor(head, 1, 1, NATIVE_REPEAT); /* outside */

@@ -45,7 +45,7 @@ static size_t make_event(uint8_t raw[512], uint32_t seq)
 {
     struct native_event e = {.code = NATIVE_EV_ERROR, .text = "a line\r\nSCAN:STOP\r\n*RST\n"};
     size_t len = native_encode_event(raw, 512, &e, 1, 0);
-    native_seal(raw, seq);
+    native_finish_frame(raw, seq);
     return len;
 }
 

@@ -63,7 +63,7 @@ static size_t make_event(uint8_t *to, size_t room, uint32_t seq)
 {
     struct native_event e = {.code = NATIVE_EV_ERROR, .a = seq};
     size_t len = native_encode_event(to, room, &e, 1, 0);
-    native_seal(to, seq);
+    native_finish_frame(to, seq);
     return len;
 }
 

@@ -183,9 +183,9 @@ static void test_parser_passes_unknown_types(void **state)
     static struct native_parser parser;
     struct line_block block = make_block(3, 1);
     size_t len = native_encode_points(out, sizeof out, &block, 0), points_len = 28 + 40 + 3 * 20, room;
-    native_seal(out, 8);
+    native_finish_frame(out, 8);
     out[points_len + 1] = 200;
-    native_seal(out + points_len, 9);
+    native_finish_frame(out + points_len, 9);
     native_parser_init(&parser);
     memcpy(native_parser_room(&parser, &room), out, len);
     native_parser_added(&parser, len);

@@ -60,10 +60,10 @@ static void make_frames(void)
             f[NATIVE_HEADER_LEN + k] = (uint8_t)(roll(4) == 0 && k + 1 < len ? NATIVE_SYNC : roll(0xd5));
         le_put32(f + 12, crc32c(0, f + NATIVE_HEADER_LEN, len));
         number[i] = is_local(i) ? 0 : next++;
-        native_seal(f, (uint32_t)number[i]);
+        native_finish_frame(f, (uint32_t)number[i]);
         while (f[NATIVE_HEADER_LEN - 1] == NATIVE_SYNC) { /* cut there, the next frame would make the header right */
             f[1]++;
-            native_seal(f, (uint32_t)number[i]);
+            native_finish_frame(f, (uint32_t)number[i]);
         }
     }
 }

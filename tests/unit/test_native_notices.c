@@ -45,7 +45,7 @@ static size_t put(uint32_t seq, int flags)
     const size_t at = n_bytes,
                  len = native_encode_event(bytes + at, sizeof bytes - at, &e, 10 * (int64_t)(int32_t)seq, flags);
     assert_int_equal(len, FRAME);
-    native_seal(bytes + at, (flags & NATIVE_LOCAL) != 0 ? 0 : seq);
+    native_finish_frame(bytes + at, (flags & NATIVE_LOCAL) != 0 ? 0 : seq);
     n_bytes += len;
     return at;
 }
@@ -249,7 +249,7 @@ static void test_end(void **state)
     at[2] = n_bytes = at[1] + 40;
     memset(bytes + at[2], 0, NATIVE_HEADER_LEN);
     memcpy(bytes + at[2], (uint8_t[]){NATIVE_SYNC, 200, NATIVE_VERSION}, 3);
-    n_bytes += native_seal(bytes + at[2], 7);
+    n_bytes += native_finish_frame(bytes + at[2], 7);
     in_all_pieces(check_hidden);
     n_bytes = 0;
     put(5, 0);

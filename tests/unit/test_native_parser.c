@@ -49,7 +49,7 @@ static void test_parser_length_refused(void **state)
     make_stream();
     begin();
     uint8_t bad[28] = {NATIVE_SYNC, NATIVE_POINTS, 1, 0, 1, 0, 1, 0}; /* 65537 bytes */
-    native_seal(bad, 0);
+    native_finish_frame(bad, 0);
     feed(bad, 28, 28);
     assert_int_equal(parser.stats.bad_bytes, 28); /* at once, without waiting for a payload */
     feed(stream, stream_len, 100);
@@ -71,7 +71,7 @@ static void test_parser_biggest_frame(void **state)
         int n = 0;
         for (int repeat = 0; repeat < 20; repeat++) {
             size_t at = 0;
-            native_seal(out, (uint32_t)repeat);
+            native_finish_frame(out, (uint32_t)repeat);
             while (at < len) {
                 size_t room;
                 uint8_t *to = native_parser_room(&parser, &room);
@@ -121,7 +121,7 @@ static void test_seq_jumps_back(void **state)
     static const uint32_t seq[] = {10, 11, 15, 0, 1, 1};
     begin();
     for (size_t i = 0; i < 6; i++) {
-        assert_int_equal(native_seal(out, seq[i]), len);
+        assert_int_equal(native_finish_frame(out, seq[i]), len);
         feed(out, len, len);
     }
     /* 15 after 11: three are lost. 0 after 15 is a jump back, of unknown size. The second 1 came already. */

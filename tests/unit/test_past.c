@@ -28,7 +28,7 @@ static void give(struct past *past, int type, int flags, uint32_t seq, uint32_t 
     le_put32(raw + 4, (uint32_t)payload);
     raw[NATIVE_HEADER_LEN] = mark;
     native_reseal(raw, NATIVE_HEADER_LEN + payload);
-    native_seal(raw, seq);
+    native_finish_frame(raw, seq);
     const struct scanhead_frame frame = {.type = type,
                                          .flags = flags,
                                          .seq = seq,

@@ -289,12 +289,12 @@ static void test_losses_are_told(void **state)
     put_anchor(NATIVE_CRS_UTM, 32632, 2);
     put_points(0);
     size_t len = native_encode_event(out, sizeof out, &e, 0, 0);
-    native_seal(out, 8); /* after 2 */
+    native_finish_frame(out, 8); /* after 2 */
     put(len);
     put(len); /* once more */
-    native_seal(out, 4);
+    native_finish_frame(out, 4);
     put(len); /* too late */
-    native_seal(out, 0x90000000u);
+    native_finish_frame(out, 0x90000000u);
     put(len); /* started again */
     assert_int_equal(record(out_path, (struct recorder_options){0}, 1, &err), 0);
     read_ply(out_path, 0);

@@ -45,7 +45,7 @@ static struct head head;
 
 static void send_frame(uint8_t *frame, size_t len)
 {
-    native_seal(frame, head.seq++);
+    native_finish_frame(frame, head.seq++);
     if (send(head.fd, frame, len, MSG_NOSIGNAL) != (ssize_t)len) head.wrong = "a frame was not taken";
     atomic_fetch_add(&head.sent, 1);
 }

@@ -313,7 +313,7 @@ static void a_face_that_stands_twice_is_a_twin(void **state)
     open_rig(&r, 1e5);
     uint64_t *twin;
     struct sh_err err;
-    check(scene_find_twins(r.scene, NULL, &twin, &err), &err);
+    check(scene_find_duplicate_faces(r.scene, NULL, &twin, &err), &err);
     assert_int_equal(twin[0], 4 | 8);
     free(twin);
     close_rig(&r);

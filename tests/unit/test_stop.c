@@ -75,10 +75,10 @@ static int build_bvh(const struct sh_report *report, struct sh_err *err)
 
 static int find_twins(const struct sh_report *report, struct sh_err *err)
 {
-    uint64_t *twin = NULL;
-    int rc = scene_find_twins(large, report, &twin, err);
-    assert_true((rc == SH_OK) == (twin != NULL));
-    free(twin);
+    uint64_t *duplicate = NULL;
+    int rc = scene_find_duplicate_faces(large, report, &duplicate, err);
+    assert_true((rc == SH_OK) == (duplicate != NULL));
+    free(duplicate);
     return rc;
 }
 

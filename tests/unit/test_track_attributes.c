@@ -12,7 +12,7 @@ static void put(size_t len, int lost)
 {
     int n = 0;
     for (size_t at = 0, frame_len; at < len; at += frame_len, n++) {
-        frame_len = native_seal(out + at, seq++);
+        frame_len = native_finish_frame(out + at, seq++);
         if (n != lost) rig_put(out + at, frame_len);
     }
 }

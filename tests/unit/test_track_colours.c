@@ -14,7 +14,7 @@ static void put(size_t len, unsigned lost)
 {
     int n = 0;
     for (size_t at = 0, frame_len; at < len; at += frame_len, n++) {
-        frame_len = native_seal(out + at, seq++);
+        frame_len = native_finish_frame(out + at, seq++);
         if ((lost >> n & 1) == 0) rig_put(out + at, frame_len);
     }
 }

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"
-#include "firmware_sim/loop/kept.h"
+#include "firmware_sim/loop/latched.h"
 #include "firmware_sim/loop/unit_queue.h"
 
 enum { CAP = 1000, HEAD = 32 }; /* a unit's cost beside its bytes: two ticks, a kind and a length, aligned */
@@ -73,22 +73,22 @@ static size_t encode(uint8_t *dst, int type, uint32_t number)
 static void the_last_ones_are_kept(void **state)
 {
     (void)state;
-    static struct kept kept;
-    static uint8_t frame[4096], copy[KEPT_MAX_BYTES];
+    static struct latched kept;
+    static uint8_t frame[4096], copy[LATCHED_MAX_BYTES];
     static const int order[] = {NATIVE_ANCHOR, NATIVE_DESCRIPTOR, NATIVE_EMITTER, NATIVE_ANCHOR};
     const struct native_event event = {.code = NATIVE_EV_STATE};
     uint32_t version, was;
-    assert_int_equal(kept_copy(&kept, copy, &was), 0);
+    assert_int_equal(latched_copy(&kept, copy, &was), 0);
     native_encode_event(frame, sizeof frame, &event, 0, 0);
-    kept_put(&kept, frame);
-    assert_int_equal(kept_copy(&kept, copy, &version), 0);
+    latched_put(&kept, frame);
+    assert_int_equal(latched_copy(&kept, copy, &version), 0);
     assert_int_equal(version, was);
     for (uint32_t i = 0; i < 4; i++) {
         encode(frame, order[i], i);
-        native_seal(frame, 7 + i);
-        kept_put(&kept, frame);
+        native_finish_frame(frame, 7 + i);
+        latched_put(&kept, frame);
     }
-    uint32_t len = kept_copy(&kept, copy, &version), at = 0;
+    uint32_t len = latched_copy(&kept, copy, &version), at = 0;
     assert_int_not_equal(version, was);
     static const int wanted[] = {NATIVE_DESCRIPTOR, NATIVE_EMITTER, NATIVE_ANCHOR};
     static struct native_parser parser; /* it checks both sums of each frame */
@@ -111,7 +111,7 @@ static void the_last_ones_are_kept(void **state)
     assert_int_equal(anchor.station, 3); /* the later of the two */
 }
 
-static struct kept shared;
+static struct latched shared;
 static _Atomic int over;
 
 static void *keep(void *arg)
@@ -119,9 +119,9 @@ static void *keep(void *arg)
     static uint8_t frame[4096];
     for (uint32_t i = 1; !atomic_load(&over); i++) {
         encode(frame, NATIVE_DESCRIPTOR, i);
-        kept_put(&shared, frame);
+        latched_put(&shared, frame);
         encode(frame, NATIVE_EMITTER, i);
-        kept_put(&shared, frame);
+        latched_put(&shared, frame);
         for (volatile int rest = 0; rest < 2000; rest++) /* in the head it is a second */
             continue;
     }
@@ -132,13 +132,13 @@ static void *keep(void *arg)
 static void copies_are_whole(void **state)
 {
     (void)state;
-    static uint8_t copy[KEPT_MAX_BYTES];
+    static uint8_t copy[LATCHED_MAX_BYTES];
     pthread_t thread;
     uint32_t last = 0, seen = 0;
     assert_int_equal(pthread_create(&thread, NULL, keep, NULL), 0);
     while (seen < 200) {
         uint32_t version;
-        uint32_t len = kept_copy(&shared, copy, &version);
+        uint32_t len = latched_copy(&shared, copy, &version);
         if (len == 0) continue;
         const uint32_t n = (uint32_t)native_frame_len(copy);
         struct native_header header;

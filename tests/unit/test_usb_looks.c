@@ -11,7 +11,7 @@
 enum { LANG = 0x0409 };
 
 struct shape {
-    enum usb_look_id look;
+    enum usb_personality_id personality;
     const char *serial; /* "": none */
     const uint8_t *device, *full, *high;
     size_t config_len;
@@ -62,9 +62,9 @@ static const uint8_t sick_device[18] = {18, 1, 0, 2, 0, 0, 0, 64, 0xa2, 0x19, 0x
 static const uint8_t sick_full[] = {SICK_BYTES(64, 0)}, sick_high[] = {SICK_BYTES(0, 2)};
 
 static const struct shape shapes[] = {
-    {USB_LOOK_NATIVE, "S", native_device, native_full, native_high, sizeof native_full},
-    {USB_LOOK_HOKUYO, "", hokuyo_device, hokuyo_full, hokuyo_high, sizeof hokuyo_full},
-    {USB_LOOK_SICK, "15340291", sick_device, sick_full, sick_high, sizeof sick_full},
+    {USB_PERSONALITY_NATIVE, "S", native_device, native_full, native_high, sizeof native_full},
+    {USB_PERSONALITY_HOKUYO, "", hokuyo_device, hokuyo_full, hokuyo_high, sizeof hokuyo_full},
+    {USB_PERSONALITY_SICK, "15340291", sick_device, sick_full, sick_high, sizeof sick_full},
 };
 
 struct rig {
@@ -81,15 +81,15 @@ static void rig_complete(void *ctx, struct usb_transfer *transfer)
 
 static int n_done;
 
-static void rig_open(struct rig *rig, enum usb_look_id id, const char *serial, enum usb_rate rate)
+static void rig_open(struct rig *rig, enum usb_personality_id id, const char *serial, enum usb_rate rate)
 {
-    const struct usb_look *look = usb_look_get(id);
-    struct usb_identity identity = {.vid = look->vid, .pid = look->pid, .highest = USB_RATE_HIGH};
+    const struct usb_personality *personality = usb_personality_get(id);
+    struct usb_identity identity = {.vid = personality->vid, .pid = personality->pid, .highest = USB_RATE_HIGH};
     struct sh_err err = {0, ""};
     memset(rig, 0, sizeof *rig);
     n_done = 0;
     snprintf(identity.serial, sizeof identity.serial, "%s", serial);
-    if (scanhead_usb_create(look, &identity, &rig->head, &err) != SH_OK) fail_msg("%s", err.text);
+    if (scanhead_usb_create(personality, &identity, &rig->head, &err) != SH_OK) fail_msg("%s", err.text);
     usb_device_attach(rig->head.device, rate, rig_complete, &n_done);
 }
 
@@ -123,12 +123,12 @@ static void test_descriptors(void **state)
         for (int high = 0; high < 2; high++) {
             const struct shape *s = &shapes[i];
             struct rig rig;
-            rig_open(&rig, s->look, s->serial, high ? USB_RATE_HIGH : USB_RATE_FULL);
+            rig_open(&rig, s->personality, s->serial, high ? USB_RATE_HIGH : USB_RATE_FULL);
             expect_bytes(&rig, 0x0100, s->device, 18);
             expect_bytes(&rig, 0x0200, high ? s->high : s->full, s->config_len);
             /* There is a BOS only where the native identity has content for it. */
             const int bos = control(&rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0f00, 0, 255);
-            assert_true((bos == USB_STALL) == (s->look != USB_LOOK_NATIVE));
+            assert_true((bos == USB_STALL) == (s->personality != USB_PERSONALITY_NATIVE));
             usb_device_free(rig.head.device);
         }
 }
@@ -149,16 +149,16 @@ static void test_strings(void **state)
 {
     (void)state;
     static const struct {
-        enum usb_look_id look;
+        enum usb_personality_id personality;
         const char *serial, *string[4];
     } cases[] = {
-        {USB_LOOK_HOKUYO, "", {"Hokuyo Data Flex for USB", "URG-Series USB Driver", NULL, NULL}},
-        {USB_LOOK_HOKUYO, "H0807111", {"Hokuyo Data Flex for USB", "URG-Series USB Driver", "H0807111", NULL}},
-        {USB_LOOK_SICK, "15340291", {"Default Configuration", "TIM3xx", "15340291", NULL}},
+        {USB_PERSONALITY_HOKUYO, "", {"Hokuyo Data Flex for USB", "URG-Series USB Driver", NULL, NULL}},
+        {USB_PERSONALITY_HOKUYO, "H0807111", {"Hokuyo Data Flex for USB", "URG-Series USB Driver", "H0807111", NULL}},
+        {USB_PERSONALITY_SICK, "15340291", {"Default Configuration", "TIM3xx", "15340291", NULL}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct rig rig;
-        rig_open(&rig, cases[i].look, cases[i].serial, USB_RATE_HIGH);
+        rig_open(&rig, cases[i].personality, cases[i].serial, USB_RATE_HIGH);
         for (unsigned k = 0; k < 4; k++)
             expect_text(&rig, k + 1, cases[i].string[k]);
         control(&rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0100, 0, 18);
@@ -173,7 +173,7 @@ static void test_status(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
         struct rig rig;
-        rig_open(&rig, shapes[i].look, "", USB_RATE_HIGH);
+        rig_open(&rig, shapes[i].personality, "", USB_RATE_HIGH);
         configure(&rig);
         assert_int_equal(control(&rig, 0x80, USB_REQ_GET_STATUS, 0, 0, 2), 2);
         assert_int_equal(rig.in[0], 1);
@@ -198,9 +198,9 @@ static void test_port(void **state)
     struct rig rig;
     struct usb_transfer out;
     char text[8];
-    rig_open(&rig, USB_LOOK_HOKUYO, "", USB_RATE_FULL);
+    rig_open(&rig, USB_PERSONALITY_HOKUYO, "", USB_RATE_FULL);
     configure(&rig);
-    assert_int_equal(rig.head.look->n_sessions, 1);
+    assert_int_equal(rig.head.personality->n_sessions, 1);
     assert_int_equal(control(&rig, 0x21, 0x22, 1, 0, 0), 0);
     assert_true(rig.head.session[0].open);
     assert_int_equal(control(&rig, 0x21, 0x22, 0, 0, 0), 0);
@@ -221,7 +221,7 @@ static void test_line_coding(void **state)
     (void)state;
     static const uint32_t rates[] = {1, 19200, 57600, 115200, 250000, 500000, 750000, 12345678, UINT32_MAX};
     struct rig rig;
-    rig_open(&rig, USB_LOOK_HOKUYO, "", USB_RATE_FULL);
+    rig_open(&rig, USB_PERSONALITY_HOKUYO, "", USB_RATE_FULL);
     configure(&rig);
     for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
         const uint8_t coding[7] = {
@@ -244,14 +244,14 @@ static void test_foreign_requests(void **state)
 {
     (void)state;
     struct rig rig;
-    rig_open(&rig, USB_LOOK_SICK, "", USB_RATE_HIGH);
+    rig_open(&rig, USB_PERSONALITY_SICK, "", USB_RATE_HIGH);
     configure(&rig);
     assert_int_equal(control(&rig, 0x41, SCANHEAD_USB_STREAM, 1, 0, 0), USB_STALL);
     assert_int_equal(control(&rig, 0x21, 0x22, 1, 0, 0), USB_STALL);
     assert_int_equal(control(&rig, 0xc0, 0x20, 0, 7, 255), USB_STALL); /* Microsoft OS descriptors */
     assert_false(rig.head.session[0].open);
     usb_device_free(rig.head.device);
-    rig_open(&rig, USB_LOOK_HOKUYO, "", USB_RATE_HIGH);
+    rig_open(&rig, USB_PERSONALITY_HOKUYO, "", USB_RATE_HIGH);
     configure(&rig);
     assert_int_equal(control(&rig, 0x41, SCANHEAD_USB_STREAM, 1, 0, 0), USB_STALL);
     assert_int_equal(control(&rig, 0xc0, 0x20, 0, 7, 255), USB_STALL);

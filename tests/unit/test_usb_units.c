@@ -9,7 +9,7 @@
 #include "tests/unit/usbredir_guest.h"
 #endif
 
-#include "drivers/usb/looks.h"
+#include "drivers/usb/personalities.h"
 
 enum { MOST = 65535, ECONNRESET_WIRE = -104 };
 
@@ -29,7 +29,7 @@ static struct link_spec sick_spec(int backend, int speed)
     return (struct link_spec){.type = LINK_USB,
                               .backend = backend,
                               .speed = speed,
-                              .look = USB_LOOK_SICK,
+                              .personality = USB_PERSONALITY_SICK,
                               .vid = 0x19a2,
                               .pid = 0x5001,
                               .serial = "T"};

@@ -10,7 +10,7 @@
 #include <sys/socket.h>
 
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/loop/bell.h"
+#include "firmware_sim/loop/wakeup.h"
 #include "firmware_sim/loop/loop.h"
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"
@@ -22,7 +22,7 @@ static const int64_t DEADLINE_NS = 240000000000;
 enum { TURNS = 20000, SLEEPERS = 3 };
 
 static struct {
-    struct bell here, there;
+    struct wakeup here, there;
     _Atomic uint32_t ball;
     _Atomic int in_time;
 } game;
@@ -30,13 +30,13 @@ static struct {
 static void *play(void *arg)
 {
     const uint32_t mine = (uint32_t)(intptr_t)arg;
-    struct bell *hear = mine == 0 ? &game.here : &game.there, *ring = mine == 0 ? &game.there : &game.here;
+    struct wakeup *hear = mine == 0 ? &game.here : &game.there, *ring = mine == 0 ? &game.there : &game.here;
     const int64_t until_ns = clock_now_ns() + DEADLINE_NS;
     for (uint32_t ball; (ball = atomic_load(&game.ball)) < TURNS;) {
         if (ball % 2 == mine) {
             atomic_store(&game.ball, ball + 1);
-            bell_ring(ring, 1);
-        } else if (bell_sleep_until(hear, until_ns)) {
+            wakeup_signal(ring, 1);
+        } else if (wakeup_sleep_until(hear, until_ns)) {
             atomic_store(&game.in_time, 0);
             break;
         }
@@ -48,29 +48,29 @@ static void a_ring_is_never_lost(void **state)
 {
     (void)state;
     pthread_t player[2];
-    bell_create(&game.here);
-    bell_create(&game.there);
+    wakeup_create(&game.here);
+    wakeup_create(&game.there);
     atomic_store(&game.in_time, 1);
     for (intptr_t i = 0; i < 2; i++)
         assert_int_equal(pthread_create(&player[i], NULL, play, (void *)i), 0);
     for (int i = 0; i < 2; i++)
         pthread_join(player[i], NULL);
-    bell_free(&game.here);
-    bell_free(&game.there);
+    wakeup_free(&game.here);
+    wakeup_free(&game.there);
     assert_true(game.in_time && game.ball == TURNS);
 }
 
 static void rings_are_not_counted(void **state)
 {
     (void)state;
-    struct bell bell;
-    bell_create(&bell);
+    struct wakeup wakeup;
+    wakeup_create(&wakeup);
     for (int i = 0; i < 1000; i++)
-        bell_ring(&bell, SLEEPERS);
+        wakeup_signal(&wakeup, SLEEPERS);
     for (int i = 0; i < SLEEPERS; i++)
-        bell_sleep(&bell); /* each finds one */
-    assert_true(bell_sleep_until(&bell, clock_now_ns() + 1000000));
-    bell_free(&bell);
+        wakeup_sleep(&wakeup); /* each finds one */
+    assert_true(wakeup_sleep_until(&wakeup, clock_now_ns() + 1000000));
+    wakeup_free(&wakeup);
 }
 
 /* ---- the loop */

@@ -56,9 +56,9 @@ static void test_figures(void **state)
     const char *const one[] = {"coverage", config, "--json", "--by", "label", "--threads", "1", NULL};
     const char *const sets[] = {"coverage", config, "--json", "--by", "label", "--set", "loop.threads=1", NULL};
     const char *const four[] = {"coverage", config, "--json", "--by", "label", "--set", "loop.threads=4", NULL};
-    static const char *const keys[] = {"cell_m",       "cells",    "pieces",     "triangles",   "twin_m2", "several_m2",
-                                       "none_percent", "mean",     "p05",        "p50",         "p95",     "pulses",
-                                       "met",          "alone_m2", "front_hits", "seen_percent"};
+    static const char *const keys[] = {
+        "cell_m", "cells", "pieces", "triangles", "duplicate_m2", "several_m2", "none_percent", "mean",
+        "p05",    "p50",   "p95",    "pulses",    "met",          "alone_m2",   "front_hits",   "seen_percent"};
     free(run(wire, one, 2)); /* no such option: it is a key */
     char *json = run(wire, sets, 0), *again = run(wire, four, 0);
     assert_string_equal(json, again);

@@ -37,7 +37,7 @@ static size_t prolong(uint8_t *to, const char *from, size_t len)
     for (int i = 0; i < ROUNDS; i++)
         memcpy(to + (size_t)i * len, from, len);
     for (size_t at = 0; at < ROUNDS * len; at += native_frame_len(to + at))
-        native_seal(to + at, seq++);
+        native_finish_frame(to + at, seq++);
     return ROUNDS * len;
 }
 

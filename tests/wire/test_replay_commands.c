@@ -224,7 +224,7 @@ static const char *write_moment(struct wire *wire, const struct native_emitter *
     if (e != NULL) {
         const size_t n = native_encode_emitter(bytes + len, sizeof bytes - len, e, NULL, tape.frame[i].t_ns, 0);
         assert_true(n > 0);
-        native_seal(bytes + len, tape.frame[i].seq + 1);
+        native_finish_frame(bytes + len, tape.frame[i].seq + 1);
         len += n;
     }
     tape_free(&tape);

@@ -150,7 +150,7 @@ static void test_begun_within_a_scan(void **state)
         if (i < 100 && !is_front) continue;
         if (i < 100) {
             bytes[3] |= SCANHEAD_REPEAT | SCANHEAD_LOCAL;
-            native_seal(bytes, 0);
+            native_finish_frame(bytes, 0);
         }
         assert_int_equal(fwrite(bytes, 1, frame->len, f), frame->len);
     }

@@ -7,7 +7,7 @@
 #include "core/studio/coverage/cut.h"
 #include "core/studio/coverage/inside.h"
 #include "core/grow.h"
-#include "core/huge.h"
+#include "core/huge_pages.h"
 #include "core/rng.h"
 #include "core/vec3.h"
 
@@ -78,7 +78,7 @@ static int is_silent(const struct coverage *c, uint32_t t)
 
 static int has_cells(const struct coverage *c, uint32_t t)
 {
-    return !is_silent(c, t) && (c->twin[t / 64] >> t % 64 & 1) == 0;
+    return !is_silent(c, t) && (c->duplicate[t / 64] >> t % 64 & 1) == 0;
 }
 
 static double count_pieces(const struct coverage *c, double cell_m)
@@ -184,7 +184,7 @@ static void cut_triangle(struct build *b, uint32_t t)
     vec3_normal(corner[0], corner[1], corner[2], n);
     const double area_m2 = 0.5 * vec3_length(n);
     if (c->first[t] == NO_CELL) {
-        *(is_silent(c, t) ? &c->silent_m2 : &c->twin_m2) += area_m2;
+        *(is_silent(c, t) ? &c->silent_m2 : &c->duplicate_m2) += area_m2;
         return;
     }
     b->label_side = (uint32_t)(c->scene->label[t] - c->scene->label0) << 3 | side_of(n);
@@ -251,7 +251,7 @@ static int number_pieces(struct coverage *c, struct sh_err *err)
             c->n_pieces += cut_rows(&cut, k);
         }
     }
-    if (has_room) has_room = (c->piece = huge_alloc((c->n_pieces + 1) * sizeof *c->piece)) != NULL;
+    if (has_room) has_room = (c->piece = huge_pages_alloc((c->n_pieces + 1) * sizeof *c->piece)) != NULL;
     return has_room ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the pieces of %u triangles", n);
 }
 
@@ -262,7 +262,7 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "no memory for coverage");
     c->spec = *spec;
     c->scene = bvh_scene(spec->bvh);
-    int rc = scene_find_twins(c->scene, report, &c->twin, err);
+    int rc = scene_find_duplicate_faces(c->scene, report, &c->duplicate, err);
     if (rc == SH_OK) rc = set_up(c, err);
     if (rc == SH_OK) rc = number_pieces(c, err);
     if (rc == SH_OK) rc = build(c, report, err);
@@ -275,7 +275,7 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
 void coverage_free(struct coverage *coverage)
 {
     if (coverage == NULL) return;
-    free(coverage->twin);
+    free(coverage->duplicate);
     free(coverage->first);
     free(coverage->column);
     free(coverage->piece);

@@ -63,7 +63,7 @@ int coverage_sum(const struct coverage *c, struct coverage_sums *sums, struct sh
                                    .cells = c->n_cells,
                                    .pieces = c->n_pieces,
                                    .triangles = c->scene->n_triangles,
-                                   .twin_m2 = c->twin_m2,
+                                   .duplicate_m2 = c->duplicate_m2,
                                    .silent_m2 = c->silent_m2};
     for (uint32_t i = 0; i < c->n_cells; i++) {
         const struct cell *cell = &c->cell[i];

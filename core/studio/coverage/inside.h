@@ -30,8 +30,8 @@ struct coverage {
     uint32_t *piece;    /* [n_pieces] its cell */
     uint64_t n_columns, n_pieces;
     uint32_t n_cells, n_stations;
-    uint64_t *twin; /* bits: triangles that lie on others */
-    double twin_m2, silent_m2;
+    uint64_t *duplicate; /* bits: triangles that lie on others */
+    double duplicate_m2, silent_m2;
     struct cell *cell;
     struct cell_met *met; /* of the scan that waits */
 };

@@ -33,13 +33,13 @@ struct batch {
     int n_endings;
     /* as planned */
     uint32_t n_combinations;
-    struct batch_made *made; /* [n_combinations]; job is empty */
-    struct batch_job *job;   /* [n_jobs] */
+    struct batch_provenance *made; /* [n_combinations]; job is empty */
+    struct batch_job *job;         /* [n_jobs] */
     size_t job_room;
     uint32_t n_jobs;
     int digits; /* of a job's number in names */
     struct batch_cache cache;
-    char engine[sizeof((struct batch_made *)0)->engine];
+    char engine[sizeof((struct batch_provenance *)0)->engine];
 };
 
 /* ---- plan.c */
@@ -55,7 +55,7 @@ static inline int batch_is_mine(const struct batch *b, uint32_t job)
 
 /* The name of a job, from 0, and what it is made with. */
 void batch_job_name(const struct batch *b, uint32_t job, char name[BATCH_NAME_LEN]);
-void batch_job_made(const struct batch *b, uint32_t job, struct batch_made *made);
+void batch_job_provenance(const struct batch *b, uint32_t job, struct batch_provenance *made);
 /* A setting that no byte of a recording depends on. */
 int batch_is_of_speed(const char *set);
 

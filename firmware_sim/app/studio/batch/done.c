@@ -17,7 +17,7 @@ struct finding {
 static int take_entry(void *ctx, struct batch_entry *entry, struct sh_err *err)
 {
     struct finding *f = ctx;
-    struct batch_made made;
+    struct batch_provenance made;
     (void)err;
     if (entry->job > f->b->n_jobs) {
         if (entry->job > f->beyond) f->beyond = entry->job;
@@ -25,9 +25,9 @@ static int take_entry(void *ctx, struct batch_entry *entry, struct sh_err *err)
         return SH_OK;
     }
     struct batch_job *job = &f->b->job[entry->job - 1];
-    batch_job_made(f->b, entry->job - 1, &made);
+    batch_job_provenance(f->b, entry->job - 1, &made);
     if (f->any_engine) memcpy(made.engine, entry->made.engine, sizeof made.engine);
-    const char *differs = batch_made_differs(&made, &entry->made);
+    const char *differs = batch_provenance_differs(&made, &entry->made);
     if (differs != NULL) {
         job->other = differs;
         batch_entry_free(entry);

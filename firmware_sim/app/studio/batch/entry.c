@@ -42,7 +42,7 @@ static int take_files(json_t *from, struct batch_entry *entry)
 
 static int take_entry(json_t *from, struct batch_entry *entry)
 {
-    struct batch_made *made = &entry->made;
+    struct batch_provenance *made = &entry->made;
     const char *program, *engine, *configuration, *inputs, *settings, *stream;
     json_int_t job, pulses, points;
     json_t *files;

@@ -26,10 +26,10 @@ static const struct site *shared_site(struct loading *l)
 /* Whether what was loaded is what was planned with. */
 static int check_made(struct loading *l, struct sh_err *err)
 {
-    const struct batch_made *planned = &l->b->made[l->now->combination];
-    struct batch_made made = *planned;
-    int rc = batch_made_of(l->now->cfg, &l->b->cache, &made, &app_report_stderr, err);
-    const char *differs = rc == SH_OK ? batch_made_differs(planned, &made) : NULL;
+    const struct batch_provenance *planned = &l->b->made[l->now->combination];
+    struct batch_provenance made = *planned;
+    int rc = batch_provenance_of(l->now->cfg, &l->b->cache, &made, &app_report_stderr, err);
+    const char *differs = rc == SH_OK ? batch_provenance_differs(planned, &made) : NULL;
     if (differs == NULL) return rc;
     return sh_fail(err, SH_ESTATE, "%s: %s than when the campaign began; begin again", l->now->cfg->file, differs);
 }

@@ -6,7 +6,7 @@
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_MANIFEST_H
 #define FIRMWARE_SIM_APP_STUDIO_BATCH_MANIFEST_H
 
-#include "firmware_sim/app/studio/batch/made.h"
+#include "firmware_sim/app/studio/batch/provenance.h"
 #include "firmware_sim/app/studio/batch/sweep.h"
 
 struct batch_file {
@@ -17,7 +17,7 @@ struct batch_file {
 
 struct batch_entry {
     uint32_t job; /* its number, from 1 */
-    struct batch_made made;
+    struct batch_provenance made;
     uint64_t pulses, points;
     char stream_sha[BATCH_SHA_LEN];
     double seconds; /* that it took */

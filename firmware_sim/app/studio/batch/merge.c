@@ -119,7 +119,7 @@ static void put_job(struct json *json, const struct batch *b, uint32_t i)
 
 static void put_all(struct json *json, const struct batch *b)
 {
-    const struct batch_made *made = &b->job[0].entry.made;
+    const struct batch_provenance *made = &b->job[0].entry.made;
     json_open_object(json, NULL);
     json_string(json, "program", made->program);
     json_string(json, "engine", made->engine);

@@ -79,7 +79,7 @@ int batch_is_of_speed(const char *set)
     return 0;
 }
 
-void batch_job_made(const struct batch *b, uint32_t job, struct batch_made *made)
+void batch_job_provenance(const struct batch *b, uint32_t job, struct batch_provenance *made)
 {
     const char *set[BATCH_MAX_SWEEPS],
         *text[APP_MAX_SETS + BATCH_MAX_SWEEPS + 2 * APP_MAX_OPTIONS + RECORD_MAX_FILES + 3];
@@ -100,7 +100,7 @@ void batch_job_made(const struct batch *b, uint32_t job, struct batch_made *made
         text[n++] = b->ending[i];
     if (b->surfaces) text[n++] = "surfaces.csv";
     *made = b->made[b->job[job].combination];
-    batch_made_job(made, text, n);
+    batch_provenance_job(made, text, n);
 }
 
 /* ---- all combinations */
@@ -172,13 +172,13 @@ static int plan_config(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct planned *p = ctx;
     struct batch *b = p->b;
-    struct batch_made *made = &b->made[p->combination];
+    struct batch_provenance *made = &b->made[p->combination];
     uint32_t n_stations = 0;
     int rc = record_job_check(p->job, cfg, err);
     if (rc == SH_OK && !config_is_alone(cfg)) rc = check_other_heads(b, p->job, cfg, err);
     if (rc == SH_OK) rc = check_epoch(cfg, err);
     if (rc == SH_OK) rc = site_count_stations(cfg, &app_report_stderr, &n_stations, err);
-    if (rc == SH_OK) rc = batch_made_of(cfg, &b->cache, made, &app_report_stderr, err);
+    if (rc == SH_OK) rc = batch_provenance_of(cfg, &b->cache, made, &app_report_stderr, err);
     if (rc != SH_OK) return rc;
     snprintf(made->program, sizeof made->program, "%s", scanhead_version());
     snprintf(made->engine, sizeof made->engine, "%s", b->engine);

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "core/grow.h"
-#include "firmware_sim/app/beside.h"
+#include "firmware_sim/app/sidecars.h"
 #include "firmware_sim/app/studio/batch/load.h"
 #include "firmware_sim/base/clock.h"
 
@@ -46,7 +46,7 @@ static int add_file(struct listing *l, const char *path)
 }
 
 /* Files that a mesh names were written with it where they have the job's own name: materials, buffers, images. */
-static int add_beside(void *ctx, const char *name, const char *path)
+static int add_sidecar(void *ctx, const char *name, const char *path)
 {
     struct listing *l = ctx;
     return strncmp(name, l->name, strlen(l->name)) == 0 && strchr(name, '/') == NULL ? add_file(l, path) : SH_OK;
@@ -64,7 +64,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_j
         const char *path = files->file[i].path;
         rc = add_file(&l, path);
         if (rc == SH_OK && (app_ends_in(path, ".obj") || app_ends_in(path, ".gltf")))
-            rc = app_beside(path, add_beside, &l, err);
+            rc = app_sidecars(path, add_sidecar, &l, err);
     }
     if (rc == SH_OK && done->surfaces != NULL) rc = add_file(&l, done->surfaces);
     return rc;
@@ -78,7 +78,7 @@ static int note_done(struct runner *r, uint32_t job, const struct record_job *do
     struct batch_entry entry = {.job = job + 1, .pulses = result->counts.pulses, .points = result->points};
     entry.seconds = 1e-3 * round(1e-6 * (double)(clock_now_ns() - start_ns));
     snprintf(entry.stream_sha, sizeof entry.stream_sha, "%s", result->sha256);
-    batch_job_made(r->b, job, &entry.made);
+    batch_job_provenance(r->b, job, &entry.made);
     int rc = list_files(r->b, job, done, &entry, err);
     if (rc == SH_OK) rc = batch_manifest_add(r->manifest, &entry, err);
     batch_entry_free(&entry);

@@ -260,7 +260,7 @@ static int run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_FLAG, "json", NULL, .at = AT(json),
-     .help = "print the figures as JSON: cell_m, cells, pieces, triangles, area_m2, twin_m2, none_m2, one_m2, "
+     .help = "print the figures as JSON: cell_m, cells, pieces, triangles, area_m2, duplicate_m2, none_m2, one_m2, "
              "several_m2 and the same as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), "
              "stations, labels, next"},
     {APP_TEXT, "by", "label", .at = AT(by), .help = "also print the figures of each label: object and material"},

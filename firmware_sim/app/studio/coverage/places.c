@@ -7,7 +7,7 @@
 #include "core/angle.h"
 #include "core/csv.h"
 #include "core/grow.h"
-#include "core/studio/standpoint.h"
+#include "core/studio/viewpoint.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/config/places.h"
@@ -36,15 +36,15 @@ static int check_upright(const struct coverage_finder *f, struct sh_err *err)
 static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
 {
     const struct scene *scene = f->site->scene;
-    struct standpoint_grid grid = {.step_m = f->o->grid_m, .height_m = f->o->height_m};
-    struct standpoint_place *found = NULL;
+    struct viewpoint_grid grid = {.step_m = f->o->grid_m, .height_m = f->o->height_m};
+    struct viewpoint_place *found = NULL;
     uint32_t n = 0;
     for (int i = 0; i < 3; i++) {
         grid.min_m[i] = isnan(f->o->area_m[0][i]) ? scene->min_m[i] : f->o->area_m[0][i];
         grid.max_m[i] = isnan(f->o->area_m[1][i]) ? scene->max_m[i] : f->o->area_m[1][i];
     }
     int rc = check_upright(f, err);
-    if (rc == SH_OK) rc = standpoint_places(f->site->bvh, &grid, f->report, &found, &n, err);
+    if (rc == SH_OK) rc = viewpoint_places(f->site->bvh, &grid, f->report, &found, &n, err);
     if (rc == SH_OK && n > MOST_PLACES)
         rc = sh_fail(err, SH_EINPUT,
                      "--grid %g: %u places to stand; allowed are %d: use a wider grid, or a part with --at",

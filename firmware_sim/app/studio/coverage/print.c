@@ -75,7 +75,8 @@ void coverage_print_text(const struct coverage_result *r)
 {
     const struct coverage_sums *s = &r->sums;
     printf("%-10s %12.3f m2 in %" PRIu32 " cells of %g m\n", "surface", s->area_m2, s->cells, r->cell_m);
-    if (s->twin_m2 > 0.0) printf("%-10s %12.3f m2 left out: faces with the corners of another one\n", "", s->twin_m2);
+    if (s->duplicate_m2 > 0.0)
+        printf("%-10s %12.3f m2 left out: faces with the corners of another one\n", "", s->duplicate_m2);
     if (s->silent_m2 > 0.0) printf("%-10s %12.3f m2 left out: not among scene.target\n", "", s->silent_m2);
     print_area("none", s->none_m2, s->area_m2);
     print_area("one", s->one_m2, s->area_m2);
@@ -145,7 +146,7 @@ void coverage_put(struct json *json, const struct coverage_result *r)
     json_uint(json, "pieces", s->pieces);
     json_uint(json, "triangles", s->triangles);
     json_double(json, "area_m2", s->area_m2);
-    json_double(json, "twin_m2", s->twin_m2);
+    json_double(json, "duplicate_m2", s->duplicate_m2);
     json_double(json, "silent_m2", s->silent_m2);
     put_area(json, "none_m2", "none_percent", s->none_m2, s->area_m2);
     put_area(json, "one_m2", "one_percent", s->one_m2, s->area_m2);

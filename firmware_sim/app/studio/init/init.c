@@ -40,21 +40,21 @@ static const char *base_of(const char *path)
 /* ---- place */
 
 static int find_place(const struct init_run *run, const struct scene *scene, struct config_profile *profile,
-                      struct standpoint *at, struct sh_err *err)
+                      struct viewpoint *at, struct sh_err *err)
 {
     int rc = config_load_profile(PROFILE, run->output, profile, err);
     if (rc != SH_OK) return rc;
-    const struct standpoint_view view = {profile->range_min_m, profile->range_max_m,
-                                         angle_rad(1e-6 * (double)profile->fov_min_udeg),
-                                         angle_rad(1e-6 * (double)profile->fov_max_udeg)};
-    rc = standpoint_find(scene, &view, &app_report_stderr, at, err);
+    const struct viewpoint_view view = {profile->range_min_m, profile->range_max_m,
+                                        angle_rad(1e-6 * (double)profile->fov_min_udeg),
+                                        angle_rad(1e-6 * (double)profile->fov_max_udeg)};
+    rc = viewpoint_find(scene, &view, &app_report_stderr, at, err);
     if (rc == SH_OK && at->seen == 0.0)
         rc = sh_fail(
             err, SH_EINPUT,
             "%s: no place was found from which a head with ranges of %g to %g m hits anything: the mesh is %.3g m "
             "large; --scale sets metres per unit, now %g",
             run->name, profile->range_min_m, profile->range_max_m, init_largest_m(scene), run->as.scale);
-    if (rc != SH_OK || at->kind != STANDPOINT_INSIDE) return rc;
+    if (rc != SH_OK || at->kind != VIEWPOINT_INSIDE) return rc;
     struct config_profile room;
     rc = config_load_profile(ROOM_PROFILE, run->output, &room, err);
     if (rc == SH_OK && init_largest_m(scene) <= room.range_max_m) *profile = room;
@@ -148,7 +148,7 @@ static void put_operand(const char *path)
     putchar('\'');
 }
 
-static void say_result(const struct init_run *run, const struct scene *s, const struct standpoint *at)
+static void say_result(const struct init_run *run, const struct scene *s, const struct viewpoint *at)
 {
     char where[128];
     const double *p = at->position_m;
@@ -173,7 +173,7 @@ static int write_config(struct init_run *run, const struct scene *scene, struct 
     char path[CONFIG_PATH_LEN], link[64];
     const char *base = base_of(run->output);
     struct config_profile profile;
-    struct standpoint at;
+    struct viewpoint at;
     int stem = (int)(strrchr(base, '.') - base);
     int rc = find_place(run, scene, &profile, &at, err);
     if (rc == SH_OK) rc = find_path(run, path, err);

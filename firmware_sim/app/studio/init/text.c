@@ -28,14 +28,14 @@ static double choose_step(double area_deg2)
     return 0.5;
 }
 
-static void choose_window(const struct config_profile *p, const struct standpoint *at, struct init_scan *scan)
+static void choose_window(const struct config_profile *p, const struct viewpoint *at, struct init_scan *scan)
 {
     const double pan_min_deg = from_micro(p->pan_min_udeg), pan_max_deg = from_micro(p->pan_max_udeg);
     const double fov_min_deg = from_micro(p->fov_min_udeg), fov_max_deg = from_micro(p->fov_max_udeg);
     scan->pan_stop_deg = pan_max_deg;
     scan->line_start_deg = fov_min_deg;
     scan->line_stop_deg = fov_max_deg;
-    if (at->kind != STANDPOINT_OUTSIDE) return;
+    if (at->kind != VIEWPOINT_OUTSIDE) return;
     scan->pan_stop_deg = fmin(pan_min_deg + ceil(10.0 * angle_deg(at->pan_rad)) / 10.0, pan_max_deg);
     scan->line_start_deg = clamp(floor(10.0 * angle_deg(at->line0_rad)) / 10.0, fov_min_deg, fov_max_deg);
     scan->line_stop_deg = clamp(ceil(10.0 * angle_deg(at->line1_rad)) / 10.0, fov_min_deg, fov_max_deg);
@@ -56,7 +56,7 @@ static void choose_rates(const struct config_profile *p, double sweep_deg, struc
     scan->lines_hz = clamp(fmin(most_hz, floor(scan->prr_hz / per_line)), min_hz, max_hz);
 }
 
-void init_choose_scan(const struct config_profile *p, const struct standpoint *at, struct init_scan *scan)
+void init_choose_scan(const struct config_profile *p, const struct viewpoint *at, struct init_scan *scan)
 {
     choose_window(p, at, scan);
     const double pan_deg = scan->pan_stop_deg - from_micro(p->pan_min_udeg);
@@ -66,11 +66,11 @@ void init_choose_scan(const struct config_profile *p, const struct standpoint *a
     scan->duration_s = pan_deg / scan->pan_deg_s;
 }
 
-void init_describe(const struct standpoint *at, char *buf, size_t len)
+void init_describe(const struct viewpoint *at, char *buf, size_t len)
 {
-    if (at->kind == STANDPOINT_INSIDE)
+    if (at->kind == VIEWPOINT_INSIDE)
         snprintf(buf, len, "inside, %.3g m above a floor", at->floor_m);
-    else if (at->kind == STANDPOINT_GROUND)
+    else if (at->kind == VIEWPOINT_GROUND)
         snprintf(buf, len, "on open ground, %.3g m above it", at->floor_m);
     else
         snprintf(buf, len, "outside, facing the mesh");
@@ -102,7 +102,7 @@ static void put_head(const struct init_text *t, FILE *out)
         "  prr_hz: %.0f # a coarse scan of %.2g s, a line every %g deg; higher rates and a slower pan make it finer\n",
         scan->prr_hz, scan->duration_s, scan->step_deg);
     fprintf(out, "  lines_hz: %g\n  pan_deg_s: %.6g\n", scan->lines_hz, scan->pan_deg_s);
-    if (t->at->kind != STANDPOINT_OUTSIDE) return;
+    if (t->at->kind != VIEWPOINT_OUTSIDE) return;
     fprintf(out, "  pan_stop_deg: %g # only the part of the view that holds the mesh\n", scan->pan_stop_deg);
     fprintf(out, "  line_start_deg: %g\n  line_stop_deg: %g\n", scan->line_start_deg, scan->line_stop_deg);
 }
@@ -132,7 +132,7 @@ static void put_clear(const struct scene *scene, FILE *out)
 static void put_station(const struct init_text *t, FILE *out)
 {
     static const char *const name[] = {
-        [STANDPOINT_INSIDE] = "inside", [STANDPOINT_GROUND] = "ground", [STANDPOINT_OUTSIDE] = "outside"};
+        [VIEWPOINT_INSIDE] = "inside", [VIEWPOINT_GROUND] = "ground", [VIEWPOINT_OUTSIDE] = "outside"};
     const double *p = t->at->position_m;
     char where[128];
     double heading_deg = fmod(floor(10.0 * angle_deg(t->at->heading_rad)) / 10.0 + 720.0, 360.0);

@@ -6,7 +6,7 @@
 
 #include <stdio.h>
 
-#include "core/studio/standpoint.h"
+#include "core/studio/viewpoint.h"
 #include "firmware_sim/app/studio/init/mesh.h"
 
 struct config;
@@ -23,15 +23,15 @@ struct init_text {
     const struct scene *scene; /* in metres, z up */
     const struct init_mesh *mesh;
     const struct config_profile *profile;
-    const struct standpoint *at;
+    const struct viewpoint *at;
     struct init_scan scan;
 };
 
 /* Chooses the settings of a scan: within the profile, and of up to about 200,000 pulses that are cast. */
-void init_choose_scan(const struct config_profile *profile, const struct standpoint *at, struct init_scan *scan);
+void init_choose_scan(const struct config_profile *profile, const struct viewpoint *at, struct init_scan *scan);
 
 /* Where the head stands, in words. */
-void init_describe(const struct standpoint *at, char *buf, size_t len);
+void init_describe(const struct viewpoint *at, char *buf, size_t len);
 
 void init_write_text(const struct init_text *text, FILE *out);
 

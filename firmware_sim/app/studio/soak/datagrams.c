@@ -73,18 +73,18 @@ static int port_of(int fd)
     return getsockname(fd, (struct sockaddr *)&at, &len) == 0 ? ntohs(at.sin_port) : 0;
 }
 
-struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *twin)
+struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *clean_link)
 {
     struct soak_datagrams *d = calloc(1, sizeof *d);
     if (d == NULL) return NULL;
     d->fd = d->clean_fd = -1;
-    *twin = *spec;
-    twin->clean = 1;
-    snprintf(twin->address, sizeof twin->address, "127.0.0.1");
-    twin->interface[0] = twin->source[0] = '\0';
-    twin->source_port = twin->ttl = 0;
+    *clean_link = *spec;
+    clean_link->clean = 1;
+    snprintf(clean_link->address, sizeof clean_link->address, "127.0.0.1");
+    clean_link->interface[0] = clean_link->source[0] = '\0';
+    clean_link->source_port = clean_link->ttl = 0;
     if (bind_to(spec->address[0] != '\0' ? spec->address : "127.0.0.1", spec->port, &d->fd) == 0 &&
-        bind_to("127.0.0.1", 0, &d->clean_fd) == 0 && (twin->port = port_of(d->clean_fd)) != 0)
+        bind_to("127.0.0.1", 0, &d->clean_fd) == 0 && (clean_link->port = port_of(d->clean_fd)) != 0)
         return d;
     soak_datagrams_close(d);
     return NULL;

@@ -14,7 +14,7 @@ struct soak_link;
 
 /* Receives what a link sends, and what a second link of the same protocol will send, which is to be opened beside it.
  * NULL: it can't. */
-struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *twin);
+struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *clean_link);
 void soak_datagrams_close(struct soak_datagrams *datagrams);
 int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
 void soak_datagrams_step(struct soak_link *link);

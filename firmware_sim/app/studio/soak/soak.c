@@ -160,7 +160,7 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
 
 /* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. A
  * device on USB gets a name. Where nobody could start a scan, the head does so itself. */
-static void open_twins(struct config *cfg, struct soak *soak, struct soak_options *o)
+static void open_clean_links(struct config *cfg, struct soak *soak, struct soak_options *o)
 {
     int starts = 0;
     soak->n_links = cfg->n_links;
@@ -215,7 +215,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;
-    open_twins(cfg, soak, o);
+    open_clean_links(cfg, soak, o);
     int rc = open_head(o, cfg, soak, &head, err);
     if (rc == SH_OK) rc = serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);

@@ -115,7 +115,7 @@ static void append_placing(struct past *past, struct piece *piece, int again)
         append(past, piece, p->frame, p->len);
         if (!again) continue;
         at[3] |= NATIVE_REPEAT | NATIVE_LOCAL;
-        native_seal(at, 0);
+        native_finish_frame(at, 0);
     }
 }
 

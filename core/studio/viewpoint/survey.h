@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to this folder: the scene that is looked at, and bundles of rays in it. */
+#ifndef CORE_STUDIO_VIEWPOINT_SURVEY_H
+#define CORE_STUDIO_VIEWPOINT_SURVEY_H
+
+#include "core/bvh.h"
+#include "core/studio/viewpoint.h"
+
+struct survey_rays {
+    uint32_t n;
+    double from_x[BVH_CHUNK], from_y[BVH_CHUNK], from_z[BVH_CHUNK];
+    double dir_x[BVH_CHUNK], dir_y[BVH_CHUNK], dir_z[BVH_CHUNK];
+    /* out: */
+    double range_m[BVH_CHUNK]; /* NaN: nothing */
+    uint32_t triangle[BVH_CHUNK];
+};
+
+struct survey {
+    const struct scene *scene;
+    const struct viewpoint_view *view;
+    double centre_m[3], size_m[3], radius_m; /* of the bounds, and of the sphere around them */
+    int is_part;                             /* the bounds are those of a part of the scene */
+    const struct bvh *bvh;
+    struct bvh *own; /* NULL: borrowed */
+    struct bvh_work *work;
+    struct survey_rays rays;
+};
+
+/* survey_close is due in any case. */
+int survey_open(struct survey *s, const struct scene *scene, const struct viewpoint_view *view,
+                const struct sh_report *report, struct sh_err *err);
+/* The same with a BVH that is there. */
+int survey_borrow(struct survey *s, const struct bvh *bvh, const struct viewpoint_view *view, struct sh_err *err);
+void survey_close(struct survey *s);
+
+/* Adds a ray; there is room for BVH_CHUNK. */
+void survey_add(struct survey *s, const double from_m[3], const double dir[3]);
+/* Casts the rays that were added. The next survey_add after survey_clear begins anew. */
+void survey_cast(struct survey *s);
+void survey_clear(struct survey *s);
+
+/* Cosine between a ray and its triangle's normal, -1..1: negative where it meets the front. */
+double survey_cosine(const struct survey *s, uint32_t ray);
+
+/* What the rays first..first+n-1 say. */
+struct survey_sight {
+    double seen, front; /* shares: of rays with a hit in range; of these, on a front */
+    double far_m;       /* geometric mean of these ranges; 0: none */
+};
+struct survey_sight survey_look(const struct survey *s, uint32_t first, uint32_t n);
+
+/* Direction at an azimuth (clockwise from y) and an elevation. */
+void survey_direction(double azimuth_rad, double elevation_rad, double dir[3]);
+
+/* floors.c: the best place above a floor, inside and on the ground. The score is 0 where there is none. */
+struct survey_best {
+    double inside_score, ground_score;
+    struct viewpoint inside, ground;
+    int faces_out; /* a place inside was left out, since what it sees are backs */
+};
+int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err);
+
+/* outside.c */
+void survey_outside(struct survey *s, struct viewpoint *out);
+/* The bounds become those of the part that has the most surface: a cell of a quarter of the range. */
+int survey_narrow(struct survey *s, struct sh_err *err);
+
+#endif

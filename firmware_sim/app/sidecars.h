@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/* The files that a mesh file names: materials (.mtl), buffers (.bin), images. In: the mesh's path. Out: each one that
+ * is there, in the order in which they are named.
+ *
+ * It doesn't parse the formats. A name is any text that has one of these endings and leads to a file, as it stands or
+ * by its last part. It is looked for in the folder of the file that names it, and in the mesh's. So it may find more
+ * files than a reader opens. It misses a name only where that is escaped in another way than by %20. */
+#ifndef FIRMWARE_SIM_APP_SIDECARS_H
+#define FIRMWARE_SIM_APP_SIDECARS_H
+
+#include "core/err.h"
+
+/* `take` gets the name as it stands, and the path; what it returns, if not SH_OK, ends the search. .stl names no
+ * files. */
+int app_sidecars(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
+                 struct sh_err *err);
+
+#endif

@@ -1,0 +1,335 @@
+/* SPDX-License-Identifier: MIT */
+/* Plausibility checks: values that are allowed, but hardly meant. Each gives one warning with its figures and the key
+ * to look at. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/angle.h"
+#include "core/distance.h"
+#include "core/mat3.h"
+#include "core/vec3.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/plausibility.h"
+#include "firmware_sim/site/site.h"
+
+/* Most scenes for such a head are neither smaller nor larger: then the scale is probably wrong by a thousand. */
+static const double SMALL_M = 0.05, LARGE_M = 10000.0;
+
+/* A scan is called mostly empty where a smaller share of its pulses hits a surface. */
+static const double EMPTY_SHARE = 0.05;
+
+enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
+_Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
+
+/* The program of the configured pulse rate, which has the smallest and the largest range. */
+static const struct config_program *program_of(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    return &cfg->profile.program[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)];
+}
+
+static void doubt_size(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    double size_m = 0.0;
+    for (int i = 0; i < 3; i++)
+        size_m = fmax(size_m, site->scene->max_m[i] - site->scene->min_m[i]);
+    if (size_m >= SMALL_M && size_m <= LARGE_M) return;
+    sh_warn(
+        report,
+        "%s: the scene is %.3g m large, but the head measures from %g to %g m: check scene.meshes[].scale, metres per "
+        "unit, now %g",
+        cfg->file, size_m, program_of(site)->range_min_m, program_of(site)->range_max_m, cfg->scene.mesh[0].scale);
+}
+
+/* Warns of lines without a pulse. Each line has the same window; unless the pulse rate is a multiple of the line rate,
+ * some lines may still have a pulse in it. */
+static void doubt_lines(const struct site *site, const struct sh_report *report)
+{
+    const struct head_settings *s = &site->cfg->head.settings;
+    struct schedule_spec spec;
+    struct schedule_segment segment;
+    struct schedule_line line;
+    unsigned n = 0, empty = 0;
+    site_fill_spec(site, s, &spec);
+    schedule_start(&segment, &spec);
+    for (; n < MAX_LINES; n++) {
+        schedule_get_line(&segment, n, &line);
+        if (line.pulse0 >= segment.end_pulse) break;
+        empty += line.cast_end <= line.cast0;
+    }
+    if (empty == 0) return;
+    const int64_t width_udeg = (s->line_stop_udeg - s->line_start_udeg + spec.sweep_udeg) % spec.sweep_udeg;
+    sh_warn(report,
+            "%s: head.line_start_deg, line_stop_deg: %u of %u lines cast no pulse: the window is %.4g deg wide, and "
+            "pulses are %.4g deg apart (head.prr_hz, lines_hz)",
+            site->cfg->file, empty, n, 1e-6 * (double)width_udeg,
+            1e-6 * (double)spec.sweep_udeg * (double)s->lines_uhz / (double)s->prr_uhz);
+}
+
+/* Warns where the step of a sphere is rounded, so that a turn has a whole number of steps. */
+static void doubt_step(const struct site *site, const struct sh_report *report)
+{
+    const struct emitter *e = &site->emitter;
+    if (e->kind != EMITTER_SPHERE || emitter_sphere_is_exact(e)) return;
+    const double asked_deg = 1e-6 * (double)e->asked_udeg;
+    if (e->gaps == 0)
+        sh_warn(report, "%s: head.step_deg: %.9g deg does not divide 360 deg: %u steps of %.9g deg are used",
+                site->cfg->file, asked_deg, e->steps, 360.0 / e->steps);
+    else
+        sh_warn(
+            report,
+            "%s: head.step_deg: %.9g deg does not divide 180 and 360 deg: %u steps of %.9g deg are used from ring to "
+            "ring, and %u of %.9g deg along a ring",
+            site->cfg->file, asked_deg, e->gaps, 180.0 / e->gaps, e->steps, 360.0 / e->steps);
+}
+
+static void doubt_attributes(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    if (!cfg->output.attributes || cfg->signal.on) return;
+    sh_warn(report, "%s: output.attributes: on, but signal.model is off: no echo has an amplitude%s", cfg->file,
+            cfg->beam.mode == BEAM_SINGLE ? ", and with beam.mode single each has the pulse's width" : "");
+}
+
+static void doubt_colours(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    if (cfg->output.colour != COLOUR_REFLECTANCE || cfg->signal.on) return;
+    sh_warn(
+        report,
+        "%s: output.colour: reflectance, but signal.model is off: no point has a reflectance, so all have the colour "
+        "for a missing one",
+        cfg->file);
+}
+
+/* Warns of transparent surfaces without a rule. A file's transparency is for pictures; only the configuration says
+ * whether a laser goes through. */
+static void doubt_clear(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    const uint32_t n = site->detect.ghost != NULL ? site->detect.n_real : site->n_surfaces;
+    struct site_clear clear = {.room = 320}; /* a warning is a line */
+    for (uint32_t i = 0; i < n; i++)
+        site_clear_add(&clear, site_surface(site, i), cfg->surface, cfg->n_surfaces);
+    if (clear.n == 0) return;
+    const char *const left = clear.n_left_out == 0 ? "" : "; check --scene-csv FILE lists all";
+    sh_warn(report,
+            "%s: %u surface%s transparent in the file, but scanned as opaque; only the configuration makes glass: "
+            "surfaces: [%s]%s",
+            cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules[0] != '\0' ? clear.rules : "...", left);
+}
+
+/* A near vertex settles most cases without a search over distances. */
+static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
+{
+    for (uint32_t v = 0; v < scene->n_vertices; v++) {
+        double d[3] = {scene->vertex_m[v][0] - p[0], scene->vertex_m[v][1] - p[1], scene->vertex_m[v][2] - p[2]};
+        if (vec3_dot(d, d) <= reach_m * reach_m) return 1;
+    }
+    return 0;
+}
+
+/* The distance of a point from the bounds of a copy. */
+static double distance_from(const struct scene_copy *copy, const double p[3])
+{
+    double off[3];
+    for (int k = 0; k < 3; k++)
+        off[k] = fmax(0.0, fmax(copy->min_m[k] - p[k], p[k] - copy->max_m[k]));
+    return vec3_length(off);
+}
+
+/* Copies of one mesh. */
+static int is_copy_reached(const struct scene_copied *of, const double p[3], double reach_m, int *reached,
+                           struct sh_err *err)
+{
+    struct distance *index = NULL;
+    struct distance_hit hit;
+    double in[3], vertex_m[3];
+    int rc = SH_OK;
+    for (uint32_t k = 0; k < of->n && !*reached; k++) { /* a near vertex settles most cases */
+        scene_copy_put(&of->copy[k], of->mesh->vertex_m[of->mesh->triangle[0][0]], vertex_m);
+        *reached = vec3_distance(vertex_m, p) <= reach_m;
+    }
+    for (uint32_t k = 0; k < of->n && !*reached && rc == SH_OK; k++) {
+        if (distance_from(&of->copy[k], p) > reach_m) continue;
+        if (index == NULL) rc = distance_create(of->mesh, &index, err);
+        scene_copy_put_back(&of->copy[k], p, in);
+        if (rc == SH_OK) *reached = distance_query(index, in, reach_m / of->copy[k].scale, &hit);
+    }
+    distance_free(index);
+    return rc;
+}
+
+static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
+{
+    struct distance *index = NULL;
+    struct distance_hit hit;
+    int rc = SH_OK;
+    *reached = has_near_vertex(scene, p, reach_m);
+    for (int i = 0; i < 3; i++)
+        if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
+    for (uint32_t i = 0; i < scene->n_copied && !*reached && rc == SH_OK; i++)
+        rc = is_copy_reached(&scene->copied[i], p, reach_m, reached, err);
+    if (*reached || scene->n_triangles == 0 || rc != SH_OK) return rc;
+    rc = distance_create(scene, &index, err);
+    if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
+    distance_free(index);
+    return rc;
+}
+
+static int doubt_reach(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
+{
+    const double reach_m = program_of(site)->range_max_m, *p = site->station[i].at.position_m;
+    int reached, rc = is_reached(site->scene, p, reach_m, &reached, err);
+    for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
+        rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
+    if (rc == SH_OK && !reached)
+        sh_warn(report, "station %u %s at %.10g %.10g %.10g m: no surface within range_max_m, %g m", i + 1,
+                site->station[i].station->name, p[0], p[1], p[2], reach_m);
+    return rc;
+}
+
+/* ---- the view of a station */
+
+struct look {
+    double x[LOOKS], y[LOOKS], z[LOOKS], range_m[LOOKS];
+    uint32_t triangle[LOOKS];
+};
+
+static void cast(const struct site *site, const struct site_station *s, struct bvh_work *work, struct look *look)
+{
+    const double *p = s->at.position_m;
+    const struct bvh_rays rays = {.n = LOOKS,
+                                  .from.at_m = {p[0], p[1], p[2]},
+                                  .dir = {look->x, look->y, look->z},
+                                  .range_max_m = 1e9,
+                                  .scattered = 1,
+                                  .range_m = look->range_m,
+                                  .triangle = look->triangle};
+    bvh_hits(work, site->bvh, &rays);
+}
+
+/* Warns of a head below its floor: then a surface is above it, and none under it. */
+static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
+                       struct sh_err *err)
+{
+    const struct site_station *s = &site->station[i];
+    const double *p = s->at.position_m;
+    double level[9];
+    int rc = SH_OK;
+    memcpy(level, mat3_unit, sizeof level);
+    if (site->anchor.known) rc = geoframe_level(&site->anchor.frame, p, level, err);
+    if (rc != SH_OK) return rc;
+    const double up[3] = {level[2], level[5], level[8]}, down[3] = {-level[2], -level[5], -level[8]};
+    const double above_m = bvh_ray(work, site->bvh, p, up);
+    if (!isnan(above_m) && isnan(bvh_ray(work, site->bvh, p, down)))
+        sh_warn(
+            report,
+            "station %u %s at %.10g %.10g %.10g m: no surface below it, but one %.3g m above it: it may be under the "
+            "floor",
+            i + 1, s->station->name, p[0], p[1], p[2], above_m);
+    return SH_OK;
+}
+
+/* Draws pulses evenly over the first pan sweep. */
+static void fill_frame(const struct site *site, const struct site_station *s, struct look *look)
+{
+    struct head_settings settings = site->cfg->head.settings;
+    struct schedule_spec spec;
+    struct schedule_segment segment;
+    struct schedule_line line;
+    settings.frames = 1;
+    site_fill_spec(site, &settings, &spec);
+    schedule_start(&segment, &spec);
+    for (int i = 0; i < LOOKS; i++) {
+        uint64_t k = segment.end_pulse * (2 * (uint64_t)i + 1) / (2 * LOOKS);
+        schedule_get_line(&segment, schedule_line_of(&segment, k), &line);
+        if (line.cast0 < line.cast_end)
+            k = line.cast0 + (k - line.pulse0) * (line.cast_end - line.cast0) / (line.pulse_end - line.pulse0);
+        const double pan = angle_rad(360.0 * schedule_pan_turn(&segment, k));
+        const double mirror = angle_rad(360.0 * schedule_mirror_turn(&segment, k));
+        double dir[3];
+        mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(mirror), cos(pan) * cos(mirror), sin(mirror)}, dir);
+        VEC3_SET(*look, i, dir);
+    }
+}
+
+/* Draws directions evenly over the window of a scan, as its pulses are. */
+static void fill_window(const struct site *site, const struct site_station *s, struct look *look)
+{
+    const struct head_settings *set = &site->cfg->head.settings;
+    const double pan_deg = 1e-6 * (double)(set->pan_stop_udeg - set->pan_start_udeg);
+    const double line_deg = 1e-6 * (double)(set->line_stop_udeg - set->line_start_udeg);
+    for (int i = 0; i < LOOKS; i++) {
+        double across = (i % LOOK_ACROSS + 0.5) / LOOK_ACROSS, up = ((double)(i / LOOK_ACROSS) + 0.5) / LOOK_UP;
+        double pan = angle_rad(1e-6 * (double)set->pan_start_udeg + pan_deg * across);
+        double line = angle_rad(1e-6 * (double)set->line_start_udeg + line_deg * up), dir[3];
+        mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(line), cos(pan) * cos(line), sin(line)}, dir);
+        VEC3_SET(*look, i, dir);
+    }
+}
+
+static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
+                       const struct sh_report *report)
+{
+    const struct config_program *program = program_of(site);
+    const struct site_station *s = &site->station[i];
+    const double *p = s->at.position_m;
+    int seen = 0, near = 0, far = 0;
+    if (site->emitter.kind == EMITTER_LINE)
+        fill_window(site, s, look);
+    else
+        fill_frame(site, s, look);
+    cast(site, s, work, look);
+    for (int k = 0; k < LOOKS; k++) {
+        near += look->range_m[k] < program->range_min_m;
+        far += look->range_m[k] > program->range_max_m;
+        seen += look->range_m[k] >= program->range_min_m && look->range_m[k] <= program->range_max_m;
+    }
+    if (near > LOOKS / 2)
+        sh_warn(
+            report,
+            "station %u %s at %.10g %.10g %.10g m: of %d directions %d hit something nearer than range_min_m, %g m: "
+            "the station may be inside an object",
+            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, near, program->range_min_m);
+    if (seen >= EMPTY_SHARE * LOOKS) return;
+    sh_warn(
+        report,
+        "station %u %s at %.10g %.10g %.10g m: the scan is mostly empty: of %d directions %d hit something from %g to "
+        "%g m away, %d something nearer, %d something farther",
+        i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, seen, program->range_min_m, program->range_max_m, near,
+        far);
+}
+
+/* Checks the views of stations. There is no check with moving meshes, which may fill a view, nor with a path, which
+ * leads elsewhere. Of many stops only some are checked. */
+static int doubt_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;
+    struct look *look = malloc(sizeof *look);
+    struct bvh_work *work = NULL;
+    int rc = look != NULL ? bvh_work_create(&work, err) : sh_fail(err, SH_ENOMEM, "no memory to look from stations");
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
+        if (!config_serves(site->cfg, i)) continue;
+        rc = doubt_reach(site, i, report, err);
+        if (rc != SH_OK || site->n_movers > 0) continue;
+        rc = doubt_floor(site, i, work, report, err);
+        if (rc == SH_OK) doubt_view(site, i, work, look, report);
+    }
+    bvh_work_free(work);
+    free(look);
+    return rc;
+}
+
+int site_check_plausibility(const struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    doubt_size(site, report);
+    doubt_step(site, report);
+    doubt_lines(site, report);
+    doubt_attributes(site, report);
+    doubt_colours(site, report);
+    doubt_clear(site, report);
+    return doubt_stations(site, report, err);
+}
