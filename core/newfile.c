@@ -33,7 +33,7 @@ static int code_of(int error)
     }
 }
 
-static int fail(const char *path, const char *what, struct sh_err *err)
+static int newfile_fail(const char *path, const char *what, struct sh_err *err)
 {
     int error = errno;
     return sh_fail(err, code_of(error), "%s: cannot %s: %s", path, what, strerror(error));
@@ -79,7 +79,7 @@ static const char *kind_of(mode_t mode)
 static int check_target(const char *path, struct sh_err *err)
 {
     struct stat st;
-    if (lstat(path, &st) != 0) return errno == ENOENT ? SH_OK : fail(path, "create", err);
+    if (lstat(path, &st) != 0) return errno == ENOENT ? SH_OK : newfile_fail(path, "create", err);
     if (S_ISLNK(st.st_mode)) return fail_link(path, err);
     if (!S_ISREG(st.st_mode))
         return sh_fail(err, SH_EINPUT, "%s: is a %s; allowed is a regular file, or a name that doesn't exist", path,
@@ -154,12 +154,12 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
             "%s: is a FIFO without a reader, or a socket; allowed are a regular file, a device, and a FIFO with a "
             "reader",
             path);
-    if (fd < 0) return fail(path, "be opened for writing", err);
+    if (fd < 0) return newfile_fail(path, "be opened for writing", err);
     int rc = SH_OK;
-    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = fail(path, "be opened for writing", err);
+    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = newfile_fail(path, "be opened for writing", err);
     if (rc == SH_OK && S_ISREG(st.st_mode) && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
     if (rc == SH_OK && S_ISREG(st.st_mode)) rc = lock(path, fd, SH_EINPUT, err);
-    if (rc == SH_OK && S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) rc = fail(path, "be emptied", err);
+    if (rc == SH_OK && S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) rc = newfile_fail(path, "be emptied", err);
     if (rc != SH_OK)
         close(fd);
     else
@@ -173,8 +173,8 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
     int rc = check_target(path, err), fd;
     if (rc != SH_OK) return rc;
     fd = open(path, O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
-    if (fd < 0) return fail(path, "be opened for writing", err);
-    if (fstat(fd, &st) != 0) rc = fail(path, "be opened for writing", err);
+    if (fd < 0) return newfile_fail(path, "be opened for writing", err);
+    if (fstat(fd, &st) != 0) rc = newfile_fail(path, "be opened for writing", err);
     if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
     if (rc == SH_OK) rc = lock(path, fd, SH_ESTATE, err);
     if (rc != SH_OK)
@@ -190,7 +190,7 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
 static int check_left(const char *part, int fd, struct sh_err *err)
 {
     struct stat st;
-    if (fstat(fd, &st) != 0) return fail(part, "create", err);
+    if (fstat(fd, &st) != 0) return newfile_fail(part, "create", err);
     if (!S_ISREG(st.st_mode))
         return sh_fail(err, SH_EINPUT, "%s: is a %s, but a file must be created here; remove it", part,
                        kind_of(st.st_mode));
@@ -206,11 +206,11 @@ static int open_part(const char *part, int *fd, struct sh_err *err)
     const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
     *fd = open(part, flags | O_CREAT | O_EXCL, 0666);
     if (*fd >= 0) return 1;
-    if (errno != EEXIST) return fail(part, "create", err);
+    if (errno != EEXIST) return newfile_fail(part, "create", err);
     *fd = open(part, flags);
     if (*fd < 0 && errno == ENOENT) return 0;
     if (*fd < 0 && errno == ELOOP) return fail_link(part, err);
-    if (*fd < 0) return fail(part, "create", err);
+    if (*fd < 0) return newfile_fail(part, "create", err);
     int rc = check_left(part, *fd, err);
     if (rc != SH_OK) close(*fd);
     return rc == SH_OK ? 1 : rc;
@@ -234,7 +234,7 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         if (rc < 0) break;
         rc = lock(part, fd, SH_EINPUT, err);
         if (rc == SH_OK && is_named(part, fd)) {
-            if (ftruncate(fd, 0) != 0) rc = fail(part, "create", err);
+            if (ftruncate(fd, 0) != 0) rc = newfile_fail(part, "create", err);
             if (rc == SH_OK) {
                 *out = fd;
                 return SH_OK;
@@ -250,7 +250,7 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
     int rc = check_target(part, err);
     if (rc != SH_OK) return rc;
     const int fd = open(part, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd < 0) return fail(part, "be opened for reading and writing", err);
+    if (fd < 0) return newfile_fail(part, "be opened for reading and writing", err);
     rc = check_left(part, fd, err);
     if (rc == SH_OK && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
         rc = sh_fail(err, SH_ESTATE, "%s: is still being written by another process", part);
@@ -275,7 +275,7 @@ int newfile_whole(const char *path, int *out, struct sh_err *err)
     }
     if (fd >= 0) close(fd);
     *out = open(path, O_RDONLY | flags);
-    return *out >= 0 ? SH_OK : fail(path, "be opened", err);
+    return *out >= 0 ? SH_OK : newfile_fail(path, "be opened", err);
 }
 
 long long newfile_left_len(const char *part)
@@ -318,7 +318,7 @@ static int close_renamed(const char *path, int fd)
 
 int newfile_sync(const char *part, int fd, struct sh_err *err)
 {
-    return fsync(fd) == 0 ? SH_OK : fail(part, "be synced", err);
+    return fsync(fd) == 0 ? SH_OK : newfile_fail(part, "be synced", err);
 }
 
 static int rename_checked(const char *path, const char *part, struct sh_err *err)
@@ -356,7 +356,7 @@ static int rename_free(const char *path, const char *part)
 
 int newfile_settle_free(const char *path, const char *part, int fd, struct sh_err *err)
 {
-    if (fsync(fd) != 0) return fail(part, "be synced", err);
+    if (fsync(fd) != 0) return newfile_fail(part, "be synced", err);
     if (rename_free(path, part) == 0) return close_renamed(path, fd);
     return errno == EEXIST ? sh_fail(err, SH_ESTATE, "%s: exists, and is not replaced by %s", path, part)
                            : fail_rename(path, part, err);

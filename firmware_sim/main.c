@@ -53,7 +53,7 @@ static int fail_unknown(const char *word)
     return APP_USAGE;
 }
 
-static int run(int argc, char **argv)
+static int main_run(int argc, char **argv)
 {
     if (argc < 2) {
         help_print(COMMANDS, stderr);
@@ -97,7 +97,7 @@ int main(int argc, char **argv)
     run_take_page(&watch_page);
 #endif
     int status = check_stack();
-    if (status == APP_OK) status = run(argc, argv);
+    if (status == APP_OK) status = main_run(argc, argv);
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
     if (!failed || status != APP_OK) return status;

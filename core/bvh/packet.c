@@ -122,7 +122,7 @@ static void take_near(struct bvh_query *query, uint32_t n)
 
 /* Casts rays again whose nearest range is known. No range is smaller, so the lowest number among equally near hits is
  * found in any order. */
-static void settle(struct bvh_query *query, struct packet *packet, uint32_t width)
+static void packet_settle(struct bvh_query *query, struct packet *packet, uint32_t width)
 {
     float *tfar = bvh_field(&packet->at, width, tfar);
     for (uint32_t i = 0; i < width; i++) {
@@ -145,7 +145,7 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
-    if (query->unsure != 0) settle(query, packet, width);
+    if (query->unsure != 0) packet_settle(query, packet, width);
     if (query->decided != decided) take_near(query, n);
     memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
     memcpy(batch->rays->triangle + first, query->triangle, n * sizeof *query->triangle);

@@ -47,7 +47,7 @@ static void list_paths(struct caster *c, const struct chunk *k)
 }
 
 /* Index of a pulse's echo j: its first one is in the pulse's place. */
-static uint32_t place_of(const struct secondary *f, uint32_t j)
+static uint32_t echoes_place_of(const struct secondary *f, uint32_t j)
 {
     return j == 0 ? f->pulse : f->at + j - 1;
 }
@@ -78,14 +78,14 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
     uint64_t left_out = 0;
     uint32_t to = 0;
     for (uint32_t j = 0; j < n; j++) {
-        uint32_t i = place_of(f, j);
+        uint32_t i = echoes_place_of(f, j);
         r[j] = (struct beam_return){
             .range_m = l->range_m[i], .energy = l->rho[i], .back = l->rho[i], .label = l->label[i]};
         if (texels) r[j].colour = l->colour[i];
     }
     for (uint32_t j = 0, end; j < n; j = end) {
         uint32_t found = 1;
-        for (end = j; end < n && comes_back(l, place_of(f, end));)
+        for (end = j; end < n && comes_back(l, echoes_place_of(f, end));)
             end++;
         if (end > j) {
             found = beam_merge(how, r + j, end - j, echo, &left_out);
@@ -98,7 +98,7 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
                                          .colour = r[j].colour};
         }
         for (uint32_t e = 0; e < found; e++, to++)
-            take_echo(l, place_of(f, to), (uint8_t)to, &echo[e], texels);
+            take_echo(l, echoes_place_of(f, to), (uint8_t)to, &echo[e], texels);
     }
     return to - 1;
 }
@@ -207,7 +207,7 @@ static uint32_t hear(const struct echo_list *l, const double *strength, const st
 {
     uint32_t n = 0;
     for (uint32_t j = 0; j <= f->n; j++) {
-        uint32_t i = place_of(f, j);
+        uint32_t i = echoes_place_of(f, j);
         if (!isnan(l->range_m[i]))
             h[n++] = (struct heard){l->range_m[i],  strength[i],         l->key[i],     l->label[i],
                                     l->refl_cdb[i], l->amplitude_cdb[i], l->width_m[i], l->colour[i]};
@@ -272,7 +272,7 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
         end += f->n;
         if (n == 0) l->range_m[f->pulse] = (double)NAN;
         for (uint32_t j = 0; j < n; j++) {
-            uint32_t i = place_of(f, j);
+            uint32_t i = echoes_place_of(f, j);
             l->range_m[i] = h[j].range_m;
             l->label[i] = h[j].label;
             l->key[i] = h[j].key;

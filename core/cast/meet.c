@@ -57,7 +57,7 @@ static int is_reported(const struct meeting *m, const struct seen *seen)
 }
 
 /* Glass does not refract: hits beyond it are on the same line. */
-static void take(struct meeting *m, const struct met *met, const struct seen *seen)
+static void meet_take(struct meeting *m, const struct met *met, const struct seen *seen)
 {
     const double dir[3] = VEC3_AT(met->rays.dir, seen->pulse);
     struct cast_hit *hit = &m->hit[m->n];
@@ -79,7 +79,7 @@ static void take_paths(struct meeting *m, const struct met *met, const struct pa
     for (uint32_t j = paths->first[i]; j != CAST_NO_PATH; j = paths->found[j].next) {
         const struct path_hit *p = &paths->found[j];
         if (p->ghost) continue;
-        take(m, met, &(struct seen){i, p->label, p->triangle, p->body, p->range_m, p->cosine, p->energy});
+        meet_take(m, met, &(struct seen){i, p->label, p->triangle, p->body, p->range_m, p->cosine, p->energy});
     }
 }
 
@@ -102,9 +102,9 @@ static void meet_chunk(struct caster *c, const struct chunk *k, struct meeting *
     m->k = k;
     for (uint32_t i = 0; i < k->n; i++) {
         if (isnan(met.rays.range_m[i])) continue;
-        take(m, &met,
-             &(struct seen){i, met.rays.label[i], met.rays.triangle[i], met.body[i], met.rays.range_m[i], met.cosine[i],
-                            1.0});
+        meet_take(m, &met,
+                  &(struct seen){i, met.rays.label[i], met.rays.triangle[i], met.body[i], met.rays.range_m[i],
+                                 met.cosine[i], 1.0});
         if (follows) take_paths(m, &met, &c->paths, i);
     }
 }

@@ -77,7 +77,7 @@ static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
 }
 
 /* Begins the paths of rays whose first hit lets them go on. */
-static void begin(const struct cast_setup *s, const struct met *met, struct path_rays *p)
+static void optics_begin(const struct cast_setup *s, const struct met *met, struct path_rays *p)
 {
     const struct bvh_rays *rays = &met->rays;
     p->n = p->n_found = 0;
@@ -102,7 +102,7 @@ static void begin(const struct cast_setup *s, const struct met *met, struct path
 }
 
 /* Puts the hit of ray k at the end of its first ray's chain. */
-static void keep(struct path_rays *p, uint32_t k)
+static void optics_keep(struct path_rays *p, uint32_t k)
 {
     uint32_t at = p->n_found++, ray = p->ray[k];
     p->found[at] = (struct path_hit){.range_m = p->length_m[k] + p->range_m[k],
@@ -123,7 +123,7 @@ static void keep(struct path_rays *p, uint32_t k)
 
 void caster_follow(struct nearest *w, const struct cast_setup *s, const struct met *first, struct path_rays *p)
 {
-    begin(s, first, p);
+    optics_begin(s, first, p);
     for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
         uint32_t on = 0;
         for (uint32_t k = 0; k < p->n; k++)
@@ -142,7 +142,7 @@ void caster_follow(struct nearest *w, const struct cast_setup *s, const struct m
         caster_nearest(w, s, &met);
         for (uint32_t k = 0; k < p->n; k++) {
             if (isnan(p->range_m[k])) continue;
-            keep(p, k);
+            optics_keep(p, k);
             if (caster_goes_on(s, p->label[k])) copy_ray(p, on++, k);
         }
         p->n = on;

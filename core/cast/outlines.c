@@ -10,7 +10,7 @@ struct look {
     uint32_t triangle[2048];
 };
 
-static void look(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
+static void outlines_look(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
     struct look *l = ctx;
     const struct beam_outlines_spec *spec = l->spec;
@@ -35,7 +35,7 @@ int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, 
                   struct sh_err *err)
 {
     struct look l = {.bvh = bvh, .spec = spec};
-    const struct beam_probe probe = {look, &l};
+    const struct beam_probe probe = {outlines_look, &l};
     int rc = caster_create(&l.caster, err);
     if (rc != SH_OK) return rc;
     rc = beam_outlines_create(spec, &probe, out, err);

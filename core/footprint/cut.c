@@ -19,7 +19,7 @@ static void take_from(struct beam_part *a, const struct beam_part *b)
 }
 
 /* Adds a portion as a part, with moments about its own centre. */
-static void add_part(struct beam_parts *parts, const struct beam_part *p, int centre)
+static void cut_add_part(struct beam_parts *parts, const struct beam_part *p, int centre)
 {
     if (p->energy < LEAST_PART) return;
     uint32_t i = parts->n++;
@@ -71,9 +71,9 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
     if (nested >= 0) take_from(&cap[nested], &cap[1 - nested]);
     for (uint32_t i = 0; i < n; i++) {
         take_from(&rest, &cap[i]);
-        add_part(parts, &cap[i], 0);
+        cut_add_part(parts, &cap[i], 0);
     }
-    add_part(parts, &rest, 1);
+    cut_add_part(parts, &rest, 1);
     return 1;
 }
 
@@ -186,7 +186,7 @@ static int add_places(const struct beam_pattern *fine, const struct beam_line *l
                                      .xx = portion.xx * each,
                                      .xy = portion.xy * each,
                                      .yy = portion.yy * each};
-        add_part(parts, &portion, part[p][0] & 1);
+        cut_add_part(parts, &portion, part[p][0] & 1);
     }
     return n_parts == 0;
 }

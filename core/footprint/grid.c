@@ -30,7 +30,7 @@ struct stretches {
     size_t n, room;
 };
 
-static void put(struct draw *d, uint32_t cell, float range_m)
+static void grid_put(struct draw *d, uint32_t cell, float range_m)
 {
     struct beam_outlines *o = d->o;
     if (d->what == AROUND) {
@@ -50,7 +50,7 @@ static void put_row(struct draw *d, uint32_t face, int32_t row, double from, dou
 {
     int32_t i0 = (int32_t)floor(fmax(from, 0.0)), i1 = (int32_t)floor(fmin(to, OUTLINE_CELLS - 1));
     for (int32_t i = i0; i <= i1; i++)
-        put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
+        grid_put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
 }
 
 /* Draws a piece from p to q (in cells), and all cells within `wide` of it, row by row. */

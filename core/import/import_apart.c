@@ -144,7 +144,7 @@ static enum import_end must_end(const struct import_apart *a)
 }
 
 /* Checks on the process; whether it is over. */
-static int look(struct import_apart *a)
+static int import_apart_look(struct import_apart *a)
 {
     if (!take_notes(a) && a->note[0] >= 0) {
         close(a->note[0]);
@@ -179,7 +179,7 @@ void import_watch(struct import_apart *const a[], size_t n)
         }
         poll(on, 2 * n, LOOK_MS);
         for (size_t i = 0; i < n; i++) {
-            if (a[i]->is_over || !look(a[i])) continue;
+            if (a[i]->is_over || !import_apart_look(a[i])) continue;
             a[i]->is_over = 1;
             left--;
             for (size_t k = 0; k < n; k++)

@@ -37,7 +37,7 @@ struct result_texture {
 
 /* ---- writing */
 
-static int put(int fd, const void *data, size_t size, struct sh_err *err)
+static int import_result_put(int fd, const void *data, size_t size, struct sh_err *err)
 {
     const char *p = data;
     while (size > 0) {
@@ -60,16 +60,16 @@ static int put_textures(const struct scene *s, int fd, struct sh_err *err)
                                             .raw_width = texture->raw_width,
                                             .raw_height = texture->raw_height,
                                             .wrap = {texture->wrap[0], texture->wrap[1]}};
-        rc = put(fd, &size, sizeof size, err);
-        if (rc == SH_OK) rc = put(fd, texture->file, size.name_len, err);
-        if (rc == SH_OK) rc = put(fd, texture->bytes, size.n_bytes, err);
+        rc = import_result_put(fd, &size, sizeof size, err);
+        if (rc == SH_OK) rc = import_result_put(fd, texture->file, size.name_len, err);
+        if (rc == SH_OK) rc = import_result_put(fd, texture->bytes, size.n_bytes, err);
     }
     return rc;
 }
 
 static int put_array(int fd, void **array, size_t size, struct sh_err *err)
 {
-    int rc = put(fd, *array, size, err);
+    int rc = import_result_put(fd, *array, size, err);
     free(*array);
     *array = NULL;
     return rc;
@@ -89,9 +89,9 @@ int import_result_write(struct scene *scene, int fd, struct sh_err *err)
                                .error_m = s->error_m,
                                .says = s->says};
     memcpy(head.magic, MAGIC, sizeof head.magic);
-    int rc = put(fd, &head, sizeof head, err);
+    int rc = import_result_put(fd, &head, sizeof head, err);
     if (rc == SH_OK) rc = put_textures(s, fd, err);
-    if (rc == SH_OK) rc = put(fd, s->surface, s->n_surfaces * sizeof *s->surface, err);
+    if (rc == SH_OK) rc = import_result_put(fd, s->surface, s->n_surfaces * sizeof *s->surface, err);
     if (rc == SH_OK) rc = put_array(fd, (void **)&s->vertex_m, s->n_vertices * sizeof *s->vertex_m, err);
     if (rc == SH_OK) rc = put_array(fd, (void **)&s->triangle, s->n_triangles * sizeof *s->triangle, err);
     if (rc == SH_OK) rc = put_array(fd, (void **)&s->label, s->n_triangles * sizeof *s->label, err);
@@ -133,7 +133,7 @@ static int take_at(struct result *r, uint64_t at, void *data, size_t size)
     return SH_OK;
 }
 
-static int take(struct result *r, void *data, size_t size)
+static int import_result_take(struct result *r, void *data, size_t size)
 {
     int rc = take_at(r, r->at, data, size);
     r->at += size;
@@ -160,14 +160,14 @@ static int add_texture(struct result *r, const char *file, const void *bytes, co
 static int take_texture(struct result *r, uint32_t i)
 {
     struct result_texture size;
-    int rc = take(r, &size, sizeof size);
+    int rc = import_result_take(r, &size, sizeof size);
     if (rc != SH_OK) return rc;
     if (size.name_len == 0 || size.name_len > MAX_TEXTURE_NAME) return wrong(r, "the name of texture", i);
     if (size.n_bytes > r->size) return wrong(r, "the size of texture", i);
     char *file = malloc(size.name_len), *bytes = malloc(size.n_bytes + 1);
     if (file == NULL || bytes == NULL) rc = build_fail(r->b, SH_ENOMEM, r->err, "no memory for a texture");
-    if (rc == SH_OK) rc = take(r, file, size.name_len);
-    if (rc == SH_OK) rc = take(r, bytes, size.n_bytes);
+    if (rc == SH_OK) rc = import_result_take(r, file, size.name_len);
+    if (rc == SH_OK) rc = import_result_take(r, bytes, size.n_bytes);
     if (rc == SH_OK && memchr(file, '\0', size.name_len) != NULL) rc = wrong(r, "the name of texture", i);
     if (rc == SH_OK) rc = add_texture(r, file, bytes, &size, i);
     free(file);
@@ -222,7 +222,7 @@ static int take_surfaces(struct result *r)
     if (n == 0 || n > SCENE_MAX_SURFACES) return wrong(r, "number of surfaces:", n);
     struct scene_surface *surface = malloc(n * sizeof *surface);
     r->label = malloc(n * sizeof *r->label);
-    int rc = surface != NULL && r->label != NULL ? take(r, surface, n * sizeof *surface)
+    int rc = surface != NULL && r->label != NULL ? import_result_take(r, surface, n * sizeof *surface)
                                                  : build_fail(r->b, SH_ENOMEM, r->err, "no memory for surfaces");
     for (uint32_t i = 0; i < n && rc == SH_OK; i++)
         rc = add_surface(r, &surface[i], i);
@@ -236,7 +236,7 @@ static int take_vertices(struct result *r)
     int rc = build_reserve(r->b, r->head.n_vertices, r->head.n_triangles, r->err);
     for (uint32_t left = r->head.n_vertices, n; left > 0 && rc == SH_OK; left -= n) {
         n = left < AT_ONCE ? left : AT_ONCE;
-        rc = take(r, s->vertex_m[s->n_vertices], n * sizeof *s->vertex_m);
+        rc = import_result_take(r, s->vertex_m[s->n_vertices], n * sizeof *s->vertex_m);
         for (uint32_t i = 0; i < n && rc == SH_OK; i++)
             for (int k = 0; k < 3; k++)
                 if (!(fabs(s->vertex_m[s->n_vertices + i][k]) <= BUILD_MAX_COORDINATE_M))
@@ -317,7 +317,7 @@ static int take_head(struct result *r)
     struct stat st;
     if (fstat(r->fd, &st) != 0) return build_fail(r->b, SH_EIO, r->err, "%s", strerror(errno));
     r->size = (uint64_t)st.st_size;
-    int rc = take(r, &r->head, sizeof r->head);
+    int rc = import_result_take(r, &r->head, sizeof r->head);
     if (rc == SH_OK && memcmp(r->head.magic, MAGIC, sizeof MAGIC) != 0) rc = wrong(r, "the header is wrong at byte", 0);
     if (rc == SH_OK && r->head.n_triangles == 0) rc = wrong(r, "number of triangles:", 0);
     if (rc == SH_OK && r->head.has_uv > 1) rc = wrong(r, "texture coordinates:", r->head.has_uv);
@@ -332,7 +332,7 @@ static int take_head(struct result *r)
     return rc;
 }
 
-static void count(struct result *r)
+static void import_result_count(struct result *r)
 {
     struct scene *s = r->b->scene;
     s->counts.zero_area += r->head.counts.zero_area;
@@ -352,7 +352,7 @@ int import_result_read(struct scene_build *b, int fd, struct sh_err *err)
     if (rc == SH_OK) rc = take_surfaces(&r);
     if (rc == SH_OK) rc = take_vertices(&r);
     if (rc == SH_OK) rc = take_triangles(&r, some);
-    if (rc == SH_OK) count(&r);
+    if (rc == SH_OK) import_result_count(&r);
     free(some);
     free(r.texture);
     free(r.label);

@@ -5,7 +5,7 @@
 
 const uint8_t ply_type_size[8] = {1, 1, 2, 2, 4, 4, 4, 8};
 
-static int fail(const struct text *t, struct sh_err *err, const char *what, struct text_span word)
+static int ply_read_header_fail(const struct text *t, struct sh_err *err, const char *what, struct text_span word)
 {
     return text_fail(t, t->line, SH_EINPUT, err, "%s '%.*s'", what, word.n < 40 ? (int)word.n : 40, word.p);
 }
@@ -14,13 +14,14 @@ static int read_format(struct ply_header *h, struct text *t, struct sh_err *err)
 {
     static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
     struct text_span word = text_word(t), version = text_word(t);
-    if (!text_is(version, "1.0")) return fail(t, err, "the format version must be 1.0, not", version);
+    if (!text_is(version, "1.0")) return ply_read_header_fail(t, err, "the format version must be 1.0, not", version);
     for (unsigned i = 0; i < 3; i++) {
         if (!text_is(word, names[i])) continue;
         h->format = (enum ply_format)i;
         return SH_OK;
     }
-    return fail(t, err, "the format must be ascii, binary_little_endian or binary_big_endian, not", word);
+    return ply_read_header_fail(t, err, "the format must be ascii, binary_little_endian or binary_big_endian, not",
+                                word);
 }
 
 static int read_element(struct ply_header *h, struct text *t, struct sh_err *err)
@@ -31,7 +32,7 @@ static int read_element(struct ply_header *h, struct text *t, struct sh_err *err
     bool ok = text_integer(t, &count) && count >= 0;
     text_skip_blanks(t);
     if (name.n == 0 || !ok || !text_at_line_end(t))
-        return fail(t, err, "an element must have a name and a count; this one is", name);
+        return ply_read_header_fail(t, err, "an element must have a name and a count; this one is", name);
     if (h->n_elements == PLY_MAX_ELEMENTS)
         return text_fail(t, t->line, SH_EINPUT, err, "more than %d elements", PLY_MAX_ELEMENTS);
     struct ply_element *e = &h->element[h->n_elements++];
@@ -53,7 +54,7 @@ static int read_type(struct text *t, enum ply_type *type, struct text_span word,
         *type = (enum ply_type)(i % 8);
         return SH_OK;
     }
-    return fail(t, err, "unknown property type", word);
+    return ply_read_header_fail(t, err, "unknown property type", word);
 }
 
 const char *const ply_scalar_name[PLY_SCALARS] = {[PLY_X] = "x",
@@ -143,7 +144,7 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
         word = text_word(t);
         rc = read_type(t, &p->count_type, word, err);
         if (rc == SH_OK && (p->count_type == PLY_FLOAT || p->count_type == PLY_DOUBLE))
-            return fail(t, err, "a list's count can't be of type", word);
+            return ply_read_header_fail(t, err, "a list's count can't be of type", word);
         word = text_word(t);
     }
     if (rc == SH_OK) rc = read_type(t, &p->type, word, err);
@@ -153,7 +154,8 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
     p->use = use_of(e, p, word);
     for (int i = e->first; i < h->n_properties - 1; i++) {
         if (p->use == PLY_SKIP || h->property[i].use != p->use) continue;
-        if (p->use < PLY_TIME || p->use >= PLY_SCALARS) return fail(t, err, "a property is given twice:", word);
+        if (p->use < PLY_TIME || p->use >= PLY_SCALARS)
+            return ply_read_header_fail(t, err, "a property is given twice:", word);
         p->use = PLY_SKIP; /* of properties that don't concern the position, the first one counts */
     }
     return SH_OK;
@@ -206,7 +208,7 @@ int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err)
         } else if (text_is(word, "comment")) {
             rc = read_comment(h, t, err);
         } else if (word.n > 0 && !text_is(word, "obj_info")) {
-            rc = fail(t, err, "unknown word in the header", word);
+            rc = ply_read_header_fail(t, err, "unknown word in the header", word);
         }
         if (rc != SH_OK) return rc;
     }

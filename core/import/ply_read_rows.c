@@ -131,7 +131,7 @@ static int read_row(struct ply_rows *r, struct sh_err *err)
     return ply_fail(r, err, "there are more values than the header says");
 }
 
-static int begin(struct ply_rows *r, int i, struct sh_err *err)
+static int ply_read_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
 {
     const struct ply_element *e = r->element = &r->h.element[i];
     r->row = 0;
@@ -159,7 +159,7 @@ static int end_stretch(struct ply_rows *r, struct sh_err *err)
 /* user NULL: rows are passed over. */
 static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, struct sh_err *err)
 {
-    int rc = begin(r, i, err);
+    int rc = ply_read_rows_begin(r, i, err);
     if (rc == SH_OK && user != NULL) rc = user->begin(user->ctx, err);
     for (; r->row < r->element->count && rc == SH_OK; r->row++) {
         if ((r->row & 0xffff) == 0) rc = end_stretch(r, err);

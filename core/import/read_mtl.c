@@ -58,7 +58,7 @@ static struct text_span without_comment(struct text_span name)
     return name;
 }
 
-static bool is_same(struct text_span a, struct text_span b)
+static bool read_mtl_is_same(struct text_span a, struct text_span b)
 {
     return a.n == b.n && memcmp(a.p, b.p, a.n) == 0;
 }
@@ -66,8 +66,8 @@ static bool is_same(struct text_span a, struct text_span b)
 static bool has_material(const struct scene_surface *s, struct text_span material)
 {
     const struct text_span used = {s->material, strlen(s->material)};
-    return is_same(used, material) || is_same(without_quotes(used), without_quotes(material)) ||
-           is_same(without_comment(used), material);
+    return read_mtl_is_same(used, material) || read_mtl_is_same(without_quotes(used), without_quotes(material)) ||
+           read_mtl_is_same(without_comment(used), material);
 }
 
 /* ---- colours */

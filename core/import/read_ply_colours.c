@@ -10,7 +10,7 @@
 #include "core/import/read_ply.h"
 #include "core/scene/build_surfaces.h"
 
-static const struct ply_property *find(const struct ply *y, enum ply_kind kind, enum ply_use use)
+static const struct ply_property *read_ply_colours_find(const struct ply *y, enum ply_kind kind, enum ply_use use)
 {
     const struct ply_property *found = NULL;
     for (int i = 0; i < y->r.h.n_elements && found == NULL; i++)
@@ -20,7 +20,8 @@ static const struct ply_property *find(const struct ply *y, enum ply_kind kind, 
 
 static bool has_rgb(const struct ply *y, enum ply_kind kind)
 {
-    return find(y, kind, PLY_RED) != NULL && find(y, kind, PLY_GREEN) != NULL && find(y, kind, PLY_BLUE) != NULL;
+    return read_ply_colours_find(y, kind, PLY_RED) != NULL && read_ply_colours_find(y, kind, PLY_GREEN) != NULL &&
+           read_ply_colours_find(y, kind, PLY_BLUE) != NULL;
 }
 
 /* The factor to 0..255; 0: a floating type, whose numbers decide. */
@@ -61,9 +62,11 @@ int ply_begin_textures(struct ply *y, struct sh_err *err)
     const int n = y->r.h.n_textures;
     uint32_t missing = 0;
     y->has_vertex_rgb = build_wants_colours(y->b) && has_rgb(y, PLY_VERTEX);
-    y->has_texnumbers = n > 1 && find(y, PLY_FACE, PLY_TEXNUMBER) != NULL;
-    y->has_vertex_uv = find(y, PLY_VERTEX, PLY_U) != NULL && find(y, PLY_VERTEX, PLY_V) != NULL;
-    y->has_uv = n > 0 && build_wants_textures(y->b) && (y->has_vertex_uv || find(y, PLY_FACE, PLY_TEXCOORDS) != NULL);
+    y->has_texnumbers = n > 1 && read_ply_colours_find(y, PLY_FACE, PLY_TEXNUMBER) != NULL;
+    y->has_vertex_uv =
+        read_ply_colours_find(y, PLY_VERTEX, PLY_U) != NULL && read_ply_colours_find(y, PLY_VERTEX, PLY_V) != NULL;
+    y->has_uv = n > 0 && build_wants_textures(y->b) &&
+                (y->has_vertex_uv || read_ply_colours_find(y, PLY_FACE, PLY_TEXCOORDS) != NULL);
     int rc = keep_names(y, err);
     for (int i = 0; i < n && y->has_uv && rc == SH_OK; i++)
         rc = add_texture(y, i, &missing, err);
@@ -138,7 +141,7 @@ int ply_keep_vertex_colour(struct ply *y, struct sh_err *err)
 /* Floating numbers go up to 1, or up to 255: all of them together decide which. */
 static double find_scale(const struct ply *y)
 {
-    const double scale = scale_of(find(y, PLY_VERTEX, PLY_RED));
+    const double scale = scale_of(read_ply_colours_find(y, PLY_VERTEX, PLY_RED));
     struct build_rgb_range range = {0};
     if (scale > 0.0) return scale;
     for (size_t i = 0; i < y->n_colours; i++)

@@ -16,8 +16,8 @@ void plan_say(struct plan_row *row, const char *stage, const char *method, doubl
     snprintf(row->why, sizeof row->why, "%s", why);
 }
 
-static struct plan_row *add(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
-                            const char *why)
+static struct plan_row *plan_add(struct plan_row *row, const char *stage, const char *method, double error_m,
+                                 double cost_ns, const char *why)
 {
     plan_say(row, stage, method, error_m, cost_ns, why);
     return row + 1;
@@ -59,10 +59,10 @@ static struct plan_row *plan_signal(struct plan_row *row, const struct plan_head
 {
     char why[192];
     if (!head->signal)
-        return add(row, "signal", "none", 0.0, 0.0, "signal.model is off: each hit within range_max_m is an echo");
+        return plan_add(row, "signal", "none", 0.0, 0.0, "signal.model is off: each hit within range_max_m is an echo");
     snprintf(why, sizeof why, "signal.model: targets vanish %s; the farthest of the profile's reaches is %.4g m",
              head->sharp ? "sharply" : "by chance", head->reach_m);
-    return add(row, "signal", "range equation", 0.0, 30.0, why);
+    return plan_add(row, "signal", "range equation", 0.0, 30.0, why);
 }
 
 static struct plan_row *plan_noise(struct plan_row *row, const struct plan_head *head)
@@ -72,38 +72,38 @@ static struct plan_row *plan_noise(struct plan_row *row, const struct plan_head 
         snprintf(why, sizeof why,
                  "noise.range: sigma %.3g m at %.4g m, elsewhere it depends on the signal, and %.3g ppm",
                  head->range_sigma_m, head->range_sigma_at_m, head->range_sigma_ppm);
-        row = add(row, "noise", "gauss, by signal", 0.0, 3.0, why);
+        row = plan_add(row, "noise", "gauss, by signal", 0.0, 3.0, why);
     } else if (head->noise_on) {
         snprintf(why, sizeof why, "noise.range: sigma %.3g m and %.3g ppm; noise of the head, not an error of the plan",
                  head->range_sigma_m, head->range_sigma_ppm);
-        row = add(row, "noise", "gauss", 0.0, 1.5, why);
+        row = plan_add(row, "noise", "gauss", 0.0, 1.5, why);
     } else {
-        row = add(row, "noise", "none", 0.0, 0.0, "noise.range is off");
+        row = plan_add(row, "noise", "none", 0.0, 0.0, "noise.range is off");
     }
     if (!(head->ball_radius_m > 0.0)) return row;
     snprintf(why, sizeof why, "noise.ball: points move by up to %.3g m, times its factors", head->ball_radius_m);
-    return add(row, "ball", "uniform in a ball", 0.0, 130.0, why);
+    return plan_add(row, "ball", "uniform in a ball", 0.0, 130.0, why);
 }
 
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS])
 {
     struct plan_row *row = rows;
     if (head->n_movers > 0)
-        row = add(row, "movers", "cast separately", CAST_ERROR_M, (double)NAN, "meshes that move");
+        row = plan_add(row, "movers", "cast separately", CAST_ERROR_M, (double)NAN, "meshes that move");
     else
-        row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
+        row = plan_add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
     row = plan_signal(row, head);
     row = plan_noise(row, head);
     if (head->ambiguity == DETECT_AMBIGUITY_NONE)
-        row = add(row, "zones", "none", 0.0, 0.0, "head.ambiguity is none: echoes have their true range");
+        row = plan_add(row, "zones", "none", 0.0, 0.0, "head.ambiguity is none: echoes have their true range");
     else
-        row = add(row, "zones", head->ambiguity == DETECT_FOLDED ? "folded" : "resolved", 0.0, 1.0,
-                  "head.ambiguity: echoes that return after the next pulse");
+        row = plan_add(row, "zones", head->ambiguity == DETECT_FOLDED ? "folded" : "resolved", 0.0, 1.0,
+                       "head.ambiguity: echoes that return after the next pulse");
     if (head->instrument || head->angle_noise)
-        row = add(
+        row = plan_add(
             row, "geometry", head->instrument ? "errors of geometry" : "angle noise", 0.0, 15.0,
             "instrument, noise.angle: the beam follows the mechanics with their errors, points follow the encoders");
     else
-        row = add(row, "geometry", "none", 0.0, 0.0, "instrument is all zero, noise.angle off: the head is ideal");
+        row = plan_add(row, "geometry", "none", 0.0, 0.0, "instrument is all zero, noise.angle off: the head is ideal");
     return (size_t)(row - rows);
 }

@@ -136,7 +136,7 @@ struct exact {
     struct detect_signal signal;
 };
 
-static void set_up(const struct plan_place *p, struct exact *e)
+static void sample_set_up(const struct plan_place *p, struct exact *e)
 {
     struct cast_setup *setup = &e->setup;
     *setup = p->setup;
@@ -159,7 +159,7 @@ static void cast_beam(struct plan_sample *s, const struct look *look, enum beam_
 {
     const struct plan_place *p = &s->places.place[look->place];
     struct exact e;
-    set_up(p, &e);
+    sample_set_up(p, &e);
     e.setup.beam = mode == BEAM_SINGLE ? NULL : p->beam;
     if (e.setup.beam != NULL) p->beam->mode = mode;
     cast_look(s, &e.setup, look, out);
@@ -213,7 +213,8 @@ struct tally {
     double wrong_mixed, wrong_plain; /* pulses with another number of echoes */
 };
 
-static void compare(struct tally *t, const struct echoes *got, const struct echoes *want, double weight, int mixed)
+static void sample_compare(struct tally *t, const struct echoes *got, const struct echoes *want, double weight,
+                           int mixed)
 {
     t->further += got->n > 1 ? weight * (got->n - 1) : 0.0;
     if (got->n != want->n) *(mixed ? &t->wrong_mixed : &t->wrong_plain) += weight;
@@ -255,7 +256,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
         const struct look *look = &s->look[i];
         double weight = look->mixed ? 1.0 : plain_weight;
         cast_beam(s, look, mode, &got);
-        compare(&tally, &got, &look->reference, weight, look->mixed);
+        sample_compare(&tally, &got, &look->reference, weight, look->mixed);
         caster_get_counters(s->caster, &after);
         outlined += weight * (double)(after.outlined - before.outlined);
         sub_rays += weight * (double)(after.sub_rays - before.sub_rays);
@@ -273,7 +274,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
 static void cast_way(struct plan_sample *s, const struct look *look, uint32_t depth, int apart, struct echoes *out)
 {
     struct exact e;
-    set_up(&s->places.place[look->place], &e);
+    sample_set_up(&s->places.place[look->place], &e);
     e.setup.beam = NULL;
     e.detect.depth = depth;
     if (apart) {
@@ -307,7 +308,7 @@ void plan_sample_optics(struct plan_sample *s, uint32_t depth, struct plan_optio
     for (uint32_t i = 0; i < s->n_ways && !sh_stopped(s->report); i++) {
         const struct look *way = &s->way[i];
         cast_way(s, way, depth, 0, &got);
-        compare(&tally, &got, &way->reference, 1.0, 1);
+        sample_compare(&tally, &got, &way->reference, 1.0, 1);
         if (got.n == way->reference.n && way->mixed) tally.wrong_mixed += 1.0;
     }
     conclude(&tally, s->n_ways, option);

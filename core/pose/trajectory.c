@@ -94,7 +94,7 @@ void trajectory_span(const struct trajectory *tr, double *first_s, double *last_
 }
 
 /* The last sample at or before t_s, but never the very last one; t_s lies within the span. */
-static size_t find(const struct trajectory *tr, double t_s)
+static size_t trajectory_find(const struct trajectory *tr, double t_s)
 {
     size_t lo = 0, hi = tr->n - 1;
     while (hi - lo > 1) {
@@ -116,7 +116,7 @@ void trajectory_at(const struct trajectory *tr, double t_s, struct pose *pose, d
         *frame = end->frame;
         return;
     }
-    size_t i = find(tr, t_s);
+    size_t i = trajectory_find(tr, t_s);
     const struct pose_sample *a = &tr->sample[i], *b = &tr->sample[i + 1];
     double h = b->t_s - a->t_s, f = (t_s - a->t_s) / h, g = 1.0 - f;
     pose_between(&a->pose, &b->pose, f, pose);

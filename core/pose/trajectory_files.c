@@ -244,7 +244,7 @@ static int put_sample(struct walk *w, double curve_s, double t_s, double d, stru
 }
 
 /* Samples the curve densely, heading along it, with the pauses. */
-static int follow(struct walk *w, const double *pause_s, struct sh_err *err)
+static int trajectory_files_follow(struct walk *w, const double *pause_s, struct sh_err *err)
 {
     const struct trajectory *curve = w->curve;
     const double near = 0.005; /* of a step, to either side, for the heading */
@@ -287,7 +287,7 @@ int trajectory_read_waypoints(const char *path, const struct geoframe *frame, co
     if (rc == SH_OK) rc = read_waypoints(&csv, &way, err);
     if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
     walk.curve = curve;
-    if (rc == SH_OK && (rc = follow(&walk, way.pause_s, &why)) != SH_OK)
+    if (rc == SH_OK && (rc = trajectory_files_follow(&walk, way.pause_s, &why)) != SH_OK)
         rc =
             rc == SH_ESTOPPED ? sh_fail(err, rc, "%s", why.text) : text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
     if (rc == SH_OK) rc = trajectory_from_samples(walk.out.at, walk.out.n, out, err);

@@ -53,7 +53,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->file_ns = monotonic_ns();
 }
 
-static void report(struct scene_build *b, double fraction)
+static void build_report(struct scene_build *b, double fraction)
 {
     char what[sizeof b->name + 16];
     snprintf(what, sizeof what, "reading %s", b->name);
@@ -82,7 +82,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     b->scene->counts.zero_area += b->counts.zero_area;
     b->scene->counts.not_triangles += b->counts.not_triangles;
     b->scene->counts.names_cut += b->counts.names_cut;
-    if (b->reported_ns > b->file_ns) report(b, 1);
+    if (b->reported_ns > b->file_ns) build_report(b, 1);
     if (b->scene->n_triangles == b->triangle0)
         return build_fail(b, SH_EINPUT, err, "it has no triangles (%llu without area, %llu points and lines)",
                           (unsigned long long)b->counts.zero_area, (unsigned long long)b->counts.not_triangles);
@@ -90,7 +90,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
 }
 
 /* Gives the array its final place: without room to grow, and in memory where random reads are quick. */
-static int settle(const struct scene_build *b, void **array, size_t n, size_t size, struct sh_err *err)
+static int build_settle(const struct scene_build *b, void **array, size_t n, size_t size, struct sh_err *err)
 {
     const size_t step = (size_t)16 << 20;
     char *last = huge_pages_alloc(n * size);
@@ -110,12 +110,12 @@ static int settle(const struct scene_build *b, void **array, size_t n, size_t si
 static int settle_all(const struct scene_build *b, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    int rc = settle(b, (void **)&s->surface, s->n_surfaces, sizeof *s->surface, err);
-    if (rc == SH_OK) rc = settle(b, (void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m, err);
-    if (rc == SH_OK) rc = settle(b, (void **)&s->triangle, s->n_triangles, sizeof *s->triangle, err);
-    if (rc == SH_OK) rc = settle(b, (void **)&s->label, s->n_triangles, sizeof *s->label, err);
-    if (rc == SH_OK && s->uv != NULL) rc = settle(b, (void **)&s->uv, s->n_triangles, sizeof *s->uv, err);
-    if (rc == SH_OK && s->rgb != NULL) rc = settle(b, (void **)&s->rgb, s->n_triangles, sizeof *s->rgb, err);
+    int rc = build_settle(b, (void **)&s->surface, s->n_surfaces, sizeof *s->surface, err);
+    if (rc == SH_OK) rc = build_settle(b, (void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m, err);
+    if (rc == SH_OK) rc = build_settle(b, (void **)&s->triangle, s->n_triangles, sizeof *s->triangle, err);
+    if (rc == SH_OK) rc = build_settle(b, (void **)&s->label, s->n_triangles, sizeof *s->label, err);
+    if (rc == SH_OK && s->uv != NULL) rc = build_settle(b, (void **)&s->uv, s->n_triangles, sizeof *s->uv, err);
+    if (rc == SH_OK && s->rgb != NULL) rc = build_settle(b, (void **)&s->rgb, s->n_triangles, sizeof *s->rgb, err);
     return rc;
 }
 
@@ -349,13 +349,13 @@ int build_progress(void *build, double fraction, struct sh_err *err)
 {
     struct scene_build *b = build;
     int64_t now = monotonic_ns();
-    if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
+    if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) build_report(b, fraction);
     return sh_check_stop(b->report, err);
 }
 
 void build_announce(struct scene_build *b)
 {
-    report(b, -1);
+    build_report(b, -1);
 }
 
 struct text_span build_base_name(const struct scene_build *b)

@@ -148,7 +148,7 @@ static char *find_image(const struct scene_build *b, const struct build_image *i
     return path != NULL ? path : build_join(folder[1], image->name);
 }
 
-static bool is_same(const struct scene_texture *t, const char *file, const struct build_image *image)
+static bool build_surfaces_is_same(const struct scene_texture *t, const char *file, const struct build_image *image)
 {
     return strcmp(t->file, file) == 0 && memcmp(t->wrap, image->wrap, sizeof t->wrap) == 0;
 }
@@ -158,7 +158,7 @@ int build_texture(struct scene_build *b, const struct build_image *image, uint16
     struct scene *s = b->scene;
     char *file = find_image(b, image);
     for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
-        if (is_same(&s->texture[i], file, image)) {
+        if (build_surfaces_is_same(&s->texture[i], file, image)) {
             free(file);
             *number = (uint16_t)(i + 1);
             return SH_OK;

@@ -14,7 +14,7 @@ static double turns(const double a[2], const double b[2], const double c[2])
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-static int compare(const void *a, const void *b)
+static int hull_compare(const void *a, const void *b)
 {
     const double *p = a, *q = b;
     if (p[0] != q[0]) return p[0] < q[0] ? -1 : 1;
@@ -78,7 +78,7 @@ int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh
         free(point);
         return sh_fail(err, SH_ENOMEM, "no memory for a mesh's outline");
     }
-    qsort(point, n, sizeof *point, compare);
+    qsort(point, n, sizeof *point, hull_compare);
     for (uint32_t i = 0; i < n; i++)
         k = add_chain(out->point, k, 0, point[i]);
     const uint32_t right = k > 0 ? k - 1 : 0;

@@ -133,7 +133,8 @@ static void bounds_of(const struct work *w, const uint32_t *triangle, uint32_t n
 
 /* Edges without a counterpart may still cancel, where one side has more corners along the same edge. Else they leave an
  * area open, whose mean width follows from the edges' length. */
-static enum scene_object_state judge(const struct work *w, struct body_sum *sum, double diagonal_m, uint64_t *n_open)
+static enum scene_object_state objects_judge(const struct work *w, struct body_sum *sum, double diagonal_m,
+                                             uint64_t *n_open)
 {
     double length_m = 0.0;
     *n_open = 0;
@@ -171,13 +172,13 @@ static int measure(struct work *w, const uint32_t *triangle, uint32_t n, struct 
     rc = count_edges(w, triangle, n);
     if (rc != SH_OK) return rc;
     *part = (struct scene_object){.n_triangles = n, .area_m2 = sum.area_m2};
-    part->state = judge(w, &sum, vec3_distance(min, max), &part->n_open);
+    part->state = objects_judge(w, &sum, vec3_distance(min, max), &part->n_open);
     part->volume_m3 = part->state == SCENE_OBJECT_CLOSED ? sum.volume_m3 : (double)NAN;
     return SH_OK;
 }
 
 /* An object has the worst state of its parts. A part without a volume makes the whole volume NaN. */
-static void add(struct scene_object *to, const struct scene_object *part, double scale)
+static void objects_add(struct scene_object *to, const struct scene_object *part, double scale)
 {
     to->n_triangles += part->n_triangles;
     to->n_open += part->n_open;
@@ -188,15 +189,15 @@ static void add(struct scene_object *to, const struct scene_object *part, double
 
 /* ---- one mesh */
 
-static void add_part(const struct scene_copied *copied, uint32_t label, const struct scene_object *part,
-                     struct scene_objects *o)
+static void objects_add_part(const struct scene_copied *copied, uint32_t label, const struct scene_object *part,
+                             struct scene_objects *o)
 {
     if (copied == NULL) {
-        add(&o->object[o->of[label]], part, 1.0);
+        objects_add(&o->object[o->of[label]], part, 1.0);
         return;
     }
     for (uint32_t i = 0; i < copied->n; i++)
-        add(&o->object[o->of[copied->copy[i].label0 + label]], part, copied->copy[i].scale);
+        objects_add(&o->object[o->of[copied->copy[i].label0 + label]], part, copied->copy[i].scale);
 }
 
 /* Hands over the open edges of the part that was measured last. */
@@ -248,7 +249,7 @@ static int add_mesh(const struct scene *scene, const struct scene_copied *copied
         struct scene_object part;
         if (n == 0) continue;
         rc = measure(w, w->order + begin[k], n, &part);
-        if (rc == SH_OK) add_part(copied, mesh->label[w->order[begin[k]]] - mesh->label0, &part, o);
+        if (rc == SH_OK) objects_add_part(copied, mesh->label[w->order[begin[k]]] - mesh->label0, &part, o);
         if (rc == SH_OK && w->edges != NULL && part.state == SCENE_OBJECT_OPEN) rc = hand_out(w, copied);
         sh_progress(w->report, "measuring objects", (double)begin[k + 1] / mesh->n_triangles);
     }

@@ -44,7 +44,7 @@ static void project(struct triangulate *t, uint32_t n)
 }
 
 /* Twice the signed area of the triangle (a, b, c): positive for a left turn. */
-static double turn(const struct triangulate *t, uint32_t a, uint32_t b, uint32_t c)
+static double triangulate_turn(const struct triangulate *t, uint32_t a, uint32_t b, uint32_t c)
 {
     const double *p = t->at[a].uv, *q = t->at[b].uv, *r = t->at[c].uv;
     return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
@@ -65,13 +65,13 @@ static bool blocks(const struct triangulate *t, uint32_t i, uint32_t a, uint32_t
 {
     if (i == a || i == b || i == c || is_clipped(t, i)) return false;
     if (same_place(t, i, a) || same_place(t, i, b) || same_place(t, i, c)) return false;
-    return turn(t, a, b, i) >= 0 && turn(t, b, c, i) >= 0 && turn(t, c, a, i) >= 0;
+    return triangulate_turn(t, a, b, i) >= 0 && triangulate_turn(t, b, c, i) >= 0 && triangulate_turn(t, c, a, i) >= 0;
 }
 
 static bool is_ear(const struct triangulate *t, uint32_t i)
 {
     uint32_t a = t->at[i].prev, c = t->at[i].next;
-    if (!(turn(t, a, i, c) > 0)) return false;
+    if (!(triangulate_turn(t, a, i, c) > 0)) return false;
     for (size_t k = 0; k < t->n_reflex; k++)
         if (blocks(t, t->at[k].reflex, a, i, c)) return false;
     return true;
@@ -94,7 +94,7 @@ static uint32_t forced_corner(struct triangulate *t, uint32_t start)
 {
     uint32_t convex = start, i = start;
     do {
-        double area = turn(t, t->at[i].prev, i, t->at[i].next);
+        double area = triangulate_turn(t, t->at[i].prev, i, t->at[i].next);
         if (area == 0) return i;
         if (area > 0) convex = i;
         i = t->at[i].next;
@@ -108,7 +108,7 @@ static bool is_turned_over(const struct triangulate *t, uint32_t a, uint32_t b, 
 {
     double u = t->at[b].uv[0] - t->at[a].uv[0], v = t->at[b].uv[1] - t->at[a].uv[1];
     double s = t->at[c].uv[0] - t->at[a].uv[0], w = t->at[c].uv[1] - t->at[a].uv[1];
-    return turn(t, a, b, c) < -1e-12 * (u * u + v * v + s * s + w * w);
+    return triangulate_turn(t, a, b, c) < -1e-12 * (u * u + v * v + s * s + w * w);
 }
 
 void triangulate_polygon(struct triangulate *t, uint32_t n)
@@ -122,7 +122,7 @@ void triangulate_polygon(struct triangulate *t, uint32_t n)
         t->at[i].prev = i > 0 ? i - 1 : n - 1;
     }
     for (uint32_t i = 0; i < n; i++)
-        if (!(turn(t, t->at[i].prev, i, t->at[i].next) > 0)) t->at[t->n_reflex++].reflex = i;
+        if (!(triangulate_turn(t, t->at[i].prev, i, t->at[i].next) > 0)) t->at[t->n_reflex++].reflex = i;
     uint32_t n_out = 0, left = n, tried = 0, i = 1; /* from 1: a convex polygon becomes a fan about corner 0 */
     for (uint32_t step = 1; left > 3; step++) {
         /* A polygon of the most corners may take seconds. */

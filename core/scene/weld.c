@@ -22,16 +22,16 @@ static uint64_t key_of(const double p[3])
     return key;
 }
 
-static int is_same(const struct scene_build *b, uint32_t number, const double p[3])
+static int weld_is_same(const struct scene_build *b, uint32_t number, const double p[3])
 {
     return memcmp(b->scene->vertex_m[number], p, sizeof *b->scene->vertex_m) == 0;
 }
 
 /* The slot that holds a vertex at that place, or the free one where it belongs. */
-static uint32_t *find(const struct scene_build *b, const struct build_weld *w, uint64_t key, const double p[3])
+static uint32_t *weld_find(const struct scene_build *b, const struct build_weld *w, uint64_t key, const double p[3])
 {
     size_t at = (size_t)key & (w->size - 1);
-    while (w->slot[at] != NONE && !is_same(b, w->slot[at], p))
+    while (w->slot[at] != NONE && !weld_is_same(b, w->slot[at], p))
         at = (at + 1) & (w->size - 1);
     return &w->slot[at];
 }
@@ -48,7 +48,7 @@ static int make_table(struct scene_build *b, struct build_weld *w, size_t size, 
     for (size_t i = 0; i < before; i++) {
         if (old[i] == NONE) continue;
         const double *p = b->scene->vertex_m[old[i]];
-        *find(b, w, key_of(p), p) = old[i];
+        *weld_find(b, w, key_of(p), p) = old[i];
     }
     free(old);
     return SH_OK;
@@ -76,8 +76,8 @@ int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double 
     const double *p = b->scene->vertex_m[number];
     const uint64_t key = key_of(p);
     uint32_t *recent = &w->recent[key >> 32 & (BUILD_RECENT - 1)];
-    const int is_recent = *recent != 0 && is_same(b, *recent - 1, p);
-    uint32_t *slot = is_recent ? NULL : find(b, w, key, p);
+    const int is_recent = *recent != 0 && weld_is_same(b, *recent - 1, p);
+    uint32_t *slot = is_recent ? NULL : weld_find(b, w, key, p);
     if (slot != NULL && *slot == NONE) {
         *slot = number;
         w->used++;

@@ -15,7 +15,7 @@ static void fill_uv(struct scene *scene, uint32_t from, uint32_t to)
             scene->uv[i][k / 2][k % 2] = NAN;
 }
 
-static int make_room(struct scene *s, uint64_t vertices, uint64_t triangles, int uv, int rgb, int cutouts)
+static int write_out_make_room(struct scene *s, uint64_t vertices, uint64_t triangles, int uv, int rgb, int cutouts)
 {
     const int had_uv = s->uv != NULL, had_rgb = s->rgb != NULL, had_cutouts = s->cutout != NULL;
     if (!resize(&s->vertex_m, vertices, sizeof *s->vertex_m) || !resize(&s->triangle, triangles, sizeof *s->triangle) ||
@@ -78,7 +78,7 @@ int scene_write_out_copies(struct scene *s, uint64_t most, const struct sh_repor
             "scene.meshes[].copies: %u copies come to %u triangles; reports, coverage and the page of `run` need each "
             "of them in memory: allowed there are %llu",
             s->n_copies, s->n_all, (unsigned long long)most);
-    if (!make_room(s, vertices, s->n_all, uv, rgb, cutouts))
+    if (!write_out_make_room(s, vertices, s->n_all, uv, rgb, cutouts))
         return sh_fail(err, SH_ENOMEM, "no memory for the %u triangles of copies", s->n_all);
     for (uint32_t i = 0; i < s->n_copied && rc == SH_OK; i++) {
         struct scene_copied *of = &s->copied[i];

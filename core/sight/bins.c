@@ -109,14 +109,14 @@ static void find_seen(struct build_shared *b)
             }
 }
 
-static void count(struct build_shared *b, uint32_t region, uint32_t triangle)
+static void bins_count(struct build_shared *b, uint32_t region, uint32_t triangle)
 {
     b->bin[region + 1]++;
     b->kept[triangle]++;
 }
 
 /* Counts triangle by region into bin, or, after that, writes it there. */
-static void put(struct build_shared *b, uint32_t triangle, int write)
+static void bins_put(struct build_shared *b, uint32_t triangle, int write)
 {
     double v[3][3];
     struct range r;
@@ -131,7 +131,7 @@ static void put(struct build_shared *b, uint32_t triangle, int write)
                 if (write)
                     b->binned[b->bin[at]++] = triangle;
                 else
-                    count(b, at, triangle);
+                    bins_count(b, at, triangle);
             }
     }
 }
@@ -142,7 +142,7 @@ static int put_all(struct build_shared *b, int write, struct sh_err *err)
     int rc = SH_OK;
     for (uint32_t t = 0; t < n && rc == SH_OK; t++) {
         if ((t & 0xffff) == 0) rc = sh_check_stop(b->report, err);
-        put(b, t, write);
+        bins_put(b, t, write);
     }
     return rc;
 }

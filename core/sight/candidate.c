@@ -136,7 +136,7 @@ static int find_figures(const struct sight *sight, uint32_t triangle, struct bui
 }
 
 /* The same in the coordinates of a face. */
-static void turn(const struct build_candidate *from, uint32_t face, struct build_candidate *c)
+static void candidate_turn(const struct build_candidate *from, uint32_t face, struct build_candidate *c)
 {
     *c = *from;
     for (int i = 0; i < 3; i++) {
@@ -153,11 +153,11 @@ int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triang
     const uint32_t kept = b->kept == NULL ? BUILD_NOT_KEPT : b->kept[triangle];
     if (kept == BUILD_NOT_KEPT) {
         if (!find_figures(b->sight, triangle, &figures)) return 0;
-        turn(&figures, face, c);
+        candidate_turn(&figures, face, c);
         return 1;
     }
     if (b->figures[kept].triangle == BVH_NO_TRIANGLE) return 0;
-    turn(&b->figures[kept], face, c);
+    candidate_turn(&b->figures[kept], face, c);
     return 1;
 }
 

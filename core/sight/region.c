@@ -135,7 +135,7 @@ VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarte
 
 /* Finds the candidates of a square that may be seen in each quarter. */
 VEC_CLONES
-static void look(const struct build_work *w, const struct seen *in, struct quarters *four)
+static void region_look(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
     uint32_t n[4] = {0, 0, 0, 0};
     find_covers(w, in, four);
@@ -202,7 +202,7 @@ static uint32_t make_list(const struct division *d, const struct seen *seen)
 
 enum { ONE, NOTHING, FEW, ASK };
 
-static void end(struct division *d, const struct square *q, uint32_t leaf, int what)
+static void region_end(struct division *d, const struct square *q, uint32_t leaf, int what)
 {
     put_leaf(d, q, leaf);
     d->cells[what] += (uint64_t)q->size * q->size;
@@ -211,7 +211,7 @@ static void end(struct division *d, const struct square *q, uint32_t leaf, int w
 static void end_few(struct division *d, const struct square *q, const struct seen *seen)
 {
     if (*seen->leaf == NO_LEAF) *seen->leaf = make_list(d, seen);
-    end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
+    region_end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
 }
 
 static int all_cover(const struct seen *seen)
@@ -246,7 +246,7 @@ static void divide_quarters(struct division *d, const struct square *q, const st
     struct quarters four;
     four.half = 0.5 * q->half + SIGHT_PAD;
     make_quarters(q, seen, &four);
-    look(d->w, seen, &four);
+    region_look(d->w, seen, &four);
     for (uint32_t k = 0; k < 4; k++) {
         struct seen *mine = &four.seen[k];
         mine->own_leaf = NO_LEAF;
@@ -283,9 +283,9 @@ static void divide_tile(struct division *d, const struct square *q, const struct
 static void divide(struct division *d, const struct square *q, const struct seen *seen)
 {
     if (seen->n == 0)
-        end(d, q, SIGHT_NOTHING, NOTHING);
+        region_end(d, q, SIGHT_NOTHING, NOTHING);
     else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
-        end(d, q, d->w->candidate[seen->cover].triangle, ONE);
+        region_end(d, q, d->w->candidate[seen->cover].triangle, ONE);
     else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
         end_few(d, q, seen);
     else if (q->size == SIGHT_TILE)
@@ -371,7 +371,7 @@ int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
     if (fits)
         divide(&d, &all, &seen);
     else
-        end(&d, &all, SIGHT_ASK, ASK);
+        region_end(&d, &all, SIGHT_ASK, ASK);
     for (int i = 0; i < 4; i++)
         atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
     return SH_OK;

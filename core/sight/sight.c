@@ -120,7 +120,7 @@ static int keep_records(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-static void finish(struct build_shared *b)
+static void sight_finish(struct build_shared *b)
 {
     struct sight *s = b->sight;
     struct sight_info *info = &s->info;
@@ -149,7 +149,7 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
     if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
     if (rc == SH_OK && !is_too_fine(b)) rc = keep_records(b, err);
-    if (rc == SH_OK) finish(b);
+    if (rc == SH_OK) sight_finish(b);
     free(b->seen);
     free(b->figures);
     free(b->kept);

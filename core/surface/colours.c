@@ -51,7 +51,7 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
     colours->by_vertex[label] = named->vertex_colours != SCENE_COLOURS_NONE;
 }
 
-static int load(const struct scene_texture *from, struct surface_image **out, struct sh_err *err)
+static int colours_load(const struct scene_texture *from, struct surface_image **out, struct sh_err *err)
 {
     struct texture_image image;
     struct surface_image *to = NULL;
@@ -75,7 +75,7 @@ int surface_colours_texture(struct surface_colours *colours, uint32_t label, con
     struct surface_image *image = NULL;
     for (uint32_t i = 0; i < colours->n && image == NULL; i++)
         if (colours->image[i] != NULL && colours->image[i]->from == texture) image = colours->image[i];
-    int rc = image == NULL ? load(texture, &image, err) : SH_OK;
+    int rc = image == NULL ? colours_load(texture, &image, err) : SH_OK;
     if (rc != SH_OK) return rc;
     image->users++;
     colours->image[label] = image;

@@ -35,7 +35,7 @@ static uint16_t as_texel(double reflectance)
 }
 
 /* Alpha doesn't darken: texels that are no hole have the colour of the image. */
-static void fill(struct surface_texture *t, const uint8_t *rgba, size_t n, const float colour[CHANNELS])
+static void texture_fill(struct surface_texture *t, const uint8_t *rgba, size_t n, const float colour[CHANNELS])
 {
     static const double weight[CHANNELS] = {0.2126, 0.7152, 0.0722};
     double part[CHANNELS][256];
@@ -46,8 +46,8 @@ static void fill(struct surface_texture *t, const uint8_t *rgba, size_t n, const
         t->texel[i] = as_texel(part[0][rgba[4 * i]] + part[1][rgba[4 * i + 1]] + part[2][rgba[4 * i + 2]]);
 }
 
-static int load(const struct scene_texture *from, const float colour[CHANNELS], struct surface_texture **out,
-                struct sh_err *err)
+static int texture_load(const struct scene_texture *from, const float colour[CHANNELS], struct surface_texture **out,
+                        struct sh_err *err)
 {
     struct texture_image image;
     struct surface_texture *t = NULL;
@@ -59,15 +59,15 @@ static int load(const struct scene_texture *from, const float colour[CHANNELS], 
         *t = (struct surface_texture){.frame = {image.width, image.height, {from->wrap[0], from->wrap[1]}},
                                       .from = from};
         memcpy(t->colour, colour, sizeof t->colour);
-        fill(t, image.rgba, n, colour);
+        texture_fill(t, image.rgba, n, colour);
     }
     texture_image_free(&image);
     *out = t;
     return rc;
 }
 
-static struct surface_texture *find(const struct surface_table *table, const struct scene_texture *from,
-                                    const float colour[CHANNELS])
+static struct surface_texture *texture_find(const struct surface_table *table, const struct scene_texture *from,
+                                            const float colour[CHANNELS])
 {
     for (uint32_t i = 0; i < table->n; i++) {
         struct surface_texture *t = table->texture[i];
@@ -85,8 +85,8 @@ int surface_table_texture(struct surface_table *table, uint32_t label, const str
     if (s->glass > 0.0 || s->mirror > 0.0) return SH_OK;
     if (table->texture == NULL) table->texture = calloc((size_t)table->n + 1, sizeof *table->texture);
     if (table->texture == NULL) return sh_fail(err, SH_ENOMEM, "no memory for textures");
-    struct surface_texture *t = find(table, texture, colour);
-    int rc = t == NULL ? load(texture, colour, &t, err) : SH_OK;
+    struct surface_texture *t = texture_find(table, texture, colour);
+    int rc = t == NULL ? texture_load(texture, colour, &t, err) : SH_OK;
     if (rc != SH_OK) return rc;
     t->users++;
     table->texture[label] = t;

@@ -177,7 +177,7 @@ static uint8_t *load_jpeg(stbi__context *s, int *width, int *height, int *channe
 }
 
 /* Four channels, to be freed by counted_free; NULL: stbi_failure_reason(). */
-static uint8_t *load(const uint8_t *bytes, size_t n, int *width, int *height, int *channels)
+static uint8_t *decode_load(const uint8_t *bytes, size_t n, int *width, int *height, int *channels)
 {
     stbi__context s;
     stbi__start_mem(&s, bytes, (int)n);
@@ -292,7 +292,7 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
     image->height = (uint32_t)height;
     image->has_alpha = channels == 2 || channels == 4 || has_transparent_colour(bytes, n_bytes);
     if (source->alpha_only && !image->has_alpha) return SH_OK;
-    image->rgba = load(bytes, n_bytes, &width, &height, &channels);
+    image->rgba = decode_load(bytes, n_bytes, &width, &height, &channels);
     if (image->rgba == NULL && ran_out)
         return sh_fail(err, SH_EINPUT, "%s: needs more than the allowed %d MiB of memory to decode", file,
                        TEXTURE_MAX_MEMORY >> 20);

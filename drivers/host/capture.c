@@ -21,7 +21,7 @@ struct host_capture {
     uint8_t buf[4 * NATIVE_MAX_FRAME];
 };
 
-static size_t take(const uint8_t *from, size_t have, void *to, size_t room)
+static size_t capture_take(const uint8_t *from, size_t have, void *to, size_t room)
 {
     const size_t n = have < room ? have : room;
     memcpy(to, from, n);
@@ -29,7 +29,7 @@ static size_t take(const uint8_t *from, size_t have, void *to, size_t room)
 }
 
 /* More of the file into the buffer. Returns as read(). */
-static ssize_t fill(struct host_source *source)
+static ssize_t capture_fill(struct host_source *source)
 {
     struct host_capture *c = source->capture;
     memmove(c->buf, c->buf + c->start, c->end - c->start);
@@ -58,7 +58,7 @@ static int next_packet(struct host_source *source)
         if (item > 0) continue;
         c->is_raw = item < 0 || c->reader.needed > sizeof c->buf;
         if (c->is_raw) return 1;
-        const ssize_t n = fill(source);
+        const ssize_t n = capture_fill(source);
         if (n < 0) return -1;
         c->is_raw = n == 0 && c->start < c->end; /* cut within a block */
         if (n == 0) return c->is_raw;
@@ -73,13 +73,13 @@ static ssize_t capture_read(struct host_source *source, void *to, size_t len)
         if (got <= 0) return got;
     }
     if (c->data_len != 0) {
-        const size_t n = take(c->data, c->data_len, to, len);
+        const size_t n = capture_take(c->data, c->data_len, to, len);
         c->data += n;
         c->data_len -= n;
         return (ssize_t)n;
     }
     if (c->start == c->end) return read(source->fd, to, len);
-    const size_t n = take(c->buf + c->start, c->end - c->start, to, len);
+    const size_t n = capture_take(c->buf + c->start, c->end - c->start, to, len);
     c->start += n;
     return (ssize_t)n;
 }
@@ -135,7 +135,7 @@ int host_capture_open(struct host_source *source, struct sh_err *err)
     if (source->capture == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     int rc = 0;
     ssize_t n;
-    while (source->capture->end < sizeof source->capture->buf / 2 && (n = fill(source)) != 0)
+    while (source->capture->end < sizeof source->capture->buf / 2 && (n = capture_fill(source)) != 0)
         if (n < 0) {
             rc = sh_fail(err, SH_EIO, "%s: %s", source->name, strerror(errno));
             break;

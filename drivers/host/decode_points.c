@@ -17,7 +17,8 @@ void host_turn_table(struct scanhead *sh)
 }
 
 /* Point i as on the wire; members that all layouts share are set in p. */
-static inline struct native_point take(const uint8_t *payload, uint32_t i, int64_t t0_ns, struct scanhead_point *p)
+static inline struct native_point decode_points_take(const uint8_t *payload, uint32_t i, int64_t t0_ns,
+                                                     struct scanhead_point *p)
 {
     struct native_point w;
     native_decode_point(payload, i, &w);
@@ -53,7 +54,7 @@ static void points_geodetic(const struct scanhead *sh, const struct scanhead_fra
     double from[3], to[3];
     geocentric(anchor[0], anchor[1], anchor[2], from);
     for (uint32_t i = first; i < first + n; i++, p++) {
-        const struct native_point w = take(frame->payload, i, frame->scan_t0_ns, p);
+        const struct native_point w = decode_points_take(frame->payload, i, frame->scan_t0_ns, p);
         p->x = anchor[0] + scale[0] * (int32_t)w.a;
         p->y = anchor[1] + scale[1] * (int32_t)w.b;
         p->z = anchor[2] + scale[2] * (int32_t)w.c;
@@ -71,7 +72,7 @@ static void points_geo(const struct scanhead *sh, const struct scanhead_frame *f
 {
     const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
     for (uint32_t i = first; i < first + n; i++, p++) {
-        const struct native_point w = take(frame->payload, i, frame->scan_t0_ns, p);
+        const struct native_point w = decode_points_take(frame->payload, i, frame->scan_t0_ns, p);
         double dx = scale[0] * (int32_t)w.a, dy = scale[1] * (int32_t)w.b, dz = scale[2] * (int32_t)w.c;
         p->x = anchor[0] + dx;
         p->y = anchor[1] + dy;
@@ -133,7 +134,7 @@ static void points_of_block(const struct scanhead *sh, const struct scanhead_fra
 {
     const double scale = sh->descriptor.range_scale_m;
     for (uint32_t i = 0; i < n; i++, p++) {
-        const struct native_point w = take(frame->payload, first + i, frame->scan_t0_ns, p);
+        const struct native_point w = decode_points_take(frame->payload, first + i, frame->scan_t0_ns, p);
         p->range_m = p->echo_count == 0 ? NAN : scale * w.a;
         const uint32_t m = b->one_mirror ? 0 : i;
         const double flat = p->range_m * b->cos_m[m];

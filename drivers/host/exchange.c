@@ -186,7 +186,7 @@ static int is_late(struct scanhead *sh, const char *command)
  * Between open() and raw mode the terminal echoes what the head sends, and the head takes it for commands; another
  * program may have left half a line. So an empty line ends that line, and all replies are skipped up to the answer to a
  * question of our own. Half a frame for the program before may swallow that answer: so the question is asked again. */
-static int settle(struct scanhead *sh, int64_t deadline_ns)
+static int exchange_settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";
     for (;;) {
@@ -220,7 +220,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     line[len] = '\n';
     int64_t deadline_ns = host_deadline_ns(timeout_ms);
     rc = discard_stale(sh);
-    if (rc == 0 && sh->source.unsettled && !sh->ended) rc = settle(sh, deadline_ns);
+    if (rc == 0 && sh->source.unsettled && !sh->ended) rc = exchange_settle(sh, deadline_ns);
     if (rc == 0) rc = sh->ended ? host_gone(sh) : send_all(sh, line, len + 1, deadline_ns);
     while (rc == 0) {
         rc = take_items(sh);

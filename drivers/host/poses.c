@@ -41,8 +41,8 @@ int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len)
 }
 
 /* Finds the latest two poses of one stream frame with t_ns between them; 0 where there are none. */
-static int find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a,
-                const struct native_pose **b)
+static int poses_find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a,
+                      const struct native_pose **b)
 {
     uint64_t n = poses != NULL ? poses->n : 0, first = n > KEEP ? n - KEEP : 0;
     for (uint64_t i = n; i > first + 1; i--) {
@@ -79,7 +79,7 @@ int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
     const struct native_pose *a, *b;
     struct leg leg;
     memset(pose, 0, sizeof *pose);
-    if (!find(sh->poses, t_ns, &a, &b))
+    if (!poses_find(sh->poses, t_ns, &a, &b))
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: there is no pose of the head at %.9f s of the scan",
                        sh->source.name, 1e-9 * (double)t_ns);
     set_leg(&leg, a, b);
@@ -144,7 +144,7 @@ static int to_scene_moving(struct scanhead *sh, struct scanhead_point *points, u
         const struct native_pose *a, *b;
         if (leg.a == NULL || p->t_ns < leg.a->t_ns || p->t_ns >= leg.b->t_ns) {
             leg.a = NULL;
-            if (find(sh->poses, p->t_ns, &a, &b)) set_leg(&leg, a, b);
+            if (poses_find(sh->poses, p->t_ns, &a, &b)) set_leg(&leg, a, b);
         }
         if (leg.a == NULL) {
             p->x = p->y = p->z = NAN;

@@ -156,7 +156,8 @@ int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wante
     return sh_fail(err, SH_ELOST, "%s: no such head on USB; scanhead list shows the heads", asked);
 }
 
-static void describe(libusb_device *device, const struct libusb_device_descriptor *d, struct scanhead_usb_head *head)
+static void usb_find_describe(libusb_device *device, const struct libusb_device_descriptor *d,
+                              struct scanhead_usb_head *head)
 {
     libusb_device_handle *handle;
     *head = (struct scanhead_usb_head){.vid = d->idVendor,
@@ -191,7 +192,7 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
         struct libusb_device_descriptor d;
         struct usb_interface interface;
         if (libusb_get_device_descriptor(list[i], &d) != 0 || !host_usb_interface(list[i], &interface)) continue;
-        if (n_heads < max) describe(list[i], &d, &heads[n_heads]);
+        if (n_heads < max) usb_find_describe(list[i], &d, &heads[n_heads]);
         n_heads++;
     }
     if (n >= 0) libusb_free_device_list(list, 1);

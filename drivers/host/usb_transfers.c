@@ -170,7 +170,7 @@ static int gone_or_reset(struct host_usb *usb)
 }
 
 /* The present transfer is used up: submits it again, and goes on to the next. */
-static int turn(struct host_usb *usb)
+static int usb_transfers_turn(struct host_usb *usb)
 {
     struct in_transfer *in = &usb->in[usb->next];
     int error = in->error;
@@ -201,7 +201,7 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
         }
         int error = 0;
         if (!in->flying)
-            error = turn(usb);
+            error = usb_transfers_turn(usb);
         else if (looked++)
             error = EAGAIN;
         else if (handle_events(usb, 0) != 0)
@@ -308,7 +308,7 @@ static int submit_all(struct host_usb *usb, const char *name, struct sh_err *err
     return sh_fail(err, SH_EIO, "%s: cannot start reading: %s", name, libusb_strerror(rc));
 }
 
-static int begin(struct host_usb *usb, const char *name, struct sh_err *err)
+static int usb_transfers_begin(struct host_usb *usb, const char *name, struct sh_err *err)
 {
     int rc = libusb_claim_interface(usb->head.handle, usb->head.interface.number);
     if (rc == LIBUSB_ERROR_BUSY)
@@ -335,7 +335,7 @@ int host_usb_open(const char *source, struct host_source *out, struct sh_err *er
     if (rc == SH_OK) rc = host_usb_find(usb->ctx, source, &wanted, &usb->head, err);
     if (rc == SH_OK) snprintf(out->name, sizeof out->name, "%s", usb->head.name);
     if (rc == SH_OK) rc = make_transfers(usb, err);
-    if (rc == SH_OK) rc = begin(usb, out->name, err);
+    if (rc == SH_OK) rc = usb_transfers_begin(usb, out->name, err);
     if (rc == SH_OK && (rc = submit_all(usb, out->name, err)) != SH_OK) {
         session(usb, 0);
         cancel_reads(usb);

@@ -106,7 +106,7 @@ static int is_any_ending(const struct tcp_link *tcp)
 
 /* Ends the session that has been silent for longest, if a client waits for its place. A session whose bytes wait for
  * the owner is not silent. */
-static void make_room(struct tcp_link *tcp)
+static void tcp_make_room(struct tcp_link *tcp)
 {
     struct pollfd waiting = {.fd = tcp->listener, .events = POLLIN};
     struct tcp_session *oldest = NULL;
@@ -128,7 +128,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         char peer[64];
         int fd;
         const int slot = free_slot(tcp);
-        if (slot == tcp->n_sessions && !is_any_ending(tcp)) make_room(tcp);
+        if (slot == tcp->n_sessions && !is_any_ending(tcp)) tcp_make_room(tcp);
         if (slot == tcp->n_sessions && is_any_ending(tcp)) { /* poll comes back at once */
             give_up_one(tcp);
             return;

@@ -131,7 +131,7 @@ static int go_on(void *ctx)
     return 1;
 }
 
-static void report(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
+static void usb_link_report(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
 {
     const struct scanhead_usb_session *session = &self->head.session[i];
     if (self->reported[i] && !session->open && !is_readable(self, i))
@@ -193,7 +193,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (is_plugged_anew(self) && link_events_push(&events, LINK_PLUGGED, 0, NULL))
         self->plugged = usb_device_attaches(self->head.device);
     for (int i = 0; i < self->n; i++)
-        report(self, i, want_write, &events);
+        usb_link_report(self, i, want_write, &events);
     take_news(self);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
     for (take_refused(self); self->refused != NULL; take_refused(self)) {

@@ -264,7 +264,7 @@ static void report_session(struct web_session *s, int slot, uint32_t want_write,
     if ((want_write >> slot & 1u) != 0 && s->out_len == 0) link_events_push(events, LINK_WRITABLE, slot, NULL);
 }
 
-static void report(struct web_link *web, uint32_t want_write, struct link_events *events)
+static void web_report(struct web_link *web, uint32_t want_write, struct link_events *events)
 {
     if (web->woken && link_events_push(events, LINK_WOKEN, 0, NULL)) web->woken = 0;
     for (; web->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, web->refused); web->n_refused--)
@@ -283,13 +283,13 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     struct web_link *web = link;
     struct link_events events = {event, 0, max};
     if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
-    report(web, want_write, &events);
+    web_report(web, want_write, &events);
     if (events.n > 0) timeout_ms = 0;
     if (timeout_ms > 0)
         web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, (lws_usec_t)timeout_ms * 1000);
     if (web_lws.lws_service(web->context, timeout_ms == 0 ? -1 : 0) < 0) return SH_EIO;
     web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
-    if (events.n == 0) report(web, want_write, &events);
+    if (events.n == 0) web_report(web, want_write, &events);
     return events.n;
 }
 

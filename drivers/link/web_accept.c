@@ -45,7 +45,7 @@ static int drain(int fd)
 }
 
 /* Sends a short answer. The socket takes it at once, since nothing was sent before. */
-static void say(int fd, int status, const char *words, int head_only)
+static void web_accept_say(int fd, int status, const char *words, int head_only)
 {
     char text[WEB_TEXT_ROOM];
     drain(fd);
@@ -77,11 +77,12 @@ void web_linger(struct web_link *web, struct web_conn *conn)
 /* ---- who comes in */
 
 /* A client with half a request gets the reason; others get nothing. One without a whole answer counts as refused. */
-static void make_room(struct web_link *web, struct web_conn *conn)
+static void web_accept_make_room(struct web_link *web, struct web_conn *conn)
 {
     if (conn->place.phase == WEB_ASKING || conn->place.phase == WEB_ANSWERING) web_refused(web, conn->peer);
     if (conn->place.phase == WEB_ASKING && conn->n_seen > 0)
-        say(web_lws.lws_get_socket_fd(conn->wsi), 408, "other clients wait; send the whole request at once", 0);
+        web_accept_say(web_lws.lws_get_socket_fd(conn->wsi), 408, "other clients wait; send the whole request at once",
+                       0);
     web_lws.lws_set_opaque_user_data(conn->wsi, NULL);
     web_lws.lws_set_timeout(conn->wsi, PENDING_TIMEOUT_SHUTDOWN_FLUSH, LWS_TO_KILL_ASYNC);
     web_conn_end(conn);
@@ -95,13 +96,13 @@ static void welcome(struct web_link *web, int fd, const struct sockaddr_storage 
     const int at = web_places_take((struct web_places){&web->conn[0].place, sizeof web->conn[0]}, address,
                                    web_lws.lws_now_usecs() / LWS_US_PER_MS);
     if (at < 0) {
-        say(fd, 503, "all connections of this link are taken", 0);
+        web_accept_say(fd, 503, "all connections of this link are taken", 0);
         close(fd);
         web_refused(web, peer);
         return;
     }
     struct web_conn *conn = &web->conn[at];
-    if (conn->place.phase != WEB_NOBODY) make_room(web, conn);
+    if (conn->place.phase != WEB_NOBODY) web_accept_make_room(web, conn);
     socket_tune(fd);
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     memset(conn, 0, sizeof *conn);
@@ -154,7 +155,7 @@ static int hand_over(struct web_link *web, struct web_conn *conn)
     return -1;
 }
 
-static int judge(struct web_link *web, struct web_conn *conn, const char *request, size_t begin, int result)
+static int web_accept_judge(struct web_link *web, struct web_conn *conn, const char *request, size_t begin, int result)
 {
     const int fd = web_lws.lws_get_socket_fd(conn->wsi);
     const char *words =
@@ -169,7 +170,7 @@ static int judge(struct web_link *web, struct web_conn *conn, const char *reques
         words = "a request must have at most 8192 bytes";
     }
     if (result == WEB_FOREIGN) return -1;
-    say(fd, result, words, conn->request.head_only);
+    web_accept_say(fd, result, words, conn->request.head_only);
     return linger(conn);
 }
 
@@ -188,7 +189,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
         begin++;
     conn->n_seen = (int)n;
     const int result = http_scan_head(&conn->scan, request + begin, (size_t)n - begin);
-    if (result != HTTP_SCAN_MORE || n == WEB_MAX_REQUEST) return judge(web, conn, request, begin, result);
+    if (result != HTTP_SCAN_MORE || n == WEB_MAX_REQUEST) return web_accept_judge(web, conn, request, begin, result);
     return ended ? -1 : wait_for_more(fd, (int)n);
 }
 
@@ -196,7 +197,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
 static int give_up(struct web_conn *conn)
 {
     if (conn->place.phase != WEB_ASKING || conn->n_seen == 0) return -1;
-    say(web_lws.lws_get_socket_fd(conn->wsi), 408, "a request must be complete within 20 s", 0);
+    web_accept_say(web_lws.lws_get_socket_fd(conn->wsi), 408, "a request must be complete within 20 s", 0);
     return linger(conn);
 }
 

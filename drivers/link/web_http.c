@@ -62,7 +62,7 @@ static int answer(struct web_conn *conn, int status, const char *type)
     return 0;
 }
 
-static int say(struct web_conn *conn, int status, const char *words)
+static int web_http_say(struct web_conn *conn, int status, const char *words)
 {
     conn->len = strlen(words) + 1;
     conn->bytes = conn->owned = malloc(conn->len + 1);
@@ -82,11 +82,11 @@ int web_http_begin(struct web_link *web, struct web_conn *conn)
         conn->len = page.len;
         return answer(conn, 200, page.type);
     }
-    if (asked->query_long) return say(conn, 400, "the query after ? has more than 1023 bytes");
+    if (asked->query_long) return web_http_say(conn, 400, "the query after ? has more than 1023 bytes");
     int rc = SH_EINPUT;
     if (web->source != NULL) rc = web->source->get(web->source->ctx, asked->path, asked->query, &body, &err);
-    if (rc == SH_EINPUT && err.text[0] == '\0') return say(conn, 404, "there is nothing at this path");
-    if (rc != SH_OK) return say(conn, rc == SH_EINPUT ? 400 : 503, err.text);
+    if (rc == SH_EINPUT && err.text[0] == '\0') return web_http_say(conn, 404, "there is nothing at this path");
+    if (rc != SH_OK) return web_http_say(conn, rc == SH_EINPUT ? 400 : 503, err.text);
     conn->bytes = conn->owned = body.bytes;
     conn->len = body.len;
     return answer(conn, 200, body.type);

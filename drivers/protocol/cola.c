@@ -21,7 +21,7 @@ uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
     return (uint32_t)((uint64_t)(t_ns - self->power_ns) / 1000U) - self->near_wrap;
 }
 
-static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int cola_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct cola *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
@@ -156,7 +156,7 @@ const struct protocol_ops protocol_cola = {
     .max_unit = COLA_MAX_UNIT,
     .content = cola_content,
     .reseal = cola_reseal,
-    .create = create,
+    .create = cola_create,
     .destroy = free,
     .open = open_at,
     .frame = take_frame, /* and no gap: the scan itself shows what is missing in it */

@@ -141,7 +141,7 @@ static struct parts cut(const struct cola_request *r)
 }
 
 /* The row; NULL and an error: there is none. */
-static const struct command *find(const struct cola *self, const struct parts *p, enum cola_error *error)
+static const struct command *cola_commands_find(const struct cola *self, const struct parts *p, enum cola_error *error)
 {
     const struct command *other = NULL;
     for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
@@ -169,7 +169,7 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
     enum cola_error error = COLA_COMMAND_UNKNOWN;
     self->field = cola_field_number(p.name);
     char head[COLA_MAX_NAME + 4];
-    const struct command *c = p.verb != 0 ? find(self, &p, &error) : NULL;
+    const struct command *c = p.verb != 0 ? cola_commands_find(self, &p, &error) : NULL;
     if (c == NULL) return error;
     if (c->level > self->level) return c->verb == 'W' ? COLA_WRITE_DENIED : COLA_METHOD_DENIED;
     snprintf(head, sizeof head, "%s %s", answer_verb(p.verb), p.name);

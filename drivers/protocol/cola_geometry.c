@@ -79,7 +79,7 @@ static int area_fits(const struct planar_head *head, const struct scan_cfg *aske
 }
 
 /* Finds the geometry that is asked for. Returns the status. */
-static uint32_t find(const struct cola *self, const struct scan_cfg *asked, struct planar_head *found)
+static uint32_t cola_geometry_find(const struct cola *self, const struct scan_cfg *asked, struct planar_head *found)
 {
     const struct planar_head *head = cola_head(self);
     const struct protocol_identity *id = self->identity;
@@ -143,7 +143,7 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
     enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     if (!cola_head(self)->known || self->next.is_due) return COLA_CONDITION;
-    uint32_t status = find(self, &asked, &wanted);
+    uint32_t status = cola_geometry_find(self, &asked, &wanted);
     const int other =
         status == OK && (wanted.steps != cola_head(self)->steps || wanted.lines_uhz != cola_head(self)->lines_uhz);
     if (other && is_measuring(self)) status = OTHER_ERROR;

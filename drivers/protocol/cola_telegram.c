@@ -9,7 +9,7 @@ enum { STX = 2, ETX = 3, B_HEAD = 8, B_MARKS = 4 };
 
 /* ---- reading */
 
-static uint32_t fail(struct cola_args *args, enum cola_error error)
+static uint32_t cola_telegram_fail(struct cola_args *args, enum cola_error error)
 {
     if (args->error == COLA_OK) args->error = error;
     return 0;
@@ -37,12 +37,12 @@ static uint32_t read_number(struct cola_args *args, uint8_t *sign)
     *sign = 0;
     if (args->at < args->end && (*args->at == '+' || *args->at == '-')) *sign = *args->at++;
     const int base = *sign != 0 ? 10 : 16;
-    if (args->at == args->end || *args->at == ' ') return fail(args, COLA_TOO_SHORT);
+    if (args->at == args->end || *args->at == ' ') return cola_telegram_fail(args, COLA_TOO_SHORT);
     for (; args->at < args->end && *args->at != ' '; args->at++) {
         const int d = digit(*args->at);
-        if (d >= base) return fail(args, COLA_CHARACTER);
+        if (d >= base) return cola_telegram_fail(args, COLA_CHARACTER);
         v = v * (uint64_t)base + (uint64_t)d;
-        if (v > UINT32_MAX) return fail(args, COLA_OVERFLOW);
+        if (v > UINT32_MAX) return cola_telegram_fail(args, COLA_OVERFLOW);
     }
     return (uint32_t)v;
 }
@@ -50,7 +50,7 @@ static uint32_t read_number(struct cola_args *args, uint8_t *sign)
 static uint32_t read_bytes(struct cola_args *args, unsigned bytes)
 {
     uint32_t v = 0;
-    if ((size_t)(args->end - args->at) < bytes) return fail(args, COLA_TOO_SHORT);
+    if ((size_t)(args->end - args->at) < bytes) return cola_telegram_fail(args, COLA_TOO_SHORT);
     for (unsigned i = 0; i < bytes; i++)
         v = v << 8 | *args->at++;
     return v;
@@ -62,7 +62,7 @@ uint32_t cola_arg_u(struct cola_args *args, unsigned bytes)
     if (args->error != COLA_OK) return 0;
     if (args->form == COLA_B) return read_bytes(args, bytes);
     const uint32_t v = read_number(args, &sign);
-    if (v > most(bytes) || (sign == '-' && v != 0)) return fail(args, COLA_OVERFLOW);
+    if (v > most(bytes) || (sign == '-' && v != 0)) return cola_telegram_fail(args, COLA_OVERFLOW);
     return v;
 }
 
@@ -79,7 +79,8 @@ int32_t cola_arg_i(struct cola_args *args, unsigned bytes)
     if (args->error != COLA_OK) return 0;
     if (args->form == COLA_B) return extend(read_bytes(args, bytes), bytes);
     const uint32_t v = read_number(args, &sign), half = most(bytes) / 2 + 1;
-    if (v > (sign == '+' ? half - 1 : sign == '-' ? half : most(bytes))) return (int32_t)fail(args, COLA_OVERFLOW);
+    if (v > (sign == '+' ? half - 1 : sign == '-' ? half : most(bytes)))
+        return (int32_t)cola_telegram_fail(args, COLA_OVERFLOW);
     return sign == '-' ? (int32_t)(0 - (int64_t)v) : extend(v, bytes);
 }
 
@@ -90,11 +91,11 @@ void cola_arg_text(struct cola_args *args, char *dst, size_t cap)
     if (args->error != COLA_OK) return;
     if (args->form == COLA_A && len != 0 && args->at < args->end) args->at++; /* the blank after the length */
     if ((size_t)(args->end - args->at) < len) {
-        fail(args, COLA_TOO_SHORT);
+        cola_telegram_fail(args, COLA_TOO_SHORT);
         return;
     }
     if (len >= cap) {
-        fail(args, COLA_OVERFLOW);
+        cola_telegram_fail(args, COLA_OVERFLOW);
         return;
     }
     memcpy(dst, args->at, len);
@@ -113,7 +114,7 @@ enum cola_error cola_args_end(const struct cola_args *args)
 
 /* ---- writing */
 
-static void put(struct cola_out *out, const void *bytes, size_t len)
+static void cola_telegram_put(struct cola_out *out, const void *bytes, size_t len)
 {
     if (out->cap - out->len < len) {
         out->full = 1;
@@ -129,9 +130,9 @@ void cola_begin(struct cola_out *out, enum cola_form form, const char *head)
     out->form = form;
     out->len = 0;
     out->full = 0;
-    put(out, marks, form == COLA_B ? B_HEAD : 1);
-    put(out, head, strlen(head));
-    if (form == COLA_B && strchr(head, ' ') != NULL) put(out, " ", 1);
+    cola_telegram_put(out, marks, form == COLA_B ? B_HEAD : 1);
+    cola_telegram_put(out, head, strlen(head));
+    if (form == COLA_B && strchr(head, ' ') != NULL) cola_telegram_put(out, " ", 1);
 }
 
 static void put_hex(struct cola_out *out, uint32_t v, unsigned least)
@@ -141,7 +142,7 @@ static void put_hex(struct cola_out *out, uint32_t v, unsigned least)
     for (unsigned n = 0; v != 0 || n < least; v >>= 4, n++)
         text[--at] = "0123456789ABCDEF"[v & 15u];
     text[--at] = ' ';
-    put(out, text + at, sizeof text - at);
+    cola_telegram_put(out, text + at, sizeof text - at);
 }
 
 void cola_put_u(struct cola_out *out, unsigned bytes, uint32_t v)
@@ -152,7 +153,7 @@ void cola_put_u(struct cola_out *out, unsigned bytes, uint32_t v)
     }
     uint8_t wire[4];
     be_put32(wire, v);
-    put(out, wire + 4 - bytes, bytes);
+    cola_telegram_put(out, wire + 4 - bytes, bytes);
 }
 
 void cola_put_i(struct cola_out *out, unsigned bytes, int32_t v)
@@ -172,8 +173,8 @@ void cola_put_float(struct cola_out *out, float v)
 
 void cola_put_word(struct cola_out *out, const char *word)
 {
-    if (out->form == COLA_A) put(out, " ", 1);
-    put(out, word, strlen(word));
+    if (out->form == COLA_A) cola_telegram_put(out, " ", 1);
+    cola_telegram_put(out, word, strlen(word));
 }
 
 void cola_put_text(struct cola_out *out, const char *text)
@@ -192,7 +193,7 @@ size_t cola_end(struct cola_out *out)
         for (size_t i = B_HEAD; i < out->len; i++)
             check ^= out->buf[i];
     }
-    put(out, &check, 1);
+    cola_telegram_put(out, &check, 1);
     return out->full ? 0 : out->len;
 }
 

@@ -139,7 +139,7 @@ const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_E
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 
 /* A number of 4 or 8 bytes between the machine's order and the wire's; the same both ways. */
-static void turn(void *to, const void *from, size_t unit)
+static void fields_turn(void *to, const void *from, size_t unit)
 {
     if (unit == 4) {
         uint32_t v = le_get32(from);
@@ -161,7 +161,7 @@ static size_t encode_field(const struct field *field, const char *from, uint8_t 
     }
     size_t unit = field->kind == FIELD_32 ? 4 : 8;
     for (size_t i = 0; i < field->count; i++)
-        turn(wire + i * unit, from + i * unit, unit);
+        fields_turn(wire + i * unit, from + i * unit, unit);
     return unit * field->count;
 }
 
@@ -176,7 +176,7 @@ static int decode_field(const struct field *field, const uint8_t *wire, char *to
     size_t unit = field->kind == FIELD_32 ? 4 : 8;
     for (size_t i = 0; i < field->count; i++) {
         double real = 0;
-        turn(to + i * unit, wire + i * unit, unit);
+        fields_turn(to + i * unit, wire + i * unit, unit);
         if (field->kind == FIELD_REAL) memcpy(&real, to + i * unit, sizeof real);
         if (!isfinite(real)) return SH_EFORMAT;
     }

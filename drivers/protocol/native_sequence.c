@@ -13,7 +13,7 @@ static struct native_seen look_of(const struct native_header *header)
                                 .flags = header->flags};
 }
 
-static int is_same(const struct native_seen *a, const struct native_seen *b)
+static int native_sequence_is_same(const struct native_seen *a, const struct native_seen *b)
 {
     return a->seq == b->seq && a->t_ns == b->t_ns && a->payload_crc == b->payload_crc && a->type == b->type &&
            a->length == b->length && a->flags == b->flags;
@@ -28,7 +28,7 @@ static void remember(struct native_sequence *s, const struct native_seen *frame)
 static int has_come(const struct native_sequence *s, const struct native_seen *frame, uint32_t most)
 {
     for (uint32_t i = 1; i <= most && i <= s->n_seen; i++)
-        if (is_same(&s->seen[(s->n_seen - i) % NATIVE_SEEN], frame)) return 1;
+        if (native_sequence_is_same(&s->seen[(s->n_seen - i) % NATIVE_SEEN], frame)) return 1;
     return 0;
 }
 
@@ -89,7 +89,7 @@ static enum native_notice_kind look_at_jump(struct native_sequence *s, const str
 /* LOCAL frames are not numbered, and a head may send equal ones, but never two in a row. */
 static enum native_notice_kind look_at_local(struct native_sequence *s, const struct native_seen *frame)
 {
-    if (is_same(&s->local, frame)) return NATIVE_REPEATED;
+    if (native_sequence_is_same(&s->local, frame)) return NATIVE_REPEATED;
     s->local = *frame;
     return NATIVE_NO_NOTICE;
 }

@@ -14,8 +14,8 @@ struct sentence {
     size_t cap, len;
 };
 
-static void put(struct sentence *s, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
-static void put(struct sentence *s, const char *fmt, ...)
+static void nmea_put(struct sentence *s, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+static void nmea_put(struct sentence *s, const char *fmt, ...)
 {
     va_list args;
     va_start(args, fmt);
@@ -32,23 +32,23 @@ uint8_t nmea_checksum(const char *text, size_t len)
     return sum;
 }
 
-static struct sentence begin(char *dst, size_t cap, const struct nmea_fix *fix, const char *type)
+static struct sentence nmea_begin(char *dst, size_t cap, const struct nmea_fix *fix, const char *type)
 {
     struct sentence s = {dst, cap, 0};
-    put(&s, "$%.2s%s", fix->talker, type);
+    nmea_put(&s, "$%.2s%s", fix->talker, type);
     return s;
 }
 
-static size_t end(struct sentence *s)
+static size_t nmea_end(struct sentence *s)
 {
     unsigned sum = s->len < s->cap ? nmea_checksum(s->dst + 1, s->len - 1) : 0;
-    put(s, "*%02X\r\n", sum);
+    nmea_put(s, "*%02X\r\n", sum);
     return s->len < s->cap ? s->len : 0;
 }
 
 static void put_time(struct sentence *s, const struct nmea_fix *fix)
 {
-    put(s, ",%02d%02d%02d.%02d", fix->hour, fix->minute, fix->second, fix->hundredth);
+    nmea_put(s, ",%02d%02d%02d.%02d", fix->hour, fix->minute, fix->second, fix->hundredth);
 }
 
 /* ddmm.mmmmmmm and its letter. Rounded as a whole, so that the minutes never read 60. */
@@ -59,13 +59,14 @@ static void put_angle(struct sentence *s, double deg, int degree_digits, char po
     char letter = total < 0 ? negative : positive;
     total = llabs(total);
     long long minutes = total % degree;
-    put(s, ",%0*lld%02lld.%07lld,%c", degree_digits, total / degree, minutes / 10000000, minutes % 10000000, letter);
+    nmea_put(s, ",%0*lld%02lld.%07lld,%c", degree_digits, total / degree, minutes / 10000000, minutes % 10000000,
+             letter);
 }
 
 static void put_place(struct sentence *s, const struct nmea_fix *fix)
 {
     if (fix->quality == 0) {
-        put(s, ",,,,");
+        nmea_put(s, ",,,,");
         return;
     }
     put_angle(s, fix->lat_deg, 2, 'N', 'S');
@@ -74,69 +75,69 @@ static void put_place(struct sentence *s, const struct nmea_fix *fix)
 
 size_t nmea_encode_gga(char *dst, size_t cap, const struct nmea_fix *fix)
 {
-    struct sentence s = begin(dst, cap, fix, "GGA");
+    struct sentence s = nmea_begin(dst, cap, fix, "GGA");
     put_time(&s, fix);
     put_place(&s, fix);
     if (fix->quality == 0)
-        put(&s, ",0,00,,,M,,M,,");
+        nmea_put(&s, ",0,00,,,M,,M,,");
     else
-        put(&s, ",%d,%02d,%.1f,%.4f,M,%.4f,M,,", fix->quality, fix->satellites, fix->hdop, fix->altitude_m,
-            fix->geoid_separation_m);
-    return end(&s);
+        nmea_put(&s, ",%d,%02d,%.1f,%.4f,M,%.4f,M,,", fix->quality, fix->satellites, fix->hdop, fix->altitude_m,
+                 fix->geoid_separation_m);
+    return nmea_end(&s);
 }
 
 size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
 {
     static const char mode[] = "NADNRF"; /* by quality: not valid, autonomous, differential, -, RTK, RTK float */
-    struct sentence s = begin(dst, cap, fix, "RMC");
+    struct sentence s = nmea_begin(dst, cap, fix, "RMC");
     put_time(&s, fix);
-    put(&s, ",%c", fix->quality == 0 ? 'V' : 'A');
+    nmea_put(&s, ",%c", fix->quality == 0 ? 'V' : 'A');
     put_place(&s, fix);
     if (fix->quality == 0)
-        put(&s, ",,");
+        nmea_put(&s, ",,");
     else if (isnan(fix->course_deg)) /* readers by sscanf read no sentence with an empty field */
-        put(&s, ",%.3f,000.0", fix->speed_m_s / KNOT_M_S);
+        nmea_put(&s, ",%.3f,000.0", fix->speed_m_s / KNOT_M_S);
     else /* cut, so that it never reads 360 */
-        put(&s, ",%.3f,%.2f", fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
-    put(&s, ",%02d%02d%02d,,,%c", fix->day, fix->month, fix->year % 100,
-        mode[fix->quality >= 0 && fix->quality <= 5 ? fix->quality : 0]);
-    return end(&s);
+        nmea_put(&s, ",%.3f,%.2f", fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
+    nmea_put(&s, ",%02d%02d%02d,,,%c", fix->day, fix->month, fix->year % 100,
+             mode[fix->quality >= 0 && fix->quality <= 5 ? fix->quality : 0]);
+    return nmea_end(&s);
 }
 
 /* Single satellites are not modelled, so it lists the numbers from 1 on, 12 at most. */
 size_t nmea_encode_gsa(char *dst, size_t cap, const struct nmea_fix *fix)
 {
-    struct sentence s = begin(dst, cap, fix, "GSA");
-    put(&s, ",A,%d", fix->quality == 0 ? 1 : 3);
+    struct sentence s = nmea_begin(dst, cap, fix, "GSA");
+    nmea_put(&s, ",A,%d", fix->quality == 0 ? 1 : 3);
     for (int i = 1; i <= 12; i++)
         if (fix->quality != 0 && i <= fix->satellites)
-            put(&s, ",%02d", i);
+            nmea_put(&s, ",%02d", i);
         else
-            put(&s, ",");
+            nmea_put(&s, ",");
     if (fix->quality == 0)
-        put(&s, ",,,");
+        nmea_put(&s, ",,,");
     else
-        put(&s, ",,%.1f,", fix->hdop);
-    return end(&s);
+        nmea_put(&s, ",,%.1f,", fix->hdop);
+    return nmea_end(&s);
 }
 
 size_t nmea_encode_gst(char *dst, size_t cap, const struct nmea_fix *fix)
 {
-    struct sentence s = begin(dst, cap, fix, "GST");
+    struct sentence s = nmea_begin(dst, cap, fix, "GST");
     put_time(&s, fix);
     if (fix->quality == 0)
-        put(&s, ",,,,,,,");
+        nmea_put(&s, ",,,,,,,");
     else
-        put(&s, ",,,,,%.4f,%.4f,%.4f", fix->sigma_m[0], fix->sigma_m[1], fix->sigma_m[2]);
-    return end(&s);
+        nmea_put(&s, ",,,,,%.4f,%.4f,%.4f", fix->sigma_m[0], fix->sigma_m[1], fix->sigma_m[2]);
+    return nmea_end(&s);
 }
 
 size_t nmea_encode_zda(char *dst, size_t cap, const struct nmea_fix *fix)
 {
-    struct sentence s = begin(dst, cap, fix, "ZDA");
+    struct sentence s = nmea_begin(dst, cap, fix, "ZDA");
     put_time(&s, fix);
-    put(&s, ",%02d,%02d,%04d,00,00", fix->day, fix->month, fix->year);
-    return end(&s);
+    nmea_put(&s, ",%02d,%02d,%04d,00,00", fix->day, fix->month, fix->year);
+    return nmea_end(&s);
 }
 
 size_t nmea_encode_all(char *dst, size_t cap, const struct nmea_fix *fix)

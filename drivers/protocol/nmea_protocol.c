@@ -10,7 +10,7 @@ struct receiver {
     int64_t next_ns; /* the next one; INT64_MIN: to be asked for */
 };
 
-static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int nmea_protocol_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct receiver *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol nmea: no memory");
@@ -27,7 +27,7 @@ static void open_at(void *protocol, int64_t t_ns)
     self->next_ns = INT64_MIN;
 }
 
-static void say(struct receiver *self, int64_t t_ns)
+static void nmea_protocol_say(struct receiver *self, int64_t t_ns)
 {
     struct nmea_fix fix;
     char text[NMEA_MAX_ALL];
@@ -41,7 +41,7 @@ static void pass(void *protocol, int64_t t_ns)
     struct receiver *self = protocol;
     if (self->next_ns == INT64_MIN) self->next_ns = self->host.next_fix_ns(self->host.ctx, self->from_ns);
     while (self->next_ns < t_ns) {
-        say(self, self->next_ns);
+        nmea_protocol_say(self, self->next_ns);
         self->next_ns = self->host.next_fix_ns(self->host.ctx, self->next_ns + 1);
     }
 }
@@ -65,7 +65,7 @@ const struct protocol_ops protocol_nmea = {
     .max_unit = NMEA_MAX_ALL,
     .content = nmea_content,
     .reseal = nmea_reseal,
-    .create = create,
+    .create = nmea_protocol_create,
     .destroy = free,
     .open = open_at,
     .time = pass,

@@ -134,7 +134,7 @@ size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint
 
 /* ---- reading */
 
-static int fail(const struct pcapng_reader *reader, struct sh_err *err, const char *what)
+static int pcapng_fail(const struct pcapng_reader *reader, struct sh_err *err, const char *what)
 {
     return sh_fail(err, SH_EFORMAT, "at byte %llu: %s", (unsigned long long)reader->at_byte, what);
 }
@@ -159,8 +159,8 @@ static int64_t to_ns(uint64_t time, int resolution)
 
 static int read_section(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct sh_err *err)
 {
-    if (len < SECTION_LEN) return fail(reader, err, "a section's block is too short");
-    if (le_get16(block + 12) != 1) return fail(reader, err, "its version of pcapng is not 1");
+    if (len < SECTION_LEN) return pcapng_fail(reader, err, "a section's block is too short");
+    if (le_get16(block + 12) != 1) return pcapng_fail(reader, err, "its version of pcapng is not 1");
     reader->in_section = 1;
     reader->n_interfaces = 0;
     return PCAPNG_OTHER;
@@ -168,8 +168,8 @@ static int read_section(struct pcapng_reader *reader, const uint8_t *block, size
 
 static int read_interface(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct sh_err *err)
 {
-    if (len < INTERFACE_LEN) return fail(reader, err, "an interface's block is too short");
-    if (reader->n_interfaces == PCAPNG_MAX_INTERFACES) return fail(reader, err, "more than 64 interfaces");
+    if (len < INTERFACE_LEN) return pcapng_fail(reader, err, "an interface's block is too short");
+    if (reader->n_interfaces == PCAPNG_MAX_INTERFACES) return pcapng_fail(reader, err, "more than 64 interfaces");
     struct pcapng_interface *interface = &reader->interface[reader->n_interfaces++];
     *interface = (struct pcapng_interface){
         .link = le_get16(block + 8), .snap_len = le_get32(block + 12), .resolution = MICROSECONDS};
@@ -185,10 +185,11 @@ static int read_interface(struct pcapng_reader *reader, const uint8_t *block, si
 static int read_packet(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct pcapng_packet *packet,
                        struct sh_err *err)
 {
-    if (len < PCAPNG_PACKET_HEAD + 4) return fail(reader, err, "a packet's block is too short");
+    if (len < PCAPNG_PACKET_HEAD + 4) return pcapng_fail(reader, err, "a packet's block is too short");
     const uint32_t index = le_get32(block + 8), n = le_get32(block + 20);
-    if (index >= reader->n_interfaces) return fail(reader, err, "a packet of an interface that is not described");
-    if (n > len - PCAPNG_PACKET_HEAD - 4) return fail(reader, err, "a packet is longer than its block");
+    if (index >= reader->n_interfaces)
+        return pcapng_fail(reader, err, "a packet of an interface that is not described");
+    if (n > len - PCAPNG_PACKET_HEAD - 4) return pcapng_fail(reader, err, "a packet is longer than its block");
     const struct pcapng_interface *interface = &reader->interface[index];
     const uint64_t time = (uint64_t)le_get32(block + 12) << 32 | le_get32(block + 16);
     *packet = (struct pcapng_packet){.link = interface->link,
@@ -203,13 +204,13 @@ static int read_packet(struct pcapng_reader *reader, const uint8_t *block, size_
 static int read_simple(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct pcapng_packet *packet,
                        struct sh_err *err)
 {
-    if (len < SIMPLE_HEAD + 4) return fail(reader, err, "a packet's block is too short");
-    if (reader->n_interfaces == 0) return fail(reader, err, "a packet of an interface that is not described");
+    if (len < SIMPLE_HEAD + 4) return pcapng_fail(reader, err, "a packet's block is too short");
+    if (reader->n_interfaces == 0) return pcapng_fail(reader, err, "a packet of an interface that is not described");
     const size_t room = len - SIMPLE_HEAD - 4;
     uint32_t n = le_get32(block + 8);
     *packet = (struct pcapng_packet){.link = reader->interface[0].link, .original_len = n};
     if (reader->interface[0].snap_len != 0 && n > reader->interface[0].snap_len) n = reader->interface[0].snap_len;
-    if (n > room) return fail(reader, err, "a packet is longer than its block");
+    if (n > room) return pcapng_fail(reader, err, "a packet is longer than its block");
     packet->data = block + SIMPLE_HEAD;
     packet->len = n;
     return PCAPNG_PACKET;
@@ -236,13 +237,13 @@ int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, 
     reader->needed = LEAST_BLOCK;
     if (len < LEAST_BLOCK) return PCAPNG_MORE;
     const char *why = check_front(reader, bytes, len);
-    if (why != NULL) return fail(reader, err, why);
+    if (why != NULL) return pcapng_fail(reader, err, why);
     const uint32_t type = le_get32(bytes), size = le_get32(bytes + 4);
     if (size < LEAST_BLOCK || size % 4 != 0 || size > PCAPNG_MAX_BLOCK)
-        return fail(reader, err, "a block's length is not possible");
+        return pcapng_fail(reader, err, "a block's length is not possible");
     reader->needed = size;
     if (len < size) return PCAPNG_MORE;
-    if (le_get32(bytes + size - 4) != size) return fail(reader, err, "the two lengths of a block differ");
+    if (le_get32(bytes + size - 4) != size) return pcapng_fail(reader, err, "the two lengths of a block differ");
     const int item = type == BLOCK_SECTION         ? read_section(reader, bytes, size, err)
                      : type == BLOCK_INTERFACE     ? read_interface(reader, bytes, size, err)
                      : type == BLOCK_PACKET        ? read_packet(reader, bytes, size, packet, err)

@@ -70,7 +70,7 @@ static void take_emitter(struct planar_scan *s, const struct native_emitter *e)
 }
 
 /* The place that looks at a pan count. Pan counts grow clockwise, places counter-clockwise. */
-static uint32_t place_of(const struct planar_scan *s, uint32_t pan)
+static uint32_t planar_scan_place_of(const struct planar_scan *s, uint32_t pan)
 {
     const uint64_t turned = (uint64_t)(pan * s->steps_per_count + 0.5);
     uint32_t place =
@@ -124,7 +124,7 @@ static int from_start(const struct planar_scan *s, const uint8_t *payload, const
     struct native_point p;
     if (points->n_points == 0) return 0;
     native_decode_point(payload, 0, &p);
-    return place_of(s, p.c) == (s->emitter.turn < 0 ? 0 : s->head.n - 1);
+    return planar_scan_place_of(s, p.c) == (s->emitter.turn < 0 ? 0 : s->head.n - 1);
 }
 
 /* ---- points and attributes */
@@ -145,7 +145,7 @@ static void add_points(struct planar_scan *s, const uint8_t *payload, uint32_t n
         struct native_point p;
         native_decode_point(payload, i, &p);
         if (p.echo <= 1) { /* a pulse begins; all of it is in this frame */
-            place = place_of(s, p.c);
+            place = planar_scan_place_of(s, p.c);
             if (place != NOWHERE && turn->n[place] != PLANAR_UNSEEN) place = NOWHERE; /* it came before */
             if (place != NOWHERE) turn->n[place] = 0;
             s->n_seen += place != NOWHERE;
@@ -154,8 +154,8 @@ static void add_points(struct planar_scan *s, const uint8_t *payload, uint32_t n
     }
 }
 
-static void take_points(struct planar_scan *s, const struct native_header *header, const uint8_t *payload,
-                        const struct native_points *points, struct planar_news *news)
+static void planar_scan_take_points(struct planar_scan *s, const struct native_header *header, const uint8_t *payload,
+                                    const struct native_points *points, struct planar_news *news)
 {
     turn_to(s, header->t_ns - points->t0_ns, points->line, points->line_t0_ns, from_start(s, payload, points), news);
     if (s->n_waiting != 0) break_turn(s, news); /* the attributes of the points before are missing */
@@ -210,7 +210,7 @@ struct planar_news planar_scan_frame(struct planar_scan *s, const uint8_t *frame
         if (native_decode_emitter(payload, h.length, &u.emitter) == 0) take_emitter(s, &u.emitter);
     } else if (s->head.known) {
         if (h.type == NATIVE_POINTS && native_decode_points(payload, h.length, &u.points) == 0)
-            take_points(s, &h, payload, &u.points, &news);
+            planar_scan_take_points(s, &h, payload, &u.points, &news);
         if (h.type == NATIVE_ATTRIBUTES && native_decode_attributes(payload, h.length, &u.attributes) == 0)
             take_attributes(s, payload, &u.attributes, &news);
         if (h.type == NATIVE_LINE_END && native_decode_line_end(payload, h.length, &u.end) == 0)

@@ -6,7 +6,7 @@
 
 /* Hokuyo's SCIP 2.0 and 2.2, the sensor's side: see SCIP.md. Here: the session, and bytes into lines. */
 
-static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int scip_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct scip *s = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "scip: no memory for a session");
@@ -63,7 +63,7 @@ void scip_answer(struct scip *s, const char *echo, size_t len, const char *statu
 }
 
 /* A line with bytes that no command has is noise, of a wrong bit rate for example: it gets no answer. */
-static void take_line(struct scip *s)
+static void scip_take_line(struct scip *s)
 {
     if (s->foul) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->n_line);
     if (!s->foul && s->is_over)
@@ -81,7 +81,7 @@ static void input(void *protocol, const uint8_t *bytes, size_t len)
     uint64_t n_over = 0;
     for (size_t i = 0; i < len; i++) {
         if (bytes[i] == '\n' || bytes[i] == '\r') {
-            take_line(s);
+            scip_take_line(s);
             continue;
         }
         if (bytes[i] < 0x20 || bytes[i] > 0x7e) s->foul = 1;
@@ -151,7 +151,7 @@ const struct protocol_ops protocol_scip = {
     .max_unit = SCIP_MAX_UNIT,
     .content = scip_content,
     .reseal = scip_reseal,
-    .create = create,
+    .create = scip_create,
     .destroy = free,
     .open = open_session,
     .frame = frame, /* and no gap: the times and steps of the turns show what is missing */

@@ -187,7 +187,7 @@ static const struct command {
     {"NE", 13, SCIP_MULTI_ECHO | SCIP_INTENSITY, scip_measure},
 };
 
-static const struct command *find(const struct scip *s, const char *line, size_t len)
+static const struct command *scip_command_find(const struct scip *s, const char *line, size_t len)
 {
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         const struct command *c = &commands[i];
@@ -225,7 +225,7 @@ void scip_command(struct scip *s, const char *line, size_t len)
 {
     const char *tag = memchr(line, ';', len);
     const size_t n = tag == NULL ? len : (size_t)(tag - line);
-    const struct command *c = find(s, line, n);
+    const struct command *c = scip_command_find(s, line, n);
     const char *wrong = check_line(s, c, line, len, n);
     if (wrong != NULL)
         scip_answer(s, line, len, wrong);

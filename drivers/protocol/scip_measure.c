@@ -63,7 +63,7 @@ static int is_time_us(const char *line)
     return line[0] == '%';
 }
 
-static const char *begin(struct scip *s, struct scip_request *q, const char *line, size_t len, int streams)
+static const char *scip_measure_begin(struct scip *s, struct scip_request *q, const char *line, size_t len, int streams)
 {
     memset(q, 0, sizeof *q);
     memcpy(q->echo, line, len);
@@ -89,7 +89,7 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     enum { WAIT_NS = 2000000000 };
     struct scip_request request;
     const int streams = is_time_us(line) || line[0] == 'M' || line[0] == 'N';
-    const char *refused = scip_has_head(s) ? begin(s, &request, line, len, streams) : "0A";
+    const char *refused = scip_has_head(s) ? scip_measure_begin(s, &request, line, len, streams) : "0A";
     if (refused == NULL && !streams && s->single.active) refused = "0B";
     if (refused != NULL) {
         scip_answer(s, line, len, refused);

@@ -10,7 +10,7 @@ static char sum_char(uint32_t sum)
     return (char)((sum & 0x3f) + 0x30);
 }
 
-static void put(struct scip_reply *r, const char *text, size_t len)
+static void scip_reply_put(struct scip_reply *r, const char *text, size_t len)
 {
     memcpy(r->bytes + r->len, text, len);
     r->len += len;
@@ -27,16 +27,16 @@ static uint32_t sum_of(const char *text, size_t len)
 void scip_reply_line(struct scip_reply *r, const char *text, size_t len)
 {
     const char tail[2] = {sum_char(sum_of(text, len)), '\n'};
-    put(r, text, len);
-    put(r, tail, sizeof tail);
+    scip_reply_put(r, text, len);
+    scip_reply_put(r, tail, sizeof tail);
 }
 
 void scip_reply_begin(struct scip_reply *r, const char *echo, size_t len, const char *status)
 {
     r->len = r->block = 0;
     r->sum = 0;
-    put(r, echo, len);
-    put(r, "\n", 1);
+    scip_reply_put(r, echo, len);
+    scip_reply_put(r, "\n", 1);
     scip_reply_line(r, status, 2);
 }
 
@@ -50,8 +50,8 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
     va_end(args);
     const size_t len = strlen(line);
     const char tail[3] = {';', sum_char(sum_of(line, len)), '\n'};
-    put(r, line, len);
-    put(r, tail, sizeof tail);
+    scip_reply_put(r, line, len);
+    scip_reply_put(r, tail, sizeof tail);
 }
 
 enum { MOST_CHARS = 4, TIME_US_CHARS = 11 };
@@ -86,7 +86,7 @@ static void close_block(struct scip_reply *r)
 {
     const char tail[2] = {sum_char(r->sum), '\n'};
     if (r->block == 0) return;
-    put(r, tail, sizeof tail);
+    scip_reply_put(r, tail, sizeof tail);
     r->block = 0;
     r->sum = 0;
 }
@@ -110,5 +110,5 @@ void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars)
 void scip_reply_end(struct scip_reply *r)
 {
     close_block(r);
-    put(r, "\n", 1);
+    scip_reply_put(r, "\n", 1);
 }

@@ -66,7 +66,7 @@ uint8_t velodyne_reflectivity(int refl_cdb)
     return (uint8_t)(101 + refl_cdb / 20);
 }
 
-static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int velodyne_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct velodyne *v = calloc(1, sizeof *v);
     if (v == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a Velodyne session");
@@ -227,7 +227,7 @@ static uint32_t points_of_pulse(const uint8_t *payload, uint32_t i, uint32_t n_p
     return n < n_points - i ? n : n_points - i;
 }
 
-static void take_points(struct velodyne *v, const uint8_t *payload, size_t len, int64_t frame_t_ns)
+static void velodyne_take_points(struct velodyne *v, const uint8_t *payload, size_t len, int64_t frame_t_ns)
 {
     struct native_points head;
     if (native_decode_points(payload, len, &head) != SH_OK) return;
@@ -246,7 +246,7 @@ static void take_points(struct velodyne *v, const uint8_t *payload, size_t len, 
     v->next_pulse = pulse;
 }
 
-static void take_event(struct velodyne *v, const uint8_t *payload, size_t len)
+static void velodyne_take_event(struct velodyne *v, const uint8_t *payload, size_t len)
 {
     struct native_event e;
     if (native_decode_event(payload, len, &e) != SH_OK) return;
@@ -260,10 +260,10 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     struct native_header header;
     native_read_header(bytes, &header);
     len -= NATIVE_HEADER_LEN;
-    if (header.type == NATIVE_POINTS) take_points(v, payload, len, header.t_ns);
+    if (header.type == NATIVE_POINTS) velodyne_take_points(v, payload, len, header.t_ns);
     if (header.type == NATIVE_DESCRIPTOR) take_descriptor(v, payload, len);
     if (header.type == NATIVE_EMITTER) take_emitter(v, payload, len);
-    if (header.type == NATIVE_EVENT) take_event(v, payload, len);
+    if (header.type == NATIVE_EVENT) velodyne_take_event(v, payload, len);
 }
 
 static void gap(void *protocol, uint32_t n_frames)
@@ -310,7 +310,7 @@ const struct protocol_ops protocol_velodyne = {
     .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_DATA_LEN,
     .content = mark_entries,
-    .create = create,
+    .create = velodyne_create,
     .destroy = free,
     .open = nothing_at,
     .frame = frame,

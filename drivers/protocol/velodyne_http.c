@@ -23,7 +23,7 @@ struct server {
     char body[MAX_BODY], answer[MAX_ANSWER];
 };
 
-static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int velodyne_http_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct server *s = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne settings");
@@ -190,7 +190,7 @@ const struct protocol_ops protocol_velodyne_http = {
     .n_beams = VELODYNE_BEAMS,
     .max_unit = MAX_ANSWER,
     .brief = 1,
-    .create = create,
+    .create = velodyne_http_create,
     .destroy = free,
     .open = open_at,
     .time = at_time,

@@ -18,8 +18,8 @@ struct page {
     size_t cap, len;
 };
 
-static void put(struct page *p, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
-static void put(struct page *p, const char *fmt, ...)
+static void velodyne_pages_put(struct page *p, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+static void velodyne_pages_put(struct page *p, const char *fmt, ...)
 {
     va_list args;
     va_start(args, fmt);
@@ -31,13 +31,13 @@ static void put(struct page *p, const char *fmt, ...)
 /* A string of JSON, ASCII alone. */
 static void put_string(struct page *p, const char *s)
 {
-    put(p, "\"");
+    velodyne_pages_put(p, "\"");
     for (; *s != '\0'; s++)
         if ((unsigned char)*s < 32 || (unsigned char)*s > 126 || strchr("\"\\<>&", *s) != NULL)
-            put(p, "\\u%04x", (unsigned)(unsigned char)*s);
+            velodyne_pages_put(p, "\\u%04x", (unsigned)(unsigned char)*s);
         else
-            put(p, "%c", *s);
-    put(p, "\"");
+            velodyne_pages_put(p, "%c", *s);
+    velodyne_pages_put(p, "\"");
 }
 
 static const char *on_off(int on)
@@ -50,43 +50,46 @@ static void put_position(struct page *p)
 {
     struct nmea_fix fix;
     if (!p->spec->host.fix(p->spec->host.ctx, p->t_ns, &fix) || fix.quality == 0) {
-        put(p, "\"\"");
+        velodyne_pages_put(p, "\"\"");
         return;
     }
     const long lat = lround(fabs(fix.lat_deg) * 6000.0), lon = lround(fabs(fix.lon_deg) * 6000.0);
-    put(p, "\"%ld %02ld.%02ld%c %ld %02ld.%02ld%c\"", lat / 6000, lat / 100 % 60, lat % 100,
-        fix.lat_deg < 0.0 ? 'S' : 'N', lon / 6000, lon / 100 % 60, lon % 100, fix.lon_deg < 0.0 ? 'W' : 'E');
+    velodyne_pages_put(p, "\"%ld %02ld.%02ld%c %ld %02ld.%02ld%c\"", lat / 6000, lat / 100 % 60, lat % 100,
+                       fix.lat_deg < 0.0 ? 'S' : 'N', lon / 6000, lon / 100 % 60, lon % 100,
+                       fix.lon_deg < 0.0 ? 'W' : 'E');
 }
 
 static void put_info(struct page *p)
 {
     const struct protocol_identity *id = p->spec->identity;
-    put(p, "{\"model\":");
+    velodyne_pages_put(p, "{\"model\":");
     put_string(p, id->model);
-    put(p, ",\"serial\":");
+    velodyne_pages_put(p, ",\"serial\":");
     put_string(p, id->serial);
-    put(p, ",\"firmware\":");
+    velodyne_pages_put(p, ",\"firmware\":");
     put_string(p, id->firmware);
-    put(p, ",\"mac_addr\":\"02-00-00-00-00-00\"}"); /* locally administered: nobody's */
+    velodyne_pages_put(p, ",\"mac_addr\":\"02-00-00-00-00-00\"}"); /* locally administered: nobody's */
 }
 
 static void put_status(struct page *p)
 {
     static const char *const words[] = {"Absent", "Synchronizing", "Locked", "Error"};
-    put(p, "{\"gps\":{\"pps_state\":\"%s\",\"position\":", words[velodyne_pps(&p->spec->host, p->t_ns)]);
+    velodyne_pages_put(p, "{\"gps\":{\"pps_state\":\"%s\",\"position\":", words[velodyne_pps(&p->spec->host, p->t_ns)]);
     put_position(p);
-    put(p, "},\"motor\":{\"state\":\"%s\",\"rpm\":%u,\"lock\":\"Off\",\"phase\":0},\"laser\":{\"state\":\"%s\"}}",
+    velodyne_pages_put(
+        p, "},\"motor\":{\"state\":\"%s\",\"rpm\":%u,\"lock\":\"Off\",\"phase\":0},\"laser\":{\"state\":\"%s\"}}",
         on_off(p->state.motor_on), p->state.motor_on ? p->state.rpm : 0, on_off(p->state.laser_on));
 }
 
 static void put_settings(struct page *p)
 {
-    put(p, "{\"laser\":\"%s\",\"returns\":\"%s\",\"rpm\":%u,\"fov\":{\"start\":0,\"end\":359},",
-        on_off(p->state.laser_on), p->state.returns, p->state.rpm);
-    put(p, "\"phaselock\":{\"enabled\":\"Off\",\"offset\":0,\"offsetInput\":0},\"host\":{\"addr\":");
+    velodyne_pages_put(p, "{\"laser\":\"%s\",\"returns\":\"%s\",\"rpm\":%u,\"fov\":{\"start\":0,\"end\":359},",
+                       on_off(p->state.laser_on), p->state.returns, p->state.rpm);
+    velodyne_pages_put(p, "\"phaselock\":{\"enabled\":\"Off\",\"offset\":0,\"offsetInput\":0},\"host\":{\"addr\":");
     put_string(p, velodyne_host_address(p->spec));
-    put(p, ",\"dport\":%d,\"tport\":%d},", velodyne_host_port(p->spec), VELODYNE_POSITION_PORT);
-    put(p,
+    velodyne_pages_put(p, ",\"dport\":%d,\"tport\":%d},", velodyne_host_port(p->spec), VELODYNE_POSITION_PORT);
+    velodyne_pages_put(
+        p,
         "\"net\":{\"addr\":\"\",\"mask\":\"\",\"gateway\":\"\",\"dhcp\":\"Off\",\"mac_addr\":\"02-00-00-00-00-00\"}}");
 }
 
@@ -94,40 +97,40 @@ static void put_settings(struct page *p)
  * are within its ranges. None of them is modelled. */
 static void put_diag(struct page *p)
 {
-    put(p, "{\"volt_temp\":{\"top\":{"
-           "\"hv\":2952,"         /* -141 V */
-           "\"ad_temp\":480,"     /* no published conversion */
-           "\"lm20_temp\":1126,"  /* 42 deg C */
-           "\"pwr_5v\":2048,"     /* 5.0 V */
-           "\"pwr_2_5v\":2048,"   /* 2.5 V */
-           "\"pwr_3_3v\":2703,"   /* 3.3 V */
-           "\"pwr_5v_raw\":2048," /* 5.0 V */
-           "\"pwr_raw\":2048,"
-           "\"pwr_vccint\":983},"); /* 1.2 V */
-    put(p, "\"bot\":{"
-           "\"i_out\":2107,"     /* 0.72 A */
-           "\"pwr_1_2v\":983,"   /* 1.2 V */
-           "\"lm20_temp\":1155," /* 39 deg C */
-           "\"pwr_5v\":2048,"
-           "\"pwr_2_5v\":2048,"
-           "\"pwr_3_3v\":2703,"
-           "\"pwr_v_in\":894,"     /* 12.0 V */
-           "\"pwr_1_25v\":1024}}," /* 1.25 V */
-           "\"vhv\":0,\"adc_nf\":0,\"ixe\":0}");
+    velodyne_pages_put(p, "{\"volt_temp\":{\"top\":{"
+                          "\"hv\":2952,"         /* -141 V */
+                          "\"ad_temp\":480,"     /* no published conversion */
+                          "\"lm20_temp\":1126,"  /* 42 deg C */
+                          "\"pwr_5v\":2048,"     /* 5.0 V */
+                          "\"pwr_2_5v\":2048,"   /* 2.5 V */
+                          "\"pwr_3_3v\":2703,"   /* 3.3 V */
+                          "\"pwr_5v_raw\":2048," /* 5.0 V */
+                          "\"pwr_raw\":2048,"
+                          "\"pwr_vccint\":983},"); /* 1.2 V */
+    velodyne_pages_put(p, "\"bot\":{"
+                          "\"i_out\":2107,"     /* 0.72 A */
+                          "\"pwr_1_2v\":983,"   /* 1.2 V */
+                          "\"lm20_temp\":1155," /* 39 deg C */
+                          "\"pwr_5v\":2048,"
+                          "\"pwr_2_5v\":2048,"
+                          "\"pwr_3_3v\":2703,"
+                          "\"pwr_v_in\":894,"     /* 12.0 V */
+                          "\"pwr_1_25v\":1024}}," /* 1.25 V */
+                          "\"vhv\":0,\"adc_nf\":0,\"ixe\":0}");
 }
 
 /* The three others as one, for clients that read a snapshot. */
 static void put_snapshot(struct page *p)
 {
-    put(p, "{\"info\":");
+    velodyne_pages_put(p, "{\"info\":");
     put_info(p);
-    put(p, ",\"config\":");
+    velodyne_pages_put(p, ",\"config\":");
     put_settings(p);
-    put(p, ",\"status\":");
+    velodyne_pages_put(p, ",\"status\":");
     put_status(p);
-    put(p, ",\"diag\":");
+    velodyne_pages_put(p, ",\"diag\":");
     put_diag(p);
-    put(p, "}");
+    velodyne_pages_put(p, "}");
 }
 
 static const struct {

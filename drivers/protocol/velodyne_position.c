@@ -36,7 +36,7 @@ struct position {
     int64_t next_ns; /* device time of the next packet */
 };
 
-static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int velodyne_position_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct position *p = calloc(1, sizeof *p);
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne position packets");
@@ -111,7 +111,7 @@ const struct protocol_ops protocol_velodyne_position = {
     .max_unit = VELODYNE_POSITION_LEN,
     .content = nmea_content,
     .reseal = nmea_reseal,
-    .create = create,
+    .create = velodyne_position_create,
     .destroy = free,
     .open = open_at,
     .time = at_time,

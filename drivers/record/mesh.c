@@ -114,7 +114,7 @@ static int drop_loose(struct mesh_recorder *m, struct scan_faces *faces, struct 
     return SH_OK;
 }
 
-static int add_part(struct mesh_recorder *m, struct part **part, struct sh_err *err)
+static int mesh_add_part(struct mesh_recorder *m, struct part **part, struct sh_err *err)
 {
     if (!grow(&m->part, &m->room_parts, m->n_parts + 1, sizeof *m->part))
         return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", m->base.track.path);
@@ -133,7 +133,7 @@ static int finish_grid(struct mesh_recorder *m, struct scan_faces *faces, struct
     const size_t first_face = m->n_faces;
     scan_normals((const double(*)[3])m->points.xyz_m + g->first, g->n, (const uint32_t(*)[3])faces->face,
                  faces->n_faces, m->points.normal + g->first);
-    int rc = add_part(m, &part, err);
+    int rc = mesh_add_part(m, &part, err);
     if (rc == SH_OK && is_textured(m)) {
         struct sh_err why = {0};
         rc = fail_with_path(m, mesh_texture_draw(g, &m->points, &part->image, &every, &why), &why, err);
@@ -284,7 +284,7 @@ static int mesh_take_points(void *rec, int n, struct sh_err *err)
 
 /* ---- the end */
 
-static void report(const struct mesh_recorder *m)
+static void mesh_report(const struct mesh_recorder *m)
 {
     const struct recorder *r = &m->base;
     char what[160];
@@ -317,7 +317,7 @@ static int mesh_finish(void *rec, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "%s: this scan has no triangles, and a %s file can't be empty",
                        m->base.file.path, m->base.ops->ending);
     rc = mesh_recorder_write(m, err);
-    if (rc == SH_OK) report(m);
+    if (rc == SH_OK) mesh_report(m);
     return rc;
 }
 

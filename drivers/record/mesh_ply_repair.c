@@ -43,7 +43,7 @@ static int take_header(struct mesh_lines *m, const char *line)
 }
 
 /* Bytes of a binary mesh are no lines: they are only counted. */
-static int take_line(void *ctx, const char *line, size_t len)
+static int mesh_ply_repair_take_line(void *ctx, const char *line, size_t len)
 {
     struct mesh_lines *m = ctx;
     if (m->has_ended) {
@@ -58,7 +58,7 @@ int mesh_ply_repair(struct repair *r, struct sh_err *err)
 {
     struct mesh_lines m = {0};
     uint64_t end;
-    int rc = repair_lines(r, 0, take_line, &m, &end, err);
+    int rc = repair_lines(r, 0, mesh_ply_repair_take_line, &m, &end, err);
     if (rc != SH_OK) return rc;
     if (!m.has_ended || m.n_elements != 2) return repair_fail_none(r, "PLY mesh", err);
     const uint64_t len = m.header_len + m.n[0] * m.row_len + m.n[1] * FACE_LEN;

@@ -21,7 +21,7 @@ static int grow_all(struct mesh_points *p, struct sh_err *err)
     return sh_fail(err, SH_ENOMEM, "no memory for more than %u points; a mesh keeps all its points in memory", p->n);
 }
 
-static void put(struct mesh_points *p, uint32_t i, const struct mesh_point *point)
+static void mesh_points_put(struct mesh_points *p, uint32_t i, const struct mesh_point *point)
 {
     memcpy(p->xyz_m[i], point->xyz_m, sizeof point->xyz_m);
     memcpy(p->normal[i], point->normal, sizeof point->normal);
@@ -40,7 +40,7 @@ int mesh_points_add(struct mesh_points *p, const struct mesh_point *point, struc
         return sh_fail(err, SH_EINPUT, "more than %d points; a mesh holds no more: scan fewer stations, or --split",
                        MESH_MAX_VERTICES);
     if (p->n == p->room && grow_all(p, err) != SH_OK) return SH_ENOMEM;
-    put(p, p->n++, point);
+    mesh_points_put(p, p->n++, point);
     return SH_OK;
 }
 
@@ -62,7 +62,7 @@ void mesh_points_move(struct mesh_points *p, uint32_t from, uint32_t to)
     struct mesh_point point;
     if (from == to) return;
     mesh_points_get(p, from, &point);
-    put(p, to, &point);
+    mesh_points_put(p, to, &point);
 }
 
 void mesh_points_free(struct mesh_points *p)

@@ -40,7 +40,7 @@ static int begins(const char *line, const char *key)
     return strncmp(line, key, strlen(key)) == 0;
 }
 
-static int take_line(void *ctx, const char *line, size_t len)
+static int obj_repair_take_line(void *ctx, const char *line, size_t len)
 {
     struct obj_lines *o = ctx;
     if (strlen(line) != len || len >= LINE_MOST) return 0;
@@ -61,7 +61,7 @@ int obj_repair(struct repair *r, struct sh_err *err)
 {
     struct obj_lines o = {0};
     uint64_t end;
-    int rc = repair_lines(r, 0, take_line, &o, &end, err);
+    int rc = repair_lines(r, 0, obj_repair_take_line, &o, &end, err);
     if (rc == SH_OK && o.n_vertices == 0) rc = repair_fail_none(r, "mesh of the OBJ format", err);
     if (rc == SH_OK) rc = repair_check_rest(r, end, LINE_MOST, err);
     if (rc != SH_OK) return rc;

@@ -111,7 +111,7 @@ int outfile_save(struct outfile *file, struct sh_err *err)
 }
 
 /* Makes room in the middle of a file. Direct, only whole blocks go. */
-static int make_room(struct outfile *file, struct sh_err *err)
+static int outfile_make_room(struct outfile *file, struct sh_err *err)
 {
     if (!file->may_be_direct || file->written < OUTFILE_DIRECT_FROM) return write_buffered(file, file->len, err);
     const size_t rest = (size_t)((file->written + file->len) % OUTFILE_BLOCK);
@@ -122,7 +122,7 @@ static int make_room(struct outfile *file, struct sh_err *err)
 
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err)
 {
-    if (OUTFILE_BUFFER - file->len < n && make_room(file, err) != 0) return NULL;
+    if (OUTFILE_BUFFER - file->len < n && outfile_make_room(file, err) != 0) return NULL;
     if (OUTFILE_BUFFER - file->len < n && outfile_flush(file, err) != 0)
         return NULL; /* almost all of it is asked for */
     return file->buf + file->len;

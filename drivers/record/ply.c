@@ -55,7 +55,7 @@ static int make_header(struct ply *ply, int incomplete, char **text, size_t *len
 }
 
 /* Makes room for the header with what is known of the names. */
-static int make_room(struct ply *ply, uint32_t n_surfaces, struct sh_err *err)
+static int ply_make_room(struct ply *ply, uint32_t n_surfaces, struct sh_err *err)
 {
     char *text;
     size_t len;
@@ -261,7 +261,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     int rc = check_float(ply->base.file.path, facts->columns, ply->base.track.crs == NATIVE_CRS_GEODETIC,
                          ply->base.track.pose.shift_m, err);
     set_gps(ply);
-    if (rc == 0 && !ply->begun) return make_room(ply, info->n_surfaces, err);
+    if (rc == 0 && !ply->begun) return ply_make_room(ply, info->n_surfaces, err);
     return rc == 0 && is_new ? write_header(ply, 1, err) : rc;
 }
 

@@ -61,7 +61,7 @@ static int put_station(void *rec, struct sh_err *err)
     return rc != SH_OK ? rc : outfile_write(&file->base.file, row, (size_t)n, err);
 }
 
-static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_err *err)
+static int pose_file_put(struct pose_file *file, const struct scanhead_pose *p, struct sh_err *err)
 {
     char line[LINE];
     int n = snprintf(line, sizeof line, "%u,%.9f,%.15g,%.15g,%.15g,%.17g,%.17g,%.17g,%.17g,%.9g,%d\n", file->scan,
@@ -108,7 +108,7 @@ static int put_poses(struct pose_file *file, struct scanhead *sh, const struct s
             rc = outfile_write(&file->base.file, gap, sizeof gap - 1, err);
         for (int i = 0; i < n && rc == SH_OK; i++) {
             if (pose[i].t_ns <= file->last_ns) continue;
-            rc = put(file, &pose[i], err);
+            rc = pose_file_put(file, &pose[i], err);
             file->last_ns = pose[i].t_ns;
         }
     }

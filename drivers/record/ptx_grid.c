@@ -18,7 +18,7 @@ static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
 }
 
 /* After a failure nothing more is written, so that what is there stays in one piece. */
-static int put(struct ptx_grid *grid, const void *data, size_t len, struct sh_err *err)
+static int ptx_grid_put(struct ptx_grid *grid, const void *data, size_t len, struct sh_err *err)
 {
     if (!ferror(grid->spool) && fwrite(data, len, 1, grid->spool) == 1) return 0;
     return fail_spool(grid, err);
@@ -74,7 +74,7 @@ int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station
     memcpy(head.magic, MAGIC, sizeof MAGIC);
     head.check = check_of_head(&head);
     grid->is_empty = 0;
-    return put(grid, &head, sizeof head, err);
+    return ptx_grid_put(grid, &head, sizeof head, err);
 }
 
 static int widen(struct ptx_grid *grid, uint32_t column, uint32_t row, int first)
@@ -98,7 +98,7 @@ int ptx_grid_cell(struct ptx_grid *grid, const struct ptx_cell *cell, struct sh_
     struct ptx_cell c = *cell;
     c.check = check_of_cell(&c);
     grid->n_cells++;
-    return put(grid, &c, sizeof c, err);
+    return ptx_grid_put(grid, &c, sizeof c, err);
 }
 
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err)
@@ -113,8 +113,8 @@ static void blank(struct ptx_cell *column, uint32_t n_rows)
 }
 
 /* The cells of one column; the first one of the next stays in `cell`. */
-static int fill(struct ptx_grid *grid, uint32_t at, struct ptx_cell *column, struct ptx_cell *cell, uint64_t *left,
-                struct sh_err *err)
+static int ptx_grid_fill(struct ptx_grid *grid, uint32_t at, struct ptx_cell *column, struct ptx_cell *cell,
+                         uint64_t *left, struct sh_err *err)
 {
     while (*left > 0 && cell->column == at) {
         column[cell->row - grid->row_min] = *cell;
@@ -137,7 +137,7 @@ int ptx_grid_drain(struct ptx_grid *grid,
     if (rc == 0 && left > 0 && fread(&cell, sizeof cell, 1, grid->spool) != 1) rc = fail_spool(grid, err);
     for (uint64_t at = grid->column_min; rc == 0 && at <= grid->column_max; at++) {
         blank(column, n_rows);
-        rc = fill(grid, (uint32_t)at, column, &cell, &left, err);
+        rc = ptx_grid_fill(grid, (uint32_t)at, column, &cell, &left, err);
         if (rc == 0) rc = fn(ctx, column, n_rows, err);
     }
     if (rc == 0 && left > 0)

@@ -74,7 +74,7 @@ static int take_point(struct place *p, const char *line, size_t len)
     return 1;
 }
 
-static int take_line(void *ctx, const char *line, size_t len)
+static int ptx_repair_take_line(void *ctx, const char *line, size_t len)
 {
     struct place *p = ctx;
     if (len >= LINE_MOST || !(p->header < HEADER_LINES ? take_header(p, line, len) : take_point(p, line, len)))
@@ -95,7 +95,7 @@ static int read_text(const struct repair *r, uint64_t len, struct place *p, stru
     uint64_t end;
     front.len = len;
     memset(p, 0, sizeof *p);
-    const int rc = repair_lines(&front, 0, take_line, p, &end, err);
+    const int rc = repair_lines(&front, 0, ptx_repair_take_line, p, &end, err);
     return rc == SH_OK ? repair_check_rest(&front, end, LINE_MOST, err) : rc;
 }
 

@@ -88,7 +88,7 @@ int recorder_save(struct recorder *rec, struct sh_err *err)
 
 /* After a failed write the file is not completed, even if there is room again: points in its middle would be
  * missing. */
-static int finish(struct recorder *rec, struct sh_err *err)
+static int recorder_finish(struct recorder *rec, struct sh_err *err)
 {
     int rc = outfile_check(&rec->file, err);
     if (rc == SH_OK && rec->has_failed)
@@ -147,7 +147,7 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
 {
     const struct recorder_ops *ops = rec->ops;
     char *path = strdup(rec->file.path);
-    const int rc = keep ? finish(rec, err) : SH_OK;
+    const int rc = keep ? recorder_finish(rec, err) : SH_OK;
     if (keep && rc == SH_OK) report_losses(rec);
     const enum outfile_end how = how_it_ends(rec, keep, rc);
     const int closed = outfile_close(&rec->file, how, err);

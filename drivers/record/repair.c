@@ -121,8 +121,8 @@ int repair_fail_damaged(const struct repair *r, uint64_t at, struct sh_err *err)
         r->path, (unsigned long long)at);
 }
 
-static int take_line(const struct repair *r, struct lines *l, const char *line, size_t len, uint64_t at,
-                     struct sh_err *err)
+static int repair_take_line(const struct repair *r, struct lines *l, const char *line, size_t len, uint64_t at,
+                            struct sh_err *err)
 {
     const int good = len < LINE_MOST && l->fn(l->ctx, line, len);
     if (good && l->has_bad) return repair_fail_damaged(r, l->bad_at, err);
@@ -146,11 +146,11 @@ int repair_lines(const struct repair *r, uint64_t from, int (*fn)(void *ctx, con
         for (char *stop; rc == SH_OK && (stop = memchr(block + used, '\n', n - used)) != NULL;) {
             const size_t len = (size_t)(stop - block) - used;
             *stop = '\0';
-            rc = take_line(r, &l, block + used, len, at + used, err);
+            rc = repair_take_line(r, &l, block + used, len, at + used, err);
             used += len + 1;
         }
         if (used == 0 && n < BLOCK) break; /* the rest is a piece of a line */
-        if (used == 0 && rc == SH_OK) rc = take_line(r, &l, block, used = n, at, err);
+        if (used == 0 && rc == SH_OK) rc = repair_take_line(r, &l, block, used = n, at, err);
         at += used;
     }
     free(block);
@@ -241,7 +241,7 @@ static int repair_open(struct repair *r, const struct recorder_ops *ops, struct 
 }
 
 /* Renames a repaired FILE.part to FILE. */
-static int settle(struct repaired *d, int *fd, struct sh_err *err)
+static int repair_settle(struct repaired *d, int *fd, struct sh_err *err)
 {
     if (d->was_left && !is_there(d->path)) {
         const int rc = newfile_settle_free(d->path, d->part, *fd, err);
@@ -269,7 +269,7 @@ int repair_file(const char *path, const struct sh_report *report, struct repaire
     d->cut_bytes = r.cut_bytes;
     d->unit = r.unit;
     d->was_whole = r.was_whole;
-    if (rc == SH_OK) rc = settle(d, &r.fd, err);
+    if (rc == SH_OK) rc = repair_settle(d, &r.fd, err);
     if (r.fd >= 0) close(r.fd);
     if (rc != SH_OK) repair_free(d);
     return rc;

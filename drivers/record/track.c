@@ -248,7 +248,7 @@ static int take_batches(struct track *t, const struct scanhead_frame *frame, uin
     return rc;
 }
 
-static int take_points(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
+static int track_take_points(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
 {
     int rc = track_flush(t, err);
     if (rc != 0) return rc;
@@ -284,7 +284,7 @@ static void take_line_end(struct track *t, const struct scanhead_frame *frame)
 int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     t->sh = sh;
-    if (frame->type == SCANHEAD_POINTS) return take_points(t, frame, err);
+    if (frame->type == SCANHEAD_POINTS) return track_take_points(t, frame, err);
     if (frame->type == SCANHEAD_ATTRIBUTES) return track_attributes(t, frame, err);
     if (frame->type == SCANHEAD_COLOURS) return track_colours(t, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);

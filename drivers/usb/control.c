@@ -70,7 +70,7 @@ static size_t lengthen(const struct usb_device *device, uint8_t *out, size_t roo
     return len;
 }
 
-static size_t describe(const struct usb_device *device, const struct setup *s, uint8_t *out)
+static size_t control_describe(const struct usb_device *device, const struct setup *s, uint8_t *out)
 {
     const struct usb_model *model = device->model;
     const struct usb_identity *id = &device->id;
@@ -96,7 +96,7 @@ static size_t describe(const struct usb_device *device, const struct setup *s, u
 
 static int get_descriptor(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
-    size_t len = describe(device, s, data);
+    size_t len = control_describe(device, s, data);
     if (len == 0) return USB_STALL;
     return (int)(len < s->length ? len : s->length);
 }

@@ -32,14 +32,14 @@ struct sink {
     size_t room, len;
 };
 
-static void put(struct sink *to, const void *bytes, size_t n)
+static void descriptor_put(struct sink *to, const void *bytes, size_t n)
 {
     if (to->len < to->room) memcpy(to->out + to->len, bytes, n < to->room - to->len ? n : to->room - to->len);
     to->len += n;
 }
 
 /* Fields of a descriptor as its bytes. */
-#define PUT(to, ...) put(to, (const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
+#define PUT(to, ...) descriptor_put(to, (const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
 #define U8(v)        (uint8_t)(v)
 #define U16(v)       U8(v), U8((v) >> 8)
 #define U32(v)       U16(v), U16((v) >> 16)
@@ -117,7 +117,7 @@ static void put_interface(struct sink *to, const struct usb_interface_row *row, 
 {
     PUT(to, USB_DT_INTERFACE_SIZE, USB_DT_INTERFACE, row->number, row->alt, row->n_endpoints, row->class, row->subclass,
         row->protocol, row->string);
-    if (row->extra_len > 0) put(to, row->extra, row->extra_len);
+    if (row->extra_len > 0) descriptor_put(to, row->extra, row->extra_len);
     for (unsigned i = 0; i < row->n_endpoints; i++)
         put_endpoint(to, &row->endpoint[i], rate);
 }
@@ -157,7 +157,7 @@ static void put_ms_platform(struct sink *to, const struct usb_model *model, size
     static const uint8_t uuid[16] = {0xdf, 0x60, 0xdd, 0xd8, 0x89, 0x45, 0xc7, 0x4c,
                                      0x9c, 0xd2, 0x65, 0x9d, 0x9e, 0x64, 0x8a, 0x9f};
     PUT(to, 28, USB_DT_DEVICE_CAPABILITY, CAP_PLATFORM, 0);
-    put(to, uuid, sizeof uuid);
+    descriptor_put(to, uuid, sizeof uuid);
     PUT(to, U32(MS_WINDOWS), U16(set_len), model->ms_vendor_code, 0); /* 0: no alternate enumeration */
 }
 
@@ -250,7 +250,7 @@ static void put_ms_function(struct sink *to, const struct usb_function_row *func
     PUT(to, U16(8), U16(MS_FUNCTION), function->first, 0, U16(LATER));
     PUT(to, U16(20), U16(MS_COMPATIBLE_ID));
     memcpy(id, function->compatible_id, strnlen(function->compatible_id, 8));
-    put(to, id, sizeof id);
+    descriptor_put(to, id, sizeof id);
     if (function->guid != NULL) put_property(to, function->guid);
     patch16(to, start + 6, (unsigned)(to->len - start));
 }

@@ -181,7 +181,7 @@ static void take_state(struct functionfs *self, int hung_up)
 }
 
 /* One event of ep0; 0: there is none. */
-static int take_event(struct functionfs *self)
+static int functionfs_take_event(struct functionfs *self)
 {
     struct usb_functionfs_event event;
     if (self->ep0 < 0) return 0;
@@ -228,7 +228,7 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
         int taken = 0;
         for (; going && taken < MAX_TAKEN && ffs_pipes_take(&self->pipes); taken++)
             going = go_on(ctx);
-        any = going && (take_event(self) || taken == MAX_TAKEN);
+        any = going && (functionfs_take_event(self) || taken == MAX_TAKEN);
         going = going && go_on(ctx);
     }
     if (going && (fds[AT_TTY].fd == self->console.fd || fds[AT_TIMER].revents != 0))

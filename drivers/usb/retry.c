@@ -27,7 +27,7 @@ void usb_retry_close(struct usb_retry *retry)
     retry->timer = -1;
 }
 
-static void report(struct usb_retry *retry, const char *text, const char *why)
+static void retry_report(struct usb_retry *retry, const char *text, const char *why)
 {
     snprintf(retry->news, sizeof retry->news, "%s%s", text, why);
     retry->has_news = 1;
@@ -36,7 +36,7 @@ static void report(struct usb_retry *retry, const char *text, const char *why)
 int usb_retry_start(struct usb_retry *retry)
 {
     retry->reported = 0;
-    report(retry, "the host has detached the device; it will plug itself in again", "");
+    retry_report(retry, "the host has detached the device; it will plug itself in again", "");
     return set_timer(retry, retry->pace_ms);
 }
 
@@ -48,13 +48,13 @@ int usb_retry_is_due(struct usb_retry *retry, short revents)
 
 void usb_retry_failed(struct usb_retry *retry, const char *why)
 {
-    if (!retry->reported) report(retry, "not plugged in, will try again: ", why);
+    if (!retry->reported) retry_report(retry, "not plugged in, will try again: ", why);
     retry->reported = 1;
 }
 
 int usb_retry_done(struct usb_retry *retry)
 {
-    report(retry, "plugged in again", "");
+    retry_report(retry, "plugged in again", "");
     return set_timer(retry, 0);
 }
 

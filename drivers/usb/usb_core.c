@@ -16,7 +16,7 @@ static const struct usb_pipe *pipe_of(const struct usb_device *device, unsigned 
 }
 
 /* Takes the first transfer off the pipe and gives it back. The callback may submit again. */
-static void finish(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
+static void usb_core_finish(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
 {
     struct usb_transfer *transfer = pipe->first;
     pipe->first = transfer->next;
@@ -31,7 +31,7 @@ static void finish(struct usb_device *device, struct usb_pipe *pipe, enum usb_st
 static void finish_empty(struct usb_device *device, struct usb_pipe *pipe)
 {
     while (pipe->first != NULL && pipe->first->length == 0)
-        finish(device, pipe, USB_OK);
+        usb_core_finish(device, pipe, USB_OK);
 }
 
 /* Finishes only the transfers that are there now: a back end may submit again from within complete(). */
@@ -42,7 +42,7 @@ static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_sta
     pipe->used = 0;
     while (old.first != NULL) {
         old.first->actual = old.used;
-        finish(device, &old, status);
+        usb_core_finish(device, &old, status);
     }
 }
 
@@ -167,7 +167,7 @@ void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
     /* A transfer of no bytes has nothing to wait for; neither has one that takes the end of the write before. */
     if (transfer->length != 0 && !pipe->zero_due) return;
     pipe->zero_due = 0;
-    finish(device, pipe, USB_OK);
+    usb_core_finish(device, pipe, USB_OK);
 }
 
 int usb_device_cancel(struct usb_device *device, uint64_t id)
@@ -229,11 +229,11 @@ size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void 
         at += n;
         left -= n;
         pipe->zero_due = left == 0 && status == USB_OK && n == pipe->first->length && n % packet == 0;
-        finish(device, pipe, status);
+        usb_core_finish(device, pipe, status);
     }
     if (pipe->zero_due && pipe->row->units && usb_device_can_write(device, endpoint)) {
         pipe->zero_due = 0;
-        finish(device, pipe, USB_OK);
+        usb_core_finish(device, pipe, USB_OK);
     }
     return len - left;
 }
@@ -261,7 +261,7 @@ size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, 
         pipe->used += n;
         if (pipe->used < transfer->length) break;
         transfer->actual = transfer->length;
-        finish(device, pipe, USB_OK);
+        usb_core_finish(device, pipe, USB_OK);
     }
     finish_empty(device, pipe);
     return len - left;
@@ -282,7 +282,7 @@ size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epo
     while (pipe->first != NULL && pipe->first->epoch != epoch) {
         dropped += pipe->first->length - pipe->used;
         pipe->first->actual = pipe->first->length;
-        finish(device, pipe, USB_OK);
+        usb_core_finish(device, pipe, USB_OK);
     }
     finish_empty(device, pipe);
     return dropped;

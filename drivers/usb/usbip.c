@@ -123,7 +123,7 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
 
 /* A free place, or that of the connection that has been here longest without importing. There always is one, since
  * at most one host has imported. */
-static struct usbip_conn *make_room(struct usbip *self)
+static struct usbip_conn *usbip_make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;
     for (int i = 0; i < MAX_CONNS; i++) {
@@ -144,7 +144,7 @@ static void welcome(struct usbip *self)
         socket_tune(fd);
         socket_tune_impatient(fd); /* a kernel; and as long as it seems to be there, no other host gets the device */
         setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
-        struct usbip_conn *conn = make_room(self);
+        struct usbip_conn *conn = usbip_make_room(self);
         usbip_conn_start(conn, fd, self->device, &self->taken);
         conn->number = ++self->n_welcomed;
     }

@@ -188,7 +188,7 @@ static void hold(struct usbredir *self, const struct redir_request *given)
     self->n_slow++;
 }
 
-static void take(struct usbredir *self, struct redir_request r)
+static void usbredir_requests_take(struct usbredir *self, struct redir_request r)
 {
     if (usb_device_slow_ms(self->device) > 0.0 || self->slow_first != NULL)
         hold(self, &r);
@@ -251,9 +251,10 @@ static void on_set_configuration(void *priv, uint64_t id, struct usb_redir_set_c
 {
     struct usbredir *self = priv;
     if (usbredir_is_early(self)) return;
-    take(self, (struct redir_request){.kind = SET_CONFIGURATION,
-                                      .id = id,
-                                      .header = {.request = USB_REQ_SET_CONFIGURATION, .value = set->configuration}});
+    usbredir_requests_take(
+        self, (struct redir_request){.kind = SET_CONFIGURATION,
+                                     .id = id,
+                                     .header = {.request = USB_REQ_SET_CONFIGURATION, .value = set->configuration}});
 }
 
 static void on_get_configuration(void *priv, uint64_t id)
@@ -269,12 +270,12 @@ static void on_set_alt(void *priv, uint64_t id, struct usb_redir_set_alt_setting
 {
     struct usbredir *self = priv;
     if (usbredir_is_early(self)) return;
-    take(self, (struct redir_request){.kind = SET_ALT,
-                                      .id = id,
-                                      .header = {.requesttype = USB_RECIP_INTERFACE,
-                                                 .request = USB_REQ_SET_INTERFACE,
-                                                 .value = set->alt,
-                                                 .index = set->interface}});
+    usbredir_requests_take(self, (struct redir_request){.kind = SET_ALT,
+                                                        .id = id,
+                                                        .header = {.requesttype = USB_RECIP_INTERFACE,
+                                                                   .request = USB_REQ_SET_INTERFACE,
+                                                                   .value = set->alt,
+                                                                   .index = set->interface}});
 }
 
 static void on_get_alt(void *priv, uint64_t id, struct usb_redir_get_alt_setting_header *get)
@@ -289,7 +290,7 @@ static void on_control(void *priv, uint64_t id, struct usb_redir_control_packet_
 {
     struct usbredir *self = priv;
     if (!usbredir_is_early(self) && (header->endpoint & ~USB_DIR_IN) == 0) {
-        take(self, (struct redir_request){.id = id, .header = *header, .data = data, .len = len});
+        usbredir_requests_take(self, (struct redir_request){.id = id, .header = *header, .data = data, .len = len});
         return;
     }
     if (self->greeted) {

@@ -10,7 +10,7 @@
 static const char DIR_DEFAULT[] = "/sys/devices/platform/vhci_hcd.0";
 enum { PORT_FREE = 4 }; /* VDEV_ST_NULL */
 
-static int fail(const char *dir, const char *file, struct sh_err *err)
+static int vhci_fail(const char *dir, const char *file, struct sh_err *err)
 {
     if (errno == ENOENT)
         return sh_fail(err, SH_EINPUT, "usbip: %s/%s is not there: load the module, modprobe vhci-hcd (as root)", dir,
@@ -31,7 +31,7 @@ static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct
     int found = 0;
     snprintf(path, sizeof path, "%s/status", dir);
     FILE *in = fopen(path, "r");
-    if (in == NULL) return fail(dir, "status", err);
+    if (in == NULL) return vhci_fail(dir, "status", err);
     while (!found && fgets(line, sizeof line, in) != NULL)
         found = sscanf(line, "%7s %u %u", hub, &number, &state) == 3 && state == PORT_FREE &&
                 strcmp(hub, rate == USB_RATE_SUPER ? "ss" : "hs") == 0;
@@ -45,9 +45,9 @@ static int write_attach(const char *dir, const char *text, struct sh_err *err)
     char path[320];
     snprintf(path, sizeof path, "%s/attach", dir);
     int file = open(path, O_WRONLY | O_CLOEXEC);
-    if (file < 0) return fail(dir, "attach", err);
+    if (file < 0) return vhci_fail(dir, "attach", err);
     const ssize_t len = (ssize_t)strlen(text);
-    int rc = write(file, text, (size_t)len) == len ? SH_OK : fail(dir, "attach", err);
+    int rc = write(file, text, (size_t)len) == len ? SH_OK : vhci_fail(dir, "attach", err);
     const int error = errno;
     close(file);
     errno = error;

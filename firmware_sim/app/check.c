@@ -164,7 +164,7 @@ struct check_run {
 };
 
 /* Warnings as they are, counted. */
-static void warn(void *ctx, const char *text)
+static void check_warn(void *ctx, const char *text)
 {
     struct check_run *run = ctx;
     run->n_warnings++;
@@ -174,7 +174,7 @@ static void warn(void *ctx, const char *text)
 static int check(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct check_run *run = ctx;
-    const struct sh_report report = {run, warn, app_report_stderr.progress, app_report_stderr.stop};
+    const struct sh_report report = {run, check_warn, app_report_stderr.progress, app_report_stderr.stop};
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
     int rc = sites_load(cfg, &report, &sites, err);
@@ -187,7 +187,7 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-static int run(int argc, char **argv)
+static int app_check_run(int argc, char **argv)
 {
     struct check_run r = {0};
     const int status = app_parse(&app_check, argc, argv, &r.in, &r);
@@ -250,5 +250,5 @@ const struct app_command app_check = {
     .print_more = config_print_reference,
     .part = "[SECTION]",
     .print_part = print_section,
-    .run = run,
+    .run = app_check_run,
 };

@@ -223,7 +223,8 @@ static void put_csv(FILE *out, const void *ctx)
 
 /* ---- all of it */
 
-static int add_part(struct parts *parts, const struct scene *scene, const struct site_mover *mover, struct sh_err *err)
+static int check_scene_add_part(struct parts *parts, const struct scene *scene, const struct site_mover *mover,
+                                struct sh_err *err)
 {
     struct part *p = &parts->part[parts->n++];
     *p = (struct part){.scene = scene, .is_mover = mover != NULL, .mesh = mover != NULL ? mover->number : 0};
@@ -240,9 +241,9 @@ static int add_part(struct parts *parts, const struct scene *scene, const struct
 int check_print_scene(const struct site *site, unsigned n_warnings, const char *csv, FILE *out, struct sh_err *err)
 {
     struct parts parts = {.n = 0};
-    int rc = add_part(&parts, site->scene, NULL, err);
+    int rc = check_scene_add_part(&parts, site->scene, NULL, err);
     for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++)
-        rc = add_part(&parts, site->mover[i].scene, &site->mover[i], err);
+        rc = check_scene_add_part(&parts, site->mover[i].scene, &site->mover[i], err);
     for (uint32_t i = 0; i < parts.n && rc == SH_OK && out != NULL; i++)
         print_part(&parts.part[i], out);
     if (rc == SH_OK && out != NULL) {

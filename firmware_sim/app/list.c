@@ -32,7 +32,7 @@ static void list_usb(void)
     if (n > MAX_HEADS) printf("and %d more\n", n - MAX_HEADS);
 }
 
-static int run(int argc, char **argv)
+static int list_run(int argc, char **argv)
 {
     struct app_input in;
     struct sh_err err = {0};
@@ -69,5 +69,5 @@ const struct app_command app_list = {
         "\n"
         "Heads on USB are those with this project's interface. A head with the USB identity of another maker's device\n"
         "(links[].protocol scip, cola) is not among them.\n",
-    .run = run,
+    .run = list_run,
 };

@@ -61,7 +61,7 @@ static int is_same_name(const struct named *a, const struct named *b)
 }
 
 /* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */
-static int is_same(const struct named *a, const struct named *b)
+static int outputs_is_same(const struct named *a, const struct named *b)
 {
     struct stat sa, sb;
     if (strcmp(a->path, "-") == 0 || strcmp(b->path, "-") == 0) return 0;
@@ -74,7 +74,7 @@ static int is_same(const struct named *a, const struct named *b)
 /* ---- what there is */
 
 /* Takes who and path, which are NULL where there is no memory. */
-static int add(struct files *f, char *who, char *path, int is_written, size_t n_ending)
+static int outputs_add(struct files *f, char *who, char *path, int is_written, size_t n_ending)
 {
     if (who != NULL && path != NULL && grow(&f->file, &f->room, f->n + 1, sizeof *f->file)) {
         f->file[f->n++] = (struct named){.who = who, .path = path, .is_written = is_written, .n_ending = n_ending};
@@ -97,7 +97,7 @@ static int add_option(struct files *f, const struct app_file *file)
     char *who = file->option != NULL ? join("--", 2, file->option, "") : join("the operand ", 12, file->path, "");
     char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : strdup(file->path);
     const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
-    const int rc = add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
+    const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
     if (rc == SH_OK) f->file[f->n - 1].is_beside = file->ending != NULL;
     return rc;
 }
@@ -106,13 +106,13 @@ static int add_key(void *ctx, const char *key, const char *path, int is_written)
 {
     struct files *f = ctx;
     if (is_written && !f->keeps_written) return SH_OK;
-    return add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+    return outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
 }
 
 static int add_of_mesh(void *ctx, const char *name, const char *path)
 {
     struct files *f = ctx;
-    return add(f, join(name, INT_MAX, ", named in ", f->prefix), strdup(path), 0, 0);
+    return outputs_add(f, join(name, INT_MAX, ", named in ", f->prefix), strdup(path), 0, 0);
 }
 
 /* Adds the files that meshes name. The search takes as long as reading the meshes, so it is made only where a file to
@@ -191,10 +191,10 @@ static int check(const struct files *f, struct sh_err *err)
         const struct named *out = &f->file[i];
         for (size_t k = 0; k < f->n && out->is_written; k++) {
             const struct named *other = &f->file[k];
-            if (!other->is_written && is_there(other) && is_same(out, other))
+            if (!other->is_written && is_there(other) && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: is also read as %s, and would be overwritten; name another file",
                                out->who, out->path, other->who);
-            if (other->is_written && k < i && !(out->is_beside && other->is_beside) && is_same(out, other))
+            if (other->is_written && k < i && !(out->is_beside && other->is_beside) && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: %s writes the same file; name another one", out->who, out->path,
                                other->who);
         }

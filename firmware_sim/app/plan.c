@@ -106,7 +106,7 @@ static int plan(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-static int run(int argc, char **argv)
+static int plan_run(int argc, char **argv)
 {
     struct plan_options o = {0};
     int status = app_parse(&app_plan, argc, argv, &o.in, &o);
@@ -161,5 +161,5 @@ const struct app_command app_plan = {
     .summary = "which method each stage will use, its error bound, its cost, and the total",
     .options = OPTIONS,
     .notes = NOTES,
-    .run = run,
+    .run = plan_run,
 };

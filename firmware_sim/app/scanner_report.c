@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void warn(void *ctx, const char *text)
+static void scanner_report_warn(void *ctx, const char *text)
 {
     const struct scanner_report *r = ctx;
     struct scanner_warnings *w = r->warnings;
@@ -36,7 +36,7 @@ static int stop(void *ctx)
 void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station,
                            struct scanner_warnings *warnings)
 {
-    *report = (struct scanner_report){{report, warn, progress, stop}, to, warnings, station};
+    *report = (struct scanner_report){{report, scanner_report_warn, progress, stop}, to, warnings, station};
     warnings->n_scanners += !warnings->are_said;
 }
 
@@ -48,7 +48,7 @@ static int was_said(const struct site *first, const char *text)
 }
 
 /* Where all scanners say it, the first one has said it for them. */
-static void say(const struct scanner_warnings *w, uint32_t i, int is_said, const struct sh_report *to)
+static void scanner_report_say(const struct scanner_warnings *w, uint32_t i, int is_said, const struct sh_report *to)
 {
     char stations[4 * CONFIG_MAX_STATIONS + 1] = "";
     uint32_t n = 0;
@@ -64,7 +64,7 @@ static void say(const struct scanner_warnings *w, uint32_t i, int is_said, const
 void scanner_warnings_say(struct scanner_warnings *warnings, const struct site *first, const struct sh_report *to)
 {
     for (uint32_t i = 0; i < warnings->n && !warnings->are_said; i++)
-        say(warnings, i, was_said(first, warnings->one[i].text), to);
+        scanner_report_say(warnings, i, was_said(first, warnings->one[i].text), to);
     warnings->are_said = 1;
 }
 

@@ -65,7 +65,7 @@ static int is_file(const struct search *s, const char *name, char path[PATH_MAX]
 }
 
 /* As it stands; then as readers find it: by its last part, which is how files of other machines are found, in any case. */
-static int find(const struct search *s, const char *name, char path[PATH_MAX])
+static int sidecars_find(const struct search *s, const char *name, char path[PATH_MAX])
 {
     char decoded[NAME_MAX_LEN + 1];
     decode(name, decoded);
@@ -107,7 +107,7 @@ static int try_names(struct search *s, const char *first, const char *end, int d
     for (const char *p = name; p != NULL; p = strchr(p, ' ')) {
         while (*p == ' ')
             p++;
-        if (!find(s, p, path)) continue;
+        if (!sidecars_find(s, p, path)) continue;
         return is_seen(s, path) ? SH_OK : found(s, p, path, depth);
     }
     return SH_OK;

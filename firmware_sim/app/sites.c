@@ -7,8 +7,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 
-static int add(const struct config *cfg, uint32_t station, const struct sh_report *report, struct sites *sites,
-               struct sh_err *err)
+static int sites_add(const struct config *cfg, uint32_t station, const struct sh_report *report, struct sites *sites,
+                     struct sh_err *err)
 {
     struct sites_one *one = &sites->other[sites->n++];
     one->scanner = cfg->station[station].scanner;
@@ -27,7 +27,7 @@ static int load_others(const struct config *cfg, const struct sh_report *report,
     int64_t said_ns = clock_now_ns();
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
         if (config_serves(cfg, i) || cfg->station[i].scanner != i + 1) continue;
-        rc = add(cfg, i, report, sites, err);
+        rc = sites_add(cfg, i, report, sites, err);
         if (clock_now_ns() - said_ns < 1000000000) continue;
         said_ns = clock_now_ns();
         sh_progress(report, "setting up scanners", (1.0 + i) / cfg->n_stations);

@@ -3,7 +3,7 @@
 
 #include "firmware_sim/app/csv_file.h"
 
-static void put(FILE *out, const void *ctx)
+static void surfaces_put(FILE *out, const void *ctx)
 {
     const struct site *site = ctx;
     fputs("label,object,material,type,guid,colour\n", out);
@@ -22,5 +22,5 @@ static void put(FILE *out, const void *ctx)
 
 int surfaces_write(const char *path, const struct site *site, struct sh_err *err)
 {
-    return csv_file_write(path, put, site, err);
+    return csv_file_write(path, surfaces_put, site, err);
 }

@@ -33,7 +33,7 @@ int command_fault_add(struct command_call *call)
 }
 
 /* Parses a fault's number, or ALL (0). Returns -1 when it failed. */
-static int take_number(struct command_call *call, int64_t *number)
+static int fault_commands_take_number(struct command_call *call, int64_t *number)
 {
     struct command_decimal decimal;
     char clip[COMMAND_CLIP_LEN];
@@ -59,7 +59,7 @@ int command_fault_clear(struct command_call *call)
     struct command_device *dev = call->dev;
     int64_t number;
     if (dev->faults == NULL) return none(call);
-    if (take_number(call, &number) != 0) return -1;
+    if (fault_commands_take_number(call, &number) != 0) return -1;
     if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0) return no_such(call, number);
     call->out->effect = COMMAND_FAULTS;
     return command_reply(call, "OK");
@@ -71,7 +71,7 @@ int command_fault_injected(struct command_call *call)
     int64_t number;
     uint64_t n;
     if (dev->faults == NULL) return none(call);
-    if (take_number(call, &number) != 0) return -1;
+    if (fault_commands_take_number(call, &number) != 0) return -1;
     if (dev->faults->injected(dev->faults_owner, (uint32_t)number, &n) != 0) return no_such(call, number);
     return command_reply(call, "%llu", (unsigned long long)n);
 }

@@ -101,7 +101,7 @@ static int has_setting(const struct command_call *call)
     return derived == NULL || derived->why_not(call->dev) == NULL;
 }
 
-static int describe(struct command_call *call)
+static int help_describe(struct command_call *call)
 {
     const struct command_row *row = call->row;
     const struct command_setting *setting = row->setting;
@@ -132,7 +132,7 @@ int command_help(struct command_call *call)
     for (const struct command_row *row = command_rows; row->header != NULL; row++) {
         if (!command_header_matches(row->header, header, len)) continue;
         call->row = row;
-        return describe(call);
+        return help_describe(call);
     }
     char clip[COMMAND_CLIP_LEN];
     command_clip(clip, call->param, strlen(call->param));

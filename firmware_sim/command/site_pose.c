@@ -44,7 +44,7 @@ static int fail_number(struct command_call *call, const char *name, const char *
 }
 
 /* 63 characters have room for 17 digits, a sign, a point, an exponent and a unit. */
-static int take_number(struct command_call *call, int i, const char *field, size_t len, double *value)
+static int site_pose_take_number(struct command_call *call, int i, const char *field, size_t len, double *value)
 {
     struct command_decimal decimal;
     if (len >= FIELD_LEN)
@@ -146,7 +146,7 @@ static int take_parameters(struct command_call *call)
             out->to_first = 1;
             break;
         }
-        if (take_number(call, i, field, len, &out->place.v[i]) != 0) return -1;
+        if (site_pose_take_number(call, i, field, len, &out->place.v[i]) != 0) return -1;
     }
     if (rest == NULL) return 0;
     return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes station, x, y, z, heading, pitch, roll, or station, DEF",

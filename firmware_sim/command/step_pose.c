@@ -18,7 +18,7 @@ static const struct {
 } parts[6] = {{"x", 1e9}, {"y", 1e9}, {"z", 1e9}, {"roll", 360.0}, {"pitch", 90.0}, {"heading", 360.0}};
 
 /* The number at text, up to a comma or the end; returns what follows, or NULL. */
-static const char *take_number(const char *text, double *value)
+static const char *step_pose_take_number(const char *text, double *value)
 {
     struct command_decimal decimal;
     text += strspn(text, " \t");
@@ -35,7 +35,7 @@ int command_take_pose(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "a pose in %s needs platform.kind: live", header);
     for (int i = 0; i < 6; i++) {
         double *value = &call->out->pose[i];
-        const char *end = take_number(p, value);
+        const char *end = step_pose_take_number(p, value);
         if (end == NULL) {
             char clip[COMMAND_CLIP_LEN];
             command_clip(clip, p, strcspn(p, ","));

@@ -60,7 +60,7 @@ static int load_once(const char *const *sets, int n_sets, uint32_t station, stru
     return rd.profile_read;
 }
 
-static void begin(const char *path, const char *const *sets, int n_sets, struct config *cfg)
+static void config_begin(const char *path, const char *const *sets, int n_sets, struct config *cfg)
 {
     memset(cfg, 0, sizeof *cfg);
     snprintf(cfg->file, sizeof cfg->file, "%s", path);
@@ -71,12 +71,12 @@ static void begin(const char *path, const char *const *sets, int n_sets, struct 
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                  struct config_faults *faults)
 {
-    begin(path, sets, n_sets, cfg);
+    config_begin(path, sets, n_sets, cfg);
     const int has_profile = load_once(sets, n_sets, station, cfg, NULL, faults);
     if (faults->n == 0) return SH_OK;
     /* Values are read before the profile, but their errors need its limits. So read them once more. */
     const struct config_profile profile = cfg->profile;
-    begin(path, sets, n_sets, cfg);
+    config_begin(path, sets, n_sets, cfg);
     if (has_profile) load_once(sets, n_sets, station, cfg, &profile, faults);
     return faults->fault[0].code;
 }

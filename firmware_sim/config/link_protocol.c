@@ -56,7 +56,7 @@ int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
 }
 
 /* ", as line 12 has it", where a key is given. buf holds 40. */
-static const char *place_of(const struct cfg_reader *rd, const char *path, char *buf)
+static const char *link_protocol_place_of(const struct cfg_reader *rd, const char *path, char *buf)
 {
     int line = cfg_where(rd, cfg_find(&rd->table, path), 0);
     if (line == CFG_FROM_SET)
@@ -72,11 +72,11 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
     if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && cfg->output.layout != LINE_POLAR &&
         CFG_SOUND(rd, 0, "output.layout"))
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s needs ranges, but output.layout is geo%s; required is layout: polar",
-                     ops->name, place_of(rd, "output.layout", where));
+                     ops->name, link_protocol_place_of(rd, "output.layout", where));
     if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && cfg->head.settings.echoes == BEAM_FIRST)
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
-                     ops->name, place_of(rd, "beam.echoes", where));
+                     ops->name, link_protocol_place_of(rd, "beam.echoes", where));
     if ((ops->needs & PROTOCOL_NEEDS_ATTRIBUTES) == 0) return;
     if (!cfg_is_given(rd, "output.attributes", 0))
         cfg->output.attributes = 1;
@@ -84,7 +84,7 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "%s needs amplitudes, but output.attributes is off%s; required is on, or no "
                      "such key",
-                     ops->name, place_of(rd, "output.attributes", where));
+                     ops->name, link_protocol_place_of(rd, "output.attributes", where));
 }
 
 static int has_kind(const struct protocol_ops *ops, const struct emitter *emitter)
@@ -108,7 +108,7 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
         if ((ops->emitters & 1u << kind) != 0)
             snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",
                      allowed[0] != '\0' ? ", " : "", emitter_names[kind]);
-    place_of(rd, "head.profile", where);
+    link_protocol_place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "protocol %s does not support head profile %s%s, whose emitter is %s; allowed emitters: %s",

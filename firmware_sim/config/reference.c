@@ -62,7 +62,7 @@ static void add_default(const struct cfg_key *key, char *line, size_t room)
         snprintf(line, room, "; optional");
 }
 
-static void describe(const struct cfg_key *key, struct config_key_text *out)
+static void reference_describe(const struct cfg_key *key, struct config_key_text *out)
 {
     static const char *const switches[] = {"off", "on", NULL};
     char allowed[CFG_ALLOWED_MAX];
@@ -79,14 +79,14 @@ int config_describe_key(enum config_keys keys, size_t i, struct config_key_text 
 {
     const struct cfg_table *table = keys == CONFIG_KEYS ? &cfg_config_table : &cfg_profile_table;
     if (i >= table->n) return 0;
-    describe(&table->keys[i], out);
+    reference_describe(&table->keys[i], out);
     return 1;
 }
 
 static void print_key(const struct cfg_key *key, FILE *out)
 {
     struct config_key_text text;
-    describe(key, &text);
+    reference_describe(key, &text);
     fprintf(out, "%s\n", text.path);
     print_wrapped(text.what, 4, "", out);
     print_wrapped(text.help, 4, "", out);

@@ -129,7 +129,7 @@ void device_command_once(struct device *device, uint32_t session, const char *li
     pthread_mutex_unlock(&device->lock);
 }
 
-static void report(struct device *device, uint32_t session, int number, const char *text)
+static void carry_out_report(struct device *device, uint32_t session, int number, const char *text)
 {
     pthread_mutex_lock(&device->lock);
     command_queue_push(&device->cmd.queue, number, text);
@@ -139,7 +139,7 @@ static void report(struct device *device, uint32_t session, int number, const ch
 
 void device_report(struct device *device, int number, const char *text)
 {
-    report(device, 0, number, text);
+    carry_out_report(device, 0, number, text);
 }
 
 void device_overlong(struct device *device, uint32_t session, struct command_result *out)
@@ -147,7 +147,7 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
     memset(out, 0, sizeof *out);
     char text[96];
     snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
-    report(device, session, CMD_E_OVERRUN, text);
+    carry_out_report(device, session, CMD_E_OVERRUN, text);
     out->error = CMD_E_OVERRUN;
     snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN),
              text);

@@ -32,7 +32,7 @@ static void change(struct head_clock *clock, const struct head_fault *f, int64_t
 }
 
 /* The tick ends at end_ns and takes tick_ns. */
-static void run(struct head_clock *clock, struct head_fault *f, int64_t end_ns, int64_t tick_ns)
+static void clock_faults_run(struct head_clock *clock, struct head_fault *f, int64_t end_ns, int64_t tick_ns)
 {
     const int lasts = f->fault.kind == FAULT_CLOCK_DRIFT || f->fault.kind == FAULT_CLOCK_STOP;
     if (f->begins && (lasts || f->fault.kind == FAULT_CLOCK_JUMP)) change(clock, f, f->begin_ns, 1);
@@ -53,7 +53,7 @@ void device_run_clock_faults(struct head_faults *faults, struct head_clock *cloc
         struct head_fault *f = &faults->fault[i];
         if ((HEAD_FAULT(f->fault.kind) & HEAD_FAULTS_CLOCK) == 0 || (!f->active && !f->ends)) continue;
         if (f->begins && f->fault.kind == FAULT_LEAP_SECOND) add_leap(clock, events, f);
-        run(clock, f, end_ns, faults->tick_ns);
+        clock_faults_run(clock, f, end_ns, faults->tick_ns);
     }
 }
 

@@ -95,7 +95,7 @@ static int64_t at_ns(const struct head_faults_tick *tick, const struct head_faul
 }
 
 /* Notes that the fault begins, or ends. Jumps and leap seconds have no end. */
-static void say(struct head_faults *faults, struct head_fault *f, const struct head_faults_tick *tick)
+static void head_faults_say(struct head_faults *faults, struct head_fault *f, const struct head_faults_tick *tick)
 {
     struct head_faults_tick at = *tick;
     at.t_ns = at_ns(tick, f);
@@ -123,7 +123,7 @@ int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct he
         f->ends = !active && f->active;
         f->active = active;
         any |= active || f->ends;
-        if (f->begins || f->ends) say(faults, f, tick);
+        if (f->begins || f->ends) head_faults_say(faults, f, tick);
     }
     return any;
 }

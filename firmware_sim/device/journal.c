@@ -123,7 +123,7 @@ int journal_close(struct journal *journal, struct sh_err *err)
 }
 
 /* A decimal number up to max and the blank after it. Digits only: strtoull would take signs and blanks. */
-static int take_number(const char **p, uint64_t max, uint64_t *value)
+static int journal_take_number(const char **p, uint64_t max, uint64_t *value)
 {
     const char *q = *p;
     *value = 0;
@@ -142,9 +142,9 @@ static const char *parse_entry(const char *text, struct journal_entry *entry)
 {
     uint64_t t_ns, session;
     memset(entry, 0, sizeof *entry);
-    if (take_number(&text, UINT64_MAX, &entry->tick) != 0) return "there must be a tick number and a blank";
-    if (take_number(&text, INT64_MAX, &t_ns) != 0) return "there must be a device time in ns and a blank";
-    if (take_number(&text, UINT32_MAX, &session) != 0) return "there must be a session number and a blank";
+    if (journal_take_number(&text, UINT64_MAX, &entry->tick) != 0) return "there must be a tick number and a blank";
+    if (journal_take_number(&text, INT64_MAX, &t_ns) != 0) return "there must be a device time in ns and a blank";
+    if (journal_take_number(&text, UINT32_MAX, &session) != 0) return "there must be a session number and a blank";
     if (!is_command_line(text)) return "there must be a command of 1 to 256 printable characters";
     entry->t_ns = (int64_t)t_ns;
     entry->session = (uint32_t)session;
@@ -227,7 +227,7 @@ static int read_all(struct reader *reader, struct sh_err *err)
 }
 
 /* Orders by tick; commands of one tick stay in the file's order. */
-static int compare(const void *a, const void *b)
+static int journal_compare(const void *a, const void *b)
 {
     const struct journal_entry *one = a, *other = b;
     if (one->tick != other->tick) return one->tick < other->tick ? -1 : 1;
@@ -256,7 +256,7 @@ int journal_read(const char *path, struct journal_entry **entries, size_t *n, st
         free(reader.entry);
         return rc;
     }
-    if (reader.n > 1) qsort(reader.entry, reader.n, sizeof *reader.entry, compare);
+    if (reader.n > 1) qsort(reader.entry, reader.n, sizeof *reader.entry, journal_compare);
     *entries = reader.entry;
     *n = reader.n;
     return SH_OK;

@@ -50,7 +50,7 @@ void device_begin_move(struct device *device, uint32_t session, const char *line
     snprintf(plan->line, sizeof plan->line, "%s", line);
 }
 
-static void warn(void *ctx, const char *text)
+static void moves_warn(void *ctx, const char *text)
 {
     const struct device *device = ctx;
     sh_warn(device->options.report, "%s", text);
@@ -68,7 +68,7 @@ static struct device_version *make_moved(struct device *device, const struct sit
                                          struct sh_err *err)
 {
     struct device_moves *moves = &device->moves;
-    const struct sh_report report = {device, warn, NULL, move_stops};
+    const struct sh_report report = {device, moves_warn, NULL, move_stops};
     const struct site_station_move move = {moves->first, plan->station, plan->to_first ? NULL : &plan->to};
     struct site *site;
     int rc = site_load_moved(from, &move, &report, &site, err);

@@ -10,7 +10,7 @@ static const struct pps_state *last_of(const struct pps *pps)
     return &pps->kept[(pps->n + PPS_KEPT - 1) % PPS_KEPT];
 }
 
-static void keep(struct pps *pps, const struct pps_state *state)
+static void pps_keep(struct pps *pps, const struct pps_state *state)
 {
     pps->kept[pps->n++ % PPS_KEPT] = *state;
 }
@@ -21,7 +21,7 @@ void pps_power_up(struct pps *pps, int64_t t_ns, int lost)
                                     .tai_s = INT64_MIN,
                                     .state = lost ? PROTOCOL_PPS_ABSENT : PROTOCOL_PPS_SYNCHRONISING,
                                     .set = !lost};
-    keep(pps, &state);
+    pps_keep(pps, &state);
 }
 
 void pps_take(struct pps *pps, int64_t edge_ns, int64_t tai_s)
@@ -36,7 +36,7 @@ void pps_take(struct pps *pps, int64_t edge_ns, int64_t tai_s)
             next.run = last->run + 1;
         if (next.run >= PPS_TO_LOCK) next.state = PROTOCOL_PPS_LOCKED;
     }
-    keep(pps, &next);
+    pps_keep(pps, &next);
 }
 
 enum protocol_pps pps_at(const struct pps *pps, int64_t t_ns, int *set)

@@ -194,7 +194,7 @@ void device_describe_now(struct device *device, struct device_work *work)
     pthread_mutex_unlock(&device->lock);
 }
 
-static void describe(struct device *device, uint64_t tick, struct device_work *work)
+static void scan_describe(struct device *device, uint64_t tick, struct device_work *work)
 {
     uint64_t since = tick - device->scan.tick0;
     if (device->scan.describe || device_is_repeated(device, tick)) device_describe(device, work);
@@ -227,7 +227,7 @@ static void end_scan(struct device *device, uint64_t tick)
 
 void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work)
 {
-    describe(device, tick, work);
+    scan_describe(device, tick, work);
     if (!claim_pulses(device, tick, work)) return;
     end_scan(device, tick + 1);
     device_take_events(&device->events, work);

@@ -111,7 +111,7 @@ const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t numb
 }
 
 /* A number for a new fault, whose count begins at 0. Returns 0 without memory. */
-static uint32_t take_number(struct fault_board *board)
+static uint32_t board_take_number(struct fault_board *board)
 {
     const uint32_t number = board->last_number + 1;
     if (!grow(&board->injected, &board->counted, number + (size_t)1, sizeof *board->injected)) return 0;
@@ -126,7 +126,7 @@ int fault_board_add(struct fault_board *board, const struct fault *fault, int64_
     pthread_mutex_lock(&board->lock);
     if (board->n == FAULT_MAX) {
         rc = sh_fail(err, SH_EINPUT, "there are %d faults already; allowed %d", FAULT_MAX, FAULT_MAX);
-    } else if ((*number = take_number(board)) == 0) {
+    } else if ((*number = board_take_number(board)) == 0) {
         rc = sh_fail(err, SH_ENOMEM, "no memory for another fault");
     } else {
         board->entry[board->n++] =

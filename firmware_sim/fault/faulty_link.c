@@ -55,7 +55,7 @@ static struct wire_item first_item(const struct faulty_link *f, int session, con
     return (struct wire_item){FAULT_OF_REPLIES, bytes, len, f->spec.time_ns(f->spec.owner)};
 }
 
-static void put(struct faulty_link *f, int session, const uint8_t *bytes, size_t len)
+static void faulty_link_put(struct faulty_link *f, int session, const uint8_t *bytes, size_t len)
 {
     struct faulty_session *s = &f->session[session];
     int rc = s->rest != 0 ? wire_put_rest(s->wire, bytes, s->rest) : SH_OK;
@@ -72,7 +72,7 @@ static void put(struct faulty_link *f, int session, const uint8_t *bytes, size_t
 }
 
 /* Bytes that go out without a wire: a wire that begins later must know where it begins, and what was answered. */
-static void follow(struct faulty_link *f, int session, const uint8_t *bytes, size_t len, size_t written)
+static void faulty_link_follow(struct faulty_link *f, int session, const uint8_t *bytes, size_t len, size_t written)
 {
     struct faulty_session *s = &f->session[session];
     size_t at = s->rest;
@@ -202,11 +202,11 @@ static ssize_t faulty_write(void *link, int session, const void *buf, size_t len
     if (has_wire(f, session)) {
         const int takes = flush(f, session);
         if (takes <= 0) return takes;
-        put(f, session, buf, len);
+        faulty_link_put(f, session, buf, len);
         return (ssize_t)len;
     }
     const ssize_t n = write_inner(f, session, buf, len);
-    if (n > 0 && f->spec.board != NULL) follow(f, session, buf, len, (size_t)n);
+    if (n > 0 && f->spec.board != NULL) faulty_link_follow(f, session, buf, len, (size_t)n);
     return n;
 }
 

@@ -179,7 +179,7 @@ static int is_merging(const struct wire *wire)
 }
 
 /* Finishes an item: later ones keep its delay, and pieces that were held for it go on. */
-static int finish(struct wire *wire, const struct wire_making *making)
+static int wire_finish(struct wire *wire, const struct wire_making *making)
 {
     const int of = making->item->of;
     if (making->not_before_ns > wire->last_due_ns) wire->last_due_ns = making->not_before_ns;
@@ -253,7 +253,7 @@ int wire_put(struct wire *wire, const struct wire_item *given, int64_t now_ns)
         return rc;
     }
     if (!making.is_dropped) rc = emit_all(wire, &making);
-    const int end = finish(wire, &making);
+    const int end = wire_finish(wire, &making);
     return rc != SH_OK ? rc : end;
 }
 

@@ -329,7 +329,7 @@ static int change_item(struct change *c)
     }
 }
 
-static void describe(struct change *c)
+static void wire_change_describe(struct change *c)
 {
     const struct wire_making *m = c->making;
     struct fault_note *note = &c->note;
@@ -355,7 +355,7 @@ int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t numb
 {
     struct change c = {.wire = wire, .fault = fault, .number = number, .making = making};
     if (making->is_dropped && !is_before(fault->entry.fault.kind)) return 0;
-    describe(&c);
+    wire_change_describe(&c);
     const int done = change_item(&c);
     if (done > 0 && !fault_is_act(fault->entry.fault.kind)) fault_board_note(wire->spec.board, &c.note);
     return done;

@@ -8,7 +8,7 @@
 
 enum { HEARD_MAX = 65536, LINE_MAX_LEN = 256 /* longer lines are answered, too; this much of them is kept */ };
 
-static void keep(struct wire_heard *heard, const uint8_t *bytes, size_t len)
+static void wire_heard_keep(struct wire_heard *heard, const uint8_t *bytes, size_t len)
 {
     if (heard->first > heard->len / 2) { /* seldom, so that many lines at once cost no time */
         heard->len -= heard->first;
@@ -29,7 +29,7 @@ static void end_line(struct wire_heard *heard)
     if (heard->line_len == 0 || (heard->is_blank && heard->line_len <= LINE_MAX_LEN))
         heard->len = heard->begin;
     else
-        keep(heard, (const uint8_t *)"\n", 1);
+        wire_heard_keep(heard, (const uint8_t *)"\n", 1);
     heard->begin = heard->len;
     heard->line_len = 0;
 }
@@ -45,13 +45,13 @@ static void add_byte(struct wire_heard *heard, uint8_t byte)
     }
     if (heard->line_len == 0) heard->is_blank = 1;
     heard->is_blank &= byte == ' ' || byte == '\t';
-    if (heard->line_len++ < LINE_MAX_LEN) keep(heard, &byte, 1);
+    if (heard->line_len++ < LINE_MAX_LEN) wire_heard_keep(heard, &byte, 1);
 }
 
 void wire_heard_add(struct wire_heard *heard, const void *bytes, size_t len)
 {
     const uint8_t *from = bytes;
-    if (!heard->has_lines && len <= HEARD_MAX) keep(heard, bytes, len);
+    if (!heard->has_lines && len <= HEARD_MAX) wire_heard_keep(heard, bytes, len);
     for (size_t i = 0; heard->has_lines && i < len; i++)
         add_byte(heard, from[i]);
 }

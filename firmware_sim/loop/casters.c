@@ -49,7 +49,7 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
 
 /* Puts the frames into the slot. 0: it has no room for them, and there is no memory for more. That is reported once per
  * episode. */
-static int put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
+static int casters_put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
 {
     _Atomic int *no_memory = &loop->casters.no_memory;
     if (ring_put(&loop->stream.ring, slot, tick) == SH_OK) {
@@ -74,7 +74,7 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
         return 0;
     }
     struct casters *casters = &loop->casters;
-    int whole = put(loop, slot, worker_fill(caster->worker, work));
+    int whole = casters_put(loop, slot, worker_fill(caster->worker, work));
     if (ring_ready(slot, work->tick)) {
         if (atomic_load(&casters->in_vain)) atomic_store(&casters->in_vain, 0);
         return whole;

@@ -54,7 +54,7 @@ static int take_sample(const struct cost_watch *watch, struct cost_sample *sampl
     return 1;
 }
 
-static void warn(const struct cost_watch *watch, double ns)
+static void cost_watch_warn(const struct cost_watch *watch, double ns)
 {
     char reason[128];
     site_cost_reason(watch->loop->site, reason, sizeof reason);
@@ -77,7 +77,7 @@ static void *watch_main(void *arg)
         if (atomic_load(&watch->ending) || !take_sample(watch, &sample)) return NULL;
         ns = cost_add(&watch->figures, &sample);
     }
-    warn(watch, ns);
+    cost_watch_warn(watch, ns);
     return NULL;
 }
 

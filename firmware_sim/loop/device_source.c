@@ -22,7 +22,7 @@ static void session_closed(void *self, uint32_t session, const char *who, int pa
     device_session_closed(self, session, who, partial);
 }
 
-static void report(void *self, int number, const char *text)
+static void device_source_report(void *self, int number, const char *text)
 {
     device_report(self, number, text);
 }
@@ -97,7 +97,7 @@ static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_
     return device_power_up(self, now_ns, warning, err);
 }
 
-static void end(void *self)
+static void device_source_end(void *self)
 {
     device_end(self);
 }
@@ -117,7 +117,7 @@ const struct loop_source_ops loop_device_source = {
     .overlong = overlong,
     .session_opened = session_opened,
     .session_closed = session_closed,
-    .report = report,
+    .report = device_source_report,
     .faults = faults,
     .command_once = command_once,
     .utc_ns = utc_ns,
@@ -132,7 +132,7 @@ const struct loop_source_ops loop_device_source = {
     .counters = counters,
     .scans = scans,
     .power_up = power_up,
-    .end = end,
+    .end = device_source_end,
     .files_fill = files_fill,
     .close_files = close_files,
 };

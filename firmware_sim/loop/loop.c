@@ -52,8 +52,8 @@ static void keep_description(struct loop *loop)
 }
 
 /* A new loop, with nothing open. */
-static struct loop *begin(const struct config *cfg, const struct loop_source *source,
-                          const struct loop_options *options)
+static struct loop *loop_begin(const struct config *cfg, const struct loop_source *source,
+                               const struct loop_options *options)
 {
     struct loop *loop = calloc(1, sizeof *loop);
     if (loop == NULL) return NULL;
@@ -92,7 +92,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
                 struct sh_err *err)
 {
     const struct loop_source source = {&loop_device_source, device};
-    struct loop *loop = begin(site->cfg, &source, options);
+    struct loop *loop = loop_begin(site->cfg, &source, options);
     *out = NULL;
     if (loop == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     loop->site = site;
@@ -103,7 +103,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 int loop_create_of(const struct config *cfg, const struct loop_source *source, const struct loop_options *options,
                    struct loop **out, struct sh_err *err)
 {
-    struct loop *loop = begin(cfg, source, options);
+    struct loop *loop = loop_begin(cfg, source, options);
     *out = NULL;
     if (loop == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     return open_all(loop, out, err);

@@ -16,7 +16,7 @@ static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
 }
 
 /* The error queue gets an entry once per episode. */
-static void report(struct pump *pump, struct session *s)
+static void lost_frames_report(struct pump *pump, struct session *s)
 {
     if (!s->lost.lagging) {
         char text[96];
@@ -30,7 +30,7 @@ void session_count_units(struct pump *pump, struct session *s, uint64_t n)
 {
     pump->counts.lost_units += n;
     atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
-    report(pump, s);
+    lost_frames_report(pump, s);
 }
 
 /* Announces the loss to the reader in a frame of its own. The tick's frames move back to make room before them. */
@@ -56,7 +56,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
         frames = tick->first_seq - s->lost.next_seq;
         s->lost.frames += frames;
         count_lost(pump, frames, pulses);
-        report(pump, s);
+        lost_frames_report(pump, s);
         if (pump->protocol->passes_native) announce(pump, s, tick, frames, pulses);
     } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
         s->lost.lagging = 0;

@@ -14,7 +14,7 @@ static int may_make(const struct loop *loop)
 }
 
 /* Puts the frames into the tick's slot. 0: the tick was given up meanwhile, or the slot has no room. */
-static int put(struct loop *loop, const struct ring_tick *tick, uint64_t number)
+static int player_put(struct loop *loop, const struct ring_tick *tick, uint64_t number)
 {
     struct ring_slot *slot = ring_claim(&loop->stream.ring, number);
     if (slot == NULL) return 0;
@@ -52,7 +52,7 @@ static void *player_main(void *arg)
             stream_wait_for_work(&loop->stream);
             continue;
         }
-        again = !put(loop, &tick, player->next_tick);
+        again = !player_put(loop, &tick, player->next_tick);
         if (!loop->stream.waits) stream_say_late(&loop->stream, player->next_tick);
         player->next_tick++;
         if (again) atomic_fetch_add(&loop->stream.counters->late_blocks, 1);

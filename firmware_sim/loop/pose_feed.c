@@ -53,7 +53,7 @@ static void report_bad(struct pose_feed *feed, const char *what)
     device_report(feed->device, CMD_E_DATA_TYPE, what);
 }
 
-static void take_line(struct pose_feed *feed, const char *line)
+static void pose_feed_take_line(struct pose_feed *feed, const char *line)
 {
     double v[7];
     if (line[strspn(line, " \t\r")] == '\0') return;
@@ -76,7 +76,7 @@ static void take_datagram(struct pose_feed *feed)
     for (char *line = feed->text, *next; line != NULL; line = next) {
         next = strchr(line, '\n');
         if (next != NULL) *next++ = '\0';
-        take_line(feed, line);
+        pose_feed_take_line(feed, line);
     }
 }
 

@@ -13,7 +13,7 @@
 /* At the end a reader may take this long between two bytes, and bytes held back by faults this long in all. */
 static const int64_t DRAIN_NS = 2000000000;
 
-static void say(void *owner, const char *text)
+static void pump_say(void *owner, const char *text)
 {
     const struct pump *pump = owner;
     struct link_place place;
@@ -38,7 +38,7 @@ static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t i
         .room = pump->out_cap,
         .owner = pump,
         .time_ns = device_time_ns,
-        .say = say,
+        .say = pump_say,
         .source = source->self,
         .report = source->ops->report,
     };
@@ -158,7 +158,7 @@ static void handle(struct pump *pump, const struct link_event *event)
         stream_poke(pump->stream);
         break;
     case LINK_NOTICE:
-        say(pump, event->peer);
+        pump_say(pump, event->peer);
         break;
     case LINK_WRITABLE:
     case LINK_WOKEN:

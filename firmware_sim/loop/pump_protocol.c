@@ -115,7 +115,7 @@ static void greet(struct pump *pump, struct session *s)
     give_frames(pump->protocol, s, frames, len);
 }
 
-static int create(struct pump *pump, struct session *s)
+static int pump_protocol_create(struct pump *pump, struct session *s)
 {
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
@@ -140,7 +140,7 @@ static int create(struct pump *pump, struct session *s)
 
 int session_open_protocol(struct pump *pump, struct session *s)
 {
-    const int rc = create(pump, s);
+    const int rc = pump_protocol_create(pump, s);
     if (rc == SH_OK) greet(pump, s);
     return rc;
 }
@@ -148,7 +148,7 @@ int session_open_protocol(struct pump *pump, struct session *s)
 int session_restart_protocol(struct pump *pump, struct session *s)
 {
     session_close_protocol(pump, s);
-    const int rc = create(pump, s);
+    const int rc = pump_protocol_create(pump, s);
     if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     return rc;
 }

@@ -161,7 +161,7 @@ static int has_stepped(const struct pump *pump, const struct session *s)
 }
 
 /* Puts the next ticks and replies into the buffer, which was written out. */
-static void fill(struct pump *pump, struct session *s)
+static void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
@@ -213,7 +213,7 @@ static int fill_if_link_takes(struct pump *pump, struct session *s)
 {
     const int is_over = atomic_load(&pump->stream->over);
     const int takes = session_pass(pump, s, 0);
-    if (takes > 0) fill(pump, s);
+    if (takes > 0) session_fill(pump, s);
     return takes > 0 && is_over && s->out_pos == s->out_len ? session_pass(pump, s, 1) : takes;
 }
 

@@ -129,7 +129,7 @@ static void complete_counts(struct stream *stream, uint8_t *frame)
     if (header.type == NATIVE_EVENT) complete_event(stream, frame, &header);
 }
 
-static void count(struct stream *stream, const struct ring_tick *tick, int64_t now_ns)
+static void stream_count(struct stream *stream, const struct ring_tick *tick, int64_t now_ns)
 {
     struct device_counters *c = stream->counters;
     atomic_fetch_add(&c->pulses, tick->n_cast);
@@ -162,7 +162,7 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
     finish_lines(stream, made);
     slot->first_seq = stream->seq;
     slot->pulses_before = atomic_load(&stream->counters->pulses);
-    count(stream, made, now_ns);
+    stream_count(stream, made, now_ns);
     for (uint32_t at = 0; at < made->len;) {
         uint8_t *frame = made->bytes + at;
         if (stream->as_they_are) {

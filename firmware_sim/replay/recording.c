@@ -67,7 +67,7 @@ void recording_stats(const struct recording *r, struct scanhead_stats *stats)
 
 /* A frame with a time of its own bounds the times of frames before it: they did not go out later. Where a scan was
  * stopped, the event after its last line went out with that line. */
-static void settle(struct recording *r, const struct timing_moment *by, int is_event)
+static void recording_settle(struct recording *r, const struct timing_moment *by, int is_event)
 {
     for (uint32_t i = 0; i < r->n; i++) {
         struct recording_item *item = item_of(r, i);
@@ -77,13 +77,13 @@ static void settle(struct recording *r, const struct timing_moment *by, int is_e
     }
 }
 
-static int put(struct recording *r, const struct scanhead_frame *frame, struct sh_err *err)
+static int replay_recording_put(struct recording *r, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct native_header header;
     native_read_header(frame->raw, &header);
     const struct timing_moment moment = timing_take(&r->timing, &header, frame->payload);
     if (moment.kind != TIMING_FOLLOWS && moment.kind != TIMING_STOPS)
-        settle(r, &moment, header.type == NATIVE_EVENT || header.type == NATIVE_TELEMETRY);
+        recording_settle(r, &moment, header.type == NATIVE_EVENT || header.type == NATIVE_TELEMETRY);
     struct recording_item *item = item_of(r, r->n);
     if (item->room < frame->raw_len) {
         uint8_t *bytes = realloc(item->bytes, frame->raw_len);
@@ -106,7 +106,7 @@ static int read_one(struct recording *r, struct sh_err *err)
 {
     struct scanhead_frame frame;
     const int rc = scanhead_next(r->stream, &frame, -1);
-    if (rc == SCANHEAD_OK) return put(r, &frame, err);
+    if (rc == SCANHEAD_OK) return replay_recording_put(r, &frame, err);
     if (rc != SCANHEAD_ECLOSED) return sh_fail(err, rc, "%s", scanhead_error(r->stream));
     r->at_end = 1;
     return SH_OK;

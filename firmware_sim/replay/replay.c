@@ -23,7 +23,7 @@ static int64_t tick_of(const struct replay *r, int64_t t_ns)
     return t_ns % r->tick_ns < 0 ? n - 1 : n;
 }
 
-static void fail(struct replay *r, const struct sh_err *err)
+static void replay_fail(struct replay *r, const struct sh_err *err)
 {
     if (!r->ends_then) sh_warn(r->options.report, "%s; the rest of it is not replayed", err->text);
     pthread_mutex_lock(&r->lock);
@@ -33,13 +33,13 @@ static void fail(struct replay *r, const struct sh_err *err)
 }
 
 /* Reads the next frame of the range into r->frame. 1: done; 0: there is none; -1: it failed, which is reported. */
-static int look(struct replay *r)
+static int replay_look(struct replay *r)
 {
     struct sh_err err = {0};
     const double to_ns = r->options.to_s > 0.0 ? r->options.to_s * 1e9 : INFINITY;
     while (!r->has_frame) {
         const int got = recording_next(&r->recording, &r->frame, &err);
-        if (got < 0) return fail(r, &err), -1;
+        if (got < 0) return replay_fail(r, &err), -1;
         if (got == 0) return 0;
         const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
         if (!r->in_range && since_ns < r->options.from_s * 1e9) {
@@ -66,7 +66,7 @@ static void renumber(struct replay *r, uint8_t *frame)
     if (r->seq_shift != 0) native_finish_frame(frame, r->last_seq);
 }
 
-static void add(struct replay *r, const uint8_t *frame, uint32_t len, uint64_t tick)
+static void replay_add(struct replay *r, const uint8_t *frame, uint32_t len, uint64_t tick)
 {
     memcpy(r->bytes + r->len, frame, len);
     renumber(r, r->bytes + r->len);
@@ -86,7 +86,7 @@ static void add_front(struct replay *r, uint64_t tick)
         memcpy(frame, r->front.bytes[i], r->front.len[i]);
         frame[3] |= NATIVE_REPEAT | NATIVE_LOCAL;
         native_finish_frame(frame, 0);
-        add(r, frame, r->front.len[i], tick);
+        replay_add(r, frame, r->front.len[i], tick);
     }
 }
 
@@ -123,21 +123,21 @@ static void stop(struct replay *r, uint64_t tick, int wants_again)
     pthread_mutex_unlock(&r->lock);
 }
 
-static void begin(struct replay *r, uint64_t tick)
+static void replay_begin(struct replay *r, uint64_t tick)
 {
     struct sh_err err = {0};
     if (r->end_tick == UINT64_MAX && r->options.duration_s > 0.0) r->end_tick = tick + r->n_ticks;
     r->has_frame = r->in_range = r->has_skipped = 0;
     if (recording_rewind(&r->recording, &err) != SH_OK) {
         stop(r, tick, 0);
-        fail(r, &err);
+        replay_fail(r, &err);
         return;
     }
-    const int found = look(r);
+    const int found = replay_look(r);
     if (found <= 0) {
         stop(r, tick, 0);
         sh_fail(&err, SH_EINPUT, "%s: it has no frame from %.10g s on", r->options.path, r->options.from_s);
-        if (found == 0) fail(r, &err);
+        if (found == 0) replay_fail(r, &err);
         return;
     }
     rebase(r, tick);
@@ -152,15 +152,15 @@ static void begin(struct replay *r, uint64_t tick)
 }
 
 /* Fills a tick with its frames. may_skip: time without frames passes at once. */
-static void fill(struct replay *r, uint64_t tick, int may_skip)
+static void replay_fill(struct replay *r, uint64_t tick, int may_skip)
 {
     int found;
-    while ((found = look(r)) == 1) {
+    while ((found = replay_look(r)) == 1) {
         const uint64_t due = due_tick(r, tick);
         if (due > tick && !(may_skip && r->len == 0)) return;
         if (due > tick) r->start_tick -= due - tick;    /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
-        add(r, r->frame.bytes, r->frame.len, tick);
+        replay_add(r, r->frame.bytes, r->frame.len, tick);
         r->has_frame = 0;
     }
     stop(r, tick, found == 0 && r->options.loop);
@@ -193,7 +193,7 @@ static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
     return wishes;
 }
 
-static void count(struct replay *r)
+static void replay_count(struct replay *r)
 {
     atomic_fetch_add(&r->counters.fired, r->tick.n_fired);
     atomic_fetch_add(&r->counters.cast, r->tick.n_cast);
@@ -209,12 +209,12 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     const struct wishes wishes = take_wishes(r, tick, again);
     if (wishes.over) return LOOP_SOURCE_OVER;
     if (wishes.idle && may_idle) return LOOP_SOURCE_IDLE;
-    if (wishes.starts) begin(r, tick);
+    if (wishes.starts) replay_begin(r, tick);
     if (r->playing) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
-        fill(r, tick, may_idle && r->end_tick == UINT64_MAX); /* --duration counts such time */
-        count(r);
+        replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX); /* --duration counts such time */
+        replay_count(r);
         r->tick.n_cast += before.n_cast;
         r->tick.n_fired += before.n_fired;
         r->tick.n_lines += before.n_lines;
@@ -226,7 +226,7 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     return LOOP_SOURCE_TICK;
 }
 
-static void describe(void *self, struct ring_tick *tick)
+static void replay_describe(void *self, struct ring_tick *tick)
 {
     struct replay *r = self;
     uint32_t len = 0;
@@ -322,7 +322,7 @@ static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_
     return SH_OK;
 }
 
-static void end(void *self)
+static void replay_end(void *self)
 {
     struct replay *r = self;
     pthread_mutex_lock(&r->lock);
@@ -345,12 +345,12 @@ const struct loop_source_ops replay_source = {
     .counters = counters,
     .scans = scans,
     .power_up = power_up,
-    .end = end,
+    .end = replay_end,
     .files_fill = files_fill,
     .close_files = close_files,
     .most_bytes = most_bytes,
     .usual_bytes = usual_bytes,
-    .describe = describe,
+    .describe = replay_describe,
     .next = next,
 };
 

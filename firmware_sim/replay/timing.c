@@ -49,8 +49,8 @@ static int find_first(const struct timing *t, const struct native_points *points
     return 1;
 }
 
-static struct timing_moment take_points(const struct timing *t, const struct native_header *header,
-                                        const uint8_t *payload)
+static struct timing_moment timing_take_points(const struct timing *t, const struct native_header *header,
+                                               const uint8_t *payload)
 {
     struct native_points points;
     struct native_point last = {0};
@@ -113,7 +113,7 @@ static void take_emitter(struct timing *t, const struct native_header *header, c
     }
 }
 
-static void take_event(struct timing *t, const struct native_header *header, const uint8_t *payload)
+static void timing_take_event(struct timing *t, const struct native_header *header, const uint8_t *payload)
 {
     struct native_event event;
     if (native_decode_event(payload, header->length, &event) != SH_OK) return;
@@ -129,7 +129,7 @@ struct timing_moment timing_take(struct timing *timing, const struct native_head
     if ((header->flags & NATIVE_LOCAL) != 0) return (struct timing_moment){TIMING_FOLLOWS, header->t_ns};
     switch (header->type) {
     case NATIVE_POINTS:
-        return take_points(timing, header, payload);
+        return timing_take_points(timing, header, payload);
     case NATIVE_LINE_END:
         return take_line_end(timing, header, payload);
     case NATIVE_ATTRIBUTES:
@@ -142,7 +142,7 @@ struct timing_moment timing_take(struct timing *timing, const struct native_head
         take_emitter(timing, header, payload);
         break;
     case NATIVE_EVENT:
-        take_event(timing, header, payload);
+        timing_take_event(timing, header, payload);
         break;
     default:
         break;

@@ -123,8 +123,8 @@ static int measure_corners(const struct terrain *t, const struct geoframe *frame
     return SH_OK;
 }
 
-static void say(const struct config *cfg, const struct sh_report *report, const struct terrain *t,
-                const struct crs_place *at)
+static void anchor_geotiff_say(const struct config *cfg, const struct sh_report *report, const struct terrain *t,
+                               const struct crs_place *at)
 {
     if (!cfg->scene.anchor.height_given && !t->above_ellipsoid)
         sh_warn(report,
@@ -172,7 +172,7 @@ int anchor_by_geotiff(const struct config *cfg, const struct sh_report *report, 
     const double middle_m[3] = {0.5 * (t.bounds_m[0] + t.bounds_m[2]), 0.5 * (t.bounds_m[1] + t.bounds_m[3]), height_m};
     rc = crs_locate(t.crs, middle_m[0], middle_m[1], height_m, &at, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "%s: %s", t.file, why.text);
-    say(cfg, report, &t, &at);
+    anchor_geotiff_say(cfg, report, &t, &at);
     const int zone = find_zone(middle_m, &at.at, &north);
     if (zone > 0 && t.offset_m[0] == 0.0 && t.offset_m[1] == 0.0 && t.offset_m[2] == height_m)
         return geoframe_set_grid(frame, zone, north, err);

@@ -175,7 +175,7 @@ static int load_emitter(struct site *site, struct sh_err *err)
 
 /* The anchor comes before the scene, so that an error of an IFC file's site is reported, not an error that follows from
  * it. */
-static int load(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int load_load(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = load_emitter(site, err);
     if (rc == SH_OK) rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
@@ -209,7 +209,7 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_enter_world(site, other, err);
     if (rc == SH_OK && purpose == SITE_WRITTEN_OUT) site->world->written_out = 1;
-    if (rc == SH_OK) rc = load(site, &heard.report, err);
+    if (rc == SH_OK) rc = load_load(site, &heard.report, err);
     if (rc == SH_OK && site->measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
     if (rc == SH_OK && site->measures) rc = site_plan_rows(site, err);
     if (rc == SH_OK) return SH_OK;

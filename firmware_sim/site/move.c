@@ -33,7 +33,7 @@ const char *site_why_fixed(const struct site *site)
     return NULL;
 }
 
-static int is_same(const struct site_place *a, const struct site_place *b)
+static int move_is_same(const struct site_place *a, const struct site_place *b)
 {
     return memcmp(a->position_m, b->position_m, sizeof a->position_m) == 0 && a->heading_deg == b->heading_deg &&
            a->pitch_deg == b->pitch_deg && a->roll_deg == b->roll_deg;
@@ -64,7 +64,7 @@ static int place(const struct site *first, uint32_t station, const struct site_p
     struct site_place was;
     int rc = SH_OK;
     site_get_place(first, station, &was);
-    if (to == NULL || is_same(&was, to)) return SH_OK;
+    if (to == NULL || move_is_same(&was, to)) return SH_OK;
     if (first->anchor.known)
         s->place = PLACE_NONE;
     else if (s->place != PLACE_NONE)

@@ -192,8 +192,8 @@ static int stand_on_floor(const struct config_station *s, const double level[9],
     return SH_OK;
 }
 
-static int find(const struct config_station *s, const struct placement_anchor *anchor, const struct bvh *bvh,
-                struct placement *out, struct sh_err *err)
+static int site_placement_find(const struct config_station *s, const struct placement_anchor *anchor,
+                               const struct bvh *bvh, struct placement *out, struct sh_err *err)
 {
     struct georef_place at;
     double level[9], attitude[9];
@@ -219,7 +219,7 @@ int placement_find(const struct config *cfg, uint32_t i, const struct placement_
     struct sh_err why = {0, ""};
     memset(out, 0, sizeof *out);
     out->floor_m = NAN;
-    int rc = find(&cfg->station[i], anchor, bvh, out, &why);
+    int rc = site_placement_find(&cfg->station[i], anchor, bvh, out, &why);
     if (rc == SH_OK) return SH_OK;
     return sh_fail(err, rc, "%s: stations[%u] (%s): %.300s", cfg->file, i, cfg->station[i].name, why.text);
 }

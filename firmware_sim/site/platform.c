@@ -204,7 +204,7 @@ static int place(const struct site *site, const struct pose *head, struct placem
 }
 
 /* Describes a stop as a station of the configuration. */
-static void describe(const struct pose *head, uint32_t i, struct config_station *out)
+static void platform_describe(const struct pose *head, uint32_t i, struct config_station *out)
 {
     double heading, pitch, roll;
     pose_to_angles(head->quat, &heading, &pitch, &roll);
@@ -253,7 +253,7 @@ static int add_stop(struct site *site, const struct part *part, uint32_t i, stru
     pose_mount(&body, &site->mount, &head);
     set_time(site, i, s);
     s->station = &site->stop[i];
-    describe(&head, i, &site->stop[i]);
+    platform_describe(&head, i, &site->stop[i]);
     int rc = place(site, &head, &s->at, &why);
     return rc == SH_OK ? rc : sh_fail(err, rc, "%s: stop %u: %.300s", site->cfg->file, i + 1, why.text);
 }

@@ -124,7 +124,7 @@ static uint32_t count_triangles(const struct scene *scene, const uint8_t *is_tar
     return n;
 }
 
-static void count(const struct site *site, const uint8_t *is_target, struct site_target *t)
+static void target_count(const struct site *site, const uint8_t *is_target, struct site_target *t)
 {
     uint32_t first = site->scene->n_surfaces;
     t->all_surfaces = site->n_surfaces;
@@ -174,7 +174,7 @@ int site_select_target(struct site *site, struct sh_err *err)
     uint8_t *is_target = calloc(site->n_surfaces, 1);
     if (is_target == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
     int rc = find_targets(site, is_target, err);
-    if (rc == SH_OK) count(site, is_target, t);
+    if (rc == SH_OK) target_count(site, is_target, t);
     if (rc == SH_OK && target->others == OTHERS_LEFT_OUT) rc = leave_out(site, is_target, err);
     if (rc == SH_OK && target->others == OTHERS_HIDE && t->surfaces < t->all_surfaces) {
         t->is_target = is_target;

@@ -74,7 +74,7 @@ static int open_legs(const struct site *site, struct site_station *s, uint32_t i
     return SH_OK;
 }
 
-static void warn(const struct site_station *s, uint32_t i, const struct sh_report *report)
+static void tripod_warn(const struct site_station *s, uint32_t i, const struct sh_report *report)
 {
     const struct site_tripod *t = &s->tripod;
     if (isnan(t->head_m))
@@ -192,8 +192,8 @@ static int make_legs(const struct site *site, struct site_station *s, const doub
     return SH_OK;
 }
 
-static int set_up(const struct site *site, struct site_station *s, uint32_t i, struct bvh_work *work,
-                  const struct sh_report *report, struct sh_err *err)
+static int tripod_set_up(const struct site *site, struct site_station *s, uint32_t i, struct bvh_work *work,
+                         const struct sh_report *report, struct sh_err *err)
 {
     struct site_tripod *t = &s->tripod;
     double level[9];
@@ -206,7 +206,7 @@ static int set_up(const struct site *site, struct site_station *s, uint32_t i, s
     if (rc != SH_OK) return rc;
     const int cone = t->from->cone == CHOICE_ON || (t->from->cone == CHOICE_AUTO && !t->from->legs);
     t->cast.cos_opening = cone ? cos(t->opening_rad) : 2.0;
-    warn(s, i, report);
+    tripod_warn(s, i, report);
     return t->from->legs ? make_legs(site, s, level, report, err) : SH_OK;
 }
 
@@ -219,7 +219,7 @@ int site_set_up_tripods(struct site *site, const struct sh_report *report, struc
         if (config_serves(site->cfg, i)) s->tripod.from = given(site, i);
         if (s->tripod.from == NULL) continue;
         if (work == NULL) rc = bvh_work_create(&work, err);
-        if (rc == SH_OK) rc = set_up(site, s, i, work, report, err);
+        if (rc == SH_OK) rc = tripod_set_up(site, s, i, work, report, err);
         if (rc == SH_OK) rc = sh_check_stop(report, err);
     }
     bvh_work_free(work);

@@ -15,7 +15,7 @@ static int has(const struct site_warnings *said, const char *text)
 }
 
 /* A warning for which there is no room or no memory counts as new each time. */
-static void warn(void *ctx, const char *text)
+static void warnings_warn(void *ctx, const char *text)
 {
     struct site_listener *listener = ctx;
     struct site_warnings *said = listener->said;
@@ -40,7 +40,7 @@ static int loading_stops(void *ctx)
 void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_warnings *said,
                  const struct site_warnings *before)
 {
-    *listener = (struct site_listener){{listener, warn, progress, loading_stops}, to, said, before};
+    *listener = (struct site_listener){{listener, warnings_warn, progress, loading_stops}, to, said, before};
 }
 
 void site_free_warnings(struct site_warnings *said)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Keeps the warnings that are given while a site is loaded, so that a site beside this one only gives new ones. */
-#ifndef FIRMWARE_SIM_SITE_SAID_H
-#define FIRMWARE_SIM_SITE_SAID_H
+#ifndef FIRMWARE_SIM_SITE_WARNINGS_H
+#define FIRMWARE_SIM_SITE_WARNINGS_H
 
 #include "core/err.h"
 

@@ -218,7 +218,7 @@ static int set_up_blocks(struct raster *r, struct sh_err *err)
         return (double)v;        \
     } while (0)
 
-static double load(const struct raster *r, const uint8_t *p)
+static double geotiff_read_load(const struct raster *r, const uint8_t *p)
 {
     const int is_signed = r->format == SAMPLEFORMAT_INT;
     if (r->format == SAMPLEFORMAT_IEEEFP && r->bits == 32) LOAD(float);
@@ -235,7 +235,7 @@ static double load(const struct raster *r, const uint8_t *p)
 
 static double height_of(const struct raster *r, const uint8_t *p)
 {
-    const double value = load(r, p);
+    const double value = geotiff_read_load(r, p);
     return isfinite(value) && value != r->no_data ? r->g.height_m + r->g.height_scale_m * value : NAN;
 }
 
@@ -352,7 +352,7 @@ static void doubt_heights(const struct raster *r)
             r->b->name, r->lowest, r->highest, (odd - r->g.height_m) / r->g.height_scale_m);
 }
 
-static int say(struct raster *r, struct sh_err *err)
+static int geotiff_read_say(struct raster *r, struct sh_err *err)
 {
     const struct sh_report *report = r->b->report;
     int rc = r->n_holes > 0 ? count_alone(r, err) : SH_OK;
@@ -398,7 +398,7 @@ static int read_raster(struct raster *r, struct sh_err *err)
     b->scene->n_meshes++;
     b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 3};
     rc = add_all(r, err);
-    return rc == SH_OK ? say(r, err) : rc;
+    return rc == SH_OK ? geotiff_read_say(r, err) : rc;
 }
 
 int import_geotiff(struct scene_build *b, struct sh_err *err)

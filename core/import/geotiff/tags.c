@@ -14,7 +14,7 @@ struct entry {
     uint64_t n, at;
 };
 
-static uint64_t load(const struct tags *t, const uint8_t *p, size_t size)
+static uint64_t tags_load(const struct tags *t, const uint8_t *p, size_t size)
 {
     uint64_t value = 0;
     for (size_t i = 0; i < size; i++)
@@ -22,7 +22,7 @@ static uint64_t load(const struct tags *t, const uint8_t *p, size_t size)
     return value;
 }
 
-static int take(const struct tags *t, uint64_t at, void *out, size_t size, struct sh_err *err)
+static int tags_take(const struct tags *t, uint64_t at, void *out, size_t size, struct sh_err *err)
 {
     if (at <= INT64_MAX && fseeko(t->file, (off_t)at, SEEK_SET) == 0 && fread(out, 1, size, t->file) == size)
         return SH_OK;
@@ -34,21 +34,21 @@ static int read_head(struct tags *t, struct sh_err *err)
 {
     uint8_t head[16], count[8];
     uint64_t at;
-    int rc = take(t, 0, head, 8, err);
+    int rc = tags_take(t, 0, head, 8, err);
     if (rc != SH_OK) return sh_fail(err, rc, "%s: not a TIFF: it has less than 8 bytes", t->path);
     t->is_big_endian = head[0] == 'M';
-    const uint64_t version = load(t, head + 2, 2);
+    const uint64_t version = tags_load(t, head + 2, 2);
     if (head[0] != head[1] || (head[0] != 'I' && head[0] != 'M') || (version != 42 && version != 43))
         return sh_fail(err, SH_EINPUT, "%s: not a TIFF: its first bytes must be \"II\" or \"MM\" and 42 or 43",
                        t->path);
     t->is_big = version == 43;
-    if (t->is_big) rc = take(t, 0, head, 16, err);
+    if (t->is_big) rc = tags_take(t, 0, head, 16, err);
     if (rc != SH_OK) return rc;
-    at = t->is_big ? load(t, head + 8, 8) : load(t, head + 4, 4);
+    at = t->is_big ? tags_load(t, head + 8, 8) : tags_load(t, head + 4, 4);
     const size_t size = t->is_big ? 8 : 2;
-    rc = take(t, at, count, size, err);
+    rc = tags_take(t, at, count, size, err);
     if (rc != SH_OK) return rc;
-    t->n = load(t, count, size);
+    t->n = tags_load(t, count, size);
     t->first = at + size;
     if (t->n <= MOST_ENTRIES) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s: %llu tags in its directory; allowed are %d", t->path, (unsigned long long)t->n,
@@ -76,23 +76,24 @@ static size_t size_of(unsigned type)
 }
 
 /* *found has no values where there is no such tag. Values that fit stand in the entry itself. */
-static int find(const struct tags *t, unsigned tag, struct entry *found, struct sh_err *err)
+static int tags_find(const struct tags *t, unsigned tag, struct entry *found, struct sh_err *err)
 {
     const size_t field = t->is_big ? 8 : 4, size = 4 + 2 * field;
     *found = (struct entry){0};
     for (uint64_t i = 0; i < t->n; i++) {
         const uint64_t at = t->first + i * size;
         uint8_t p[20];
-        int rc = take(t, at, p, size, err);
+        int rc = tags_take(t, at, p, size, err);
         if (rc != SH_OK) return rc;
-        if (load(t, p, 2) != tag) continue;
-        const unsigned type = (unsigned)load(t, p + 2, 2);
+        if (tags_load(t, p, 2) != tag) continue;
+        const unsigned type = (unsigned)tags_load(t, p + 2, 2);
         if (size_of(type) == 0)
             return sh_fail(err, SH_EINPUT,
                            "%s: its tag %u has values of type %u; allowed are the TIFF types 2, 3, 4, 12 and 16",
                            t->path, tag, type);
-        const uint64_t n = load(t, p + 4, field);
-        *found = (struct entry){type, n, n <= field / size_of(type) ? at + 4 + field : load(t, p + 4 + field, field)};
+        const uint64_t n = tags_load(t, p + 4, field);
+        *found =
+            (struct entry){type, n, n <= field / size_of(type) ? at + 4 + field : tags_load(t, p + 4 + field, field)};
         return SH_OK;
     }
     return SH_OK;
@@ -100,7 +101,7 @@ static int find(const struct tags *t, unsigned tag, struct entry *found, struct 
 
 static double number(const struct tags *t, unsigned type, const uint8_t *p)
 {
-    const uint64_t bits = load(t, p, size_of(type));
+    const uint64_t bits = tags_load(t, p, size_of(type));
     double value;
     if (type != DOUBLE) return (double)bits;
     memcpy(&value, &bits, sizeof value);
@@ -110,11 +111,11 @@ static double number(const struct tags *t, unsigned type, const uint8_t *p)
 int tags_numbers(const struct tags *tags, unsigned tag, double *out, size_t most, size_t *n, struct sh_err *err)
 {
     struct entry found;
-    int rc = find(tags, tag, &found, err);
+    int rc = tags_find(tags, tag, &found, err);
     *n = rc == SH_OK && found.n < most ? (size_t)found.n : rc == SH_OK ? most : 0;
     for (size_t i = 0; i < *n && rc == SH_OK; i++) {
         uint8_t p[8];
-        rc = take(tags, found.at + i * size_of(found.type), p, size_of(found.type), err);
+        rc = tags_take(tags, found.at + i * size_of(found.type), p, size_of(found.type), err);
         if (rc == SH_OK) out[i] = number(tags, found.type, p);
     }
     return rc;
@@ -123,12 +124,12 @@ int tags_numbers(const struct tags *tags, unsigned tag, double *out, size_t most
 int tags_text(const struct tags *tags, unsigned tag, char *out, size_t room, struct sh_err *err)
 {
     struct entry found;
-    int rc = find(tags, tag, &found, err);
+    int rc = tags_find(tags, tag, &found, err);
     if (rc == SH_OK && found.type == ASCII && found.n >= room)
         rc = sh_fail(err, SH_EINPUT, "%s: its tag %u has %llu bytes; allowed are up to %zu", tags->path, tag,
                      (unsigned long long)found.n, room - 1);
     const size_t n = rc != SH_OK || found.type != ASCII ? 0 : (size_t)found.n;
-    if (n > 0) rc = take(tags, found.at, out, n, err);
+    if (n > 0) rc = tags_take(tags, found.at, out, n, err);
     out[n] = '\0';
     return rc;
 }

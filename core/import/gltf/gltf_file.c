@@ -91,7 +91,7 @@ static int count_entries(struct gltf *g, const char *list, uint32_t *n)
     return rc;
 }
 
-static int make_room(struct gltf *g)
+static int gltf_file_make_room(struct gltf *g)
 {
     int rc = count_entries(g, "buffers", &g->n_buffers);
     if (rc == SH_OK) rc = count_entries(g, "bufferViews", &g->n_views);
@@ -112,7 +112,7 @@ int gltf_open(struct gltf *g)
     int rc = text_open(&g->file, g->b->spec->file, NULL, NULL, g->err);
     if (rc == SH_OK) rc = find_json(g, &json);
     if (rc == SH_OK && !g->by_assimp) rc = parse(g, json);
-    return rc == SH_OK && !g->by_assimp ? make_room(g) : rc;
+    return rc == SH_OK && !g->by_assimp ? gltf_file_make_room(g) : rc;
 }
 
 static void free_all(struct gltf_kept *kept, uint32_t n)

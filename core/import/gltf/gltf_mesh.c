@@ -159,7 +159,7 @@ static int open_colour(struct part *p, const json_t *attributes, const char *at)
     return rc;
 }
 
-static int add_part(struct part *p, const json_t *primitive, const char *at)
+static int gltf_mesh_add_part(struct part *p, const json_t *primitive, const char *at)
 {
     struct scene_build *b = p->g->b;
     uint64_t mode = TRIANGLES;
@@ -196,7 +196,7 @@ static int add_primitive(struct gltf *g, const struct drawn *d, const json_t *pr
     }
     int rc = gltf_pose_open(g, d->node, d->mesh, primitive, at, &p.pose);
     if (rc == SH_OK) rc = gltf_look_open(g, d->object, primitive, at, &p.look);
-    if (rc == SH_OK) rc = add_part(&p, primitive, at);
+    if (rc == SH_OK) rc = gltf_mesh_add_part(&p, primitive, at);
     gltf_pose_close(&p.pose);
     return rc;
 }

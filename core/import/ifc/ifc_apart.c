@@ -82,7 +82,7 @@ static void set_command(struct command *c, struct scene_build *b, const char *fo
     c->apart.task = (struct import_task){.b = b, .limits = limits, .name = name, .argv = c->argv};
 }
 
-static int finish(struct import_apart *a, struct ifc_bodies *bodies, bool *has, struct sh_err *said)
+static int ifc_apart_finish(struct import_apart *a, struct ifc_bodies *bodies, bool *has, struct sh_err *said)
 {
     int rc = import_judge(a, said);
     if (rc == SH_OK) rc = ifc_bodies_read(bodies, a->result_fd, said);
@@ -102,7 +102,7 @@ void ifc_reason(const struct scene_build *b, const char *name, const struct sh_e
     snprintf(out, IFC_REASON_LEN, "%s%s%.*s", is_named ? "" : name, is_named ? "" : ": ", len, text);
 }
 
-static int judge(struct scene_build *b, const struct ifc_readings *out, struct sh_err *err)
+static int ifc_apart_judge(struct scene_build *b, const struct ifc_readings *out, struct sh_err *err)
 {
     const int rc = sh_check_stop(b->report, err);
     if (rc != SH_OK || out->has_web || out->has_lite) return rc;
@@ -130,9 +130,9 @@ int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct 
     if (web_asked && import_start(&web.apart, &out->web_said) == SH_OK) all[n++] = &web.apart;
     if (lite_asked && import_start(&lite.apart, &out->lite_said) == SH_OK) all[n++] = &lite.apart;
     import_watch(all, n);
-    if (web_asked && web.apart.pid > 0) finish(&web.apart, &out->web, &out->has_web, &out->web_said);
-    if (lite_asked && lite.apart.pid > 0) finish(&lite.apart, &out->lite, &out->has_lite, &out->lite_said);
-    return judge(b, out, err);
+    if (web_asked && web.apart.pid > 0) ifc_apart_finish(&web.apart, &out->web, &out->has_web, &out->web_said);
+    if (lite_asked && lite.apart.pid > 0) ifc_apart_finish(&lite.apart, &out->lite, &out->has_lite, &out->lite_said);
+    return ifc_apart_judge(b, out, err);
 }
 
 void ifc_readings_free(struct ifc_readings *r)

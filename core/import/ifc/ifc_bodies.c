@@ -35,7 +35,7 @@ static int wrong(const struct reading *r, const char *what)
 }
 
 /* The next bytes, up to a multiple of 8; NULL: there are not as many. */
-static const void *take(struct reading *r, uint64_t size)
+static const void *ifc_bodies_take(struct reading *r, uint64_t size)
 {
     const void *at = r->b->bytes + r->at;
     if (size > r->b->size - r->at) return NULL;
@@ -60,14 +60,15 @@ static int check_part(const struct reading *r, const struct ifc_part *part)
 static int read_part(struct reading *r)
 {
     struct part_head head;
-    const void *at = take(r, sizeof head);
+    const void *at = ifc_bodies_take(r, sizeof head);
     if (at == NULL) return wrong(r, "it is cut off");
     memcpy(&head, at, sizeof head);
     struct ifc_part part = {
         .n_vertices = head.n_vertices, .n_triangles = head.n_triangles, .largest_m = head.largest_m};
     memcpy(part.colour, head.colour, sizeof part.colour);
-    part.vertex_m = take(r, head.n_vertices * (uint64_t)sizeof *part.vertex_m);
-    part.triangle = part.vertex_m != NULL ? take(r, head.n_triangles * (uint64_t)sizeof *part.triangle) : NULL;
+    part.vertex_m = ifc_bodies_take(r, head.n_vertices * (uint64_t)sizeof *part.vertex_m);
+    part.triangle =
+        part.vertex_m != NULL ? ifc_bodies_take(r, head.n_triangles * (uint64_t)sizeof *part.triangle) : NULL;
     if (part.triangle == NULL) return wrong(r, "it is cut off");
     if (!grow(&r->b->part, &r->b->room_parts, r->b->n_parts + 1, sizeof part))
         return sh_fail(r->err, SH_ENOMEM, "no memory for parts");
@@ -79,11 +80,11 @@ static int read_part(struct reading *r)
 static int read_product(struct reading *r)
 {
     struct product_head head;
-    const void *at = take(r, sizeof head);
+    const void *at = ifc_bodies_take(r, sizeof head);
     if (at == NULL) return wrong(r, "it is cut off");
     memcpy(&head, at, sizeof head);
     if (head.id == 0) return head.n_parts == 0 && r->at == r->b->size ? 0 : wrong(r, "a product without a number");
-    const char *text = take(r, head.n_text);
+    const char *text = ifc_bodies_take(r, head.n_text);
     if (text == NULL) return wrong(r, "it is cut off");
     const char *line = memchr(text, '\n', head.n_text);
     if (line == NULL) return wrong(r, "a text without its line");
@@ -129,7 +130,7 @@ int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err)
     *b = (struct ifc_bodies){0};
     int rc = read_file(b, fd, err);
     if (rc != SH_OK) return rc;
-    const void *head = take(&r, sizeof magic);
+    const void *head = ifc_bodies_take(&r, sizeof magic);
     if (head == NULL || memcmp(head, magic, sizeof magic) != 0) return wrong(&r, "no head");
     while ((rc = read_product(&r)) == 1)
         continue;

@@ -52,7 +52,7 @@ static char *object_name(struct reading *r, const struct ifc_product *p, const s
     return asprintf(&object, "%.*s_%.*s_%s", (int)type.n, type.p, (int)n, name, p->guid) >= 0 ? object : NULL;
 }
 
-static int add_part(struct reading *r, const struct ifc_part *part, uint16_t label)
+static int ifc_read_add_part(struct reading *r, const struct ifc_part *part, uint16_t label)
 {
     struct scene_build *b = r->b;
     b->mesh_vertex0 = b->scene->n_vertices;
@@ -101,7 +101,7 @@ static int add_body(struct reading *r, const struct ifc_product *p, const struct
         const struct ifc_part *part = &of->part[body->first + i];
         uint16_t label;
         rc = label_part(r, p, body, name, part, &label);
-        if (rc == SH_OK) rc = add_part(r, part, label);
+        if (rc == SH_OK) rc = ifc_read_add_part(r, part, label);
     }
     r->b->scene->n_meshes++;
     r->b->mesh = NULL;

@@ -27,7 +27,7 @@ struct reader {
     struct sh_err *err;
 };
 
-static int fail(struct reader *r, const struct step_record *at, const char *what)
+static int ifc_site_fail(struct reader *r, const struct step_record *at, const char *what)
 {
     char text[256];
     snprintf(text, sizeof text, "%.190s; %s", what, ADVICE);
@@ -54,7 +54,7 @@ static int take_context(struct reader *r, const struct step_record *record)
 {
     struct text_span arg[CONTEXT_ARGS];
     if (step_split(record->args, arg, CONTEXT_ARGS) != CONTEXT_ARGS)
-        return fail(r, record, "not the 6 attributes that IFC defines");
+        return ifc_site_fail(r, record, "not the 6 attributes that IFC defines");
     int is_model = text_is(arg[CONTEXT_TYPE], "'Model'");
     if (r->n_contexts++ == 0 || (is_model && !r->is_model)) {
         r->context = *record;
@@ -67,11 +67,11 @@ static int take_record(struct reader *r, const struct step_record *record)
 {
     if (text_is(record->type, "IFCSITE") && is_located(record)) {
         r->site = *record;
-        if (r->n_sites++ > 0) return fail(r, record, "a second site with a latitude; allowed one");
+        if (r->n_sites++ > 0) return ifc_site_fail(r, record, "a second site with a latitude; allowed one");
     }
     if (text_is(record->type, "IFCMAPCONVERSION") || text_is(record->type, "IFCMAPCONVERSIONSCALED")) {
         r->map = *record;
-        if (r->n_maps++ > 0) return fail(r, record, "a second map conversion; allowed one");
+        if (r->n_maps++ > 0) return ifc_site_fail(r, record, "a second map conversion; allowed one");
     }
     return text_is(record->type, "IFCGEOMETRICREPRESENTATIONCONTEXT") ? take_context(r, record) : SH_OK;
 }
@@ -95,17 +95,18 @@ struct found {
 
 /* The record that an attribute refers to, of this type and with n attributes at least (n <=
  * STEP_MAX_ARGS). */
-static int follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type, size_t n,
-                  struct found *to)
+static int ifc_site_follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type,
+                           size_t n, struct found *to)
 {
     uint64_t id;
     char what[96];
     snprintf(what, sizeof what, "a reference to %s is missing", type);
-    if (!step_reference(ref, &id)) return fail(r, from, what);
+    if (!step_reference(ref, &id)) return ifc_site_fail(r, from, what);
     const struct step_record *record = ifc_index_find(&r->index, id);
-    if (record == NULL || !text_is(record->type, type)) return fail(r, from, what);
+    if (record == NULL || !text_is(record->type, type)) return ifc_site_fail(r, from, what);
     to->record = *record;
-    if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n) return fail(r, &to->record, "attributes are missing");
+    if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n)
+        return ifc_site_fail(r, &to->record, "attributes are missing");
     return SH_OK;
 }
 
@@ -120,19 +121,19 @@ static int read_angle(struct reader *r, struct text_span span, const char *name,
     size_t n = step_list(span, &list) ? step_split(list, part, 4) : 0;
     snprintf(what, sizeof what, "%s has %zu components; allowed 3 or 4: degrees, minutes, seconds, millionths", name,
              n);
-    if (n != 3 && n != 4) return fail(r, &r->site, what);
+    if (n != 3 && n != 4) return ifc_site_fail(r, &r->site, what);
     *deg = 0.0;
     for (size_t i = n; i-- > 0;) {
         snprintf(what, sizeof what, "%s: component %zu is not a whole number within %ld", name, i + 1, limit[i]);
         if (!step_integer(part[i], &value[i]) || value[i] <= -limit[i] || value[i] >= limit[i])
-            return fail(r, &r->site, what);
+            return ifc_site_fail(r, &r->site, what);
         snprintf(what, sizeof what, "%s: components of different sign; allowed all of one", name);
-        if (value[i] != 0 && sign != 0 && (value[i] > 0) != (sign > 0)) return fail(r, &r->site, what);
+        if (value[i] != 0 && sign != 0 && (value[i] > 0) != (sign > 0)) return ifc_site_fail(r, &r->site, what);
         if (value[i] != 0) sign = value[i];
         *deg += (double)value[i] / per_deg[i];
     }
     snprintf(what, sizeof what, "%s of %.9g deg; allowed -%g to %g deg", name, *deg, limit_deg, limit_deg);
-    return fabs(*deg) <= limit_deg ? SH_OK : fail(r, &r->site, what);
+    return fabs(*deg) <= limit_deg ? SH_OK : ifc_site_fail(r, &r->site, what);
 }
 
 /* n = 2 or 3 numbers of "(a, b, c)". */
@@ -141,9 +142,10 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct t
 {
     struct text_span list, part[3];
     size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
-    if (n < min || n > max) return fail(r, at, "needs 2 or 3 numbers");
+    if (n < min || n > max) return ifc_site_fail(r, at, "needs 2 or 3 numbers");
     for (size_t i = 0; i < n; i++)
-        if (!step_real(&r->index.text, part[i], &value[i])) return fail(r, at, "a coordinate that is not a number");
+        if (!step_real(&r->index.text, part[i], &value[i]))
+            return ifc_site_fail(r, at, "a coordinate that is not a number");
     return SH_OK;
 }
 
@@ -153,13 +155,13 @@ static int read_axes(struct reader *r, const struct step_record *from, struct te
 {
     static const double plain[2][3] = {{0.0, 0.0, 1.0}, {1.0, 0.0, 0.0}};
     struct found placement, found;
-    int rc = follow(r, from, ref, "IFCAXIS2PLACEMENT3D", 3, &placement);
-    if (rc == SH_OK) rc = follow(r, &placement.record, placement.arg[0], "IFCCARTESIANPOINT", 1, &found);
+    int rc = ifc_site_follow(r, from, ref, "IFCAXIS2PLACEMENT3D", 3, &placement);
+    if (rc == SH_OK) rc = ifc_site_follow(r, &placement.record, placement.arg[0], "IFCCARTESIANPOINT", 1, &found);
     if (rc == SH_OK) rc = read_numbers(r, &found.record, found.arg[0], 3, 3, location);
     for (int i = 0; i < 2 && rc == SH_OK; i++) {
         memcpy(axes[i], plain[i], sizeof plain[i]);
         if (text_is(placement.arg[1 + i], "$")) continue;
-        rc = follow(r, &placement.record, placement.arg[1 + i], "IFCDIRECTION", 1, &found);
+        rc = ifc_site_follow(r, &placement.record, placement.arg[1 + i], "IFCDIRECTION", 1, &found);
         if (rc == SH_OK) rc = read_numbers(r, &found.record, found.arg[0], 3, 3, axes[i]);
     }
     return rc;
@@ -172,10 +174,10 @@ static int read_origin(struct reader *r, struct text_span ref, double unit_m, do
     double axes[2][3];
     memset(origin_m, 0, 3 * sizeof *origin_m);
     if (text_is(ref, "$")) return SH_OK;
-    int rc = follow(r, &r->site, ref, "IFCLOCALPLACEMENT", 2, &local);
+    int rc = ifc_site_follow(r, &r->site, ref, "IFCLOCALPLACEMENT", 2, &local);
     if (rc != SH_OK) return rc;
     if (!text_is(local.arg[0], "$"))
-        return fail(r, &local.record, "the site's placement is relative to another; allowed absolute");
+        return ifc_site_fail(r, &local.record, "the site's placement is relative to another; allowed absolute");
     rc = read_axes(r, &local.record, local.arg[1], origin_m, axes);
     for (int i = 0; i < 3; i++)
         origin_m[i] *= unit_m;
@@ -194,12 +196,14 @@ static int read_north(struct reader *r, struct ifc_site *site)
     if (rc != SH_OK) return rc;
     for (int i = 0; i < 3; i++)
         if (at[i] != 0.0 || fabs(axes[0][i] - (i == 2)) > 1e-9 || fabs(axes[1][i] - (i == 0)) > 1e-9)
-            return fail(r, &r->context, "a WorldCoordinateSystem that is shifted or turned; allowed the origin");
+            return ifc_site_fail(r, &r->context,
+                                 "a WorldCoordinateSystem that is shifted or turned; allowed the origin");
     if (text_is(arg[CONTEXT_NORTH], "$")) return SH_OK;
-    rc = follow(r, &r->context, arg[CONTEXT_NORTH], "IFCDIRECTION", 1, &direction);
+    rc = ifc_site_follow(r, &r->context, arg[CONTEXT_NORTH], "IFCDIRECTION", 1, &direction);
     if (rc == SH_OK) rc = read_numbers(r, &direction.record, direction.arg[0], 2, 3, north);
     if (rc != SH_OK) return rc;
-    if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction.record, "a true north without a direction");
+    if (!(hypot(north[0], north[1]) > 1e-9))
+        return ifc_site_fail(r, &direction.record, "a true north without a direction");
     site->north_deg = angle_deg(atan2(north[0], north[1]));
     return SH_OK;
 }
@@ -224,7 +228,7 @@ static int check_scale(struct reader *r, double scale, double expected)
     snprintf(what, sizeof what,
              "a Scale of %.9g beside a MapUnit; allowed about %.9g, the model's unit in units of the map", scale,
              expected);
-    return fail(r, &r->map, what);
+    return ifc_site_fail(r, &r->map, what);
 }
 
 static int read_map_unit(struct reader *r, const struct found *crs, double scale, double model_m, double *m)
@@ -235,7 +239,8 @@ static int read_map_unit(struct reader *r, const struct found *crs, double scale
         return rc == SH_OK ? check_scale(r, scale, model_m / *m) : rc;
     }
     *m = known_unit_m(model_m / scale, model_m);
-    return isnan(*m) ? fail(r, &r->map, "its Scale fits no unit of maps, and the system has no MapUnit") : SH_OK;
+    return isnan(*m) ? ifc_site_fail(r, &r->map, "its Scale fits no unit of maps, and the system has no MapUnit")
+                     : SH_OK;
 }
 
 /* A number of the map conversion. The first two must be there; a height that is not is NaN. */
@@ -249,7 +254,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
     if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
     if (step_real(&r->index.text, arg, value)) return SH_OK;
     snprintf(what, sizeof what, "%s is missing, or is not a number", name[which]);
-    return fail(r, &r->map, what);
+    return ifc_site_fail(r, &r->map, what);
 }
 
 static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
@@ -261,8 +266,8 @@ static int read_map_name(struct reader *r, const struct found *crs, struct ifc_m
     free(name);
     return map->crs[0] != '\0'
                ? SH_OK
-               : fail(r, &crs->record,
-                      "its name is missing or over 127 bytes long; allowed is one such as \"EPSG:25832\"");
+               : ifc_site_fail(r, &crs->record,
+                               "its name is missing or over 127 bytes long; allowed is one such as \"EPSG:25832\"");
 }
 
 static int read_map(struct reader *r, double unit_m, struct ifc_map *map)
@@ -271,14 +276,14 @@ static int read_map(struct reader *r, double unit_m, struct ifc_map *map)
     struct found crs;
     double value[MAP_ARGS], map_unit_m = 1.0;
     if (step_split(r->map.args, arg, STEP_MAX_ARGS) < MAP_ARGS)
-        return fail(r, &r->map, "not the 8 attributes that IFC defines");
-    int rc = follow(r, &r->map, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
+        return ifc_site_fail(r, &r->map, "not the 8 attributes that IFC defines");
+    int rc = ifc_site_follow(r, &r->map, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
     if (rc == SH_OK) rc = read_map_name(r, &crs, map);
     for (int i = MAP_EASTING; i < MAP_ARGS && rc == SH_OK; i++)
         rc = read_number(r, arg[i], i, &value[i]);
-    if (rc == SH_OK && !(value[MAP_SCALE] > 0.0)) rc = fail(r, &r->map, "a Scale that is not above 0");
+    if (rc == SH_OK && !(value[MAP_SCALE] > 0.0)) rc = ifc_site_fail(r, &r->map, "a Scale that is not above 0");
     if (rc == SH_OK && !(hypot(value[MAP_ABSCISSA], value[MAP_ORDINATE]) > 1e-9))
-        rc = fail(r, &r->map, "an x axis without a direction");
+        rc = ifc_site_fail(r, &r->map, "an x axis without a direction");
     if (rc == SH_OK) rc = read_map_unit(r, &crs, value[MAP_SCALE], unit_m, &map_unit_m);
     if (rc != SH_OK) return rc;
     map->easting_m = value[MAP_EASTING] * map_unit_m;
@@ -294,13 +299,13 @@ static int read_site(struct reader *r, double unit_m, struct ifc_site *site)
 {
     struct text_span arg[SITE_ARGS];
     if (step_split(r->site.args, arg, SITE_ARGS) != SITE_ARGS)
-        return fail(r, &r->site, "not the 14 attributes that IFC defines");
+        return ifc_site_fail(r, &r->site, "not the 14 attributes that IFC defines");
     int rc = read_angle(r, arg[SITE_LATITUDE], "RefLatitude", 90.0, &site->lat_deg);
     if (rc == SH_OK) rc = read_angle(r, arg[SITE_LONGITUDE], "RefLongitude", 180.0, &site->lon_deg);
     if (rc == SH_OK) rc = read_origin(r, arg[SITE_PLACEMENT], unit_m, site->origin_m);
     if (rc != SH_OK) return rc;
     if (!text_is(arg[SITE_ELEVATION], "$") && !step_real(&r->index.text, arg[SITE_ELEVATION], &site->elevation_m))
-        return fail(r, &r->site, "RefElevation is not a number");
+        return ifc_site_fail(r, &r->site, "RefElevation is not a number");
     site->elevation_m *= unit_m;
     return SH_OK;
 }

@@ -100,7 +100,7 @@ size_t ifc_styles_of(const struct ifc_records *r, uint64_t item, size_t *first)
     return end - *first;
 }
 
-static bool is_same(const struct ifc_style *style, const float colour[4])
+static bool ifc_styles_is_same(const struct ifc_style *style, const float colour[4])
 {
     for (int k = 0; k < 3; k++)
         if (fabsf(style->colour[k] - colour[k]) > SAME_COLOUR) return false;
@@ -111,9 +111,9 @@ const struct ifc_style *ifc_style_by_colour(const struct ifc_records *r, const s
                                             const float colour[4])
 {
     for (size_t i = 0; i < p->n_styles; i++)
-        if (is_same(&r->style[p->style[i]], colour)) return &r->style[p->style[i]];
+        if (ifc_styles_is_same(&r->style[p->style[i]], colour)) return &r->style[p->style[i]];
     /* A material's style has no item; the product's own come first. */
     for (size_t i = 0; i < r->n_styles && r->style[i].item == 0; i++)
-        if (is_same(&r->style[i], colour)) return &r->style[i];
+        if (ifc_styles_is_same(&r->style[i], colour)) return &r->style[i];
     return NULL;
 }

@@ -17,7 +17,7 @@ static int hex(const char *p, const char *end, int digits, uint32_t *value)
     return 1;
 }
 
-static char *put(char *out, uint32_t code)
+static char *ifc_text_put(char *out, uint32_t code)
 {
     if (code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) code = 0xfffd;
     if (code < 0x80) {
@@ -49,7 +49,7 @@ static const char *wide(const char *p, const char *end, int digits, char **out)
             code = 0x10000 + ((code - 0xd800) << 10) + (low - 0xdc00);
             p += 4;
         }
-        *out = put(*out, code);
+        *out = ifc_text_put(*out, code);
     }
     return end - p >= 4 && memcmp(p, "\\X0\\", 4) == 0 ? p + 4 : p;
 }
@@ -72,16 +72,16 @@ static const char *escape(const char *p, const char *end, char **out)
     if (end - p >= 4 && memcmp(p, "\\X2\\", 4) == 0) return wide(p + 4, end, 4, out);
     if (end - p >= 4 && memcmp(p, "\\X4\\", 4) == 0) return wide(p + 4, end, 8, out);
     if (end - p >= 5 && memcmp(p, "\\X\\", 3) == 0 && hex(p + 3, end, 2, &code)) {
-        *out = put(*out, code);
+        *out = ifc_text_put(*out, code);
         return p + 5;
     }
     if (end - p >= 4 && memcmp(p, "\\S\\", 3) == 0) {
-        *out = put(*out, (uint32_t)(unsigned char)p[3] + 0x80);
+        *out = ifc_text_put(*out, (uint32_t)(unsigned char)p[3] + 0x80);
         return p + 4;
     }
     if (end - p >= 4 && p[1] == 'P' && p[3] == '\\') return p + 4; /* a code page: \S\ is read as that of Latin-1 */
     if (end - p >= 2 && p[1] == '\\') {
-        *out = put(*out, '\\');
+        *out = ifc_text_put(*out, '\\');
         return p + 2;
     }
     return p;
@@ -97,7 +97,7 @@ char *ifc_text(struct text_span quoted)
         if (next == p) {
             const int n = utf8_length(p, end);
             if (n == 0) {
-                out = put(out, (unsigned char)*p);
+                out = ifc_text_put(out, (unsigned char)*p);
             } else {
                 memcpy(out, p, (size_t)n);
                 out += n;

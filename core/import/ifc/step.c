@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uint64_t count(const char *p, const char *end, char what)
+static uint64_t step_count(const char *p, const char *end, char what)
 {
     uint64_t n = 0;
     for (; (p = memchr(p, what, (size_t)(end - p))) != NULL; p++)
@@ -18,7 +18,7 @@ static int blank_comments(struct text *t, struct sh_err *err)
 {
     uint64_t line = 1, opened = 0;
     int quoted = 0;
-    if (memmem(t->data, t->size, "/*", 2) == NULL && count(t->data, t->data + t->size, '\'') % 2 == 0)
+    if (memmem(t->data, t->size, "/*", 2) == NULL && step_count(t->data, t->data + t->size, '\'') % 2 == 0)
         return SH_OK; /* most files */
     for (char *p = t->data, *end = t->data + t->size; p < end; p++) {
         if (*p == '\n') line++;
@@ -60,8 +60,8 @@ static const char *find_end(struct text *t)
 {
     uint64_t quotes = 0;
     for (const char *p = t->p, *end; (end = memchr(p, ';', (size_t)(t->end - p))) != NULL; p = end + 1) {
-        t->line += count(p, end, '\n');
-        quotes += count(p, end, '\'');
+        t->line += step_count(p, end, '\n');
+        quotes += step_count(p, end, '\'');
         if (quotes % 2 == 0) return end;
     }
     return NULL;

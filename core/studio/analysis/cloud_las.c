@@ -26,7 +26,7 @@ struct las {
     size_t n_no_station;
 };
 
-static int fail(const struct las *las, struct sh_err *err, const char *what)
+static int cloud_las_fail(const struct las *las, struct sh_err *err, const char *what)
 {
     return text_fail(&las->t, 0, SH_EINPUT, err, "%s", what);
 }
@@ -34,19 +34,21 @@ static int fail(const struct las *las, struct sh_err *err, const char *what)
 static int read_header(struct las *las, struct sh_err *err)
 {
     const uint8_t *d = las->data;
-    if (las->t.size < HEADER_MIN) return fail(las, err, "shorter than a LAS header");
+    if (las->t.size < HEADER_MIN) return cloud_las_fail(las, err, "shorter than a LAS header");
     unsigned header_len = le_get16(d + 94);
-    if (d[24] != 1 || d[25] < 2 || d[25] > 4) return fail(las, err, "not of LAS version 1.2 to 1.4");
-    if ((d[104] & 0xc0) != 0) return fail(las, err, "compressed (LAZ), which is not read; write it as LAS");
+    if (d[24] != 1 || d[25] < 2 || d[25] > 4) return cloud_las_fail(las, err, "not of LAS version 1.2 to 1.4");
+    if ((d[104] & 0xc0) != 0) return cloud_las_fail(las, err, "compressed (LAZ), which is not read; write it as LAS");
     las->format = d[104];
     las->record_len = le_get16(d + 105);
     las->points_at = le_get32(d + 96);
     bool is_14 = d[25] == 4 && header_len >= HEADER_14 && las->t.size >= HEADER_14;
     las->n = is_14 ? le_get64(d + 247) : le_get32(d + 107);
-    if (las->format >= N_FORMATS) return fail(las, err, "an unknown point data record format; known are 0 to 10");
-    if (las->record_len < standard_len[las->format]) return fail(las, err, "point records shorter than their format");
+    if (las->format >= N_FORMATS)
+        return cloud_las_fail(las, err, "an unknown point data record format; known are 0 to 10");
+    if (las->record_len < standard_len[las->format])
+        return cloud_las_fail(las, err, "point records shorter than their format");
     if (las->points_at > las->t.size || las->n > (las->t.size - las->points_at) / las->record_len)
-        return fail(las, err, "the file is cut off: it can't hold the points its header counts");
+        return cloud_las_fail(las, err, "the file is cut off: it can't hold the points its header counts");
     return SH_OK;
 }
 
@@ -90,7 +92,7 @@ static int read_vlrs(struct las *las, struct sh_err *err)
         const uint8_t *vlr = las->data + at;
         size_t len = at + VLR_HEAD <= las->points_at ? le_get16(vlr + 20) : 0;
         if (at + VLR_HEAD + len > las->points_at)
-            return fail(las, err, "its variable length records run into the points");
+            return cloud_las_fail(las, err, "its variable length records run into the points");
         unsigned record = le_get16(vlr + 18);
         if (strncmp((const char *)vlr + 2, "LASF_Projection", 16) == 0 && record == 2112) {
             char *wkt = strndup((const char *)vlr + VLR_HEAD, len);
@@ -152,7 +154,7 @@ static int read_points(struct las *las, struct sh_err *err)
         for (int k = 0; k < 3; k++) {
             double scale = le_get_double(las->data + 131 + 8 * k), offset = le_get_double(las->data + 155 + 8 * k);
             c->xyz_m[i][k] = (int32_t)le_get32(p + 4 * k) * scale + offset;
-            if (!isfinite(c->xyz_m[i][k])) return fail(las, err, "scales and offsets that give no position");
+            if (!isfinite(c->xyz_m[i][k])) return cloud_las_fail(las, err, "scales and offsets that give no position");
         }
         if (c->epsg == 4979) { /* x is longitude in a LAS file, latitude here */
             double lon_deg = c->xyz_m[i][0];
@@ -174,7 +176,8 @@ static int read_points(struct las *las, struct sh_err *err)
         free(c->station);
         c->station = NULL;
     } else if (las->n_no_station > 0) {
-        return fail(las, err, "some points have the point source ID 0, which is not a station; others have a station");
+        return cloud_las_fail(las, err,
+                              "some points have the point source ID 0, which is not a station; others have a station");
     }
     return SH_OK;
 }

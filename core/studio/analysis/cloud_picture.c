@@ -56,8 +56,8 @@ static double choose_pixels(struct cloud_picture *p, size_t n)
     return pixel_m;
 }
 
-static void fill(const struct cloud_picture_spec *spec, const struct cloud_picture *p, double pixel_m,
-                 struct pixel *pixel)
+static void cloud_picture_fill(const struct cloud_picture_spec *spec, const struct cloud_picture *p, double pixel_m,
+                               struct pixel *pixel)
 {
     double m[2], figure;
     for (size_t i = 0; i < spec->n; i++) {
@@ -92,7 +92,7 @@ int cloud_picture_make(const struct cloud_picture_spec *spec, struct cloud_pictu
     struct pixel *pixel = calloc(n_pixels, sizeof *pixel);
     int rc = pixel != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for a picture");
     if (rc == SH_OK) rc = picture_make(&out->image, out->image.width, out->image.height, white, err);
-    if (rc == SH_OK) fill(spec, out, pixel_m, pixel);
+    if (rc == SH_OK) cloud_picture_fill(spec, out, pixel_m, pixel);
     for (size_t i = 0; i < n_pixels && rc == SH_OK; i++)
         colour_of(&pixel[i], spec->most, out->image.rgb + 3 * i);
     free(pixel);

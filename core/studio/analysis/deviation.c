@@ -94,7 +94,7 @@ static double normal_of(const struct bvh *bvh, uint32_t triangle, struct deviati
     return fabs(vec3_dot(hit->normal, hit->beam));
 }
 
-static int is_same(double distance_m, double along_m, double cosine)
+static int deviation_is_same(double distance_m, double along_m, double cosine)
 {
     const double across_m = fabs(along_m) * cosine;
     return fabs(distance_m - across_m) <= SAME_SHARE * across_m + SAME_M;
@@ -120,8 +120,8 @@ static int is_sampled(const struct work *w, size_t i)
     return w->every <= 1 || ((uint64_t)i * 0x9e3779b97f4a7c15ULL >> 32) % w->every == 0;
 }
 
-static void judge(const struct work *w, const struct deviation_head *head, size_t i, const double at_m[3],
-                  const struct deviation_hit *hit)
+static void deviation_judge(const struct work *w, const struct deviation_head *head, size_t i, const double at_m[3],
+                            const struct deviation_hit *hit)
 {
     if (!is_sampled(w, i)) return;
     double counts_m;
@@ -133,17 +133,17 @@ static void judge(const struct work *w, const struct deviation_head *head, size_
 }
 
 /* The nearest surface is the one that the beam meets, along_m before the point. */
-static void keep(const struct work *w, const struct deviation_head *head, size_t i, double along_m,
-                 const struct deviation_hit *hit)
+static void deviation_keep(const struct work *w, const struct deviation_head *head, size_t i, double along_m,
+                           const struct deviation_hit *hit)
 {
     double at_m[3];
     for (int k = 0; k < 3; k++)
         at_m[k] = head->setup.station_m[k] + (hit->range_m - along_m) * hit->beam[k];
     w->out->along_m[i] = (float)along_m;
-    judge(w, head, i, at_m, hit);
+    deviation_judge(w, head, i, at_m, hit);
 }
 
-static void settle(const struct work *w, const struct batch *b, uint32_t k, const struct deviation_head *head)
+static void deviation_settle(const struct work *w, const struct batch *b, uint32_t k, const struct deviation_head *head)
 {
     const struct bvh *bvh = head->setup.bvh;
     const struct scene *scene = bvh_scene(bvh);
@@ -157,7 +157,7 @@ static void settle(const struct work *w, const struct batch *b, uint32_t k, cons
         along_m = b->range_m[k] - b->hit_m[k];
         cosine = normal_of(bvh, first, &hit);
         hit.label = (int32_t)(scene->label[first] - scene->label0);
-        same = is_same(w->of->distance_m[i], along_m, cosine);
+        same = deviation_is_same(w->of->distance_m[i], along_m, cosine);
     }
     if (same && w->out->met != NULL) w->out->met[i] = first;
     if (!same && nearest != first) {
@@ -168,11 +168,11 @@ static void settle(const struct work *w, const struct batch *b, uint32_t k, cons
             along_m = b->range_m[k] - range_m;
             cosine = normal_of(bvh, nearest, &hit);
             hit.label = -1; /* the share of the power that got there is not known */
-            same = is_same(w->of->distance_m[i], along_m, cosine);
+            same = deviation_is_same(w->of->distance_m[i], along_m, cosine);
         }
     }
     w->out->cosine[i] = (float)cosine;
-    if (same && b->is_cut[k] == 0) keep(w, head, i, along_m, &hit);
+    if (same && b->is_cut[k] == 0) deviation_keep(w, head, i, along_m, &hit);
 }
 
 /* Whether a ray around another one meets the same plane as that. */
@@ -229,12 +229,12 @@ static void cast(const struct work *w, struct batch *b, const struct deviation_h
     memset(b->is_cut, 0, b->n);
     if (head->setup.beam != NULL) look_around(b, head, &rays);
     for (uint32_t k = 0; k < b->n; k++)
-        settle(w, b, k, head);
+        deviation_settle(w, b, k, head);
     b->n = 0;
 }
 
 /* The point's ray, where there is one: not of shots without echo, of points that are far, nor of bodies. */
-static void add(const struct work *w, struct batch *b, size_t i, const struct deviation_head *head)
+static void deviation_add(const struct work *w, struct batch *b, size_t i, const struct deviation_head *head)
 {
     double p[3], d[3];
     const struct deviation_points *out = w->out;
@@ -273,7 +273,7 @@ static void work_on(void *ctx, int reports)
             const unsigned its = cloud_station(w->of->cloud, i);
             if (b->n == BVH_CHUNK || (its != station && station != 0)) cast(w, b, &w->head[station - 1]);
             station = its;
-            add(w, b, i, &w->head[station - 1]);
+            deviation_add(w, b, i, &w->head[station - 1]);
         }
         if (station != 0) cast(w, b, &w->head[station - 1]);
         if (reports) sh_progress(w->report, "following the beams", (double)end / (double)n);

@@ -52,7 +52,7 @@ static double mean(long double sum, size_t n)
     return n > 0 ? (double)(sum / (long double)n) : (double)NAN;
 }
 
-static void finish(struct figures *f, const struct sums *s)
+static void figures_finish(struct figures *f, const struct sums *s)
 {
     const size_t near = f->points - f->far;
     f->mean_m = mean(s->d, near);
@@ -112,7 +112,7 @@ int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)
         if (g < n_groups) add_point(in, i, &out[g], &sums[g]);
     }
     for (uint32_t g = 0; g < n_groups; g++)
-        finish(&out[g], &sums[g]);
+        figures_finish(&out[g], &sums[g]);
     find_p95(in, &(struct groups){n_groups, group, ctx}, by_group, at, out);
 done:
     free(sums);

@@ -29,7 +29,7 @@ static size_t slot_of(const struct table *t, uint64_t key)
 }
 
 /* 1: made larger, 0: no memory. */
-static int make_room(struct table *t)
+static int figures_density_make_room(struct table *t)
 {
     struct table larger = {.bits = t->bits == 0 ? FIRST_BITS : t->bits + 1, .used = t->used};
     larger.cell = calloc((size_t)1 << larger.bits, sizeof *larger.cell);
@@ -65,11 +65,11 @@ static uint64_t key_of(const struct cutter *cut, uint32_t triangle, const double
 }
 
 /* 1: too many cells, or no memory for more (SH_ENOMEM). */
-static int add(struct table *t, uint64_t key, double area_m2, double range_m)
+static int figures_density_add(struct table *t, uint64_t key, double area_m2, double range_m)
 {
     if (t->bits == 0 || t->used * 4 >= (size_t)3 << t->bits) {
         if (t->bits == MOST_CELLS_BITS) return 1;
-        if (!make_room(t)) return SH_ENOMEM;
+        if (!figures_density_make_room(t)) return SH_ENOMEM;
     }
     struct figures_cell *c = &t->cell[slot_of(t, key)];
     if (c->n == 0) {
@@ -82,8 +82,8 @@ static int add(struct table *t, uint64_t key, double area_m2, double range_m)
     return 0;
 }
 
-static int fill(const struct figures_on_scene *in, const struct cutter *cut, const struct sh_report *report,
-                struct table *t)
+static int figures_density_fill(const struct figures_on_scene *in, const struct cutter *cut,
+                                const struct sh_report *report, struct table *t)
 {
     const struct cloud *cloud = in->compared->cloud;
     const uint32_t *triangle = in->compared->triangle;
@@ -97,7 +97,7 @@ static int fill(const struct figures_on_scene *in, const struct cutter *cut, con
         cloud_to_scene(cloud, in->compared->site, i, p);
         const uint64_t key = key_of(cut, triangle[i], p, cloud_station(cloud, i), &area_m2);
         const double range_m = (double)in->range_m[i];
-        int rc = isfinite(area_m2) ? add(t, key, area_m2, range_m) : 0;
+        int rc = isfinite(area_m2) ? figures_density_add(t, key, area_m2, range_m) : 0;
         if (rc != 0) return rc;
     }
     return 0;
@@ -115,7 +115,7 @@ static int by_density(const void *a, const void *b)
     return x != y ? (x > y) - (x < y) : (k > l) - (k < l);
 }
 
-static void keep(struct table *t, struct figures_density *out)
+static void figures_density_keep(struct table *t, struct figures_density *out)
 {
     size_t n = 0;
     for (size_t i = 0; t->bits != 0 && i < (size_t)1 << t->bits; i++)
@@ -142,10 +142,10 @@ int figures_density_of(const struct figures_on_scene *in, double cell_m, const s
         cut.cell_m *= 2.0;
     for (int rc = 1; rc != 0; cut.cell_m *= 2.0) {
         struct table t = {0};
-        rc = fill(in, &cut, report, &t);
+        rc = figures_density_fill(in, &cut, report, &t);
         if (rc == 0) {
             out->cell_m = cut.cell_m;
-            keep(&t, out);
+            figures_density_keep(&t, out);
             break;
         }
         free(t.cell);

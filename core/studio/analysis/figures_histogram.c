@@ -55,7 +55,7 @@ static int set_bins(const struct sizes *s, double share, int is_signed, struct f
     return 1;
 }
 
-static void put(struct figures_histogram *h, double v)
+static void figures_histogram_put(struct figures_histogram *h, double v)
 {
     if (!isfinite(v)) return;
     const double bin = floor((v - h->from) / h->width);
@@ -74,7 +74,7 @@ void figures_histogram_of(const double *value, size_t n, double share, struct fi
         add_size(&sizes, value[i]);
     if (!set_bins(&sizes, share, 0, out)) return;
     for (size_t i = 0; i < n; i++)
-        put(out, value[i]);
+        figures_histogram_put(out, value[i]);
 }
 
 void figures_histogram_of_signed(const float *value, size_t n, double share, struct figures_histogram *out)
@@ -84,5 +84,5 @@ void figures_histogram_of_signed(const float *value, size_t n, double share, str
         add_size(&sizes, (double)value[i]);
     if (!set_bins(&sizes, share, 1, out)) return;
     for (size_t i = 0; i < n; i++)
-        put(out, (double)value[i]);
+        figures_histogram_put(out, (double)value[i]);
 }

@@ -113,7 +113,7 @@ int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *e
 }
 
 /* Where a place is in the image. */
-static void place_of(const struct map *map, double x_m, double y_m, double place[2])
+static void map_draw_place_of(const struct map *map, double x_m, double y_m, double place[2])
 {
     struct map_layout at;
     map_get_layout(map, &at);
@@ -123,7 +123,7 @@ static void place_of(const struct map *map, double x_m, double y_m, double place
 
 void map_station_place(const struct map *map, uint32_t station, double place[2])
 {
-    place_of(map, map->station[station].x_m, map->station[station].y_m, place);
+    map_draw_place_of(map, map->station[station].x_m, map->station[station].y_m, place);
 }
 
 static void draw_edges(const struct map *map, struct pen *pen)
@@ -132,8 +132,8 @@ static void draw_edges(const struct map *map, struct pen *pen)
     pen->begin(pen->on, "edges", "open edges of the scene");
     for (uint64_t i = 0; i < map->counts.edges; i++) {
         double from[2], to[2];
-        place_of(map, map->edge[i][0][0], map->edge[i][0][1], from);
-        place_of(map, map->edge[i][1][0], map->edge[i][1][1], to);
+        map_draw_place_of(map, map->edge[i][0][0], map->edge[i][0][1], from);
+        map_draw_place_of(map, map->edge[i][1][0], map->edge[i][1][1], to);
         pen->line(pen->on, from, to, 2, red);
     }
     pen->end(pen->on);

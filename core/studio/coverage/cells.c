@@ -215,7 +215,7 @@ static int build(struct coverage *c, const struct sh_report *report, struct sh_e
     return c->met != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the cells of coverage");
 }
 
-static int set_up(struct coverage *c, struct sh_err *err)
+static int cells_set_up(struct coverage *c, struct sh_err *err)
 {
     double span_m = 0.0;
     for (int i = 0; i < 3; i++) {
@@ -263,7 +263,7 @@ int coverage_create(const struct coverage_spec *spec, const struct sh_report *re
     c->spec = *spec;
     c->scene = bvh_scene(spec->bvh);
     int rc = scene_find_duplicate_faces(c->scene, report, &c->duplicate, err);
-    if (rc == SH_OK) rc = set_up(c, err);
+    if (rc == SH_OK) rc = cells_set_up(c, err);
     if (rc == SH_OK) rc = number_pieces(c, err);
     if (rc == SH_OK) rc = build(c, report, err);
     if (rc == SH_OK) return SH_OK;

@@ -11,7 +11,7 @@ struct share {
     double value, area_m2;
 };
 
-static int compare(const void *a, const void *b)
+static int figures_compare(const void *a, const void *b)
 {
     const double x = ((const struct share *)a)->value, y = ((const struct share *)b)->value;
     return (x > y) - (x < y);
@@ -50,7 +50,7 @@ static void spread_of(const struct coverage *c, enum figure figure, struct share
         n++;
     }
     if (n == 0) return;
-    qsort(share, n, sizeof *share, compare);
+    qsort(share, n, sizeof *share, figures_compare);
     *out = (struct coverage_spread){sum / area_m2, part_of(share, n, area_m2, 0.05), part_of(share, n, area_m2, 0.5),
                                     part_of(share, n, area_m2, 0.95)};
 }

@@ -75,7 +75,7 @@ static void cast(struct gain_worker *w, const double from_m[3], uint32_t first, 
         take_ray(w, from_m, i, d->each_sr[first + i]);
 }
 
-static void look(struct gain_worker *w, uint32_t place)
+static void gains_look(struct gain_worker *w, uint32_t place)
 {
     const uint32_t n = w->g->directions->n;
     struct coverage_gain *gain = &w->g->gain[place];
@@ -120,7 +120,7 @@ static void work_on(void *ctx, int reports)
     uint32_t place;
     if (w == NULL) atomic_store(&g->failed, 1);
     while (w != NULL && (place = atomic_fetch_add(&g->next, 1)) < g->places->n && !sh_stopped(g->report)) {
-        look(w, place);
+        gains_look(w, place);
         if (reports) sh_progress(g->report, "comparing places", (double)(place + 1) / g->places->n);
     }
     free_worker(w);

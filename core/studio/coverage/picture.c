@@ -52,7 +52,7 @@ struct paint {
     double low, high; /* of density, log10 */
 };
 
-static int set_up(struct paint *p, struct sh_err *err)
+static int picture_set_up(struct paint *p, struct sh_err *err)
 {
     struct coverage_sums sums;
     p->high = 1.0;
@@ -130,7 +130,7 @@ static void add_face(void *ctx, uint32_t cell, int n, const double corner[4][3])
     }
 }
 
-static int make_room(struct picture *p, struct sh_err *err)
+static int picture_make_room(struct picture *p, struct sh_err *err)
 {
     const struct coverage_spec *spec = &p->paint.c->spec;
     const double mib = ((double)p->vertices * CORNER_BYTES + (double)p->faces * FACE_BYTES) / 0x1p20;
@@ -183,8 +183,8 @@ int coverage_write_mesh(const struct coverage *coverage, const char *path, enum 
 {
     struct picture p = {.paint = {.c = coverage, .colour = colour}};
     coverage_pieces(coverage, count_face, &p);
-    int rc = set_up(&p.paint, err);
-    if (rc == SH_OK) rc = make_room(&p, err);
+    int rc = picture_set_up(&p.paint, err);
+    if (rc == SH_OK) rc = picture_make_room(&p, err);
     if (rc == SH_OK) {
         coverage_pieces(coverage, add_face, &p);
         rc = write(&p, path, report, err);

@@ -188,7 +188,7 @@ static void measure(struct work *w)
 }
 
 /* Clusters that triangles use become vertices, in the order of their triangles. */
-static int keep(const struct work *w, struct decimated *out, struct sh_err *err)
+static int decimate_keep(const struct work *w, struct decimated *out, struct sh_err *err)
 {
     const uint32_t n = w->faces.n;
     uint32_t n_vertices = 0;
@@ -227,7 +227,8 @@ static int copy(const struct decimate_mesh *mesh, struct decimated *out, struct 
     return SH_OK;
 }
 
-static int set_up(struct work *w, const struct decimate_mesh *mesh, const struct sh_report *report, struct sh_err *err)
+static int decimate_set_up(struct work *w, const struct decimate_mesh *mesh, const struct sh_report *report,
+                           struct sh_err *err)
 {
     *w = (struct work){.mesh = mesh, .report = report, .most = UINT32_MAX};
     w->of_vertex = malloc(((size_t)mesh->n_vertices + 1) * sizeof *w->of_vertex);
@@ -251,10 +252,10 @@ int decimate_by_cell(const struct decimate_mesh *mesh, double cell_m, const stru
     struct work w;
     *out = (struct decimated){0};
     if (!(cell_m > 0.0)) return sh_fail(err, SH_EINPUT, "a cell of %g m: allowed is more than 0", cell_m);
-    int rc = set_up(&w, mesh, report, err);
+    int rc = decimate_set_up(&w, mesh, report, err);
     if (rc != SH_OK) return rc;
     const double n = pass(&w, cell_m, err);
-    rc = n < 0.0 ? (int)n : keep(&w, out, err);
+    rc = n < 0.0 ? (int)n : decimate_keep(&w, out, err);
     tear_down(&w);
     return rc;
 }
@@ -271,7 +272,7 @@ int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_re
     if (most < DECIMATE_LEAST)
         return sh_fail(err, SH_EINPUT, "a mesh of %u triangles: allowed are %d or more", most, DECIMATE_LEAST);
     if (mesh->n_triangles <= most) return copy(mesh, out, err);
-    int rc = set_up(&w, mesh, report, err);
+    int rc = decimate_set_up(&w, mesh, report, err);
     if (rc != SH_OK) return rc;
     w.most = most;
     double cell_m = fmax(sqrt(3.0 * w.area_m2 / most), 1e-6 * vec3_length(w.extent_m)), fits_m = INFINITY;
@@ -285,7 +286,7 @@ int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_re
     }
     rc = n < 0.0    ? (int)n
          : n > most ? sh_fail(err, SH_ESTATE, "no cell size gives %u triangles", most)
-                    : keep(&w, out, err);
+                    : decimate_keep(&w, out, err);
     tear_down(&w);
     return rc;
 }

@@ -32,7 +32,7 @@ struct node {
     uint8_t name_len;
 };
 
-static int fail(const struct nodes *n, uint64_t at, struct sh_err *err)
+static int fbx_nodes_fail(const struct nodes *n, uint64_t at, struct sh_err *err)
 {
     return sh_fail(err, SH_EIO, "%s: byte %llu of what Assimp exported is not FBX as known here (version 7500)",
                    n->to->path, (unsigned long long)at);
@@ -41,7 +41,7 @@ static int fail(const struct nodes *n, uint64_t at, struct sh_err *err)
 /* 1: a node. 0: the end of a list. */
 static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct node *node, struct sh_err *err)
 {
-    if (at > end || end - at < NODE_LEN) return fail(n, at, err);
+    if (at > end || end - at < NODE_LEN) return fbx_nodes_fail(n, at, err);
     const uint8_t *p = n->raw + at;
     node->at = at;
     node->end = le_get64(p);
@@ -50,7 +50,7 @@ static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct no
     node->name = p + NODE_LEN;
     if (node->end == 0) return 0;
     const uint64_t head = at + NODE_LEN + node->name_len;
-    if (node->end > end || head > node->end || bytes > node->end - head) return fail(n, at, err);
+    if (node->end > end || head > node->end || bytes > node->end - head) return fbx_nodes_fail(n, at, err);
     node->inside = head + bytes;
     return 1;
 }
@@ -60,7 +60,7 @@ static int64_t length_of(const struct nodes *n, const struct node *node, int dep
 {
     int64_t sum = (int64_t)(node->inside - node->at);
     if (node->inside == node->end) return sum;
-    if (depth == MAX_DEPTH) return fail(n, node->at, err);
+    if (depth == MAX_DEPTH) return fbx_nodes_fail(n, node->at, err);
     for (uint64_t at = node->inside; at < node->end;) {
         struct node child;
         int is = read_node(n, at, node->end, &child, err);
@@ -74,7 +74,7 @@ static int64_t length_of(const struct nodes *n, const struct node *node, int dep
     return sum + NODE_LEN;
 }
 
-static int put(struct nodes *n, const void *data, size_t len, struct sh_err *err)
+static int fbx_nodes_put(struct nodes *n, const void *data, size_t len, struct sh_err *err)
 {
     n->out += len;
     return mesh_file_write(n->to, data, len, err);
@@ -83,7 +83,7 @@ static int put(struct nodes *n, const void *data, size_t len, struct sh_err *err
 static int put_zeros(struct nodes *n, size_t len, struct sh_err *err)
 {
     static const uint8_t zero[120];
-    return put(n, zero, len, err);
+    return fbx_nodes_put(n, zero, len, err);
 }
 
 static int is_named(const struct node *node, const char *name)
@@ -99,7 +99,7 @@ static int put_time(struct nodes *n, const struct node *node, struct sh_err *err
                       : is_named(node, "Hour")  ? 10
                                                 : is_named(node, "Month") || is_named(node, "Day");
     const uint8_t property[5] = {'I', (uint8_t)(value & 255), (uint8_t)(value >> 8)};
-    return put(n, property, sizeof property, err);
+    return fbx_nodes_put(n, property, sizeof property, err);
 }
 
 static int put_node(struct nodes *n, const struct node *node, int is_time, int depth, struct sh_err *err)
@@ -110,10 +110,10 @@ static int put_node(struct nodes *n, const struct node *node, int is_time, int d
     memcpy(head, n->raw + node->at, NODE_LEN);
     le_put64(head, n->out + (uint64_t)len);
     const uint64_t properties = node->inside - node->at - NODE_LEN - node->name_len;
-    int rc = put(n, head, NODE_LEN, err);
-    if (rc == SH_OK) rc = put(n, node->name, node->name_len, err);
+    int rc = fbx_nodes_put(n, head, NODE_LEN, err);
+    if (rc == SH_OK) rc = fbx_nodes_put(n, node->name, node->name_len, err);
     if (rc == SH_OK && is_time && properties == 5) return put_time(n, node, err);
-    if (rc == SH_OK) rc = put(n, node->name + node->name_len, properties, err);
+    if (rc == SH_OK) rc = fbx_nodes_put(n, node->name + node->name_len, properties, err);
     if (node->inside == node->end) return rc;
     for (uint64_t at = node->inside; rc == SH_OK && at < node->end;) {
         struct node child;
@@ -128,11 +128,11 @@ static int put_node(struct nodes *n, const struct node *node, int is_time, int d
 /* A mark, zeros up to a multiple of 16, version, zeros, another mark. */
 static int put_tail(struct nodes *n, uint64_t at, struct sh_err *err)
 {
-    if (n->n_raw < at || n->n_raw - at < MARK_LEN + TAIL_LEN) return fail(n, at, err);
-    int rc = put(n, n->raw + at, MARK_LEN, err);
+    if (n->n_raw < at || n->n_raw - at < MARK_LEN + TAIL_LEN) return fbx_nodes_fail(n, at, err);
+    int rc = fbx_nodes_put(n, n->raw + at, MARK_LEN, err);
     if (rc == SH_OK) rc = put_zeros(n, 4, err);
     if (rc == SH_OK) rc = put_zeros(n, 16 - n->out % 16, err);
-    return rc == SH_OK ? put(n, n->raw + n->n_raw - TAIL_LEN, TAIL_LEN, err) : rc;
+    return rc == SH_OK ? fbx_nodes_put(n, n->raw + n->n_raw - TAIL_LEN, TAIL_LEN, err) : rc;
 }
 
 int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct sh_err *err)
@@ -141,8 +141,8 @@ int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct
     uint64_t at = HEAD_LEN;
     if (n_raw < HEAD_LEN || memcmp(raw, "Kaydara FBX Binary  ", 21) != 0 ||
         (le_get64(raw + HEAD_LEN - 8) >> 32) < VERSION_LEAST)
-        return fail(&n, 0, err);
-    int rc = put(&n, raw, HEAD_LEN, err);
+        return fbx_nodes_fail(&n, 0, err);
+    int rc = fbx_nodes_put(&n, raw, HEAD_LEN, err);
     while (rc == SH_OK) {
         struct node node;
         rc = read_node(&n, at, n_raw, &node, err);

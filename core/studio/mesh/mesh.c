@@ -20,7 +20,7 @@ enum { N_FORMATS = sizeof formats / sizeof formats[0] };
 static const double FLOAT_HALF_STEP = 0x1p-24; /* the largest relative error of rounding to float */
 static const double FLOAT_LEAST_M = 1e-6;
 
-static const struct mesh_format *find(const char *path)
+static const struct mesh_format *mesh_find(const char *path)
 {
     size_t len = strlen(path);
     for (size_t i = 0; i < N_FORMATS; i++) {
@@ -32,24 +32,24 @@ static const struct mesh_format *find(const char *path)
 
 int mesh_has_format(const char *path)
 {
-    return find(path) != NULL;
+    return mesh_find(path) != NULL;
 }
 
 int mesh_takes_points(const char *path)
 {
-    const struct mesh_format *format = find(path);
+    const struct mesh_format *format = mesh_find(path);
     return format != NULL && format->takes_points;
 }
 
 int mesh_is_float(const char *path)
 {
-    const struct mesh_format *format = find(path);
+    const struct mesh_format *format = mesh_find(path);
     return format != NULL && format->is_float;
 }
 
 int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err)
 {
-    const struct mesh_format *format = find(path);
+    const struct mesh_format *format = mesh_find(path);
     double size2 = 0, most = 0;
     if (format == NULL || !format->is_float) return SH_OK;
     for (int k = 0; k < 3; k++) {
@@ -137,7 +137,7 @@ static int check(const char *path, const struct mesh_format *format, const struc
 
 int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report *report, struct sh_err *err)
 {
-    const struct mesh_format *format = find(path);
+    const struct mesh_format *format = mesh_find(path);
     if (format == NULL)
         return sh_fail(err, SH_EINPUT, "%s: no mesh format has this ending; allowed are .ply .obj .gltf .glb .fbx",
                        path);

@@ -92,7 +92,7 @@ static int stands(const struct survey *s, uint32_t first, double height)
 }
 
 /* Directions as a scan's: even in azimuth and in line angle. Each line begins a little further. */
-static struct survey_sight look(struct survey *s, const struct floor *f, double height, int *level)
+static struct survey_sight floors_look(struct survey *s, const struct floor *f, double height, int *level)
 {
     const double p[3] = {f->at_m[0], f->at_m[1], f->at_m[2] + height};
     const struct viewpoint_view *v = s->view;
@@ -122,8 +122,8 @@ static double score(const struct survey *s, const struct floor *f, const struct 
            (1.0 - 0.5 * fmin(high, 1.0));
 }
 
-static void keep(struct viewpoint *out, enum viewpoint_kind kind, const struct survey *s, const struct floor *f,
-                 double height, double seen)
+static void floors_keep(struct viewpoint *out, enum viewpoint_kind kind, const struct survey *s, const struct floor *f,
+                        double height, double seen)
 {
     *out = (struct viewpoint){.kind = kind,
                               .position_m = {f->at_m[0], f->at_m[1], f->at_m[2] + height},
@@ -152,7 +152,7 @@ static void try(struct survey *s, const struct floors *floors, const struct floo
 {
     int level, open = isinf(f->room_m);
     double height = height_m(s, f);
-    struct survey_sight sight = look(s, f, height, &level);
+    struct survey_sight sight = floors_look(s, f, height, &level);
     double value = score(s, f, &sight);
     if (!level) return;
     if (!open && sight.seen >= LEAST_SEEN_INSIDE && (sight.front < 0.5 || !f->front)) {
@@ -161,11 +161,11 @@ static void try(struct survey *s, const struct floors *floors, const struct floo
     }
     if (!open && sight.seen >= LEAST_SEEN_INSIDE && value > best->inside_score) {
         best->inside_score = value;
-        keep(&best->inside, VIEWPOINT_INSIDE, s, f, height, sight.seen);
+        floors_keep(&best->inside, VIEWPOINT_INSIDE, s, f, height, sight.seen);
     }
     if (open && value > best->ground_score && is_good_ground(s, floors, f, sight.seen)) {
         best->ground_score = value;
-        keep(&best->ground, VIEWPOINT_GROUND, s, f, height, sight.seen);
+        floors_keep(&best->ground, VIEWPOINT_GROUND, s, f, height, sight.seen);
     }
 }
 

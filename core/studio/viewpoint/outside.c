@@ -53,7 +53,7 @@ static void frame(const struct survey *s, double ahead_rad, struct viewpoint *at
 }
 
 /* Casts rays over the part of the view that a place has, and gives what they hit. */
-static struct survey_sight look(struct survey *s, const struct viewpoint *at)
+static struct survey_sight outside_look(struct survey *s, const struct viewpoint *at)
 {
     survey_clear(s);
     for (int i = 0; i < GRID * GRID; i++) {
@@ -78,7 +78,7 @@ void survey_outside(struct survey *s, struct viewpoint *out)
             at.position_m[i] = s->centre_m[i] - away_m * toward[i];
         frame(s, ahead, &at);
         if (!(at.line1_rad > at.line0_rad)) continue;
-        struct survey_sight sight = look(s, &at);
+        struct survey_sight sight = outside_look(s, &at);
         double liked = height_worth[k / SIDES] * side_worth[k % SIDES] * (0.5 + 0.5 * sight.front);
         double value = sight.seen * at.pan_rad * (at.line1_rad - at.line0_rad) * liked;
         if (s->is_part) value *= sight.front; /* a place between bodies, not within one */
@@ -107,7 +107,7 @@ static uint32_t cell_of(const struct survey *s, const struct cells *c, const dou
     return at[1] * c->n[0] + at[0];
 }
 
-static void fill(const struct survey *s, struct cells *c)
+static void outside_fill(const struct survey *s, struct cells *c)
 {
     for (uint32_t i = 0; i < s->scene->n_all; i++) {
         double corner[3][3], n[3];
@@ -162,7 +162,7 @@ int survey_narrow(struct survey *s, struct sh_err *err)
         c.n[k] = (uint32_t)fmax(ceil(s->size_m[k] / c.size_m), 1.0);
     c.area_m2 = calloc((size_t)c.n[0] * c.n[1], sizeof *c.area_m2);
     if (c.area_m2 == NULL) return sh_fail(err, SH_ENOMEM, "no memory to look for a part of the scene");
-    fill(s, &c);
+    outside_fill(s, &c);
     narrow(s, &c, find_fullest(&c));
     free(c.area_m2);
     return SH_OK;

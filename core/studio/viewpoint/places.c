@@ -29,7 +29,7 @@ struct drop {
     int done;
 };
 
-static int keep(struct viewpoint_place **list, size_t *n, size_t *room, const struct viewpoint_place *place)
+static int places_keep(struct viewpoint_place **list, size_t *n, size_t *room, const struct viewpoint_place *place)
 {
     if (!grow(list, room, *n + 1, sizeof **list)) return 0;
     (*list)[(*n)++] = *place;
@@ -51,7 +51,7 @@ static int take_surface(struct search *s, struct drop *d, uint32_t ray)
     d->last_m = z_m;
     d->top_m = z_m - fmax(1e-6 * s->survey.radius_m, 1e-6);
     if (!has_room || !asked_for || fabs(survey_cosine(&s->survey, ray)) < LEVEL) return 1;
-    return keep(&s->floor, &s->n_floors, &s->floor_room, &floor);
+    return places_keep(&s->floor, &s->n_floors, &s->floor_room, &floor);
 }
 
 /* Floors of up to BVH_CHUNK columns, layer by layer. */
@@ -74,7 +74,7 @@ static int find_floors(struct search *s, struct drop *drop, uint32_t n)
     return has_room;
 }
 
-static int compare(const void *a, const void *b)
+static int places_compare(const void *a, const void *b)
 {
     const struct viewpoint_place *p = a, *q = b;
     for (int i = 0; i < 2; i++)
@@ -114,13 +114,13 @@ static int choose(struct search *s)
         survey_cast(&s->survey);
         for (size_t i = first; i < end; i++)
             if (stands(s, (uint32_t)(i - first) * LOOKS) &&
-                !keep(&s->place, &s->n_places, &s->place_room, &s->floor[i]))
+                !places_keep(&s->place, &s->n_places, &s->place_room, &s->floor[i]))
                 return 0;
     }
     return 1;
 }
 
-static int find(struct search *s, struct sh_err *err)
+static int places_find(struct search *s, struct sh_err *err)
 {
     const uint64_t all = s->across[0] * s->across[1];
     struct drop drop[BVH_CHUNK];
@@ -135,7 +135,7 @@ static int find(struct search *s, struct sh_err *err)
         if (!find_floors(s, drop, n)) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
         sh_progress(s->report, "looking for floors", (double)(first + n) / (double)all);
     }
-    if (s->n_floors > 0) qsort(s->floor, s->n_floors, sizeof *s->floor, compare);
+    if (s->n_floors > 0) qsort(s->floor, s->n_floors, sizeof *s->floor, places_compare);
     return choose(s) ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for places to stand");
 }
 
@@ -168,7 +168,7 @@ int viewpoint_places(const struct bvh *bvh, const struct viewpoint_grid *grid, c
     s->report = report;
     int rc = check_grid(s, err);
     if (rc == SH_OK) rc = survey_borrow(&s->survey, bvh, &view, err);
-    if (rc == SH_OK) rc = find(s, err);
+    if (rc == SH_OK) rc = places_find(s, err);
     if (rc == SH_OK) {
         *out = s->place;
         *n = (uint32_t)s->n_places;

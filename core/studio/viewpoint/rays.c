@@ -6,7 +6,7 @@
 #include "core/studio/viewpoint/survey.h"
 #include "core/vec3.h"
 
-static void set_up(struct survey *s, const struct scene *scene, const struct viewpoint_view *view)
+static void rays_set_up(struct survey *s, const struct scene *scene, const struct viewpoint_view *view)
 {
     memset(s, 0, sizeof *s);
     s->scene = scene;
@@ -21,7 +21,7 @@ static void set_up(struct survey *s, const struct scene *scene, const struct vie
 int survey_open(struct survey *s, const struct scene *scene, const struct viewpoint_view *view,
                 const struct sh_report *report, struct sh_err *err)
 {
-    set_up(s, scene, view);
+    rays_set_up(s, scene, view);
     /* Places outside are farther away: from there a ray may take one surface for another at their border, which a
      * survey can bear. If the BVH reached so far for places inside, too, most of their hits would be in doubt. */
     int rc = bvh_create(scene, 0, report, &s->own, err);
@@ -31,7 +31,7 @@ int survey_open(struct survey *s, const struct scene *scene, const struct viewpo
 
 int survey_borrow(struct survey *s, const struct bvh *bvh, const struct viewpoint_view *view, struct sh_err *err)
 {
-    set_up(s, bvh_scene(bvh), view);
+    rays_set_up(s, bvh_scene(bvh), view);
     s->bvh = bvh;
     return bvh_work_create(&s->work, err);
 }

@@ -20,7 +20,8 @@ static int look_from_outside(struct survey *s, struct viewpoint *out, struct sh_
     return SH_OK;
 }
 
-static int find(struct survey *s, const struct sh_report *report, struct viewpoint *out, struct sh_err *err)
+static int viewpoint_find_one(struct survey *s, const struct sh_report *report, struct viewpoint *out,
+                              struct sh_err *err)
 {
     struct survey_best best = {0};
     int rc = survey_floors(s, report, &best, err);
@@ -46,7 +47,7 @@ int viewpoint_find(const struct scene *scene, const struct viewpoint_view *view,
     struct survey *s = malloc(sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a survey of the scene");
     int rc = survey_open(s, scene, view, report, err);
-    if (rc == SH_OK) rc = find(s, report, out, err);
+    if (rc == SH_OK) rc = viewpoint_find_one(s, report, out, err);
     survey_close(s);
     free(s);
     return rc;

@@ -112,7 +112,7 @@ static int put_alternatives(const char *argument)
     return n;
 }
 
-static const char *place_of(const struct app_option *row)
+static const char *completion_place_of(const struct app_option *row)
 {
     static const struct {
         const char *begins, *kind;
@@ -135,7 +135,7 @@ static void put_value(const struct app_option *row)
         fputs("words", stdout);
         put_words(words);
     } else if (put_alternatives(row->argument) == 0) {
-        fputs(place_of(row), stdout);
+        fputs(completion_place_of(row), stdout);
     }
 }
 

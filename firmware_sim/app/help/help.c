@@ -25,7 +25,7 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 /* Nobody calls it: main.c calls help_run. */
-static int run(int argc, char **argv)
+static int help_run_command(int argc, char **argv)
 {
     (void)argc;
     (void)argv;
@@ -38,7 +38,7 @@ const struct app_command help_command = {
     .summary = "this text, that of a command, manual pages, a completion",
     .options = OPTIONS,
     .notes = "help --man PAGE | man -l - shows a page that is not installed.\n",
-    .run = run,
+    .run = help_run_command,
 };
 
 static void print_command(const struct app_command *command, FILE *out)

@@ -161,7 +161,7 @@ static int gives_frames(const struct app_sets *sets)
     return 0;
 }
 
-static int run(int argc, char **argv)
+static int run_run(int argc, char **argv)
 {
     struct run_options o = {0};
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
@@ -246,5 +246,5 @@ const struct app_command app_run = {
     .options = OPTIONS,
     .opens_links = 1,
     .notes = NOTES,
-    .run = run,
+    .run = run_run,
 };

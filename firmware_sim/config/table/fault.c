@@ -29,7 +29,7 @@ int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const 
     return sh_fail(&faults->fault[at], code, "%s", text);
 }
 
-static int add(struct cfg_reader *rd, int code, int line, const char *text)
+static int fault_add(struct cfg_reader *rd, int code, int line, const char *text)
 {
     const uint64_t source = line == CFG_FROM_SET || rd->set != NULL    ? 1
                             : rd->table.keys == cfg_profile_table.keys ? 2
@@ -37,7 +37,7 @@ static int add(struct cfg_reader *rd, int code, int line, const char *text)
     return cfg_add_fault(rd->faults, source << 32 | (uint32_t)line, code, text);
 }
 
-static int fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
+static int fault_fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
 {
     char what[sizeof rd->faults->fault[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[48] = "";
     vsnprintf(what, sizeof what, fmt, ap);
@@ -48,14 +48,14 @@ static int fail(struct cfg_reader *rd, int code, int line, const char *name, con
         snprintf(text, sizeof text, "--set %s: %s", name, what);
     else
         snprintf(text, sizeof text, "%s%s: %s%s%s", rd->file, place, name, name[0] != '\0' ? ": " : "", what);
-    return add(rd, code, line, text);
+    return fault_add(rd, code, line, text);
 }
 
 int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
 {
     va_list ap;
     va_start(ap, fmt);
-    fail(rd, code, line, "", fmt, ap);
+    fault_fail(rd, code, line, "", fmt, ap);
     va_end(ap);
     return code;
 }
@@ -64,7 +64,7 @@ int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt,
 {
     va_list ap;
     va_start(ap, fmt);
-    int code = fail(rd, SH_EINPUT, line, name, fmt, ap);
+    int code = fault_fail(rd, SH_EINPUT, line, name, fmt, ap);
     va_end(ap);
     return code;
 }
@@ -75,7 +75,7 @@ int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
     va_list ap;
     rd->bad[cfg_row(rd, key)][item] = 1;
     va_start(ap, fmt);
-    int code = fail(rd, SH_EINPUT, line, cfg_full_name(rd, key, item, name), fmt, ap);
+    int code = fault_fail(rd, SH_EINPUT, line, cfg_full_name(rd, key, item, name), fmt, ap);
     va_end(ap);
     return code;
 }
@@ -124,7 +124,7 @@ int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const c
         snprintf(name, sizeof name, "%.190s", of);
     }
     va_start(ap, fmt);
-    int code = fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
+    int code = fault_fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
     va_end(ap);
     return code;
 }

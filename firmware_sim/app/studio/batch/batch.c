@@ -143,7 +143,7 @@ static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
 };
 /* clang-format on */
 
-static int run(int argc, char **argv)
+static int batch_run_command(int argc, char **argv)
 {
     /* of record, as they are: those that name no files, and that make sense for one station off line */
     static const char *const passed[] = {
@@ -186,5 +186,5 @@ const struct app_command app_batch = {
     .summary = "scan all stations and values of a campaign",
     .options = OPTIONS,
     .notes = HELP_NOTES,
-    .run = run,
+    .run = batch_run_command,
 };

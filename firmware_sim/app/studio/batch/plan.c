@@ -15,8 +15,8 @@
 
 /* ---- a job as a line of `record` */
 
-static void add(struct batch_line *line, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
-static void add(struct batch_line *line, const char *fmt, ...)
+static void plan_add(struct batch_line *line, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+static void plan_add(struct batch_line *line, const char *fmt, ...)
 {
     va_list args;
     va_start(args, fmt);
@@ -31,22 +31,23 @@ int batch_line_make(const struct batch *b, uint32_t combination, uint32_t statio
     const char *set[BATCH_MAX_SWEEPS];
     struct batch_line *line = *out = calloc(1, sizeof *line);
     if (line == NULL) return app_fail(&(struct sh_err){SH_ENOMEM, "no memory"});
-    add(line, "record");
-    add(line, "%s", b->in.operand[0]);
-    add(line, "--station=%u", station);
+    plan_add(line, "record");
+    plan_add(line, "%s", b->in.operand[0]);
+    plan_add(line, "--station=%u", station);
     for (int i = 0; i < b->n_endings; i++)
-        add(line, "--output=%s%s%s.%s", b->dir != NULL ? b->dir : "", b->dir != NULL ? "/" : "", name, b->ending[i]);
+        plan_add(line, "--output=%s%s%s.%s", b->dir != NULL ? b->dir : "", b->dir != NULL ? "/" : "", name,
+                 b->ending[i]);
     if (b->surfaces)
-        add(line, "--surfaces=%s%s%s.surfaces.csv", b->dir != NULL ? b->dir : "", b->dir != NULL ? "/" : "", name);
+        plan_add(line, "--surfaces=%s%s%s.surfaces.csv", b->dir != NULL ? b->dir : "", b->dir != NULL ? "/" : "", name);
     for (int i = 0; i < b->in.sets.n; i++)
-        add(line, "--set=%s", b->in.sets.set[i]);
+        plan_add(line, "--set=%s", b->in.sets.set[i]);
     batch_sweeps_at(&b->sweeps, combination, set);
     for (uint32_t i = 0; i < b->sweeps.n; i++)
-        add(line, "--set=%s", set[i]);
+        plan_add(line, "--set=%s", set[i]);
     for (int i = 0; i < b->options.n; i++)
-        add(line, "%s", b->options.word[i]);
-    if (b->in.scenario != NULL) add(line, "--scenario=%s", b->in.scenario);
-    if (b->threads != NULL) add(line, "--threads=%s", b->threads);
+        plan_add(line, "%s", b->options.word[i]);
+    if (b->in.scenario != NULL) plan_add(line, "--scenario=%s", b->in.scenario);
+    if (b->threads != NULL) plan_add(line, "--threads=%s", b->threads);
     const int status = record_line_read(&line->line, line->n, line->word);
     line->line.job.only_whole = line->line.job.hash = line->line.job.brief = 1;
     line->line.job.recording.progress = !b->quiet;

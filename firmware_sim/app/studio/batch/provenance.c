@@ -84,7 +84,7 @@ void batch_cache_free(struct batch_cache *cache)
     *cache = (struct batch_cache){0};
 }
 
-static struct batch_known *find(struct batch_cache *cache, const char *path)
+static struct batch_known *provenance_find(struct batch_cache *cache, const char *path)
 {
     for (size_t i = 0; i < cache->n; i++)
         if (strcmp(cache->known[i].path, path) == 0) return &cache->known[i];
@@ -115,7 +115,7 @@ static const char *sha_of(struct inputs *in, const char *path)
 {
     struct stat st;
     uint64_t bytes;
-    struct batch_known *k = find(in->cache, path);
+    struct batch_known *k = provenance_find(in->cache, path);
     if (k == NULL) {
         in->rc = sh_fail(in->err, SH_ENOMEM, "no memory for the names of input files");
         return "";
@@ -156,7 +156,7 @@ static void take_mesh(struct inputs *in, const char *path)
 {
     take_file(in, "mesh", path);
     if (in->rc != SH_OK) return;
-    struct batch_known *k = find(in->cache, path); /* it is there by now */
+    struct batch_known *k = provenance_find(in->cache, path); /* it is there by now */
     if (!k->is_searched) {
         in->rc = app_sidecars(path, keep_sidecar, k, in->err);
         if (in->rc == SH_ENOMEM) sh_fail(in->err, SH_ENOMEM, "no memory for the names of input files");

@@ -167,7 +167,7 @@ void batch_sweeps_at(const struct batch_sweeps *sweeps, uint32_t combination, co
 /* ---- stations and shards */
 
 /* A whole number from 1 to `max` at *p, which is moved on. 0: there is none. */
-static uint32_t take_number(const char **p, uint32_t max)
+static uint32_t sweep_take_number(const char **p, uint32_t max)
 {
     uint64_t number = 0;
     while (**p >= '0' && **p <= '9' && number <= max)
@@ -188,11 +188,11 @@ int batch_stations_parse(const char *text, struct batch_stations *stations, stru
     stations->all = strcmp(text, "all") == 0;
     if (stations->all) return SH_OK;
     for (const char *p = text;; p++) {
-        const uint32_t from = take_number(&p, CONFIG_MAX_STOPS);
+        const uint32_t from = sweep_take_number(&p, CONFIG_MAX_STOPS);
         uint32_t to = from;
         if (*p == '-') {
             p++;
-            to = take_number(&p, CONFIG_MAX_STOPS);
+            to = sweep_take_number(&p, CONFIG_MAX_STOPS);
         }
         if (from <= last || to < from || (*p != ',' && *p != '\0')) return fail_stations(text, err);
         for (last = from; last <= to; last++)
@@ -205,11 +205,11 @@ int batch_stations_parse(const char *text, struct batch_stations *stations, stru
 int batch_shard_parse(const char *text, uint32_t *i, uint32_t *n, struct sh_err *err)
 {
     const char *p = text;
-    *i = take_number(&p, BATCH_MAX_JOBS);
+    *i = sweep_take_number(&p, BATCH_MAX_JOBS);
     *n = 0;
     if (*i > 0 && *p == '/') {
         p++;
-        *n = take_number(&p, BATCH_MAX_JOBS);
+        *n = sweep_take_number(&p, BATCH_MAX_JOBS);
     }
     if (*n != 0 && *p == '\0' && *i <= *n) return SH_OK;
     return sh_fail(err, SH_EINPUT, "--shard %s: allowed I/N, from 1/N to N/N, N up to %d", text, BATCH_MAX_JOBS);

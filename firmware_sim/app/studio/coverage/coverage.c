@@ -246,7 +246,7 @@ static int add_numbers(struct coverage_run *r)
     return APP_USAGE;
 }
 
-static int run(int argc, char **argv)
+static int coverage_run_command(int argc, char **argv)
 {
     struct coverage_run r = {.o = {.height_m = 1.6, .step_deg = 1.0, .scans = 3}};
     int status = app_parse(&app_coverage, argc, argv, &r.in, &r);
@@ -318,5 +318,5 @@ const struct app_command app_coverage = {
     .summary = "how much of the surface the stations see, and where to stand next",
     .options = OPTIONS,
     .notes = NOTES,
-    .run = run,
+    .run = coverage_run_command,
 };

@@ -21,7 +21,7 @@ struct chooser {
 
 /* ---- rounds */
 
-static void turn(const double dir[3], double heading_rad, double out[3])
+static void next_turn(const double dir[3], double heading_rad, double out[3])
 {
     const double s = sin(heading_rad), c = cos(heading_rad);
     out[0] = c * dir[0] + s * dir[1];
@@ -41,7 +41,7 @@ static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], 
         c->open[c->n_open++] = i;
     }
     for (uint32_t i = 0; i < c->f->n_dir; i++)
-        turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
+        next_turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
     const struct coverage_directions directions = {c->f->n_dir, (const double(*)[3])turned, c->f->each_sr,
                                                    profile->range_min_m, profile->range_max_m};
     const struct coverage_places places = {c->n_open, (const double(*)[3])c->open_m};

@@ -225,7 +225,7 @@ static int init(struct init_run *run, struct sh_err *err)
     return rc;
 }
 
-static int run(int argc, char **argv)
+static int init_run_command(int argc, char **argv)
 {
     struct sh_err err = {0};
     struct init_run run = {0};
@@ -269,5 +269,5 @@ const struct app_command app_init = {
         "\n"
         "The station is put above a floor inside, or on open ground, or outside facing the mesh: where most rays over\n"
         "the view of the head hit the mesh. The configuration has comments; change the values that don't fit.\n",
-    .run = run,
+    .run = init_run_command,
 };

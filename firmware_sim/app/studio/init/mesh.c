@@ -132,7 +132,7 @@ static void choose_scale(const struct init_wish *wish, const char *name, const s
 }
 
 /* To metres, z up: what the configuration will do. */
-static void turn(struct scene *scene, const struct init_mesh *as, double scale)
+static void mesh_turn(struct scene *scene, const struct init_mesh *as, double scale)
 {
     const int y_up = as->up == SCENE_UP_Y;
     const double low[3] = {scene->min_m[0], scene->min_m[1], scene->min_m[2]}, *high = scene->max_m;
@@ -158,7 +158,7 @@ static int has_advice(const char *file, const char *text)
     return geotiff_is_name(file);
 }
 
-static int fail(const char *file, const struct sh_err *why, int code, struct sh_err *err)
+static int mesh_fail(const char *file, const struct sh_err *why, int code, struct sh_err *err)
 {
     if (code != SH_EINPUT || has_advice(file, why->text)) return sh_fail(err, code, "%s", why->text);
     return sh_fail(err, code, "%.380s; a mesh of triangles is needed: export it again, for instance as .obj or .ply",
@@ -210,10 +210,10 @@ int init_load_mesh(const struct init_wish *wish, const char *name, struct scene 
     struct sh_err why = {0};
     if (access(wish->file, R_OK) != 0) return sh_fail(err, SH_EINPUT, "%s: %s", wish->file, strerror(errno));
     int rc = read_mesh(&spec, scene, &why);
-    if (rc != SH_OK) return fail(wish->file, &why, rc, err);
+    if (rc != SH_OK) return mesh_fail(wish->file, &why, rc, err);
     choose_up(wish, name, *scene, mesh);
     choose_scale(wish, name, *scene, mesh);
     find_crs(wish, mesh);
-    turn(*scene, mesh, mesh->scale / spec.scale);
+    mesh_turn(*scene, mesh, mesh->scale / spec.scale);
     return SH_OK;
 }

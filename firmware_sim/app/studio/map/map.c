@@ -281,7 +281,7 @@ static int run_view(struct map_run *run)
     return status == APP_OK ? app_with_config(&run->in, draw_view, run) : status;
 }
 
-static int run(int argc, char **argv)
+static int map_run_command(int argc, char **argv)
 {
     struct map_run run = {.view = map_view_default};
     int status = app_parse(&app_map, argc, argv, &run.in, &run);
@@ -364,5 +364,5 @@ const struct app_command app_map = {
         "\n"
         "With --perspective the points are shown as seen from a place. Hidden ones are removed, and shading by depth\n"
         "(eye-dome lighting) gives them shape. CLOUD, or --cloud FILE with a CONFIG, is a recording.\n",
-    .run = run,
+    .run = map_run_command,
 };

@@ -12,7 +12,7 @@
 #include "firmware_sim/config/load.h"
 
 /* Which of those that are known has the scanner of station i, from 0; n: none yet. */
-static uint32_t find(const struct heads *heads, uint32_t i)
+static uint32_t heads_find(const struct heads *heads, uint32_t i)
 {
     const struct config_station *station = heads->one[0].cfg->station;
     uint32_t k = 0;
@@ -34,7 +34,7 @@ int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err)
     heads->n = 1;
     heads->one[0].cfg = cfg;
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
-        const uint32_t k = find(heads, i);
+        const uint32_t k = heads_find(heads, i);
         struct heads_one *one = &heads->one[k];
         if (k == heads->n) {
             one->cfg = calloc(1, sizeof *one->cfg);

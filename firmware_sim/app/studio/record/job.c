@@ -92,7 +92,7 @@ static void print_note(void *ctx, const char *text)
 
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
-static int follow(struct record_job *r, struct scanhead *sh, struct sh_err *err)
+static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result *result = &r->result;
     struct sh_err why = {0};
@@ -141,7 +141,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     r->recording.ctx = r;
     r->recording.interrupted = app_interrupted;
     r->recording.report = &app_report_stderr;
-    rc = follow(r, sh, err);
+    rc = job_follow(r, sh, err);
     if (rc == SH_OK || result->points != 0) say_result(r);
     char order[256];
     if (recording_describe_order(result, order, sizeof order))

@@ -91,7 +91,7 @@ static void end_loop(struct offline *off)
     off->loop = NULL;
 }
 
-static void end(struct offline *off)
+static void offline_end(struct offline *off)
 {
     end_loop(off);
     device_free(off->device);
@@ -110,12 +110,12 @@ int offline_finish(struct offline *off, struct sh_err *err)
 void offline_stop(struct offline *off)
 {
     if (off->sh != NULL) shutdown(off->fd, SHUT_RDWR); /* a loop that waited for this reader goes on */
-    end(off);
+    offline_end(off);
 }
 
 void offline_close(struct offline *off)
 {
     if (off->sh != NULL) scanhead_close(off->sh); /* likewise */
     off->sh = NULL;
-    end(off);
+    offline_end(off);
 }

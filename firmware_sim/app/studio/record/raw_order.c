@@ -4,7 +4,7 @@
 #include <stddef.h>
 
 /* Asks all that are empty, until none of them has anything new. */
-static int fill(struct raw_input *const *input, int n, struct sh_err *err)
+static int raw_order_fill(struct raw_input *const *input, int n, struct sh_err *err)
 {
     for (int found = 1; found;) {
         found = 0;
@@ -30,7 +30,7 @@ static struct raw_input *find_oldest(struct raw_input *const *input, int n)
 int raw_pass_in_order(struct raw_input *const *input, int n, int most, struct sh_err *err)
 {
     for (int passed = 0; passed < most; passed++) {
-        int rc = fill(input, n, err);
+        int rc = raw_order_fill(input, n, err);
         if (rc < 0) return rc;
         struct raw_input *oldest = find_oldest(input, n);
         if (oldest == NULL) return passed;

@@ -64,7 +64,7 @@ static int64_t end_of(const struct raw *r, int64_t begin_ns)
     return r->duration_s > 0.0 ? r->first_ns + (int64_t)(1e9 * r->duration_s) : INT64_MAX;
 }
 
-static void describe(const struct raw *r, char *text, size_t len)
+static void raw_run_describe(const struct raw *r, char *text, size_t len)
 {
     const uint64_t dropped = r->ops->dropped(r);
     const int n =
@@ -73,12 +73,12 @@ static void describe(const struct raw *r, char *text, size_t len)
 }
 
 /* Each second; what came is then in the file, too. */
-static int report(struct raw *r, int64_t now_ns, int64_t *next_ns, struct sh_err *err)
+static int raw_run_report(struct raw *r, int64_t now_ns, int64_t *next_ns, struct sh_err *err)
 {
     char what[112] = "recording: ";
     if (now_ns < *next_ns) return SH_OK;
     *next_ns = now_ns + SECOND_NS;
-    describe(r, what + strlen(what), sizeof what - strlen(what));
+    raw_run_describe(r, what + strlen(what), sizeof what - strlen(what));
     const double done =
         r->duration_s > 0.0 && r->first_ns != 0 ? 1e-9 * (double)(now_ns - r->first_ns) / r->duration_s : -1.0;
     if (!r->quiet) sh_progress(&app_report_stderr, what, done < 1.0 ? done : 1.0);
@@ -94,7 +94,7 @@ static int wait_until(struct raw *r, int64_t now_ns, int64_t end_ns)
     return poll(fds, (nfds_t)n, timeout_ms) >= 0 || errno == EINTR ? SH_OK : SH_EIO;
 }
 
-static int follow(struct raw *r, struct sh_err *err)
+static int raw_run_follow(struct raw *r, struct sh_err *err)
 {
     const int64_t begin_ns = clock_now_ns();
     int64_t next_ns = begin_ns + SECOND_NS, now_ns;
@@ -103,7 +103,7 @@ static int follow(struct raw *r, struct sh_err *err)
         if (wait_until(r, now_ns, end_of(r, begin_ns)) != SH_OK)
             return sh_fail(err, SH_EIO, "%s: cannot wait: %s", r->in.operand[0], strerror(errno));
         rc = r->ops->work(r, err);
-        if (rc >= 0) rc = report(r, clock_now_ns(), &next_ns, err);
+        if (rc >= 0) rc = raw_run_report(r, clock_now_ns(), &next_ns, err);
         if (rc < 0) return rc;
     }
     /* What the system holds came before the end. More may come all the time. */
@@ -119,7 +119,7 @@ static int record(struct raw *r, struct sh_err *err)
     stamped_begin(&keeper);
     int rc = r->ops->open(r, err);
     if (rc == SH_OK) rc = app_say_ready(r->ready_fd, put_ready, r, err);
-    if (rc == SH_OK) rc = follow(r, err);
+    if (rc == SH_OK) rc = raw_run_follow(r, err);
     stamped_close(&keeper);
     return rc;
 }
@@ -158,7 +158,7 @@ int raw_run(struct raw *r, struct sh_err *err)
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (rc == SH_OK) rc = r->ops->check(r, err);
     char text[96];
-    describe(r, text, sizeof text);
+    raw_run_describe(r, text, sizeof text);
     if (r->capture.packets != 0 && after == SH_OK && !r->quiet) fprintf(stderr, "scanhead: %s in %s\n", text, r->path);
     if (has_figures && r->stats != NULL) {
         after = app_write_json(r->stats, put_stats, r, &why);

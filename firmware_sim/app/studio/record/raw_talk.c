@@ -66,7 +66,7 @@ static int is_free(const struct talk_end *end)
     return end->sent == end->len && !end->is_over;
 }
 
-static int take(struct raw_input *input, struct sh_err *err)
+static int raw_talk_take(struct raw_input *input, struct sh_err *err)
 {
     struct talk_end *end = (struct talk_end *)input;
     (void)err;
@@ -198,7 +198,7 @@ int talk_open(struct talk *talk, struct raw *r, const int fd[2], int64_t began_n
         end->is_over = end->is_deaf = 0;
         end->len = end->sent = 0;
         end->received = 0;
-        end->input = (struct raw_input){.take = fd[i] < 0 ? take_send : take, .pass = pass};
+        end->input = (struct raw_input){.take = fd[i] < 0 ? take_send : raw_talk_take, .pass = pass};
     }
     /* Where the device broke the connection at once, it has no name any more. */
     if (set_ends(talk, fd[1]) != SH_OK)

@@ -28,7 +28,7 @@ struct udp {
     uint8_t frame[ETHERNET_MAX_FRAME];
 };
 
-static int take(struct raw_input *input, struct sh_err *err)
+static int raw_udp_take(struct raw_input *input, struct sh_err *err)
 {
     struct port *p = (struct port *)input;
     const int rc = stamped_take(&p->socket, p->data, sizeof p->data, &p->datagram, err);
@@ -57,7 +57,7 @@ static int open_port(struct raw *r, struct port *p, int number, struct sh_err *e
 {
     char at[80];
     p->r = r;
-    p->input = (struct raw_input){.take = take, .pass = pass};
+    p->input = (struct raw_input){.take = raw_udp_take, .pass = pass};
     const int rc = stamped_open(r->place.host, number, &p->socket, err);
     if (rc != SH_OK) return rc;
     socket_address_text((struct sockaddr *)&p->socket.own, p->socket.own_len, at, sizeof at);

@@ -241,7 +241,7 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     return APP_GO_ON;
 }
 
-static int run(int argc, char **argv)
+static int record_run(int argc, char **argv)
 {
     struct sh_err err = {0};
     struct record_line r;
@@ -396,5 +396,5 @@ const struct app_command app_record = {
     .summary = "write the points of a scan to files",
     .options = OPTIONS,
     .notes = HELP_NOTES,
-    .run = run,
+    .run = record_run,
 };

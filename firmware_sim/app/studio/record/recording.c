@@ -158,7 +158,7 @@ static double fraction_done(const struct recording *r)
     return (before + fmin(1.0, fmax(0.0, r->into_s / scan_s))) / n;
 }
 
-static int report(struct recording *r, struct sh_err *err)
+static int recording_report(struct recording *r, struct sh_err *err)
 {
     int64_t now_ns = clock_now_ns();
     if (now_ns < r->next_report_ns) return SH_OK;
@@ -213,7 +213,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
     struct scanhead_frame frame;
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
-    const int reported = report(r, err);
+    const int reported = recording_report(r, err);
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
     if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0)
@@ -277,7 +277,7 @@ static int has_waited(const struct recording *r, int64_t asked_ns)
     return now_ns - last_ns > (int64_t)END_MS * 1000000 || now_ns - asked_ns > (int64_t)LAST_MS * 1000000;
 }
 
-static int follow(struct recording *r, struct sh_err *err)
+static int recording_follow(struct recording *r, struct sh_err *err)
 {
     int64_t asked_ns = 0;
     r->heard_ns = clock_now_ns();
@@ -323,7 +323,7 @@ static int record_scan(struct recording *r, uint32_t station, struct sh_err *err
     int rc = r->o->listen ? SH_OK : start_scan(r, station, err);
     r->scan_over = r->scan_started = 0; /* what came before the reply is of another scan */
     if (rc != SH_OK || (r->interrupted && !r->o->listen)) return rc;
-    return follow(r, err);
+    return recording_follow(r, err);
 }
 
 /* Whoever records a scan without end, of a head that stands, ends it; it is then complete. */
@@ -362,7 +362,7 @@ static int record_listening(struct recording *r, struct sh_err *err)
     /* More scans may follow until the stream ends. */
     while (rc == SH_OK && !r->stopping) {
         r->scan_over = 0;
-        rc = follow(r, err);
+        rc = recording_follow(r, err);
     }
     return rc;
 }

@@ -7,7 +7,7 @@
 #include "firmware_sim/command/head.h"
 
 /* The scan at hand is over. cast is at least what is known of it. */
-static void end(struct recording_counts *c, uint64_t fired, uint64_t cast, uint64_t lost)
+static void recording_counts_end(struct recording_counts *c, uint64_t fired, uint64_t cast, uint64_t lost)
 {
     uint64_t least = c->scan.pulses + lost;
     c->scans++;
@@ -22,7 +22,7 @@ static void end(struct recording_counts *c, uint64_t fired, uint64_t cast, uint6
 
 void recording_count_end(struct recording_counts *c)
 {
-    if (c->within) end(c, 0, c->scan.pulses + c->scan.lost + c->scan.left_out, c->scan.lost);
+    if (c->within) recording_counts_end(c, 0, c->scan.pulses + c->scan.lost + c->scan.left_out, c->scan.lost);
 }
 
 /* Frames of this scan come. Where the one at hand is another one, its end was lost, and nobody said its counts
@@ -35,7 +35,7 @@ static enum recording_news enter(struct recording_counts *c, uint32_t number)
     return end_lost ? RECORDING_END_LOST : RECORDING_NOTHING;
 }
 
-static enum recording_news begin(struct recording_counts *c, uint32_t number)
+static enum recording_news recording_counts_begin(struct recording_counts *c, uint32_t number)
 {
     enum recording_news news = enter(c, number);
     if (!c->within) memset(&c->scan, 0, sizeof c->scan); /* overruns of the scan before may have come after its end */
@@ -54,7 +54,7 @@ static enum recording_news take_telemetry(struct recording_counts *c, const stru
     c->told.cast = t.scan_cast;
     if (!c->within || !frames_lost || t.state != HEAD_IDLE) return RECORDING_NOTHING;
     if (c->scan.number == t.scan)
-        end(c, t.scan_fired, t.scan_cast, t.scan_lost);
+        recording_counts_end(c, t.scan_fired, t.scan_cast, t.scan_lost);
     else
         recording_count_end(c);
     return RECORDING_END_LOST;
@@ -66,16 +66,16 @@ static enum recording_news take_scan_end(struct recording_counts *c, const struc
     uint64_t lost = frame->event_value[2];
     if (number == c->ended && !c->within) return RECORDING_SCAN_OVER; /* telemetry has said so */
     enter(c, number);
-    end(c, frame->event_value[1], c->told.scan == number ? c->told.cast : c->scan.pulses + lost + c->scan.left_out,
-        lost);
+    recording_counts_end(c, frame->event_value[1],
+                         c->told.scan == number ? c->told.cast : c->scan.pulses + lost + c->scan.left_out, lost);
     return RECORDING_SCAN_OVER;
 }
 
-static enum recording_news take_event(struct recording_counts *c, const struct scanhead_frame *frame)
+static enum recording_news recording_counts_take_event(struct recording_counts *c, const struct scanhead_frame *frame)
 {
     switch (frame->event) {
     case SCANHEAD_EV_SCAN_START:
-        return begin(c, (uint32_t)frame->event_value[0]);
+        return recording_counts_begin(c, (uint32_t)frame->event_value[0]);
     case SCANHEAD_EV_SCAN_END:
         return take_scan_end(c, frame);
     case SCANHEAD_EV_OVERRUN:
@@ -106,7 +106,7 @@ enum recording_news recording_count(struct recording_counts *c, const struct sca
     case SCANHEAD_TELEMETRY:
         return take_telemetry(c, frame, frames_lost);
     case SCANHEAD_EVENT:
-        return take_event(c, frame);
+        return recording_counts_take_event(c, frame);
     default:
         return RECORDING_NOTHING;
     }

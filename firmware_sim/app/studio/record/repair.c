@@ -20,7 +20,7 @@ struct results {
     int n;
 };
 
-static void say(const struct repaired *f)
+static void repair_say(const struct repaired *f)
 {
     char scans[48] = "";
     if (f->n_scans > 0) snprintf(scans, sizeof scans, " of %" PRIu64 " scan%s", f->n_scans, f->n_scans == 1 ? "" : "s");
@@ -34,7 +34,7 @@ static void say(const struct repaired *f)
     if (f->is_part) fprintf(stderr, "scanhead: %s keeps its name: %s exists, and is not replaced\n", f->part, f->path);
 }
 
-static void put(struct json *json, const void *ctx)
+static void repair_put(struct json *json, const void *ctx)
 {
     const struct results *all = ctx;
     json_open_array(json, NULL);
@@ -71,10 +71,11 @@ int record_repair(const char *const *paths, int n, const char *stats, int quiet)
         r->path = paths[i];
         const int rc = repair_file(paths[i], quiet ? &app_report_quiet : &app_report_seconds, &r->file, &r->err);
         r->status = rc == SH_OK ? APP_OK : app_fail(&r->err);
-        if (rc == SH_OK && !quiet) say(&r->file);
+        if (rc == SH_OK && !quiet) repair_say(&r->file);
         if (r->status > status) status = r->status;
     }
-    if (stats != NULL && app_write_json(stats, put, &all, &err) != SH_OK && status == APP_OK) status = app_fail(&err);
+    if (stats != NULL && app_write_json(stats, repair_put, &all, &err) != SH_OK && status == APP_OK)
+        status = app_fail(&err);
     for (int i = 0; i < n; i++)
         repair_free(&all.of[i].file);
     free(all.of);

@@ -13,7 +13,7 @@ static double y_of(double part)
     return BOTTOM - part * (BOTTOM - TOP);
 }
 
-static void begin(FILE *out, const char *title)
+static void charts_begin(FILE *out, const char *title)
 {
     fprintf(out, "<svg class=\"chart\" viewBox=\"0 0 %d %d\" role=\"img\"><title>", WIDTH, HEIGHT);
     picture_put_escaped(out, title);
@@ -85,7 +85,7 @@ void page_histogram(FILE *out, const char *title, const struct figures_histogram
         if (curve != NULL) most = fmax(most, curve(ctx, from, from + h->width));
     }
     most *= 1.05;
-    begin(out, title);
+    charts_begin(out, title);
     put_scale(out, most, 1.0);
     for (uint32_t k = 0; k < h->bins; k++) {
         const double x = LEFT + (double)k / h->bins * (RIGHT - LEFT), wide = (double)(RIGHT - LEFT) / h->bins;
@@ -166,7 +166,7 @@ void page_bars(FILE *out, const struct page_bars *b)
     most = most > 0.0 ? 1.05 * most : 1e-3;
     const char *unit = page_unit(most, &per_m);
     const uint32_t apart = names_apart(b);
-    begin(out, b->title);
+    charts_begin(out, b->title);
     put_scale(out, most, per_m);
     for (uint32_t g = 0; g < b->n_groups; g++)
         put_group(out, b, g, apart, most);

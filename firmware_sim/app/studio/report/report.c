@@ -20,7 +20,7 @@ static int write_all(struct report *r, struct sh_err *err)
                    r->f.stats.beyond, r->f.stats.points, r->tolerance_m);
 }
 
-static int report(struct config *cfg, void *ctx, struct sh_err *err)
+static int report_report(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct report *r = ctx;
     app_catch_signals();
@@ -32,7 +32,7 @@ static int report(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-static int run(int argc, char **argv)
+static int report_run(int argc, char **argv)
 {
     struct report r = {.tolerance_m = 0.001, .max_m = 10};
     int status = app_parse(&app_report, argc, argv, &r.in, &r);
@@ -42,7 +42,7 @@ static int run(int argc, char **argv)
         !app_ends_in(r.html_path, ".htm"))
         status =
             app_usage(&app_report, "--html %s: the file is a page; allowed is a name that ends in .html", r.html_path);
-    return status == APP_GO_ON ? app_with_config(&r.in, report, &r) : status;
+    return status == APP_GO_ON ? app_with_config(&r.in, report_report, &r) : status;
 }
 
 #define AT(member) offsetof(struct report, member)
@@ -102,5 +102,5 @@ const struct app_command app_report = {
     .summary = "distance of a recording's points from the configuration's scene",
     .options = OPTIONS,
     .notes = NOTES,
-    .run = run,
+    .run = report_run,
 };

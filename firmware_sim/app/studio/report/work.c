@@ -37,7 +37,7 @@ static int index_legs(struct report *r, struct sh_err *err)
     return rc;
 }
 
-static int load(struct report *r, struct sh_err *err)
+static int work_load(struct report *r, struct sh_err *err)
 {
     struct stat file;
     const unsigned columns = CLOUD_TIME | CLOUD_ECHO_COUNT | (config_head_moves(&r->cfg->platform) ? CLOUD_RANGE : 0u);
@@ -119,7 +119,7 @@ static void without_beams(struct report *r)
     }
 }
 
-static int compare(struct report *r, struct sh_err *err)
+static int work_compare(struct report *r, struct sh_err *err)
 {
     const struct site *site = r->site;
     struct sh_err why = {0};
@@ -267,8 +267,8 @@ static const double SHOWN = 0.995;
 
 int report_work(struct report *r, struct sh_err *err)
 {
-    int rc = load(r, err);
-    if (rc == SH_OK) rc = compare(r, err);
+    int rc = work_load(r, err);
+    if (rc == SH_OK) rc = work_compare(r, err);
     if (rc != SH_OK) return rc;
     rc = sh_check_stop(&app_report_seconds, err);
     if (rc == SH_OK) rc = tables(r, err);

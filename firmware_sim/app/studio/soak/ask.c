@@ -90,7 +90,7 @@ static void judge_note(struct soak_link *link, const struct fault_note *note, co
 
 /* An answer is odd where no fault explains it. A reply that comes next to hurt bytes is lost with them, and one to a
  * question that goes out while the connection is being made again may be lost with the one before. */
-static void judge(struct soak_link *link, const struct answer *a)
+static void ask_judge(struct soak_link *link, const struct answer *a)
 {
     struct soak_ask *ask = &link->ask;
     ask->answered += a->rc == SCANHEAD_OK && a->is_right;
@@ -106,7 +106,8 @@ static void judge(struct soak_link *link, const struct answer *a)
     }
 }
 
-static int put(struct soak_link *link, const char *command, int (*is_right)(const char *text), char reply[REPLY_LEN])
+static int ask_put(struct soak_link *link, const char *command, int (*is_right)(const char *text),
+                   char reply[REPLY_LEN])
 {
     struct soak_ask *ask = &link->ask;
     struct answer a;
@@ -124,7 +125,7 @@ static int put(struct soak_link *link, const char *command, int (*is_right)(cons
     a.is_same = a.rc == SCANHEAD_OK && strcmp(reply, ask->before) == 0;
     if (a.rc == SCANHEAD_OK) memcpy(ask->before, reply, sizeof ask->before);
     pthread_mutex_lock(&link->lock);
-    judge(link, &a);
+    ask_judge(link, &a);
     ask->active = 0;
     ask->settling = a.rc == SCANHEAD_ETIMEOUT;
     pthread_mutex_unlock(&link->lock);
@@ -141,15 +142,15 @@ void soak_ask_next(struct soak_link *link)
     } questions[] = {{"*IDN?", is_identity}, {"SYST:ERR:COUN?", is_count}, {"SYST:VERS?", is_version}};
     const uint32_t which = link->ask.next++ % (sizeof questions / sizeof *questions);
     char reply[REPLY_LEN] = "";
-    const int is_right = put(link, questions[which].command, questions[which].is_right, reply);
+    const int is_right = ask_put(link, questions[which].command, questions[which].is_right, reply);
     if (which == 0 && is_right) snprintf(link->idn, sizeof link->idn, "%.255s", reply);
 }
 
 void soak_ask_scan(struct soak_link *link)
 {
     char reply[REPLY_LEN] = "";
-    if (!put(link, "HEAD:STATe?", is_state, reply)) return;
+    if (!ask_put(link, "HEAD:STATe?", is_state, reply)) return;
     soak_saw_state(link, reply);
-    if (strcmp(reply, "idle") == 0) put(link, "SCAN:STARt", is_start, reply);
-    if (strcmp(reply, "fault") == 0) put(link, "*RST", is_start, reply);
+    if (strcmp(reply, "idle") == 0) ask_put(link, "SCAN:STARt", is_start, reply);
+    if (strcmp(reply, "fault") == 0) ask_put(link, "*RST", is_start, reply);
 }

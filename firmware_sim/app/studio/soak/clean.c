@@ -24,7 +24,7 @@ soak_seq soak_seq_of(struct soak *soak, uint32_t seq)
     return base + (uint64_t)(int64_t)(int32_t)(seq - (uint32_t)base);
 }
 
-static void keep(struct soak *soak, const struct scanhead_frame *frame)
+static void clean_keep(struct soak *soak, const struct scanhead_frame *frame)
 {
     struct soak_clean *c = &soak->clean;
     if ((frame->flags & SCANHEAD_LOCAL) != 0) return;
@@ -81,7 +81,7 @@ static void *read_clean(void *arg)
     struct scanhead_stats stats;
     int rc;
     while ((rc = scanhead_next(c->sh, &frame, NEXT_MS)) == SCANHEAD_OK || rc == SCANHEAD_ETIMEOUT) {
-        if (rc == SCANHEAD_OK) keep(soak, &frame);
+        if (rc == SCANHEAD_OK) clean_keep(soak, &frame);
         if (atomic_load(&c->want_health) == 1) ask(c);
     }
     if (atomic_load(&soak->phase) != SOAK_ENDS) snprintf(c->failed, sizeof c->failed, "%.255s", scanhead_error(c->sh));

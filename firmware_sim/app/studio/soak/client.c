@@ -225,7 +225,7 @@ static void step(struct recorder *r)
     }
 }
 
-static void *compare(void *arg)
+static void *client_compare(void *arg)
 {
     struct soak_link *link = arg;
     while (atomic_load(&link->soak->phase) == SOAK_RUNS)
@@ -258,7 +258,8 @@ int soak_clients_start(struct soak *soak, struct sh_err *err)
     for (uint32_t i = 0; i < soak->n_links; i++) {
         struct soak_link *link = &soak->link[i];
         if (!link->usable) continue;
-        link->running = pthread_create(&link->thread, NULL, link->datagrams != NULL ? compare : record, link) == 0;
+        link->running =
+            pthread_create(&link->thread, NULL, link->datagrams != NULL ? client_compare : record, link) == 0;
         if (!link->running) return sh_fail(err, SH_EIO, "no thread for the client of link %u", link->number);
     }
     return SH_OK;

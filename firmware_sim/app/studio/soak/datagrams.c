@@ -130,7 +130,7 @@ static void take_others(struct soak_datagrams *d)
 }
 
 /* The number of the same clean datagram, nearest to the one expected; 0: there is none. */
-static soak_seq find(const struct soak_link *link, const struct datagram *got)
+static soak_seq datagrams_find(const struct soak_link *link, const struct datagram *got)
 {
     const struct soak_datagrams *d = link->datagrams;
     struct soak_clean_frame clean;
@@ -146,7 +146,7 @@ static soak_seq find(const struct soak_link *link, const struct datagram *got)
 static void take_one(struct soak_link *link, const struct datagram *got)
 {
     struct soak_clean_frame clean;
-    const soak_seq next = link->begun ? link->last + 1 : UNITS + 1, is = find(link, got);
+    const soak_seq next = link->begun ? link->last + 1 : UNITS + 1, is = datagrams_find(link, got);
     if (is != 0) {
         soak_saw_unit(link, is, got->digest, got->len);
     } else if (soak_datagrams_get(link->datagrams, next, &clean) && clean.len == got->len) {

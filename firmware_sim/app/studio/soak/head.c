@@ -197,7 +197,7 @@ static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
     t->leap_s = leap_s;
 }
 
-static void take_event(struct soak_link *link, const struct scanhead_frame *frame)
+static void head_take_event(struct soak_link *link, const struct scanhead_frame *frame)
 {
     const int64_t a = (int64_t)frame->event_value[1], b = (int64_t)frame->event_value[2];
     if (frame->event == SCANHEAD_EV_STATE) take_state(link, frame);
@@ -263,7 +263,7 @@ static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
     link->usual_rate = rate;
 }
 
-static void take_points(struct soak_link *link, const struct scanhead_frame *frame)
+static void head_take_points(struct soak_link *link, const struct scanhead_frame *frame)
 {
     /* A scan that begins anew shows that power was away, even to a client that was not connected when it went. */
     if (link->have_pulse && frame->pulse0 < link->pulse0) soak_saw_power_go(link, frame->t_ns);
@@ -282,8 +282,8 @@ void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame)
 {
     pthread_mutex_lock(&link->lock);
     if (link->frames == 1) link->times.pps_ns = frame->t_ns;
-    if (frame->type == SCANHEAD_EVENT) take_event(link, frame);
-    if (frame->type == SCANHEAD_POINTS) take_points(link, frame);
+    if (frame->type == SCANHEAD_EVENT) head_take_event(link, frame);
+    if (frame->type == SCANHEAD_POINTS) head_take_points(link, frame);
     pthread_mutex_unlock(&link->lock);
 }
 

@@ -211,7 +211,7 @@ static void mark_away(struct soak_link *link, soak_seq from, soak_seq to)
     }
 }
 
-static void begin(struct soak_link *link, soak_seq seq)
+static void ledger_begin(struct soak_link *link, soak_seq seq)
 {
     if (link->begun)
         mark_away(link, link->last + 1, seq);
@@ -246,7 +246,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     pthread_mutex_lock(&link->lock);
     const soak_seq seq = soak_seq_of(link->soak, frame->seq);
     if (!link->begun) soak_head_begins(link, frame);
-    if (!link->in_session) begin(link, seq);
+    if (!link->in_session) ledger_begin(link, seq);
     if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
     link->frames++;
@@ -263,7 +263,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
 
 void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len)
 {
-    if (!link->begun) begin(link, seq);
+    if (!link->begun) ledger_begin(link, seq);
     struct soak_fact *fact = touch(link, seq);
     if (fact == NULL) return;
     if (seq > link->last || fact->seq == link->first) {

@@ -17,7 +17,7 @@ static const char *row_name(int row)
     return row == SOAK_RESEALED ? "flip, resealed" : fault_names[row];
 }
 
-static void add(struct soak_row *sum, const struct soak_row *row)
+static void sheet_add(struct soak_row *sum, const struct soak_row *row)
 {
     sum->injected += row->injected;
     sum->noticed += row->noticed;
@@ -32,13 +32,13 @@ static struct soak_row sum_of(const struct soak *soak)
     struct soak_row sum = {0};
     for (int row = 0; row < SOAK_N_ROWS; row++)
         for (uint32_t i = 0; i < soak->n_links; i++)
-            add(&sum, &soak->link[i].row[row]);
+            sheet_add(&sum, &soak->link[i].row[row]);
     return sum;
 }
 
 /* ---- the verdict */
 
-static void fail(struct soak *soak, int is_wrong, const char *why)
+static void sheet_fail(struct soak *soak, int is_wrong, const char *why)
 {
     for (uint32_t i = 0; i < soak->n_failures; i++)
         if (strcmp(soak->failures[i], why) == 0) return;
@@ -66,19 +66,19 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
     for (uint32_t i = 0; i < link->plugs.n; i++)
         link->row[link->plugs.note[i].kind].missed++;
     for (int row = 0; row < SOAK_N_ROWS; row++)
-        add(&sum, &link->row[row]);
-    fail(soak, has_open_rows(link->row), "a fault was not noticed, and is not one that can't be noticed");
+        sheet_add(&sum, &link->row[row]);
+    sheet_fail(soak, has_open_rows(link->row), "a fault was not noticed, and is not one that can't be noticed");
     if (!link->usable) return;
-    fail(soak, link->failed[0] != '\0', "a client gave up");
-    fail(soak, sum.missed != 0, "a fault that can be noticed was not noticed");
-    fail(soak, link->wrong_plain != 0, "a frame that was accepted differs from the clean one, without a fault");
-    fail(soak, link->lost_plain > link->reader_lost, "frames were lost without a fault");
-    fail(soak, link->ask.odd != 0, "a reply was wrong or missing without a fault");
-    fail(soak, link->odd_closings != 0, "a connection was closed without a fault");
-    fail(soak, link->frames == 0, "a client got no frame");
-    fail(soak, !link->in_session, "a client had no connection at the end");
-    fail(soak, bad < link->expected_bad_min || bad > link->expected_bad_max,
-         "the number of bytes outside of frames is not that of the faults");
+    sheet_fail(soak, link->failed[0] != '\0', "a client gave up");
+    sheet_fail(soak, sum.missed != 0, "a fault that can be noticed was not noticed");
+    sheet_fail(soak, link->wrong_plain != 0, "a frame that was accepted differs from the clean one, without a fault");
+    sheet_fail(soak, link->lost_plain > link->reader_lost, "frames were lost without a fault");
+    sheet_fail(soak, link->ask.odd != 0, "a reply was wrong or missing without a fault");
+    sheet_fail(soak, link->odd_closings != 0, "a connection was closed without a fault");
+    sheet_fail(soak, link->frames == 0, "a client got no frame");
+    sheet_fail(soak, !link->in_session, "a client had no connection at the end");
+    sheet_fail(soak, bad < link->expected_bad_min || bad > link->expected_bad_max,
+               "the number of bytes outside of frames is not that of the faults");
 }
 
 void soak_conclude(struct soak *soak)
@@ -88,12 +88,12 @@ void soak_conclude(struct soak *soak)
         conclude_link(soak, &soak->link[i]);
     soak->healthy = soak->clean.idn[0] != '\0' && strcmp(state, "scanning") == 0;
     soak->hash_is_same = soak->stats.have_hash && strcmp(soak->stats.sha256, soak->clean.sha256) == 0;
-    fail(soak, soak->clean.failed[0] != '\0', "the clean reader ended before the head did");
-    fail(soak, !soak->healthy, "the head is not healthy at the end");
-    fail(soak, !soak->stats.have_hash, "the head could not compute its hash fast enough");
-    fail(soak, soak->stats.have_hash && !soak->hash_is_same && soak->clean.reader_lost == 0,
-         "the clean reader's hash is not that of the head");
-    fail(soak, soak->stats.counters.lost_pulses != 0, "the head lost pulses");
+    sheet_fail(soak, soak->clean.failed[0] != '\0', "the clean reader ended before the head did");
+    sheet_fail(soak, !soak->healthy, "the head is not healthy at the end");
+    sheet_fail(soak, !soak->stats.have_hash, "the head could not compute its hash fast enough");
+    sheet_fail(soak, soak->stats.have_hash && !soak->hash_is_same && soak->clean.reader_lost == 0,
+               "the clean reader's hash is not that of the head");
+    sheet_fail(soak, soak->stats.counters.lost_pulses != 0, "the head lost pulses");
 }
 
 /* ---- text */

@@ -228,7 +228,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-static int run(int argc, char **argv)
+static int soak_run_command(int argc, char **argv)
 {
     struct soak_options o = {.duration_s = 30.0};
     const int status = app_parse(&app_soak, argc, argv, &o.in, &o);
@@ -274,5 +274,5 @@ const struct app_command app_soak = {
     .options = OPTIONS,
     .opens_links = 1,
     .notes = NOTES,
-    .run = run,
+    .run = soak_run_command,
 };

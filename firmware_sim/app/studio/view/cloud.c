@@ -35,7 +35,7 @@ static void leave_out_empty(struct viewed *v)
 }
 
 /* The arrays become the recording's. */
-static void take(struct viewed *v, struct cloud *c)
+static void cloud_take(struct viewed *v, struct cloud *c)
 {
     v->points = (struct viewed_points){.n = (uint32_t)c->n,
                                        .xyz_m = c->xyz_m,
@@ -109,7 +109,7 @@ int viewed_load_cloud(struct viewed *v, const struct sh_report *report, struct s
         cloud_free(&cloud);
         return sh_fail(err, SH_EINPUT, "%s: %zu points; at most %u can be shown", v->path, n, UINT32_MAX);
     }
-    take(v, &cloud);
+    cloud_take(v, &cloud);
     leave_out_empty(v);
     if (strcmp(v->format, "ply") == 0) rc = read_comments(v, err);
     snprintf(v->why_no_mesh, sizeof v->why_no_mesh,

@@ -7,7 +7,7 @@
 #include "firmware_sim/app/studio/view/viewed.h"
 
 /* A column's array, wherever it points to, and the bytes of a value. */
-static void *place_of(struct viewed_points *p, enum viewed_column column, size_t *size)
+static void *points_place_of(struct viewed_points *p, enum viewed_column column, size_t *size)
 {
     const struct {
         void *at;
@@ -37,7 +37,7 @@ static void *pointer_at(const void *place)
 const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size)
 {
     struct viewed_points copy = *points; /* the same pointers */
-    return pointer_at(place_of(&copy, column, size));
+    return pointer_at(points_place_of(&copy, column, size));
 }
 
 int viewed_points_room(struct viewed_points *p, size_t n, unsigned has, struct sh_err *err)
@@ -45,7 +45,7 @@ int viewed_points_room(struct viewed_points *p, size_t n, unsigned has, struct s
     bool ok = resize(&p->xyz_m, n, sizeof *p->xyz_m);
     for (int c = 0; c < VIEWED_COLUMNS && ok; c++) {
         size_t size;
-        void *place = place_of(p, (enum viewed_column)c, &size);
+        void *place = points_place_of(p, (enum viewed_column)c, &size);
         if ((has >> c & 1u) != 0) ok = resize(place, n, size);
     }
     return ok ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %zu points", n);
@@ -56,7 +56,7 @@ void viewed_points_free(struct viewed_points *p)
     free(p->xyz_m);
     for (int c = 0; c < VIEWED_COLUMNS; c++) {
         size_t size;
-        free(pointer_at(place_of(p, (enum viewed_column)c, &size)));
+        free(pointer_at(points_place_of(p, (enum viewed_column)c, &size)));
     }
     memset(p, 0, sizeof *p);
 }

@@ -64,7 +64,7 @@ static int begin_scan(void *ctx, struct sh_err *err)
 
 /* ---- points come */
 
-static int make_room(struct viewed_stream *s, struct sh_err *err)
+static int stream_make_room(struct viewed_stream *s, struct sh_err *err)
 {
     struct viewed_points *p = &s->v->points;
     if (p->n < s->room) return SH_OK;
@@ -118,7 +118,7 @@ static int put_into_grid(struct viewed_stream *s, int i, const double xyz_m[3], 
     return is_in < 0 ? is_in : SH_OK;
 }
 
-static int take_points(void *ctx, int n, struct sh_err *err)
+static int stream_take_points(void *ctx, int n, struct sh_err *err)
 {
     struct viewed_stream *s = ctx;
     struct track *t = &s->track;
@@ -135,7 +135,7 @@ static int take_points(void *ctx, int n, struct sh_err *err)
             t->missing.n_nowhere++;
             continue;
         }
-        rc = make_room(s, err);
+        rc = stream_make_room(s, err);
         if (rc != SH_OK) return rc;
         put_point(s, i, xyz_m);
         rc = put_into_grid(s, i, xyz_m, err);
@@ -208,7 +208,7 @@ static int open_stream(struct viewed_stream *s, struct scanhead **sh, struct sh_
 int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct sh_err *err)
 {
     static const struct track_ops ops = {
-        .scan = begin_scan, .points = take_points, .wants_attributes = 1, .wants_colours = 1};
+        .scan = begin_scan, .points = stream_take_points, .wants_attributes = 1, .wants_colours = 1};
     struct viewed_stream *s = calloc(1, sizeof *s);
     struct scanhead *sh = NULL;
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to read it", v->path);

@@ -16,7 +16,7 @@ struct view_options {
 };
 
 /* Sessions get no data. What they send is read, and has no effect. */
-static void take_event(const struct link_ops *ops, void *link, const struct link_event *event)
+static void view_take_event(const struct link_ops *ops, void *link, const struct link_event *event)
 {
     char said[4096];
     if (event->kind == LINK_READABLE)
@@ -33,7 +33,7 @@ static int serve(const struct link_ops *ops, void *link, struct sh_err *err)
         const int n = ops->poll(link, -1, 0, POLL_MS, event, LINK_MAX_EVENTS);
         if (n < 0) return sh_fail(err, n, "the link of the page failed");
         for (int i = 0; i < n; i++)
-            take_event(ops, link, &event[i]);
+            view_take_event(ops, link, &event[i]);
     }
     return SH_OK;
 }
@@ -87,7 +87,7 @@ static int show(const struct view_options *o, struct viewed *v, struct sh_err *e
     return rc;
 }
 
-static int run(int argc, char **argv)
+static int view_run(int argc, char **argv)
 {
     struct view_options o = {0};
     struct viewed viewed = {0};
@@ -131,5 +131,5 @@ const struct app_command app_view = {
     .summary = "show a recording in the browser",
     .options = OPTIONS,
     .notes = NOTES,
-    .run = run,
+    .run = view_run,
 };

@@ -129,7 +129,7 @@ static uint32_t hash_of(uint64_t pulse)
 }
 
 /* Echoes of one pulse follow each other, at the same time. This is the only work for every point. */
-static void take_points(struct watch *w, const struct scanhead_frame *frame)
+static void observe_take_points(struct watch *w, const struct scanhead_frame *frame)
 {
     const uint32_t keeps = w->at.in_scene ? w->sample.every - 1 : 0, n_surfaces = w->site->scene->n_surfaces;
     uint64_t pulse = frame->pulse0 - 1;
@@ -172,7 +172,7 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     struct sh_err err;
     past_take(w->past, frame, w->lost_frames);
     if (frame->type == SCANHEAD_POINTS && follow_scan(w)) {
-        take_points(w, frame);
+        observe_take_points(w, frame);
         if (w->sample.n - w->sample.done >= WATCH_BATCH && watch_sample_compare(w, &err) != SH_OK)
             w->sample.n = w->sample.done; /* no memory now: these are passed over */
     }

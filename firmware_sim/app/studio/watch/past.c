@@ -140,7 +140,7 @@ static struct piece *find_piece(struct past *past, const struct scanhead_frame *
     return last;
 }
 
-static void keep(struct past *past, const struct scanhead_frame *frame)
+static void past_keep(struct past *past, const struct scanhead_frame *frame)
 {
     const uint64_t points = frame->type == SCANHEAD_POINTS ? frame->n_points : 0;
     struct piece *piece = find_piece(past, frame);
@@ -155,7 +155,7 @@ static void keep(struct past *past, const struct scanhead_frame *frame)
 }
 
 /* A frame that is repeated says nothing new; its flags and its time may differ. */
-static int is_same(const struct placing *p, const struct scanhead_frame *frame)
+static int past_is_same(const struct placing *p, const struct scanhead_frame *frame)
 {
     return p->frame != NULL && p->len == frame->raw_len &&
            memcmp(p->frame + NATIVE_HEADER_LEN, frame->payload, frame->payload_len) == 0;
@@ -164,7 +164,7 @@ static int is_same(const struct placing *p, const struct scanhead_frame *frame)
 static void take_placing(struct past *past, int kind, const struct scanhead_frame *frame)
 {
     struct placing *p = &past->placing[kind];
-    if ((frame->flags & SCANHEAD_REPEAT) != 0 && is_same(p, frame)) return;
+    if ((frame->flags & SCANHEAD_REPEAT) != 0 && past_is_same(p, frame)) return;
     uint8_t *copy = realloc(p->frame, frame->raw_len);
     if (copy == NULL) return; /* the next repetition brings it */
     p->frame = copy;
@@ -196,7 +196,7 @@ void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t l
     case SCANHEAD_POSES:
     case SCANHEAD_ATTRIBUTES:
     case SCANHEAD_COLOURS:
-        keep(past, frame);
+        past_keep(past, frame);
         past->after_pose = frame->type == SCANHEAD_POSES;
         break;
     default:
@@ -222,7 +222,7 @@ static int read_query(const char *query, uint64_t *from, struct sh_err *err)
     return SH_OK;
 }
 
-static struct piece *find(struct past *past, uint64_t *from)
+static struct piece *past_find(struct past *past, uint64_t *from)
 {
     if (past->n == 0) return NULL;
     if (*from < piece_at(past, 0)->base) *from = piece_at(past, 0)->base;
@@ -252,7 +252,7 @@ int past_get(struct past *past, const char *query, struct web_body *out, struct 
     int rc = read_query(query, &from, err);
     if (rc != SH_OK) return rc;
     pthread_mutex_lock(&past->lock);
-    const struct piece *piece = find(past, &from);
+    const struct piece *piece = past_find(past, &from);
     const size_t len = piece != NULL ? piece->len - (size_t)(from - piece->base) : 0;
     *out = (struct web_body){"application/octet-stream", malloc(PAST_HEAD_LEN + len), PAST_HEAD_LEN + len};
     if (out->bytes != NULL) {

@@ -173,7 +173,7 @@ static int density(struct watch *w, const struct cloud *cloud, struct sh_err *er
     return SH_OK;
 }
 
-static void judge(struct watch *w)
+static void sample_judge(struct watch *w)
 {
     const struct watch_sample *s = &w->sample;
     struct report_verdict *v = &w->at.verdict;
@@ -197,7 +197,7 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
         figures_histogram_of_signed(s->points.along_m, s->n, SHOWN, &w->at.histogram);
     else
         figures_histogram_of(s->distance_m, s->n, SHOWN, &w->at.histogram);
-    judge(w);
+    sample_judge(w);
     w->at.every = s->every;
     w->at.sampled_points = s->n;
     return SH_OK;

@@ -92,7 +92,7 @@ void watch_seen_mark(struct watch_seen *seen, uint32_t station, uint32_t triangl
     if (cell != COVERAGE_NO_CELL) seen->bits[(station - 1) * seen->words + cell / 64] |= 1ULL << cell % 64;
 }
 
-static uint32_t count(const struct watch_seen *seen, const uint64_t *bits, double *sum_m2)
+static uint32_t seen_count(const struct watch_seen *seen, const uint64_t *bits, double *sum_m2)
 {
     uint32_t n = 0;
     *sum_m2 = 0.0;
@@ -110,11 +110,11 @@ void watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stat
     *cells = 0;
     *share = (double)NAN;
     if (seen->coverage == NULL) return;
-    *cells = count(seen, seen->bits + (station - 1) * seen->words, &sum_m2);
+    *cells = seen_count(seen, seen->bits + (station - 1) * seen->words, &sum_m2);
     *share = sum_m2 / seen->area_m2;
     memset(seen->all, 0, seen->words * sizeof *seen->all);
     for (uint32_t s = 0; s < n_stations; s++)
         for (size_t i = 0; i < seen->words; i++)
             seen->all[i] |= seen->bits[s * seen->words + i];
-    seen->n_seen = count(seen, seen->all, &seen->seen_m2);
+    seen->n_seen = seen_count(seen, seen->all, &seen->seen_m2);
 }

@@ -21,7 +21,7 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
     return SH_EINPUT;
 }
 
-static int make_room(struct watch *w, struct sh_err *err)
+static int watch_make_room(struct watch *w, struct sh_err *err)
 {
     const uint32_t n = w->site->n_stations;
     w->head = calloc(n, sizeof *w->head);
@@ -70,7 +70,7 @@ static int open_watch(const struct config *cfg, const struct site *site, const s
     w->fd = w->link.fd = -1;
     atomic_init(&w->ending, 0);
     pthread_mutex_init(&w->lock, NULL);
-    int rc = make_room(w, err);
+    int rc = watch_make_room(w, err);
     if (rc == SH_OK) rc = watch_make_scene(w, err);
     if (rc == SH_OK) rc = watch_sample_open(w, err);
     if (rc == SH_OK) rc = watch_seen_open(w, err);
