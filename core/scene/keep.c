@@ -55,11 +55,11 @@ int scene_keep(struct scene *s, const uint8_t *keep, struct sh_err *err)
         for (uint32_t v = 0; v < s->n_vertices; v++)
             vec3_bound(s->min_m, s->max_m, s->vertex_m[v]);
         /* Where memory can't be given back, it stays. */
-        resize(&s->triangle, s->n_triangles, sizeof *s->triangle);
-        resize(&s->label, s->n_triangles, sizeof *s->label);
+        if (s->triangle != NULL) resize(&s->triangle, s->n_triangles, sizeof *s->triangle);
+        if (s->label != NULL) resize(&s->label, s->n_triangles, sizeof *s->label);
         if (s->uv != NULL) resize(&s->uv, s->n_triangles, sizeof *s->uv);
         if (s->rgb != NULL) resize(&s->rgb, s->n_triangles, sizeof *s->rgb);
-        resize(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+        if (s->vertex_m != NULL) resize(&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
         rc = scene_keep_copies(s, keep, label, err);
     }
     free(label);

@@ -130,7 +130,7 @@ struct cloud_stats {
 
 /* distance_m as cloud_compare gives it; not negative. */
 void cloud_stats(const double *distance_m, size_t n, double tolerance_m, struct cloud_stats *out);
-/* That percentile of the finite ones of n values from 0 up, n_finite in number; NaN: there are none. */
+/* Returns that percentile of the n_finite finite ones of n values from 0 up; NaN: there are none. */
 double cloud_percentile(const double *v, size_t n, size_t n_finite, unsigned permille);
 
 #endif

@@ -174,7 +174,7 @@ static void fill_points(struct scanhead *sh, struct scanhead_frame *frame)
         (struct native_attributes){.pulse0 = points.pulse0, .line = points.line, .n_points = points.n_points};
 }
 
-/* Of attributes and colours. */
+/* Fills a frame of attributes or colours. */
 static void fill_beside(struct scanhead_frame *frame)
 {
     struct native_attributes head;

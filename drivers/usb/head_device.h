@@ -20,7 +20,7 @@ struct scanhead_usb_session {
 struct scanhead_usb {
     const struct usb_personality *personality;
     struct usb_device *device;
-    struct scanhead_usb_session session[USB_MAX_SESSIONS]; /* look->n_sessions of them */
+    struct scanhead_usb_session session[USB_MAX_SESSIONS]; /* [personality->n_sessions] */
     uint8_t line_coding[7];
     int cut_due; /* the bus, not the host, has ended a session; scanhead_usb_cut says why */
     enum usb_end cut;

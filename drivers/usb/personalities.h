@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* USB identities of a head ("looks"): its own, and those of the devices whose protocols it speaks. Each is data: a
- * model (usb.h), ids, and where its sessions are.
+/* USB identities of a head, its personalities: its own, and those of the devices whose protocols it speaks. Each is
+ * data: a model (model.h), ids, and the places of its sessions.
  *
- *   look     from protocol   what the host sees
+ *   name     from protocol   what the host sees
  *   native   native          CDC-ACM console, and a vendor interface with a bulk pair for the stream
  *   hokuyo   scip            CDC-ACM alone, as URG series heads: the stock driver makes /dev/ttyACM0 of it
  *   sick     cola            one vendor interface with a bulk pair, as TiM heads: libusb reads it

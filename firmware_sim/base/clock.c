@@ -5,6 +5,8 @@
 #include <sys/timex.h>
 #include <time.h>
 
+#include "core/monotonic.h"
+
 static int64_t read_ns(clockid_t id)
 {
     struct timespec t;
@@ -14,7 +16,7 @@ static int64_t read_ns(clockid_t id)
 
 int64_t clock_now_ns(void)
 {
-    return read_ns(CLOCK_MONOTONIC);
+    return monotonic_ns();
 }
 
 /* Reads the clock between two readings of the monotonic clock, a few times, since any may be interrupted; the tightest

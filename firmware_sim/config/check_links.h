@@ -17,7 +17,7 @@ void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
 /* Fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
 void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
 void cfg_set_usb_personality(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
-/* What the protocols of links need. */
+/* Checks the needs of the protocols of links. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
 /* Whether the protocol can describe a head of this emitter. */
 int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter);

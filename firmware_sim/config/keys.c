@@ -170,8 +170,18 @@ static const struct cfg_key config_keys[] = {
              "(required)."},
     {LINK(interface), CFG_TEXT, .def = "", .example = "eth1", .of = CFG_KIND(LINK_UDP),
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
- "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still say where "
- "packets to other addresses go: binding a socket to an interface needs a privilege."}, {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP), .help = "udp: numeric address of this machine that packets come from, so that receivers can distinguish heads. When not given: the interface's, or as the system chooses; but the address after the receiver's where that is on the loopback and has the source's port."}, {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP), .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, velodyne-position 8308, as the device's, or another with a warning where these are taken; but without source and interface the system chooses for a receiver on this machine. One that listens on the same port at all addresses must share it (SO_REUSEADDR)."}, {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4", .of = CFG_KIND(LINK_UDP),
+             "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still "
+             "say where packets to other addresses go: binding a socket to an interface needs a privilege."},
+    {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP),
+     .help = "udp: numeric address of this machine that packets come from, so that receivers can distinguish heads. "
+             "When not given: the interface's, or as the system chooses; but the address after the receiver's where "
+             "that is on the loopback and has the source's port."},
+    {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP),
+     .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, "
+             "velodyne-position 8308, as the device's, or another with a warning where these are taken; but without "
+             "source and interface the system chooses for a receiver on this machine. One that listens on the same "
+             "port at all addresses must share it (SO_REUSEADDR)."},
+    {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4", .of = CFG_KIND(LINK_UDP),
      .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the "
              "system's."},
     {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, .of = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_WEB),
@@ -201,18 +211,10 @@ static const struct cfg_key config_keys[] = {
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
- {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB), .help = "usb: serial number. "
-                                                                                              "When not given: "
-                                                                                              "head.serial where that "
-                                                                                              "is given, else "
-                                                                                              "SIM-0001 and eight "
-                                                                                              "digits that identify "
-                                                                                              "this head on this "
-                                                                                              "machine; with scip "
-                                                                                              "none, as the real "
-                                                                                              "device. Only the USB "
-                                                                                              "device has these "
-                                                                                              "digits, not *IDN?."},
+    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB),
+     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits "
+             "that identify this head on this machine; with scip none, as the real device. Only the USB device has "
+             "these digits, not *IDN?."},
 
 #include "firmware_sim/config/measurement_rows.h"
 
@@ -241,8 +243,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(time.offset_s), CFG_REAL, "s", "0", -1e6, 1e6,
      .help = "The head's clock is ahead of the true time by this much. It shows in UTC, GPS time and PPS of the head, "
              "not in those of the receiver."},
-    {KEY(time.drift_ppm), CFG_REAL, "ppm", "0", -1000, 1000, .help = "The head's clock runs fast by this, from "
-                                                                     "power-up."},
+    {KEY(time.drift_ppm), CFG_REAL, "ppm", "0", -1000, 1000,
+     .help = "The head's clock runs fast by this, from power-up."},
     {KEY(time.jump_s), CFG_REAL, "s", "0", -1e6, 1e6, .help = "The head's clock jumps ahead by this, once."},
     {KEY(time.jump_at_s), CFG_REAL, "s", "0", 0, 1e8, .help = "Time of the jump, after power-up."},
 

@@ -7,10 +7,10 @@
      .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: sub-rays where the footprint "
              "reaches over an edge, or onto glass or a mirror; auto: as `scanhead plan` says."},
     {KEY(beam.rings), CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS,
-     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to "
-             "0.35 / n^0.75 of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, "
-             "0.35 mrad, 100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than it can tell "
-             "apart."},
+     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to 0.35 / "
+             "n^0.75 of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, 0.35 mrad, "
+             "100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than it can "
+             "tell apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Echoes of glass and of surfaces behind it are among them."},
@@ -47,8 +47,8 @@
      .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that value applies at "
              "range_sigma_at_m, and noise grows as the signal gets weaker (signal.model: on); off: exact ranges."},
     {KEY(noise.sigma_m), CFG_REAL, "m", "@range_sigma_m", 0, 10,
-     .help = "One sigma of the range noise, its fixed part, in place of the profile's range_sigma_m. With a signal model "
-             "at least the profile's range_sigma_floor_m."},
+     .help = "One sigma of the range noise, its fixed part, in place of the profile's range_sigma_m. With a signal "
+             "model at least the profile's range_sigma_floor_m."},
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},
@@ -58,8 +58,8 @@
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
     {KEY(noise.ball.distance_1_m), CFG_REAL, "1/m", "0", 0, 100,
      .help = "The radius grows by this share of itself per metre of range."},
-    {KEY(noise.ball.factor), CFG_VEC3, NULL, "[1, 1, 1]", 0, 1000, .help = "Factors that stretch the ball along its "
-                                                                           "axes."},
+    {KEY(noise.ball.factor), CFG_VEC3, NULL, "[1, 1, 1]", 0, 1000,
+     .help = "Factors that stretch the ball along its axes."},
     {"noise.ball.axes", IN_CONFIG(noise.ball.local), CFG_ENUM, .def = "scene", WORDS("scene", "beam"),
      .help = "Axes of the ball: x, y, z of the scene; or of the beam: along it, to the right, up."},
     {KEY(noise.ball.seed), CFG_COUNT, NULL, "", 0, 18446744073709551615.0, .example = "1",

@@ -19,8 +19,9 @@
      .help = "Time that a reader may take for one mesh; more is an error."},
     {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
      .help = "Files that Assimp may have open at a time: a mesh and the files that it names."},
-    {"scene.ifc_reader", IN_CONFIG(scene.import.ifc_reader), CFG_ENUM, .def = "auto",
-     WORDS([IFC_READER_AUTO] = "auto", [IFC_READER_WEB] = "web-ifc", [IFC_READER_LITE] = "ifc-lite", [IFC_READER_ASSIMP] = "assimp"),
+    {"scene.ifc_reader", IN_CONFIG(scene.import.ifc_reader), CFG_ENUM,
+     .def = "auto", WORDS([IFC_READER_AUTO] = "auto", [IFC_READER_WEB] = "web-ifc", [IFC_READER_LITE] = "ifc-lite",
+     [IFC_READER_ASSIMP] = "assimp"),
      .help = "Reader of bodies of .ifc. auto: web-ifc and ifc-lite, compared product by product. Where they are not "
              "installed, Assimp reads them; products with shapes that Assimp is known to read wrong are an error "
              "then. web-ifc, ifc-lite: that one alone, not cross-checked. assimp: Assimp; a warning names such "
@@ -31,8 +32,8 @@
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},
-    {MESH(file), CFG_PATH, .example = "scenes/glass_room.obj", .help = "Path: .obj .ply .stl .gltf .glb .fbx .dae "
-                                                                       ".ifc .tif .tiff"},
+    {MESH(file), CFG_PATH, .example = "scenes/glass_room.obj",
+     .help = "Path: .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif .tiff"},
     {MESH(up), CFG_ENUM, .example = "z", WORDS([SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y"),
      .help = "Axis that points up in the file; y turns (x, y, z) to (x, -z, y)."},
     {MESH(scale), CFG_REAL, "m/unit", NULL, 1e-9, 1e9, .example = "1", .help = "Metres per unit of the file."},
@@ -72,8 +73,8 @@
              "UTM (or UPS), or ECEF; geotiff: as the system of the .tif says."},
     {KEY(scene.anchor.origin_m), CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9,
      .help = "explicit: the scene's point that lies at lat_deg, lon_deg, height_m."},
-    {KEY(scene.anchor.lat_deg), CFG_REAL, "deg", "", -90, 90, .example = "49.1", .help = "explicit: its latitude, WGS "
-                                                                                         "84."},
+    {KEY(scene.anchor.lat_deg), CFG_REAL, "deg", "", -90, 90, .example = "49.1",
+     .help = "explicit: its latitude, WGS 84."},
     {KEY(scene.anchor.lon_deg), CFG_REAL, "deg", "", -180, 180, .example = "8.436", .help = "explicit: its longitude."},
     {KEY(scene.anchor.height_m), CFG_REAL, "m", "", -1000, 10000, .example = "110",
      .help = "explicit: its height above the ellipsoid; ifc: the same, instead of the file's (above the sea); "
@@ -82,7 +83,8 @@
      .help = "explicit: direction of true north, clockwise from the scene's y axis."},
     {KEY(scene.anchor.utm_zone), CFG_COUNT, NULL, "", 0, 60, .example = "32",
      .help = "utm: zone of the meshes' coordinates; 0: UPS. Required with source: utm."},
-    {"scene.anchor.hemisphere", IN_CONFIG(scene.anchor.north), CFG_ENUM, .def = "", .example = "north", WORDS("south", "north"),
+    {"scene.anchor.hemisphere", IN_CONFIG(scene.anchor.north), CFG_ENUM, .def = "",
+     .example = "north", WORDS("south", "north"),
      .help = "utm: hemisphere that their northing counts from. Required with source: utm."},
 
     {"stations", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
@@ -114,7 +116,8 @@
     {STATION(easting_m), CFG_REAL, "m", "", -1e7, 1e7, .example = "458835",
      .help = "UTM or UPS easting of the head's origin, with false origin."},
     {STATION(northing_m), CFG_REAL, "m", "", -1e7, 2e7, .example = "5438800", .help = "Northing; with easting_m."},
-    {STATION(ecef_m), CFG_VEC3, "m", "", -1e7, 1e7, .example = "[4138400, 613700, 4798000]", .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
+    {STATION(ecef_m), CFG_VEC3, "m", "", -1e7, 1e7, .example = "[4138400, 613700, 4798000]",
+     .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
 
     {"stations[].tripod", .type = CFG_MAP,
      .help = "Tripod of the head. Its legs open as the head is lowered; the area below the head between them is "
@@ -133,8 +136,8 @@
     {TRIPOD(legs), CFG_BOOL, .def = "off",
      .help = "Three legs as a mesh: they hide the surfaces behind them, and points on them have the object tripod, "
              "material leg."},
-    {TRIPOD(leg_diameter_m), CFG_REAL, "m", "0.03", 0.001, 1, .help = "legs: width of a leg, a prism of six sides, "
-                                                                      "from edge to edge."},
+    {TRIPOD(leg_diameter_m), CFG_REAL, "m", "0.03", 0.001, 1,
+     .help = "legs: width of a leg, a prism of six sides, from edge to edge."},
     {TRIPOD(legs_heading_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "legs: direction of the first leg, clockwise from the scene's y axis; the others follow by 120 deg."},
     {"stations[].scanner", 0, sizeof(struct config_station), CFG_MAP, .example = "{}",
@@ -143,36 +146,57 @@
              "file's head and instrument. --set stations.1.scanner.head.lines_hz=10 works, too."},
 
     {"platform", .type = CFG_MAP, .help = "What carries the head: a tripod, or something that moves."},
-    {KEY(platform.kind), CFG_ENUM, .def = "static",
-     WORDS([PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live",
-           [PLATFORM_STOPS] = "stops"),
- .help = "static: at the station; trajectory: along a file; stops: standing at some poses of the file, which are then "
-         "the scan's stations, or without a file at the stations themselves, while meshes move; live: at poses that a "
-         "peer sends, by UDP or, with pace step, by TIME:STEP."}, {KEY(platform.file), CFG_PATH, .def = "", .example = "path.csv", .of = ON_PATH,
+    {KEY(platform.kind), CFG_ENUM,
+     .def = "static", WORDS([PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] =
+     "live", [PLATFORM_STOPS] = "stops"),
+     .help = "static: at the station; trajectory: along a file; stops: standing at some poses of the file, which "
+             "are then the scan's stations, or without a file at the stations themselves, while meshes move; live: "
+             "at poses that a peer sends, by UDP or, with pace step, by TIME:STEP."},
+    {KEY(platform.file), CFG_PATH, .def = "", .example = "path.csv", .of = ON_PATH,
      .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene "
              "frame."},
     {KEY(platform.waypoints), CFG_PATH, .def = "", .example = "way.csv",
      .of = ON_PATH,
      .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] in place of file. The heading follows the "
              "path; the platform is level as a station there."},
- {KEY(platform.start_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH, .help = "trajectory, stops: start of a scan, or "
-                                                                            "the first stop, on the trajectory: "
-                                                                            "seconds after its first "
+    {KEY(platform.start_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH,
+     .help = "trajectory, stops: start of a scan, or the first stop, on the trajectory: seconds after its first "
              "sample."},
- {KEY(platform.end_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH, .help = "trajectory, stops: end of a scan, or of "
-                                                                          "the stops, in the same way; the last "
-                                                                          "sample when not given. Required for stops "
-                                                                          "without a trajectory."}, {KEY(platform.step_s), CFG_REAL, "s", "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS),
-     .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops, unless frames_per_s is."},
- {KEY(platform.frames_per_s), CFG_REAL, "1/s", "0", 0, 1e6, .example = "25", .of = CFG_KIND(PLATFORM_STOPS), .help = "stops: first_frame, last_frame and frame_step give the times of the stops, in place of start_s, end_s and step_s. Frame 0 is at the trajectory's first sample, or at time 0. The points' frame scalar counts in the same way."}, {KEY(platform.first_frame), CFG_REAL, NULL, "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS), .help = "stops, with frames_per_s: frame of the first stop."}, {KEY(platform.last_frame), CFG_REAL, NULL, "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS), .help = "stops, with frames_per_s: no stop is after this frame; the trajectory's last sample when not given."}, {KEY(platform.frame_step), CFG_REAL, NULL, "1", 1e-6, 1e9, .of = CFG_KIND(PLATFORM_STOPS), .help = "stops, with frames_per_s: frames from each stop to the next."},
+    {KEY(platform.end_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH,
+     .help = "trajectory, stops: end of a scan, or of the stops, in the same way; the last sample when not given. "
+             "Required for stops without a trajectory."},
+    {KEY(platform.step_s), CFG_REAL, "s", "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS),
+     .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops, unless frames_per_s "
+             "is."},
+    {KEY(platform.frames_per_s), CFG_REAL, "1/s", "0", 0, 1e6, .example = "25", .of = CFG_KIND(PLATFORM_STOPS),
+     .help = "stops: first_frame, last_frame and frame_step give the times of the stops, in place of start_s, end_s "
+             "and step_s. Frame 0 is at the trajectory's first sample, or at time 0. The points' frame scalar "
+             "counts in the same way."},
+    {KEY(platform.first_frame), CFG_REAL, NULL, "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS),
+     .help = "stops, with frames_per_s: frame of the first stop."},
+    {KEY(platform.last_frame), CFG_REAL, NULL, "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS),
+     .help = "stops, with frames_per_s: no stop is after this frame; the trajectory's last sample when not given."},
+    {KEY(platform.frame_step), CFG_REAL, NULL, "1", 1e-6, 1e9, .of = CFG_KIND(PLATFORM_STOPS),
+     .help = "stops, with frames_per_s: frames from each stop to the next."},
     {KEY(platform.at_end), CFG_ENUM, .def = "stop", WORDS([PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold"),
      .of = CFG_KIND(PLATFORM_TRAJECTORY),
      .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
     {KEY(platform.mount_m), CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000, .of = ~CFG_KIND(PLATFORM_STATIC),
      .help = "The head's origin on the platform: right, forward, up."},
- {KEY(platform.mount_heading_deg), CFG_REAL, "deg", "0", -360, 360, .of = ~CFG_KIND(PLATFORM_STATIC), .help = "Heading of the head on the platform, clockwise; then pitch, then roll."}, {KEY(platform.mount_pitch_deg), CFG_REAL, "deg", "0", -90, 90, .of = ~CFG_KIND(PLATFORM_STATIC), .help = "Positive: nose up."}, {KEY(platform.mount_roll_deg), CFG_REAL, "deg", "0", -360, 360, .of = ~CFG_KIND(PLATFORM_STATIC), .help = "Positive: right side down."}, {KEY(platform.reach_m), CFG_REAL, "m", "100", 1, 1e5, .of = CFG_KIND(PLATFORM_LIVE), .help = "live: largest distance of the head from the station."}, {KEY(platform.extrapolate_ms), CFG_REAL, "ms", "100", 0, 10000, .of = CFG_KIND(PLATFORM_LIVE), .help = "live: how long the motion between the last two poses is continued after the last one. After that the platform stands, and its poses count as late. Between two poses it moves evenly."}, {KEY(platform.address), CFG_TEXT, .def = "127.0.0.1", .of = CFG_KIND(PLATFORM_LIVE),
-     .help = "live, in real time: address where poses arrive by UDP, as lines of t_s x y z roll pitch heading, up to "
-             "3600 s ahead of device time."},
+    {KEY(platform.mount_heading_deg), CFG_REAL, "deg", "0", -360, 360, .of = ~CFG_KIND(PLATFORM_STATIC),
+     .help = "Heading of the head on the platform, clockwise; then pitch, then roll."},
+    {KEY(platform.mount_pitch_deg), CFG_REAL, "deg", "0", -90, 90, .of = ~CFG_KIND(PLATFORM_STATIC),
+     .help = "Positive: nose up."},
+    {KEY(platform.mount_roll_deg), CFG_REAL, "deg", "0", -360, 360, .of = ~CFG_KIND(PLATFORM_STATIC),
+     .help = "Positive: right side down."},
+    {KEY(platform.reach_m), CFG_REAL, "m", "100", 1, 1e5, .of = CFG_KIND(PLATFORM_LIVE),
+     .help = "live: largest distance of the head from the station."},
+    {KEY(platform.extrapolate_ms), CFG_REAL, "ms", "100", 0, 10000, .of = CFG_KIND(PLATFORM_LIVE),
+     .help = "live: how long the motion between the last two poses is continued after the last one. After that the "
+             "platform stands, and its poses count as late. Between two poses it moves evenly."},
+    {KEY(platform.address), CFG_TEXT, .def = "127.0.0.1", .of = CFG_KIND(PLATFORM_LIVE),
+     .help = "live, in real time: address where poses arrive by UDP, as lines of t_s x y z roll pitch heading, up "
+             "to 3600 s ahead of device time."},
     {KEY(platform.port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(PLATFORM_LIVE),
      .help = "live: its port; 0: the system chooses."},
     /* clang-format on */

@@ -56,15 +56,16 @@ static const struct cfg_key profile_keys[] = {
      .help = "planar: the first step that is cast; a turn begins with step 0."},
     {EMITTER(last_step), CFG_COUNT, NULL, OWNED, 0, EMITTER_MAX_STEPS - 1, FIGURE, NEEDED_BY(EMITTER_PLANAR),
      .help = "planar: the last one."},
-    {EMITTER(front_step), CFG_COUNT, NULL, OWNED, 0, EMITTER_MAX_STEPS - 1, FIGURE,
- NEEDED_BY(EMITTER_PLANAR), .help = "planar: the step that points ahead, along y. Line angles count from it, in the "
-                                    "direction of the steps."},
+    {EMITTER(front_step), CFG_COUNT, NULL, OWNED, 0, EMITTER_MAX_STEPS - 1, FIGURE, NEEDED_BY(EMITTER_PLANAR),
+     .help = "planar: the step that points ahead, along y. Line angles count from it, in the direction of the steps."},
     {EMITTER(step_direction), CFG_ENUM, .def = OWNED, .names = turn_names, FIGURE,
- .of = CFG_KIND(EMITTER_PLANAR) | CFG_KIND(EMITTER_BEAMS), .help = "planar, beams: direction of the turn, seen from "
-                                                                   "above; clockwise when not given."},
+     .of = CFG_KIND(EMITTER_PLANAR) | CFG_KIND(EMITTER_BEAMS),
+     .help = "planar, beams: direction of the turn, seen from above; clockwise when not given."},
     {"geometries", .type = CFG_LIST, .min = 0, .max = HEAD_MAX_RATES,
      .offset = offsetof(struct config_profile, arrangement.geometry), .size = sizeof(struct config_geometry),
- .count_offset = offsetof(struct config_profile, arrangement.n_geometries), .of = CFG_KIND(EMITTER_PLANAR), .help = "planar: the line rates of a head with fixed line rates, with the steps of a turn at each. The first is that of power-up. Without geometries any line rate is allowed, at steps_per_turn."},
+     .count_offset = offsetof(struct config_profile, arrangement.n_geometries), .of = CFG_KIND(EMITTER_PLANAR),
+     .help = "planar: the line rates of a head with fixed line rates, with the steps of a turn at each. The first "
+             "is that of power-up. Without geometries any line rate is allowed, at steps_per_turn."},
     {"geometries[]", .type = CFG_MAP, .help = "Written { lines_hz: F, steps_per_turn: N, from: GRADE }."},
     {"geometries[].lines_hz", GEOMETRY(lines_uhz), CFG_MICRO, "Hz", NULL, 0.01, 1e6, .help = "Line rate."},
     {"geometries[].steps_per_turn", GEOMETRY(steps_per_turn), CFG_COUNT, NULL, NULL, 4, 18000,
@@ -72,23 +73,25 @@ static const struct cfg_key profile_keys[] = {
              "which also divides first_step, last_step and front_step."},
     {"geometries[].from", GEOMETRY(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
     {"firing_ns", IN_PROFILE(arrangement.firing_fs), CFG_MICRO, "ns", OWNED, 0.001, 1e9, FIGURE,
- NEEDED_BY(EMITTER_BEAMS), .help = "beams: duration of a firing sequence with its rest; a multiple of 0.001 ns."},
+     NEEDED_BY(EMITTER_BEAMS),
+     .help = "beams: duration of a firing sequence with its rest; a multiple of 0.001 ns."},
     {"beams", .type = CFG_LIST, .min = 0, .max = EMITTER_MAX_BEAMS,
      .offset = offsetof(struct config_profile, arrangement.beam), .size = sizeof(struct config_profile_beam),
      .count_offset = offsetof(struct config_profile, arrangement.n_beams), NEEDED_BY(EMITTER_BEAMS),
      .help = "beams: in the order in which they fire."},
     {"beams[]", .type = CFG_MAP,
      .help = "Written { elevation_deg: E, azimuth_deg: A, offset_ns: T, from: GRADE }."},
-    {"beams[].elevation_deg", BEAM(elevation_udeg), CFG_MICRO, "deg", NULL, -90, 90, .help = "Elevation above the "
-                                                                                             "horizontal."},
+    {"beams[].elevation_deg", BEAM(elevation_udeg), CFG_MICRO, "deg", NULL, -90, 90,
+     .help = "Elevation above the horizontal."},
     {"beams[].azimuth_deg", BEAM(azimuth_udeg), CFG_MICRO, "deg", "0", -360, 360,
      .help = "Azimuth, clockwise from the head's direction at that time."},
     {"beams[].offset_ns", BEAM(offset_ns), CFG_COUNT, "ns", NULL, 0, 1e9,
      .help = "Firing time after the sequence's first beam; the times rise from 0."},
     {"beams[].from", BEAM(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
     {"step_deg", IN_PROFILE(arrangement.step_udeg), CFG_MICRO, "deg", OWNED, 0.01, 90, FIGURE,
- NEEDED_BY(EMITTER_SPHERE), .help = "sphere: angle from pulse to pulse and from ring to ring. It is rounded to whole "
-                                    "steps of a turn and of half a turn."},
+     NEEDED_BY(EMITTER_SPHERE),
+     .help = "sphere: angle from pulse to pulse and from ring to ring. It is rounded to whole steps of a turn and "
+             "of half a turn."},
 
     {EMITTER(directions), CFG_PATH, .def = OWNED, NEEDED_BY(EMITTER_DIRECTIONS),
      .help = "directions: a text file with a direction a row: x y z in the head's frame, or azimuth and elevation in "
@@ -106,9 +109,10 @@ static const struct cfg_key profile_keys[] = {
     {"fov_min_deg", IN_PROFILE(fov_min_udeg), CFG_MICRO, "deg", OWNED, -180, 360, FIGURE,
      NEEDED_BY(EMITTER_LINE),
      .help = "line: field of view of a line, 0 forward, 90 up, above 90 backward over the zenith."},
-    {"fov_max_deg", IN_PROFILE(fov_max_udeg), CFG_MICRO, "deg", OWNED, -180, 360, FIGURE,
- NEEDED_BY(EMITTER_LINE), .help = "line: end of the field of view, which must fit into a sweep, 360 / facets * "
-                                  "optical_gain."}, {"pan_min_deg", IN_PROFILE(pan_min_udeg), CFG_MICRO, "deg", OWNED, -360, 360, FIGURE, NEEDED_BY(EMITTER_LINE), .help = "line: smallest pan angle."},
+    {"fov_max_deg", IN_PROFILE(fov_max_udeg), CFG_MICRO, "deg", OWNED, -180, 360, FIGURE, NEEDED_BY(EMITTER_LINE),
+     .help = "line: end of the field of view, which must fit into a sweep, 360 / facets * optical_gain."},
+    {"pan_min_deg", IN_PROFILE(pan_min_udeg), CFG_MICRO, "deg", OWNED, -360, 360, FIGURE, NEEDED_BY(EMITTER_LINE),
+     .help = "line: smallest pan angle."},
     {"pan_max_deg", IN_PROFILE(pan_max_udeg), CFG_MICRO, "deg", OWNED, -360, 360, FIGURE,
      NEEDED_BY(EMITTER_LINE),
      .help = "line: largest pan angle; at most a turn from pan_min_deg."},
@@ -137,11 +141,12 @@ static const struct cfg_key profile_keys[] = {
     {REACH(reflectance), CFG_REAL, NULL, NULL, 0.001, 1, .help = "Reflectance of the target: Lambertian, head on."},
     {REACH(range_m), CFG_REAL, "m", NULL, 0.1, 1e5, .help = "Range where half of the pulses still detect it."},
     {REACH(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
-    {"programs", .type = CFG_LIST, .min = 0, .max = HEAD_MAX_RATES, .offset = offsetof(struct config_profile, program),
-     .size = sizeof(struct config_program), .count_offset = offsetof(struct config_profile, n_programs),
- .of = CFG_KIND(EMITTER_LINE), .help = "The pulse rates of a head with fixed rates, and the values that depend on "
-                                       "them. The rates rise from prr_min_hz to prr_max_hz; no other rate is allowed. "
-                                       "Without programs any rate between these two is allowed."},
+    {"programs", .type = CFG_LIST, .min = 0, .max = HEAD_MAX_RATES,
+     .offset = offsetof(struct config_profile, program), .size = sizeof(struct config_program),
+     .count_offset = offsetof(struct config_profile, n_programs), .of = CFG_KIND(EMITTER_LINE),
+     .help = "The pulse rates of a head with fixed rates, and the values that depend on them. The rates rise from "
+             "prr_min_hz to prr_max_hz; no other rate is allowed. Without programs any rate between these two is "
+             "allowed."},
     {"programs[]", .type = CFG_MAP, .help = "One pulse rate; each entry is a figure."},
     {"programs[].prr_hz", PROGRAM(prr_uhz), CFG_MICRO, "Hz", NULL, 1, 1e7, FIGURE, .help = "Its pulse rate."},
     {"programs[].max_echoes", PROGRAM(max_echoes), CFG_COUNT, NULL, "", 1, LINE_MAX_ECHOES, FIGURE,
@@ -166,8 +171,8 @@ static const struct cfg_key profile_keys[] = {
      .help = "Range below which light misses the detector: it receives the share 1 - exp(-(R / overlap_m)^2); 0: all "
              "light."},
     {KEY(wavelength_nm), CFG_REAL, "nm", "1550", 400, 2000, FIGURE, .help = "Wavelength of the laser."},
-    {KEY(visibility_m), CFG_REAL, "m", "23000", 100, 1e6, FIGURE, .help = "Visibility for which the reaches are "
-                                                                          "given."},
+    {KEY(visibility_m), CFG_REAL, "m", "23000", 100, 1e6, FIGURE,
+     .help = "Visibility for which the reaches are given."},
     {KEY(mirror_counts), CFG_REAL, NULL, NULL, 0, 4294967296.0, FIGURE,
      .help = "Encoder counts per turn of the line angle; 0: ideal."},
     {KEY(pan_counts), CFG_REAL, NULL, NULL, 0, 4294967296.0, FIGURE,

@@ -37,7 +37,7 @@ struct faulty_link;
 /* Opens the link, and puts itself around it. */
 int faulty_open(const struct faulty_spec *faults, const struct link_spec *spec, struct faulty_link **out,
                 struct sh_err *err);
-/* Of this link: members that the inner one lacks are NULL here, too. */
+/* Returns the operations of this link; members that the inner one lacks are NULL here, too. */
 const struct link_ops *faulty_ops(const struct faulty_link *link);
 
 /* Whether there is an injected fault, or there was one. */

@@ -113,7 +113,7 @@ int session_waits(const struct pump *pump, const struct session *s);
 /* In the paces that wait, sessions take no frames while the file of the truth is behind. Their clients still get their
  * replies. */
 int session_waits_for_files(const struct pump *pump);
-/* Of the session on its link. */
+/* Returns the number of the session on its link. */
 static inline int session_index(const struct pump *pump, const struct session *s)
 {
     return (int)(s - pump->session);

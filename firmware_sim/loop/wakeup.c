@@ -7,35 +7,35 @@
 
 void wakeup_create(struct wakeup *wakeup)
 {
-    sem_init(&wakeup->rings, 0, 0);
+    sem_init(&wakeup->signals, 0, 0);
 }
 
 void wakeup_free(struct wakeup *wakeup)
 {
-    sem_destroy(&wakeup->rings);
+    sem_destroy(&wakeup->signals);
 }
 
-/* Either this thread sees that an earlier ring was heard, and rings again; or the thread that heard it sees the change.
+/* Either this thread sees that an earlier signal was taken, and signals again; or the thread that took it sees the change.
  * Both need a store to be ordered before a later load, which a semaphore by itself does not promise. */
 void wakeup_signal(struct wakeup *wakeup, uint32_t n)
 {
     int kept = 0;
     atomic_thread_fence(memory_order_seq_cst);
-    sem_getvalue(&wakeup->rings, &kept);
+    sem_getvalue(&wakeup->signals, &kept);
     for (uint32_t i = (uint32_t)kept; i < n; i++)
-        sem_post(&wakeup->rings);
+        sem_post(&wakeup->signals);
 }
 
 void wakeup_sleep(struct wakeup *wakeup)
 {
-    sem_wait(&wakeup->rings); /* a signal may end it: then it returns without a ring */
+    sem_wait(&wakeup->signals); /* a signal may end it: then it returns without one */
     atomic_thread_fence(memory_order_seq_cst);
 }
 
 int wakeup_sleep_until(struct wakeup *wakeup, int64_t t_ns)
 {
     const struct timespec until = {.tv_sec = t_ns / 1000000000, .tv_nsec = t_ns % 1000000000};
-    const int over = sem_clockwait(&wakeup->rings, CLOCK_MONOTONIC, &until) != 0 && errno == ETIMEDOUT;
+    const int over = sem_clockwait(&wakeup->signals, CLOCK_MONOTONIC, &until) != 0 && errno == ETIMEDOUT;
     atomic_thread_fence(memory_order_seq_cst);
     return over;
 }

@@ -227,7 +227,7 @@ enum { SITE_MAX_SIGHTS = 16 };
  * their scans, and while none is on: casters take the map with the station's setup. */
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
 
-/* Of its configuration: the file, for messages; the head profile; the head's settings at power-up. */
+/* These give parts of its configuration: the file, for messages; the head profile; the head's settings at power-up. */
 const char *site_file(const struct site *site);
 const struct config_profile *site_profile(const struct site *site);
 const struct head_settings *site_settings(const struct site *site);

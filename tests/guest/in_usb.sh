@@ -146,7 +146,7 @@ check_cut_records() {
     kill -INT $client
     wait $client
     check "$1: exit status 1 when the head was away" test $? = 1
-    check "$1: and it says so, once" grep 'away within 1 scans' again.err
+    check "$1: and it says so, once" grep 'disconnected within 1 scans' again.err
     check "$1: with the count" grep '"replugs": 1,' again.json
 }
 

@@ -54,8 +54,7 @@ static void write_file(const char *name, const char *mode, const char *text)
 static struct batch_entry an_entry(uint32_t job, struct batch_file file[2])
 {
     static const char sha[] = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
-    struct batch_entry entry = {
-        .job = job, .pulses = 18446744073709551615u, .points = 17, .seconds = 1.25, .n_files = 2};
+    struct batch_entry entry = {.job = job, .pulses = INT64_MAX, .points = 17, .seconds = 1.25, .n_files = 2};
     file[0] = (struct batch_file){.name = "0001_a.ply", .bytes = 1234};
     file[1] = (struct batch_file){.name = "0001_a.las", .bytes = 0};
     strcpy(file[0].sha, sha);

@@ -31,7 +31,7 @@ static void a_call_that_is_not_there(void **state)
     void (*found[2])(void) = {NULL, NULL};
     struct sh_err err = {0};
     assert_int_equal(late_load(LATE_tiff, call, found, 2, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, "is without TIFFNeverCalledSo"));
+    assert_non_null(strstr(err.text, "lacks the function TIFFNeverCalledSo"));
 }
 
 int main(void)

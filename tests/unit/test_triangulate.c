@@ -67,7 +67,7 @@ static void crossing_polygon_is_told(void **state)
     struct scene *s = load_text("bow.obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 3 0\nf 1 2 3 4\n");
     assert_int_equal(s->n_triangles, 2);
     assert_int_equal(n_warnings, 1);
-    assert_non_null(strstr(warnings, "bow.obj: 1 polygons cross themselves"));
+    assert_non_null(strstr(warnings, "bow.obj: the outlines of 1 polygons cross themselves"));
     scene_free(s);
 }
 

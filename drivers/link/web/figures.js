@@ -31,7 +31,7 @@ const PAGE = [
   ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
 ];
 
-// Of these rows any count but 0 is bad: their names among a head's figures.
+// Any count but 0 is bad in these rows: their names among a head's figures.
 const LOSSES = {'lost-frames': 'lost_frames', 'repeated': 'repeated_frames', 'late-frames': 'late_frames',
   'restarts': 'jumps_back', 'lost-pulses': 'left_out_pulses', 'dropped': 'dropped_pulses',
   'unplaced': 'unplaced_pulses', 'bad': 'bad_bytes'};

@@ -12,7 +12,7 @@ const MOVE_MS = 55; // a frame may take so long while it moves
 const LEAST = 25_000;
 const MOST = 20_000_000;
 
-// So many points of a resting view are spread over all parts before the rest comes part by part, since each call to
+// This many points of a resting view are spread over all parts before the rest comes part by part, since each call to
 // draw takes as long as 1000 points.
 const EVENLY = 400_000;
 

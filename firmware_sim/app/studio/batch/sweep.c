@@ -126,8 +126,9 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
                            "--sweep %s: it would replace the values of --sweep %s; allowed is the other order", s->key,
                            sweeps->sweep[i].key);
     }
-    return app_read_numbers(equals + 1, ':', range, 3) ? add_range(s, equals + 1, range, err)
-                                                       : add_list(s, equals + 1, err);
+    const int has_blank = strpbrk(equals + 1, " \t") != NULL;
+    return !has_blank && app_read_numbers(equals + 1, ':', range, 3) ? add_range(s, equals + 1, range, err)
+                                                                     : add_list(s, equals + 1, err);
 }
 
 void batch_sweeps_free(struct batch_sweeps *sweeps)

@@ -306,10 +306,8 @@ static int map_run_command(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES, .help = "file to write: .png, "
-                                                                                              "or .svg (points as an "
-                                                                                              "image, everything else "
-                                                                                              "as vectors)"},
+    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES,
+     .help = "file to write: .png, or .svg (points as an image, everything else as vectors)"},
     {APP_NUMBER, "pixel-m", "M", .min = 1e-4, .max = 1e4, .at = AT(pixel_m),
      .help = "side of a pixel; default: 1200 pixels on the longer side"},
     {APP_FLAG, "open-edges", NULL, .at = AT(open_edges),

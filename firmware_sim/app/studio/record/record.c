@@ -267,8 +267,8 @@ static int record_run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES, .help = "file to write; may "
-                                                                                                "be repeated"},
+    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES,
+     .help = "file to write; may be repeated"},
     {APP_ALONE, "repair", "FILE", .apply = take_repair, .file = APP_READS,
      .help = "instead of recording: complete the file that a killed recorder or a full disk left (FILE.part), in "
              "place, and print how much was kept; a complete file is only checked. May be repeated; without SOURCE "
@@ -326,8 +326,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "surfaces", "FILE", .at = AT(job.surfaces), .file = APP_WRITES,
      .help = "write the surfaces of a CONFIG as CSV: label, object, material, IFC type and GlobalId, colour; - is "
              "standard output"},
-    {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .file = APP_WRITES, .help = "write counts of the received data "
-                                                                                 "as JSON; - is standard output"},
+    {APP_TEXT, "stats", "FILE", .at = AT(job.stats), .file = APP_WRITES,
+     .help = "write counts of the received data as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
     {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(job.crs_given),
@@ -339,8 +339,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "only with --raw: text to send when connected"},
     {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only),
      .help = "only with --raw: listen there, and record the connections of others"},
-    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only), .help = "only with --raw: descriptor that gets a line when it "
-                                                            "listens"},
+    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only),
+     .help = "only with --raw: descriptor that gets a line when it listens"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };

@@ -247,8 +247,8 @@ static const struct app_option OPTIONS[] = {
      .help = "inject faults for S seconds from the first points on (default 30), in the pace fast of device time"},
     {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
      .help = "connect a client only to this link of the configuration"},
-    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES, .help = "write the results as JSON, too; - is "
-                                                                           "standard output"},
+    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES,
+     .help = "write the results as JSON, too; - is standard output"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},

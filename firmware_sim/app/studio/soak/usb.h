@@ -15,7 +15,7 @@ struct soak_row;
 int soak_usb_is_here(const struct link_spec *spec);
 /* Gives it a serial number where none is configured, so that its client can name it. number: of the link, from 1. */
 void soak_usb_name(struct link_spec *spec, uint32_t number);
-/* What its client opens. */
+/* Writes the source that its client opens. */
 void soak_usb_source(const struct link_spec *spec, char *source, size_t len);
 
 /* The faults of the enumeration at hand, until a client opens the device. */

@@ -78,9 +78,10 @@ static int get_cloud(struct view_serve *s, const char *query, struct web_body *o
                            {"count", 1, UINT32_MAX, 1, VIEW_MAX_POINTS},
                            {"every", 1, UINT32_MAX, 1, 1},
                            {.name = NULL}};
-    int rc = read_query(words, query, err);
+    const int rc = read_query(words, query, err);
+    if (rc != SH_OK) return rc;
     const struct view_part part = {(uint32_t)words[0].value, (uint32_t)words[2].value, (uint32_t)words[1].value};
-    return rc == SH_OK ? view_encode_points(&v->points, v->origin_m, v->t0_s, &part, out, err) : rc;
+    return view_encode_points(&v->points, v->origin_m, v->t0_s, &part, out, err);
 }
 
 static int need_mesh(const struct viewed *v, struct sh_err *err)
@@ -129,9 +130,10 @@ static int get_sparse(struct view_serve *s, const char *query, struct web_body *
         {"first", 0, UINT32_MAX, 1, 0},         {"count", 1, UINT32_MAX, 1, VIEW_MAX_POINTS}};
     int rc = need_mesh(v, err);
     if (rc == SH_OK) rc = read_query(words, query, err);
+    if (rc != SH_OK) return rc;
     const struct view_spread wish = {words[0].value, words[1].value, (uint64_t)words[3].value,
                                      (uint64_t)words[2].value};
-    if (rc == SH_OK) rc = make_sparse(s, &wish, err);
+    rc = make_sparse(s, &wish, err);
     const struct view_part part = {(uint32_t)words[4].value, 1, (uint32_t)words[5].value};
     return rc == SH_OK ? view_encode_points(&s->sparse, v->origin_m, v->t0_s, &part, out, err) : rc;
 }

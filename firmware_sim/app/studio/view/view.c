@@ -108,8 +108,8 @@ static int view_run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_WHOLE, "port", "P", .min = 0, .max = 65535, .at = AT(port), .help = "port of the page; 0: the system chooses "
-                                                                             "(default)"},
+    {APP_WHOLE, "port", "P", .min = 0, .max = 65535, .at = AT(port),
+     .help = "port of the page; 0: the system chooses (default)"},
     {APP_TEXT, "address", "A", .at = AT(address),
      .help = "address to listen on, a number or a name (default 127.0.0.1: only this machine)"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),

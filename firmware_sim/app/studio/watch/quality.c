@@ -76,7 +76,7 @@ static void put_scan(struct json *json, const struct watch_scan *s)
     json_open_object(json, "all");
     report_put_figures(json, &s->figures);
     report_put_density(json, &s->density);
-    json_double(json, "density_cell_m", s->density_cell_m);
+    json_double(json, "density_cell_m", s->density_cell_m > 0.0 ? s->density_cell_m : (double)NAN);
     json_close_object(json);
     report_put_verdict(json, &s->verdict);
 }

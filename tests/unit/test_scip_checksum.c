@@ -2,7 +2,7 @@
 /* SCIP: scans whose values are changed on request, with right sums. A decoder written from the protocol's description
  * alone reads them. */
 #include "tests/unit/scip_rig.h"
-#include "tests/unit/seal_rig.h"
+#include "tests/unit/checksum_rig.h"
 
 static int n_chars, intensity;
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Units whose contents are changed and whose checksums are made right again, for each protocol that has units. A reader
  * that follows the protocol's description alone must accept them. */
-#ifndef TESTS_UNIT_SEAL_RIG_H
-#define TESTS_UNIT_SEAL_RIG_H
+#ifndef TESTS_UNIT_CHECKSUM_RIG_H
+#define TESTS_UNIT_CHECKSUM_RIG_H
 
 #include <setjmp.h>
 #include <stdarg.h>

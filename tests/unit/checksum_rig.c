@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "tests/unit/seal_rig.h"
+#include "tests/unit/checksum_rig.h"
 
 #include "core/rng.h"
 

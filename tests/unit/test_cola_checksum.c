@@ -2,7 +2,7 @@
 /* CoLa: LMDscandata whose values are changed on request, with a right check byte. It is read by the public layout alone
  * (cola_rig). */
 #include "tests/unit/cola_rig.h"
-#include "tests/unit/seal_rig.h"
+#include "tests/unit/checksum_rig.h"
 
 static struct protocol_rig_shot shots[40];
 

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 
 #include "tests/common/nmea_reader.h"
-#include "tests/unit/seal_rig.h"
+#include "tests/unit/checksum_rig.h"
 #include "tests/unit/velodyne_head.h"
 
 static struct protocol_rig rig;
