@@ -7,7 +7,7 @@
  * --set, to the working directory.
  *
  * The struct is constant once it is loaded. Values that a run measures or chooses are in the site (firmware_sim/site).
- * Who needs only places, a head profile, limits, loading or the reference includes these headers and not this one. */
+ * A file that needs only places, a head profile, limits, loading or the reference includes those headers, not this one. */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
 
