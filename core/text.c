@@ -163,6 +163,11 @@ bool text_is(struct text_span span, const char *text)
     return span.n == strlen(text) && memcmp(span.p, text, span.n) == 0;
 }
 
+bool text_is_word(struct text_span span, const char *word)
+{
+    return span.n == strlen(word) && strncasecmp(span.p, word, span.n) == 0;
+}
+
 bool text_integer(struct text *t, int64_t *value)
 {
     const char *p = t->p;

@@ -19,6 +19,8 @@ struct text_span {
 
 /* The same text? */
 bool text_is(struct text_span span, const char *text);
+/* The same word, whatever its case? */
+bool text_is_word(struct text_span span, const char *word);
 
 struct text {
     const char *path; /* the caller's */

@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "core/import/readers.h"
@@ -231,22 +230,17 @@ static int set_texture(struct mtl *m, struct text_span text, bool is_opacity, st
 
 /* ---- libraries */
 
-static bool is_word(struct text_span word, const char *name)
-{
-    return word.n == strlen(name) && strncasecmp(word.p, name, word.n) == 0;
-}
-
 static int read_materials(struct mtl *m, struct sh_err *err)
 {
     int rc = SH_OK;
     m->material = (struct text_span){"", 0};
     for (; m->t.p < m->t.end && rc == SH_OK; text_next_line(&m->t)) {
         struct text_span word = text_word(&m->t);
-        if (is_word(word, "newmtl")) set_material(m, text_rest(&m->t));
-        if (is_word(word, "Kd")) take_colour(m);
-        if (is_word(word, "d") || is_word(word, "Tr")) take_opacity(m, is_word(word, "d"));
-        bool is_opacity = is_word(word, "map_d");
-        if ((is_opacity || is_word(word, "map_Kd")) && build_wants_textures(m->b))
+        if (text_is_word(word, "newmtl")) set_material(m, text_rest(&m->t));
+        if (text_is_word(word, "Kd")) take_colour(m);
+        if (text_is_word(word, "d") || text_is_word(word, "Tr")) take_opacity(m, text_is_word(word, "d"));
+        bool is_opacity = text_is_word(word, "map_d");
+        if ((is_opacity || text_is_word(word, "map_Kd")) && build_wants_textures(m->b))
             rc = set_texture(m, text_rest(&m->t), is_opacity, err);
     }
     return rc;

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/bytes.h"
 #include "core/import/readers.h"
@@ -82,11 +81,6 @@ static int read_binary(struct stl *s, struct sh_err *err)
 
 /* ---- text */
 
-static bool is_word(struct text_span word, const char *name)
-{
-    return word.n == strlen(name) && strncasecmp(word.p, name, word.n) == 0;
-}
-
 static int fail_at(struct stl *s, struct text_span word, const char *expected, struct sh_err *err)
 {
     s->b->line = s->t.line;
@@ -110,7 +104,7 @@ static struct text_span next_word(struct text *t)
 static int expect(struct stl *s, const char *name, struct sh_err *err)
 {
     const struct text_span word = next_word(&s->t);
-    return is_word(word, name) ? SH_OK : fail_at(s, word, name, err);
+    return text_is_word(word, name) ? SH_OK : fail_at(s, word, name, err);
 }
 
 static int read_vertex(struct stl *s, size_t at, struct sh_err *err)
@@ -132,9 +126,9 @@ static int read_text_facet(struct stl *s, struct sh_err *err)
     int rc = expect(s, "outer", err);
     if (rc == SH_OK) rc = expect(s, "loop", err);
     struct text_span word = {"", 0};
-    while (rc == SH_OK && is_word(word = next_word(&s->t), "vertex"))
+    while (rc == SH_OK && text_is_word(word = next_word(&s->t), "vertex"))
         rc = read_vertex(s, n++, err);
-    if (rc == SH_OK && !is_word(word, "endloop")) rc = fail_at(s, word, n < 3 ? "vertex" : "endloop", err);
+    if (rc == SH_OK && !text_is_word(word, "endloop")) rc = fail_at(s, word, n < 3 ? "vertex" : "endloop", err);
     if (rc == SH_OK) rc = expect(s, "endfacet", err);
     if (rc != SH_OK) return rc;
     s->b->counts.not_triangles += n < 3;
@@ -146,13 +140,13 @@ static int read_solid(struct stl *s, struct sh_err *err)
 {
     struct text_span word = {"", 0};
     int rc = begin_solid(s, text_rest(&s->t), err);
-    for (uint64_t i = 0; rc == SH_OK && is_word(word = next_word(&s->t), "facet"); i++) {
+    for (uint64_t i = 0; rc == SH_OK && text_is_word(word = next_word(&s->t), "facet"); i++) {
         if ((i & 0xffff) == 0) rc = build_progress(s->b, (double)(s->t.p - s->t.data) / (double)s->t.size, err);
         if ((i & 0xffff) == 0) text_drop_read(&s->t);
         if (rc == SH_OK) rc = read_text_facet(s, err);
     }
     if (rc != SH_OK) return rc;
-    if (!is_word(word, "endsolid")) return fail_at(s, word, "facet or endsolid", err);
+    if (!text_is_word(word, "endsolid")) return fail_at(s, word, "facet or endsolid", err);
     text_next_line(&s->t); /* its name again */
     return SH_OK;
 }
@@ -162,7 +156,7 @@ static int read_text(struct stl *s, struct sh_err *err)
     struct text_span word;
     int rc = build_weld_begin(s->b, &s->weld, s->t.size / 64 + 1, err);
     while (rc == SH_OK && (word = next_word(&s->t)).n > 0)
-        rc = is_word(word, "solid") ? read_solid(s, err) : fail_at(s, word, "solid", err);
+        rc = text_is_word(word, "solid") ? read_solid(s, err) : fail_at(s, word, "solid", err);
     return rc;
 }
 
@@ -170,7 +164,7 @@ static int read_text(struct stl *s, struct sh_err *err)
 static bool is_text(const struct stl *s)
 {
     struct text t = s->t;
-    return is_word(next_word(&t), "solid") &&
+    return text_is_word(next_word(&t), "solid") &&
            memchr(s->t.data, '\0', s->t.size < 2 * HEAD ? s->t.size : 2 * HEAD) == NULL;
 }
 

@@ -125,13 +125,6 @@ void config_print_reference(FILE *out)
     print_profile_keys(out);
 }
 
-/* path is section, or a key in it. */
-static int is_in(const char *path, const char *section)
-{
-    const size_t len = strlen(section);
-    return strncmp(path, section, len) == 0 && (path[len] == '\0' || path[len] == '.' || path[len] == '[');
-}
-
 static int fail_section(const char *section, struct sh_err *err)
 {
     char known[300] = "", shown[CFG_SHOW_MAX];
@@ -156,7 +149,7 @@ int config_print_section(const char *section, FILE *out, struct sh_err *err)
         return SH_OK;
     }
     for (size_t i = 0; i < cfg_config_table.n; i++) {
-        if (!is_in(cfg_config_table.keys[i].path, section)) continue;
+        if (!cfg_is_in(cfg_config_table.keys[i].path, section)) continue;
         print_key(&cfg_config_table.keys[i], out);
         n++;
     }
@@ -175,7 +168,7 @@ static int is_needed(const struct cfg_key *key)
 static int has_needed(const char *section)
 {
     for (size_t i = 0; i < cfg_config_table.n; i++)
-        if (is_in(cfg_config_table.keys[i].path, section) && is_needed(&cfg_config_table.keys[i])) return 1;
+        if (cfg_is_in(cfg_config_table.keys[i].path, section) && is_needed(&cfg_config_table.keys[i])) return 1;
     return 0;
 }
 

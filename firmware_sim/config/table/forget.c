@@ -10,12 +10,6 @@
 const char cfg_sections_of_scanner[] =
     "sections head (without station, start), beam, cast, plan, noise, signal, surfaces, optics, instrument";
 
-static int is_in(const char *path, const char *section)
-{
-    const size_t len = strlen(section);
-    return strncmp(path, section, len) == 0 && (path[len] == '\0' || path[len] == '.' || path[len] == '[');
-}
-
 int cfg_is_of_scanner(const char *path)
 {
     static const char *const sections[] = {"head",   "beam",     "cast",   "plan",      "noise",
@@ -24,7 +18,7 @@ int cfg_is_of_scanner(const char *path)
     for (size_t i = 0; i < CFG_LEN(not_these); i++)
         if (strcmp(path, not_these[i]) == 0) return 0;
     for (size_t i = 0; i < CFG_LEN(sections); i++)
-        if (is_in(path, sections[i])) return 1;
+        if (cfg_is_in(path, sections[i])) return 1;
     return 0;
 }
 
@@ -39,7 +33,7 @@ void cfg_forget_list(struct cfg_reader *rd, const char *path)
 {
     const struct cfg_key *list = cfg_find(&rd->table, path);
     for (size_t i = 0; i < rd->table.n; i++)
-        if (is_in(rd->table.keys[i].path, path)) forget_row(rd, &rd->table.keys[i]);
+        if (cfg_is_in(rd->table.keys[i].path, path)) forget_row(rd, &rd->table.keys[i]);
     memset(cfg_address(rd, list, 0), 0, list->size * (size_t)list->max);
     *cfg_list_count(rd, list) = 0;
 }
@@ -56,13 +50,13 @@ void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
     for (size_t i = 0; i < rd->table.n; i++) {
         const struct cfg_key *row = &rd->table.keys[i];
-        if (!is_in(row->path, key->path)) continue;
+        if (!cfg_is_in(row->path, key->path)) continue;
         if (row->type == CFG_LIST)
             cfg_forget_list(rd, row->path);
         else if (cfg_list_of(&rd->table, row) == cfg_list_of(&rd->table, key)) /* else it went with its list */
             forget_value(rd, row, item);
     }
-    if (strncmp(key->path, "stations[]", 10) == 0 && is_in("stations[].scanner", key->path))
+    if (strncmp(key->path, "stations[]", 10) == 0 && cfg_is_in("stations[].scanner", key->path))
         ((struct config_station *)cfg_address(rd, cfg_find(&rd->table, "stations[].scanner"), item))->has_scanner = 0;
 }
 
@@ -73,7 +67,7 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
     if (key->type == CFG_LIST) {
         cfg_forget_list(rd, key->path);
         for (size_t i = 0; i < rd->table.n; i++)
-            if (is_in(rd->table.keys[i].path, key->path)) rd->own[i] = 1;
+            if (cfg_is_in(rd->table.keys[i].path, key->path)) rd->own[i] = 1;
     }
     rd->own[row] = 1;
     forget_row(rd, key);
@@ -87,7 +81,7 @@ void cfg_end_scanner(struct cfg_reader *rd)
     for (size_t i = 0; i < rd->table.n; i++) {
         const struct cfg_key *key = &rd->table.keys[i];
         if (rd->own[i] || key->type == CFG_MAP || !cfg_is_of_scanner(key->path)) continue;
-        if (!is_in(key->path, "head") && !is_in(key->path, "instrument")) continue;
+        if (!cfg_is_in(key->path, "head") && !cfg_is_in(key->path, "instrument")) continue;
         forget_row(rd, key);
         memset(cfg_address(rd, key, 0), 0, key->size);
     }

@@ -31,6 +31,12 @@ const char *cfg_name(const char *path, uint32_t item, char *buf)
     return buf;
 }
 
+int cfg_is_in(const char *path, const char *section)
+{
+    const size_t len = strlen(section);
+    return strncmp(path, section, len) == 0 && (path[len] == '\0' || path[len] == '.' || path[len] == '[');
+}
+
 void cfg_cut_to_parent(char *path)
 {
     size_t len = strlen(path);

@@ -71,6 +71,8 @@ const struct cfg_key *cfg_list_of(const struct cfg_table *table, const struct cf
 const char *cfg_name(const char *path, uint32_t item, char *buf);
 /* The section around a path, in place: "links[].type" -> "links[]" -> "links" -> "". */
 void cfg_cut_to_parent(char *path);
+/* Whether path is the section, or a key in it. */
+int cfg_is_in(const char *path, const char *section);
 /* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
 const char *cfg_word_below(const char *path, const char *parent);
 
