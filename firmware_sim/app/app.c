@@ -182,12 +182,8 @@ static void print_progress(void *ctx, const char *what, double fraction)
 static void print_each_second(void *ctx, const char *what, double fraction)
 {
     static int64_t printed_ns;
-    static char of[64];
     const int64_t now_ns = clock_now_ns();
-    if (strncmp(of, what, sizeof of - 1) != 0) { /* other work begins: short work prints no line */
-        snprintf(of, sizeof of, "%s", what);
-        printed_ns = now_ns;
-    }
+    if (printed_ns == 0) printed_ns = now_ns; /* a short command prints none */
     if (now_ns - printed_ns < 1000000000) return;
     printed_ns = now_ns;
     print_progress(ctx, what, fraction);

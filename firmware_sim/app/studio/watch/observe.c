@@ -49,7 +49,6 @@ static const struct site *find_head(struct watch *w, const struct scanhead_info 
 {
     const uint32_t station = info->station - 1;
     const struct site *site = device_hold_scan(w->options.device, info->scan, &w->held);
-    w->now = w->head[station];
     if (site != NULL) report_head_of(site, station, &w->now);
     if (!w->site->moving) memcpy(w->now.setup.station_m, info->station_m, sizeof w->now.setup.station_m);
     memcpy(w->now.setup.rotation, info->rotation, sizeof w->now.setup.rotation);
@@ -58,19 +57,26 @@ static const struct site *find_head(struct watch *w, const struct scanhead_info 
     return site;
 }
 
+/* A scan of which nothing is known but its number and its station: its points can't be taken. */
+static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
+{
+    let_go(w);
+    w->at = (struct watch_scan){.scan = scan, .station = station};
+    w->now = w->head[station - 1];
+    w->fresh = 0;
+    watch_sample_begin(w);
+    watch_seen_begin(&w->seen, station);
+}
+
 /* The head's setup in this scan: as the device has it, at the place and the rate that the stream gives. */
 static void begin_scan(struct watch *w, const struct scanhead_info *info)
 {
-    let_go(w);
-    w->at = (struct watch_scan){.scan = info->scan, .station = info->station};
+    begin_unknown(w, info->scan, info->station);
     const struct site *site = find_head(w, info);
     w->at.in_scene = !info->geo || info->crs == 0 ||
                      (!info->moving && follow_georef(w, site->station[info->station - 1].georef, info));
     w->began_ns = clock_now_ns();
     w->began_thread_ns = clock_thread_ns();
-    w->fresh = 0;
-    watch_sample_begin(w);
-    watch_seen_begin(&w->seen, info->station);
 }
 
 static void end_scan(struct watch *w)
@@ -184,17 +190,6 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
         end_scan(w);
         w->fresh = 1;
     }
-}
-
-/* A scan of which nothing came that tells where it was made: its points can't be taken. */
-static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
-{
-    let_go(w);
-    w->at = (struct watch_scan){.scan = scan, .station = station};
-    w->now = w->head[station - 1];
-    w->fresh = 0;
-    watch_sample_begin(w);
-    watch_seen_begin(&w->seen, station);
 }
 
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
