@@ -125,6 +125,29 @@ static void test_tcp_endings(void **state)
     bench_close(&bench);
 }
 
+/* A client that leaves with bytes unread resets the connection. The head notices it while it writes, before it has read
+ * the client's last command. */
+static void test_tcp_last_words(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
+    struct bench bench = bench_open(&spec);
+    const struct linger reset = {.l_onoff = 1, .l_linger = 0};
+    char words[4];
+    int fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(write(fd, "STOP", 4), 4);
+    setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
+    close(fd);
+    for (int i = 0; i < 3; i++) /* the reset has come: on the loopback interface close() delivers it */
+        assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 0);
+    bench_read_all(&bench, 0, words, 4);
+    assert_memory_equal(words, "STOP", 4);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_close(&bench);
+}
+
 static void test_tcp_full(void **state)
 {
     (void)state;
@@ -282,10 +305,15 @@ static void test_tcp_privileged_port(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tcp_sessions),    cmocka_unit_test(test_tcp_endings),
-        cmocka_unit_test(test_tcp_full),        cmocka_unit_test(test_tcp_kill),
-        cmocka_unit_test(test_tcp_descriptors), cmocka_unit_test(test_tcp_small_array),
-        cmocka_unit_test(test_tcp_refusals),    cmocka_unit_test(test_tcp_privileged_port),
+        cmocka_unit_test(test_tcp_sessions),
+        cmocka_unit_test(test_tcp_endings),
+        cmocka_unit_test(test_tcp_last_words),
+        cmocka_unit_test(test_tcp_full),
+        cmocka_unit_test(test_tcp_kill),
+        cmocka_unit_test(test_tcp_descriptors),
+        cmocka_unit_test(test_tcp_small_array),
+        cmocka_unit_test(test_tcp_refusals),
+        cmocka_unit_test(test_tcp_privileged_port),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
