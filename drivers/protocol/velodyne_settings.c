@@ -156,19 +156,29 @@ static int set_network(const struct posted *p, const char *value, int apply)
 static int set_phase_lock(const struct posted *p, const char *value, int apply)
 {
     int on;
-    (void)apply;
     if (!read_switch(value, &on)) return refuse(p, 400, "enabled: allowed are on and off");
-    return on ? refuse(p, 409, "enabled: allowed is off; this head has no phase lock") : 200;
+    return apply ? command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF") : 200;
 }
 
-/* Without a phase lock it has no effect; but what the device doesn't take is refused. */
+/* The device's page multiplies its field offsetInput by 100 and sends both. */
 static int set_phase(const struct posted *p, const char *value, int apply)
+{
+    char line[40];
+    long cdeg;
+    if (!read_number(value, &cdeg) || cdeg > 35999)
+        return refuse(p, 400, "offset: allowed are whole numbers from 0 to 35999, in 0.01 degree");
+    snprintf(line, sizeof line, "HEAD:PHASE %ld.%02ld", cdeg / 100, cdeg % 100);
+    return apply ? command(p, line) : 200;
+}
+
+/* Only offset counts; but what the device doesn't take is refused. */
+static int check_phase_input(const struct posted *p, const char *value, int apply)
 {
     char *end;
     (void)apply;
-    const double offset = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : -1.0;
-    if (offset >= 0.0 && offset < 36000.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 200;
-    return refuse(p, 400, "offset: 0 to 35999, in 0.01 degree; offsetInput: in degrees");
+    const double deg = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : -1.0;
+    if (deg >= 0.0 && deg < 360.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 200;
+    return refuse(p, 400, "offsetInput: 0 to 359.99, in degrees");
 }
 
 static int save(const struct posted *p, const char *value, int apply)
@@ -206,7 +216,7 @@ static const struct setting {
     {"/cgi/setting/net", "dhcp", set_network},
     {"/cgi/setting/phaselock", "enabled", set_phase_lock},
     {"/cgi/setting/phaselock", "offset", set_phase},
-    {"/cgi/setting/phaselock", "offsetInput", set_phase},
+    {"/cgi/setting/phaselock", "offsetInput", check_phase_input},
     {"/cgi/save", "data", save},
     {"/cgi/reset", "data", reset},
 };
@@ -293,6 +303,24 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     return status;
 }
 
+static uint32_t read_cdeg(const char *reply)
+{
+    return (uint32_t)(strtod(reply, NULL) * 100.0 + 0.5) % 36000u;
+}
+
+static void read_phase(const struct protocol_spec *spec, struct velodyne_state *out)
+{
+    char reply[32];
+    ask(spec, "HEAD:PHASE:LOCK?", reply, sizeof reply);
+    out->phase_lock = strcmp(reply, "ON") == 0;
+    ask(spec, "HEAD:PHASE?", reply, sizeof reply);
+    out->offset_cdeg = read_cdeg(reply);
+    ask(spec, "HEAD:PHASE:EDGE?", reply, sizeof reply);
+    out->is_locked = strncmp(reply, "LOCKED,", 7) == 0;
+    const char *comma = strchr(reply, ',');
+    out->edge_cdeg = comma != NULL ? read_cdeg(comma + 1) : 0;
+}
+
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out)
 {
     char reply[32];
@@ -300,6 +328,7 @@ void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state
     ask(spec, "HEAD:LINES?", reply, sizeof reply);
     out->rpm = (uint32_t)(strtod(reply, NULL) * 60.0 + 0.5);
     ask(spec, "SCAN:ECHOES?", reply, sizeof reply);
+    read_phase(spec, out);
     out->returns = "";
     for (size_t i = 0; i < sizeof returns / sizeof returns[0]; i++)
         if (strlen(reply) >= 3 && strncasecmp(reply, returns[i].word, strlen(reply)) == 0)

@@ -56,6 +56,11 @@ enum fault_kind {
     FAULT_CLOCK_DRIFT,   /* gains ppm */
     FAULT_CLOCK_STOP,
     FAULT_PPS_LOST,
+    FAULT_PPS_JITTER,    /* every second pulse is late by for_ms */
+    FAULT_NMEA_LOST,     /* the receiver sends no sentence */
+    FAULT_NMEA_LATE,     /* by for_ms */
+    FAULT_NMEA_VOID,     /* it has no fix */
+    FAULT_NMEA_CHECKSUM, /* its sentences have wrong checksums */
     FAULT_LEAP_SECOND,   /* at the end of the minute at hand; no table has it */
     FAULT_COUNTERS_HIGH, /* counters begin n below their wrap at power-up */
     FAULT_N_KINDS
