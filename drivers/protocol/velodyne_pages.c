@@ -78,8 +78,8 @@ static void put_status(struct page *p)
     put_position(p);
     velodyne_pages_put(
         p, "},\"motor\":{\"state\":\"%s\",\"rpm\":%u,\"lock\":\"%s\",\"phase\":%u},\"laser\":{\"state\":\"%s\"}}",
-        on_off(p->state.motor_on), p->state.motor_on ? p->state.rpm : 0, on_off(p->state.is_locked),
-        p->state.edge_cdeg, on_off(p->state.laser_on));
+        on_off(p->state.motor_on), p->state.motor_on ? p->state.rpm : 0, on_off(p->state.is_locked), p->state.edge_cdeg,
+        on_off(p->state.laser_on));
 }
 
 static void put_settings(struct page *p)

@@ -160,25 +160,33 @@ static int set_phase_lock(const struct posted *p, const char *value, int apply)
     return apply ? command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF") : 200;
 }
 
-/* The device's page multiplies its field offsetInput by 100 and sends both. */
+/* A decimal from 0 to below a limit: 1, or 0. */
+static int read_decimal(const char *s, double limit, double *out)
+{
+    char *end;
+    if (s[0] < '0' || s[0] > '9' || strspn(s, "0123456789.") != strlen(s)) return 0;
+    *out = strtod(s, &end);
+    return *end == '\0' && *out < limit;
+}
+
+/* The device's page multiplies its field offsetInput by 100, so that the product may have many decimals, and sends
+ * both. */
 static int set_phase(const struct posted *p, const char *value, int apply)
 {
     char line[40];
-    long cdeg;
-    if (!read_number(value, &cdeg) || cdeg > 35999)
-        return refuse(p, 400, "offset: allowed are whole numbers from 0 to 35999, in 0.01 degree");
-    snprintf(line, sizeof line, "HEAD:PHASE %ld.%02ld", cdeg / 100, cdeg % 100);
+    double cdeg;
+    if (!read_decimal(value, 36000.0, &cdeg)) return refuse(p, 400, "offset: allowed are 0 to 35999, in 0.01 degree");
+    const long whole = (long)(cdeg + 0.5) % 36000;
+    snprintf(line, sizeof line, "HEAD:PHASE %ld.%02ld", whole / 100, whole % 100);
     return apply ? command(p, line) : 200;
 }
 
 /* Only offset counts; but what the device doesn't take is refused. */
 static int check_phase_input(const struct posted *p, const char *value, int apply)
 {
-    char *end;
+    double deg;
     (void)apply;
-    const double deg = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : -1.0;
-    if (deg >= 0.0 && deg < 360.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 200;
-    return refuse(p, 400, "offsetInput: 0 to 359.99, in degrees");
+    return read_decimal(value, 360.0, &deg) ? 200 : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
 }
 
 static int save(const struct posted *p, const char *value, int apply)
@@ -194,6 +202,8 @@ static int reset(const struct posted *p, const char *value, int apply)
     if (!apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
+    if (status == 200) status = command(p, "HEAD:PHASE DEF");
+    if (status == 200) status = command(p, "HEAD:PHASE:LOCK DEF");
     if (status == 200 && !is_scanning(p->spec)) status = command(p, "SCAN:START");
     return status;
 }

@@ -110,9 +110,11 @@ static int open_faults(struct device *device, struct sh_err *err)
     if (rc != SH_OK) return rc;
     fault_board_listen(device->faults, write_note, device);
     head_faults_init(&device->head_faults, device->faults, device->tick_ns);
-    device->beam = (struct device_beam){
-        .scan = &device->scan, .board = device->faults, .settings = &device->cmd.settings, .tick_ns = device->tick_ns,
-        .free_ppm = device->site->cfg->head.motor_ppm};
+    device->beam = (struct device_beam){.scan = &device->scan,
+                                        .board = device->faults,
+                                        .settings = &device->cmd.settings,
+                                        .tick_ns = device->tick_ns,
+                                        .free_ppm = device->site->cfg->head.motor_ppm};
     device->desk = (struct fault_desk){.cfg = device->site->cfg, .board = device->faults};
     device->cmd.faults = &fault_desk_commands;
     device->cmd.faults_owner = &device->desk;

@@ -80,9 +80,13 @@ struct device {
         int waits; /* a pulse of the head's clock, or of the receiver, comes later than its second */
         int64_t t_ns, tai_s;
     } late_own, late_received;
+    struct device_edge {
+        int waits; /* a pulse has come; the rotor's speed after it is chosen with the scan's next pulse */
+        int64_t t_ns;
+    } edge;
     struct receiver_line line;
     uint64_t line_taken; /* sentences that pps has */
-    char plan[160]; /* site_plan_text */
+    char plan[160];      /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
@@ -159,9 +163,9 @@ int device_end_boot(struct device *device, uint64_t tick);
 int device_is_dead(const struct device *device, uint64_t released);
 
 /* phase_lock.c: the rotor's phase, held to the receiver's pulses. */
-/* A pulse has come in the tick at hand. */
+/* A pulse comes in the tick at hand. */
 void device_hold_phase(struct device *device, int64_t edge_ns);
-/* A tick begins: without locked pulses, or with another speed, the rotor runs free. */
+/* A tick begins: chooses the rotor's speed after a pulse; without locked pulses it runs free. */
 void device_check_phase(struct device *device, int64_t t_ns);
 
 /* time_of_day.c: the head's clock and the receiver. */

@@ -50,33 +50,48 @@ static void note_edge(struct device *device, double turn)
                      fabs(wrap(turn - (double)phase_udeg / TURN_UDEG)) * TURN_UDEG <= (double)HELD_UDEG;
 }
 
-void device_hold_phase(struct device *device, int64_t edge_ns)
+/* Chooses the speed from the scan's next pulse on, which is the first one after the edge. */
+static void hold(struct device *device, int64_t edge_ns)
 {
-    struct device_scan *scan = &device->scan;
+    const struct device_scan *scan = &device->scan;
     const struct schedule_segment *seg = &scan->segment;
-    const struct config_profile *profile = site_profile(device->site);
-    int64_t hour_ns;
-    if (!scan->on || profile->emitter.kind != EMITTER_BEAMS || scan->pulse_next >= seg->end_pulse) return;
-    const int64_t scan_ns = edge_ns - (int64_t)scan->tick0 * device->tick_ns;
-    note_edge(device, turn_at(seg, scan->pulse_next, scan_ns));
-    const struct pps_moment at = {edge_ns, head_clock_ns(&device->clock, edge_ns)};
-    if (!is_on(device) || pps_at(&device->pps, at, &hour_ns) != PROTOCOL_PPS_LOCKED) return;
-    const double left_s = 1.0 + (double)(scan_ns - schedule_time_ns(seg, scan->pulse_next)) / SECOND_NS;
-    const double free_turn =
-        schedule_sweep_turn(seg, scan->pulse_next) + 1e-6 * (double)scan->lines_uhz * left_s;
+    const int64_t most_uhz = site_profile(device->site)->lines_max_uhz;
+    const double left_s = 1.0 + (double)(edge_ns - schedule_time_ns(seg, scan->pulse_next)) / SECOND_NS;
+    const double free_turn = schedule_sweep_turn(seg, scan->pulse_next) + 1e-6 * (double)scan->lines_uhz * left_s;
     double missing = wrap((double)device->cmd.settings.phase_udeg / TURN_UDEG - free_turn);
-    const int64_t most_uhz = profile->lines_max_uhz;
     if (missing > 0.0 && scan->lines_uhz + llround(1e6 * missing / left_s) > most_uhz) missing -= 1.0;
     set_speed(device, scan->lines_uhz + llround(1e6 * missing / left_s));
 }
 
-void device_check_phase(struct device *device, int64_t t_ns)
+static int is_locked(const struct device *device, int64_t t_ns)
 {
     int64_t hour_ns;
-    if (!device->scan.on) device->cmd.phase.is_known = device->cmd.phase.is_held = 0;
-    if (device->beam.held_uhz == 0) return;
     const struct pps_moment at = {t_ns, head_clock_ns(&device->clock, t_ns)};
-    if (is_on(device) && pps_at(&device->pps, at, &hour_ns) == PROTOCOL_PPS_LOCKED) return;
+    return pps_at(&device->pps, at, &hour_ns) == PROTOCOL_PPS_LOCKED;
+}
+
+void device_hold_phase(struct device *device, int64_t edge_ns)
+{
+    device->edge = (struct device_edge){1, edge_ns};
+}
+
+/* The tick of the edge has its pulses at the speed that was planned for it. */
+static void take_edge(struct device *device)
+{
+    const struct device_scan *scan = &device->scan;
+    const int64_t edge_ns = device->edge.t_ns - (int64_t)scan->tick0 * device->tick_ns;
+    if (schedule_time_ns(&scan->segment, scan->pulse_next) < edge_ns) return;
+    device->edge.waits = 0;
+    note_edge(device, turn_at(&scan->segment, scan->pulse_next, edge_ns));
+    if (is_on(device) && is_locked(device, device->edge.t_ns)) hold(device, edge_ns);
+}
+
+void device_check_phase(struct device *device, int64_t t_ns)
+{
+    const int turns = device->scan.on && site_profile(device->site)->emitter.kind == EMITTER_BEAMS;
+    if (!turns) device->edge.waits = device->cmd.phase.is_known = device->cmd.phase.is_held = 0;
+    if (device->edge.waits && device->scan.pulse_next < device->scan.segment.end_pulse) take_edge(device);
+    if (device->beam.held_uhz == 0 || (is_on(device) && is_locked(device, t_ns))) return;
     device->cmd.phase.is_held = 0;
     set_speed(device, 0);
 }

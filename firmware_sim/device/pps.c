@@ -33,9 +33,8 @@ static void pps_keep(struct pps *pps, const struct pps_state *state)
 
 void pps_power_up(struct pps *pps, struct pps_moment at, int64_t hour_ns, int pulses)
 {
-    const struct pps_state state = {.from = at,
-                                    .state = pulses ? PROTOCOL_PPS_SYNCHRONISING : PROTOCOL_PPS_ABSENT,
-                                    .hour_ns = in_hour(hour_ns)};
+    const struct pps_state state = {
+        .from = at, .state = pulses ? PROTOCOL_PPS_SYNCHRONISING : PROTOCOL_PPS_ABSENT, .hour_ns = in_hour(hour_ns)};
     pps_keep(pps, &state);
 }
 

@@ -15,8 +15,8 @@
 enum { RECEIVER_KEPT = 256 };
 
 struct receiver_sentence {
-    int64_t t_ns;   /* device time of its arrival */
-    uint64_t index; /* of its fix */
+    int64_t t_ns;           /* device time of its arrival */
+    uint64_t index;         /* of its fix */
     int is_void, is_spoilt; /* it says that there is no fix; its checksum is wrong */
 };
 

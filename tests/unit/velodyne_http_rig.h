@@ -14,7 +14,7 @@
 
 extern struct protocol_rig http_rig;
 /* The head's answers: state, rate, echoes; the fourth is a test's own. It scans at 10 Hz, with strongest echoes. */
-extern struct protocol_rig_reply http_replies[6];
+extern struct protocol_rig_reply http_replies[7];
 
 int http_setup(void **state);
 int http_teardown(void **state);
