@@ -69,11 +69,22 @@ int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kin
     return 0;
 }
 
-int64_t device_clock_fault_ns(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns)
+int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns)
 {
     double sum_ms = 0.0;
     for (uint32_t i = 0; i < faults->n; i++)
-        if (has_moment(&faults->fault[i], kind, t_ns)) sum_ms += faults->fault[i].fault.for_ms;
+        if (has_moment(&faults->fault[i], FAULT_NMEA_LATE, t_ns)) sum_ms += faults->fault[i].fault.for_ms;
+    return llround(1e6 * sum_ms);
+}
+
+int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns)
+{
+    double sum_ms = 0.0;
+    for (uint32_t i = 0; i < faults->n; i++) {
+        const struct head_fault *f = &faults->fault[i];
+        if (!has_moment(f, FAULT_PPS_JITTER, edge_ns)) continue;
+        if ((edge_ns - f->from_ns) / UTC_SECOND_NS % 2 == 0) sum_ms += f->fault.for_ms;
+    }
     return llround(1e6 * sum_ms);
 }
 

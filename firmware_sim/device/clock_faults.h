@@ -13,10 +13,13 @@ struct head_clock;
 /* Begins and ends those of a tick. */
 void device_run_clock_faults(struct head_faults *faults, struct head_clock *clock, struct device_events *events,
                              uint64_t tick);
-/* For kinds that strike at pulses and sentences, after a step of the tick: whether one has this device time; for how
- * long all of them together; counts the pulse or sentence for the note of their end. */
+/* For kinds that strike at pulses and sentences, after a step of the tick: whether one has this device time; counts the
+ * pulse or sentence for the note of their end. */
 int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
-int64_t device_clock_fault_ns(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
+
+/* How late all of them together make a sentence; a pulse: of each fault the first one, the third and so on are late. */
+int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns);
+int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns);
 
 #endif

@@ -36,7 +36,7 @@ static void send_fix(struct receiver_line *line, const struct gnss *gnss, struct
     if (strikes(faults, FAULT_NMEA_LOST, t_ns) || !gnss->site->cfg->gnss.nmea) return;
     next.is_void = strikes(faults, FAULT_NMEA_VOID, t_ns);
     next.is_spoilt = strikes(faults, FAULT_NMEA_CHECKSUM, t_ns);
-    if (strikes(faults, FAULT_NMEA_LATE, t_ns)) next.t_ns += device_clock_fault_ns(faults, FAULT_NMEA_LATE, t_ns);
+    if (strikes(faults, FAULT_NMEA_LATE, t_ns)) next.t_ns += device_sentence_late_ns(faults, t_ns);
     if (line->n != 0 && next.t_ns <= sentence_at(line, line->n - 1)->t_ns)
         next.t_ns = sentence_at(line, line->n - 1)->t_ns + 1;
     line->kept[line->n++ % RECEIVER_KEPT] = next;

@@ -21,12 +21,13 @@ int64_t device_gps_ns(const struct device *device, int64_t t_ns)
 }
 
 /* Whether a pulse comes in a tick that ends at end_ns. found: the second at *edge_ns begins in it. An injected fault
- * makes each odd second's pulse late. */
+ * makes pulses late. */
 static int find_pulse(struct device *device, struct device_late_pulse *late, int found, int64_t end_ns,
                       int64_t *edge_ns, int64_t *tai_s)
 {
-    const int64_t late_ns =
-        found && *tai_s % 2 != 0 ? device_clock_fault_ns(&device->head_faults, FAULT_PPS_JITTER, *edge_ns) : 0;
+    const int64_t late_ns = found ? device_pulse_late_ns(&device->head_faults, *edge_ns) : 0;
+    if (late_ns > 0 && late == &device->late_own)
+        device_count_clock_fault(&device->head_faults, FAULT_PPS_JITTER, *edge_ns);
     if (late_ns > 0) *late = (struct device_late_pulse){1, *edge_ns + late_ns, *tai_s};
     if (!late->waits || late->t_ns >= end_ns) return found && late_ns == 0;
     late->waits = 0;

@@ -56,7 +56,7 @@ enum fault_kind {
     FAULT_CLOCK_DRIFT,   /* gains ppm */
     FAULT_CLOCK_STOP,
     FAULT_PPS_LOST,
-    FAULT_PPS_JITTER,    /* every second pulse is late by for_ms */
+    FAULT_PPS_JITTER,    /* the first pulse and every second one after it are late by for_ms */
     FAULT_NMEA_LOST,     /* the receiver sends no sentence */
     FAULT_NMEA_LATE,     /* by for_ms */
     FAULT_NMEA_VOID,     /* it has no fix */

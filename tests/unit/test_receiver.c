@@ -74,17 +74,18 @@ static void follows_what_comes(void **state)
         /* The pulses of 3.5 and 4.5 s are lost: absent, and relocked after three more. The time goes on. */
         {{"faults[0].kind=pps_lost", "faults[0].from_s=3.2", "faults[0].until_s=5.2", NULL},
          {{3.4, LOCKED, 0.9}, {3.502, ABSENT, 1.002}, {5.5, SYNC, 3}, {7.4, SYNC, 4.9}, {7.5, LOCKED, 5}}},
-        /* Every second pulse is 5 ms late: none agrees with the one before. */
+        /* The first pulse is 5 ms late, and every second one after it: none agrees with the one before. */
         {{"faults[0].kind=pps_jitter", "faults[0].for_ms=5", "faults[0].from_s=3", "faults[0].until_s=6", NULL},
-         {{4.4, LOCKED, 1.9},
-          {4.502, ABSENT, 2.002},
+         {{3.4, LOCKED, 0.9},
+          {3.502, ABSENT, 1.002},
+          {3.6, ERROR, 1.1},
           {4.6, ERROR, 2.1},
-          {5.6, ERROR, 3.1},
-          {6.6, SYNC, 4.1},
-          {7.6, LOCKED, 5.1}}},
-        /* It is 0.5 ms late, which is taken for the second. */
+          {6.6, ERROR, 4.1},
+          {7.6, SYNC, 5.1},
+          {8.6, LOCKED, 6.1}}},
+        /* It is 0.5 ms late, and taken for the second. */
         {{"faults[0].kind=pps_jitter", "faults[0].for_ms=0.5", "faults[0].from_s=3", NULL},
-         {{4.5, LOCKED, 2}, {4.6, LOCKED, 2.0995}, {5.6, LOCKED, 3.1}}},
+         {{3.5, LOCKED, 1}, {3.6, LOCKED, 1.0995}, {4.6, LOCKED, 2.1}}},
         /* A late sentence without its second's pulse having changed is a second behind; so is the time. */
         {{"faults[0].kind=nmea_late", "faults[0].for_ms=1200", "faults[0].from_s=3", "faults[0].until_s=6", NULL},
          {{4.4, LOCKED, 1.9},
