@@ -235,8 +235,7 @@ static void test_documents(void **state)
     http_replies[4] = (struct protocol_rig_reply){"HEAD:PHASE:EDGE?", "LOCKED,90.004999", 0};
     http_replies[5] = (struct protocol_rig_reply){"HEAD:PHASE?", "90.01", 0};
     http_get("/cgi/settings.json");
-    assert_non_null(
-        strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
+    assert_non_null(strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"rpm\":600,\"lock\":\"On\",\"phase\":9000}"));
     http_replies[2].reply = "ALL";
