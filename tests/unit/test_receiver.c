@@ -166,11 +166,12 @@ static void sentences_go_wrong(void **state)
     rig_close(rig);
 }
 
-/* Turns of the rotor at the full second at device time t_s, by the segment of its tick. */
+/* Turns of the rotor at the full second at device time t_s, by the segment that has the pulses around it. */
 static double turn_at(struct rig *rig, double t_s)
 {
     const int64_t t_ns = llround(1e9 * t_s);
     rig_go_to(rig, (uint64_t)(t_ns / TICK_NS) + 1);
+    if (schedule_time_ns(&rig->work.segment, rig->work.pulse_end) <= t_ns - rig->work.scan_t0_ns) rig_claim(rig);
     const struct schedule_segment *seg = &rig->work.segment;
     const uint64_t k = rig->work.pulse0;
     const int64_t since_ns = t_ns - rig->work.scan_t0_ns - schedule_time_ns(seg, k);
@@ -194,20 +195,25 @@ static void the_rotor_is_where_the_lock_wants_it(void **state)
 {
     (void)state;
     static const struct {
-        const char *lines, *phase;
-        double deg;
-    } cases[] = {{"head.lines_hz=5", "head.phase_deg=0", 0},
-                 {"head.lines_hz=10", "head.phase_deg=90.01", 90.01},
-                 {"head.lines_hz=20", "head.phase_deg=359.99", 359.99}};
+        const char *lines, *phase, *epoch;
+        double deg, edge_s;
+    } cases[] = {{"head.lines_hz=5", "head.phase_deg=0", "time.epoch=2026-01-01T00:59:57.5Z", 0, 0.5},
+                 /* The last pulses of the tick with the edge come before it. */
+                 {"head.lines_hz=10", "head.phase_deg=90.01", "time.epoch=2026-01-01T00:59:57.49902Z", 90.01, 0.50098},
+                 {"head.lines_hz=20", "head.phase_deg=359.99", "time.epoch=2026-01-01T00:59:57.5Z", 359.99, 0.5},
+                 {"head.lines_hz=20", "head.phase_deg=180", "time.epoch=2026-01-01T00:59:57.5Z", 180, 0.5}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        const char *sets[] = {cases[i].lines, cases[i].phase, "head.phase_lock=on", "head.motor_ppm=-300"};
-        struct rig *rig = open_with(sets, 4);
-        assert_true(fabs(beyond(turn_at(rig, 2.5), cases[i].deg)) > 0.01);
+        const char *sets[] = {cases[i].lines, cases[i].phase, cases[i].epoch, "head.phase_lock=on",
+                              "head.motor_ppm=-300"};
+        struct rig *rig = open_with(sets, 5);
+        assert_true(fabs(beyond(turn_at(rig, 2 + cases[i].edge_s), cases[i].deg)) > 0.01);
         assert_string_equal(rig_tell(rig, "HEAD:PHAS:LOCK?", rig->next), "ON");
-        for (int s = 3; s < 7; s++)
-            if (fabs(beyond(turn_at(rig, s + 0.5), cases[i].deg)) > EXACT_DEG)
-                fail_msg("%s: at second %d it is %.6f degrees beyond", cases[i].lines, s,
-                         beyond(turn_at(rig, s + 0.5), cases[i].deg));
+        for (int s = 3; s < 7; s++) {
+            const double beyond_deg = beyond(turn_at(rig, s + cases[i].edge_s), cases[i].deg);
+            if (fabs(beyond_deg) > EXACT_DEG)
+                fail_msg("%s: at second %d it is %.6f degrees beyond", cases[i].lines, s, beyond_deg);
+            assert_true(rig->work.segment.spec.lines_uhz <= 20000000); /* a head has no more turns than its profile */
+        }
         assert_memory_equal(rig_tell(rig, "HEAD:PHAS:EDGE?", rig->next), "LOCKED,", 7);
         rig_close(rig);
     }
@@ -249,6 +255,10 @@ static void only_whole_turns_are_held(void **state)
     rig_tell(rig, "HEAD:PHAS 45", rig->next);
     turn_at(rig, 5.5);
     assert_true(fabs(beyond(turn_at(rig, 6.5), 45)) <= EXACT_DEG);
+    rig_go_to(rig, 6600);
+    rig_tell(rig, "HEAD:LIN 10", rig->next); /* it does not go on at the speed that held it */
+    rig_claim(rig);
+    assert_int_equal(rig->work.segment.spec.lines_uhz, 10000000);
     rig_close(rig);
 }
 
