@@ -233,6 +233,11 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
     if (cfg_has_profile(rd) && kind != EMITTER_BEAMS) refuse_rotor_settings(rd, cfg);
     if (cfg_has_profile(rd) && cfg->profile.arrangement.n_geometries > 0) cfg_choose_geometry(rd, cfg);
     if (!cfg_has_profile(rd) || kind == EMITTER_LINE) return;
+    if (s->phase_lock && CFG_SOUND(rd, 0, "head.lines_hz", "head.phase_lock") && s->lines_uhz % 1000000 != 0)
+        cfg_fail_key(rd, "head.phase_lock", 0,
+                     "on, but head.lines_hz is %.15g, which is at another azimuth each second; allowed with whole "
+                     "turns per second",
+                     from_micro(s->lines_uhz));
     check_instrument(rd, cfg);
     if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)
         cfg_fail_key(rd, "head.ambiguity", 0,

@@ -20,16 +20,18 @@ int64_t device_gps_ns(const struct device *device, int64_t t_ns)
     return device->clock.source != EPOCH_NONE ? utc_gps_ns(head_clock_ns(&device->clock, t_ns)) : 0;
 }
 
-/* Whether a pulse comes in a tick that ends at end_ns. found: the second at *edge_ns begins in it. An injected fault
- * makes pulses late. */
-static int find_pulse(struct device *device, struct device_late_pulse *late, int found, int64_t end_ns,
-                      int64_t *edge_ns, int64_t *tai_s)
+/* Whether a pulse comes in the tick at t_ns. found: the second at *edge_ns begins in it. An injected fault makes pulses
+ * late. */
+static int find_pulse(struct device *device, struct device_late_pulse *late, int found, int64_t t_ns, int64_t *edge_ns,
+                      int64_t *tai_s)
 {
     const int64_t late_ns = found ? device_pulse_late_ns(&device->head_faults, *edge_ns) : 0;
-    if (late_ns > 0 && late == &device->late_own)
-        device_count_clock_fault(&device->head_faults, FAULT_PPS_JITTER, *edge_ns);
-    if (late_ns > 0) *late = (struct device_late_pulse){1, *edge_ns + late_ns, *tai_s};
-    if (!late->waits || late->t_ns >= end_ns) return found && late_ns == 0;
+    if (late->t_ns < t_ns) late->waits = 0; /* power was gone when it came */
+    if (late_ns > 0) {
+        if (late == &device->late_own) device_count_clock_fault(&device->head_faults, FAULT_PPS_JITTER, *edge_ns);
+        *late = (struct device_late_pulse){1, *edge_ns + late_ns, *tai_s};
+    }
+    if (!late->waits || late->t_ns >= t_ns + device->tick_ns) return found && late_ns == 0;
     late->waits = 0;
     *edge_ns = late->t_ns;
     *tai_s = late->tai_s;
@@ -50,7 +52,7 @@ void device_say_pps(struct device *device, uint64_t tick)
     int found = head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s);
     if (found) device_count_clock_fault(&device->head_faults, FAULT_PPS_LOST, edge_ns);
     if (found) found = has_pulses(device, edge_ns);
-    if (!find_pulse(device, &device->late_own, found, t_ns + device->tick_ns, &edge_ns, &tai_s)) return;
+    if (!find_pulse(device, &device->late_own, found, t_ns, &edge_ns, &tai_s)) return;
     int64_t tai_ns = tai_s * UTC_SECOND_NS;
     char text[UTC_TEXT_LEN];
     struct utc_time utc;
@@ -74,7 +76,6 @@ static void follow_from_power_up(struct device *device, int64_t t_ns)
     const int pulses = has_pulses(device, t_ns);
     const int sentences = c->nmea && !device_has_clock_fault(&device->head_faults, FAULT_NMEA_LOST, t_ns);
     const int warm = device->pps.n == 0 && pulses && sentences && !c->cold;
-    device->late_received.waits = 0;
     pps_power_up(&device->pps, at, warm ? utc_posix_from_tai(&device->clock.table, at.head_ns) : 0, pulses);
 }
 
@@ -109,7 +110,7 @@ void device_follow_receiver(struct device *device, uint64_t tick)
     const int64_t last_s = (head_clock_true_ns(&device->clock, end_ns) - 1) / UTC_SECOND_NS;
     int64_t tai_s = last_s, edge_ns = t_ns + last_s * UTC_SECOND_NS - head_clock_true_ns(&device->clock, t_ns);
     const int found = edge_ns >= t_ns && has_pulses(device, edge_ns);
-    if (find_pulse(device, &device->late_received, found, end_ns, &edge_ns, &tai_s)) {
+    if (find_pulse(device, &device->late_received, found, t_ns, &edge_ns, &tai_s)) {
         take_sentences(device, edge_ns);
         pps_take(&device->pps, moment_at(device, edge_ns));
         device_hold_phase(device, edge_ns);
