@@ -121,23 +121,23 @@ static int64_t sum_ns(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns)
     return sum;
 }
 
-/* The grandmaster of that number, which a fault makes; NULL: it is not there. */
-static const struct head_fault *other_master(const struct ptp *ptp, uint32_t number, int64_t t_ns)
+/* What a fault says of the grandmaster with this identity: of several, the last in the list. NULL: none does. */
+static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identity, int64_t t_ns)
 {
-    const struct head_fault *f = NULL;
+    const struct head_fault *f = NULL, *last = NULL;
     while ((f = ptp_next(ptp, FAULT_PTP_GRANDMASTER, t_ns, f)) != NULL)
-        if (f->number == number) break;
-    return f;
+        if (f->fault.grandmaster == identity) last = f;
+    return last;
 }
 
-/* The best one: of several, the last in the list. */
-static uint32_t best_master(const struct ptp *ptp, int64_t t_ns)
+/* The identity of the best one: of several faults, the last in the list says it. */
+static uint64_t best_master(const struct ptp *ptp, int64_t t_ns)
 {
     const struct head_fault *f = NULL;
-    uint32_t number = 0;
+    uint64_t identity = ptp->cfg->grandmaster;
     while ((f = ptp_next(ptp, FAULT_PTP_GRANDMASTER, t_ns, f)) != NULL)
-        number = f->number;
-    return number;
+        identity = f->fault.grandmaster;
+    return identity;
 }
 
 /* ---- the servo */
@@ -206,26 +206,31 @@ static int has_master(const struct ptp *ptp)
     return ptp->now.port == NATIVE_PTP_UNCALIBRATED || ptp->now.port == NATIVE_PTP_SLAVE;
 }
 
-static void select_master(struct ptp *ptp, int64_t t_ns, uint32_t number)
+/* Whether the master that was selected is still on the network. */
+static int is_there(const struct ptp *ptp, int64_t t_ns)
 {
-    const struct head_fault *other = other_master(ptp, number, t_ns);
-    ptp->selected = number;
-    ptp->now.grandmaster = other != NULL ? other->fault.grandmaster : ptp->cfg->grandmaster;
-    ptp->now.clock_class = other != NULL ? other->fault.clock_class : ptp->cfg->clock_class;
+    const uint64_t identity = ptp->now.grandmaster;
+    return identity == ptp->cfg->grandmaster || fault_of(ptp, identity, t_ns) != NULL;
+}
+
+/* An Announce of the selected master says what it is. */
+static void hear_master(struct ptp *ptp, int64_t t_ns)
+{
+    const struct head_fault *f = fault_of(ptp, ptp->now.grandmaster, t_ns);
+    ptp->now.clock_class = f != NULL ? f->fault.clock_class : ptp->cfg->clock_class;
     ptp->now.clock_accuracy = ptp->cfg->clock_accuracy;
     ptp->now.utc_valid = ptp->cfg->utc_valid;
     ptp->announce_ns = t_ns;
-    set_state(ptp, t_ns, NATIVE_PTP_UNCALIBRATED, ptp->now.servo, "RS_SLAVE");
+    ptp_keep(ptp, t_ns);
 }
 
 /* While another master is a candidate, the selected one goes on if it is still there. */
 static void take_announce(struct ptp *ptp, int64_t t_ns)
 {
-    const uint32_t best = best_master(ptp, t_ns);
+    const uint64_t best = best_master(ptp, t_ns);
     if (ptp->is_faulty || holds(ptp, FAULT_PTP_LOST, t_ns)) return;
-    if (has_master(ptp) && (ptp->selected == 0 || other_master(ptp, ptp->selected, t_ns) != NULL))
-        ptp->announce_ns = t_ns;
-    if (has_master(ptp) && best == ptp->selected) {
+    if (has_master(ptp) && is_there(ptp, t_ns)) hear_master(ptp, t_ns);
+    if (has_master(ptp) && best == ptp->now.grandmaster) {
         ptp->n_heard = 0;
         return;
     }
@@ -233,7 +238,9 @@ static void take_announce(struct ptp *ptp, int64_t t_ns)
     ptp->candidate = best;
     if (ptp->n_heard < PTP_ANNOUNCES_TO_SELECT) return;
     ptp->n_heard = 0;
-    select_master(ptp, t_ns, best);
+    ptp->now.grandmaster = best;
+    hear_master(ptp, t_ns);
+    set_state(ptp, t_ns, NATIVE_PTP_UNCALIBRATED, ptp->now.servo, "RS_SLAVE");
 }
 
 static int64_t deviation_ns(const struct ptp *ptp, int64_t t_ns, uint64_t sync, uint32_t draw)
@@ -244,13 +251,13 @@ static int64_t deviation_ns(const struct ptp *ptp, int64_t t_ns, uint64_t sync, 
 
 static void take_sync(struct ptp *ptp, int64_t t_ns)
 {
-    const struct head_fault *other = other_master(ptp, ptp->selected, t_ns);
+    const struct head_fault *f = fault_of(ptp, ptp->now.grandmaster, t_ns);
     const uint64_t number = (uint64_t)(t_ns / (ptp->cfg->sync_ms * MS_NS));
-    if (!has_master(ptp) || (ptp->selected != 0 && other == NULL) || holds(ptp, FAULT_PTP_LOST, t_ns) ||
+    if (!has_master(ptp) || !is_there(ptp, t_ns) || holds(ptp, FAULT_PTP_LOST, t_ns) ||
         holds(ptp, FAULT_PTP_NO_SYNC, t_ns))
         return;
     const int64_t master_ns = head_clock_true_ns(ptp->clock, t_ns) + sum_ns(ptp, FAULT_PTP_STEP, t_ns) +
-                              (other != NULL ? llround(other->fault.ns) : 0);
+                              (f != NULL ? llround(f->fault.ns) : 0);
     const int64_t asymmetry_ns = llround(ptp->cfg->asymmetry_ns) + sum_ns(ptp, FAULT_PTP_ASYMMETRY, t_ns);
     ptp->now.offset_ns =
         head_clock_ns(ptp->clock, t_ns) - master_ns + asymmetry_ns + deviation_ns(ptp, t_ns, number, 0);

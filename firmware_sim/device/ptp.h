@@ -65,9 +65,9 @@ struct ptp {
     uint32_t n; /* changes so far; the last PTP_KEPT are kept */
     struct ptp_status kept[PTP_KEPT];
     struct ptp_status now;
-    /* masters, each by the number of its fault; 0: that of the configuration */
-    uint32_t selected, candidate, n_heard; /* Announce messages of the candidate in a row */
-    int64_t announce_ns;                   /* the last one of the selected master */
+    uint64_t candidate;  /* the identity of another master, which is better */
+    uint32_t n_heard;    /* its Announce messages in a row */
+    int64_t announce_ns; /* the last one of the selected master */
     /* servo */
     int n_samples;    /* up to 2 */
     int has_locked;   /* the first step, if any, is over */

@@ -238,6 +238,47 @@ static void another_grandmaster_has_another_time(void **state)
     rig_close(rig);
 }
 
+/* A grandmaster that loses its reference keeps its identity: the class changes with the next Announce, the time with the
+ * next Sync, and no state does. */
+static void the_same_grandmaster_changes(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.ptp.grandmaster=0xec4670fffe0a1b2c", "time.ptp.max_ppm=1"};
+    static const char *const faults[] = {
+        "{kind: ptp_grandmaster, from_s: 8.5, until_s: 10.5, grandmaster: 0xec4670fffe0a1b2c, ns: 5000, clock_class: 7}"};
+    static const int class[] = {6, 6, 7, 7, 6}, offset_ns[] = {0, -5000, -4000, 2000, 1000};
+    static const uint64_t tick[] = {8499, 9999, 10499, 11999, 12500};
+    struct rig *rig = follow(sets, 2, faults, 1);
+    rig_go_to(rig, 6000);
+    expect_events(rig, NULL, 0, 13000, 0);
+    for (int i = 0; i < 5; i++) {
+        const struct answer a = ask(rig, tick[i]);
+        assert_string_equal(a.master, "ec4670.fffe.0a1b2c");
+        assert_true(a.class == class[i] && llabs(a.offset_ns - offset_ns[i]) <= 1); /* 1 ppm is 1000 ns a second */
+    }
+    rig_close(rig);
+}
+
+/* A fault that sets the clock itself is an offset for the servo, which steps it back. */
+static void a_jump_of_the_clock_is_corrected(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.ptp.step_threshold_ns=100000"};
+    static const char *const faults[] = {"{kind: clock_jump, from_s: 9.5, jump_s: 0.25}"};
+    static const struct said want[] = {
+        {10000000000, 8, 0, "SLAVE to UNCALIBRATED on SYNCHRONIZATION_FAULT, servo s2 to s0"},
+        {12000000000, 8, 1, "servo s0 to s1"},
+        {13000000000, 9, 2, "UNCALIBRATED to SLAVE on MASTER_CLOCK_SELECTED, servo s1 to s2"},
+    };
+    struct rig *rig = follow(sets, 1, faults, 1);
+    rig_go_to(rig, 6000);
+    expect_events(rig, want, 3, 14000, 0);
+    assert_int_equal(ask(rig, 10000).offset_ns, 250000000);
+    assert_int_equal(shown_ns(rig, 11999), INT64_C(12249000000));
+    assert_int_equal(shown_ns(rig, 12000), 12 * SECOND_NS);
+    rig_close(rig);
+}
+
 /* ---- the path */
 
 /* Runs to 40 s and returns what the follower measured each second from 20 s on. */
@@ -372,6 +413,8 @@ int main(void)
         cmocka_unit_test(the_clock_is_as_computed),
         cmocka_unit_test(the_states_are_those_of_ptp4l),
         cmocka_unit_test(another_grandmaster_has_another_time),
+        cmocka_unit_test(the_same_grandmaster_changes),
+        cmocka_unit_test(a_jump_of_the_clock_is_corrected),
         cmocka_unit_test(an_asymmetry_is_not_seen),
         cmocka_unit_test(jitter_is_bounded_and_repeatable),
         cmocka_unit_test(the_rate_is_limited),
