@@ -161,7 +161,8 @@ function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}
 // By the number of the port's state (drivers/protocol/EVENTS.md).
 const PTP_PORTS = {1: 'INITIALIZING', 2: 'FAULTY', 4: 'LISTENING', 8: 'UNCALIBRATED', 9: 'SLAVE'};
 
-function ptpText(t) {
+/** The port, the servo and the offset; empty where the head follows no master. */
+export function ptpText(t) {
   if (!t.ptp_port) return '';
   return `, PTP ${PTP_PORTS[t.ptp_port] ?? t.ptp_port}, s${t.ptp_servo}, ${grouped(number(t.ptp_offset_ns))} ns`;
 }

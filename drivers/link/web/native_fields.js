@@ -72,7 +72,7 @@ const telemetry = layout(`state u32, scan u32, pulses u64, echoes u64, lines u64
   late_max_us u32, errors_queued u32, reader_lost_frames u64, utc_ns I64`);
 const scanCounts = layout('scan_fired u64, scan_cast u64, scan_lost u64');
 const lostLines = layout('lost_lines u64');
-const ptp = layout(`ptp_port u32, ptp_servo u32, ptp_offset_ns i64, ptp_delay_ns i64, ptp_grandmaster U64, ptp_class u32,
+const ptp = layout(`ptp_port u32, ptp_servo u32, ptp_offset_ns I64, ptp_delay_ns I64, ptp_grandmaster U64, ptp_class u32,
   ptp_accuracy u32, ptp_flags u32, ptp_reserved u32`);
 const event = layout('code u32, reserved u32, a U64, b U64, c U64, text char[96]');
 const emitter = layout(`kind u32, n_beams u32, steps u32, first_step i32, last_step i32, front_step i32, turn i32,
