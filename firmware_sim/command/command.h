@@ -11,7 +11,7 @@
  *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
  *   site      SITE:POSE
  *   fault     FAULt:ADD  FAULt:CLEar  FAULt:LIST?  FAULt:INJected?
- *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:STEP
+ *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:PTP?  TIME:STEP
  *
  * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
  * is STATe. A query ends in '?'. Settings have both forms.
@@ -145,6 +145,7 @@ struct command_device {
     uint64_t lost_journal_lines, lost_truth_lines; /* lines that these files lack */
     int64_t t_ns;                                  /* device time */
     char utc[40], gps[40];                   /* the same as time of day, by the clock of the head; empty: unknown */
+    char ptp[128];                           /* its PTP follower then; empty: it has none */
     int step_allowed;                        /* 1 when the pace is `step` */
     int pose_allowed;                        /* 1 when the platform is live: a step may carry a pose */
     double pose_centre_m[3], pose_reach_m;   /* the pose must be within pose_reach_m of the centre; scene frame */

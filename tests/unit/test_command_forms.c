@@ -75,6 +75,7 @@ static const struct {
     {"TIME", "TIME", 1, 0, ""},
     {"TIME:UTC", "TIME:UTC", 1, 0, ""},
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
+    {"TIME:PTP", "TIME:PTP", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
     {"FAULT:ADD", "FAUL:ADD", 0, 1, " {kind: drop}"},
     {"FAULT:CLEAR", "FAUL:CLE", 0, 1, " ALL"},
