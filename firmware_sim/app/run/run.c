@@ -127,12 +127,11 @@ static int open_watch(const struct config *cfg, const struct site *site, struct 
 /* A replayed journal has what was stored, as its first commands. It must not depend on a file that changes. */
 static int open_settings(struct run_options *o, const struct config *cfg, struct sh_err *err)
 {
-    if (cfg->head.settings_file[0] == '\0') return SH_OK;
-    if (o->device.replay == NULL)
+    if (o->device.replay != NULL)
+        app_warn_settings_file(cfg, "the journal that is replayed has the settings");
+    else if (cfg->head.settings_file[0] != '\0')
         return settings_file_open(cfg->head.settings_file, cfg->profile.name, &app_report_stderr, &o->device.settings,
                                   err);
-    sh_warn(&app_report_stderr, "head.settings_file %s: is not read or written while a journal is replayed",
-            cfg->head.settings_file);
     return SH_OK;
 }
 
