@@ -147,6 +147,7 @@ int device_create(const struct site *site, const struct device_options *options,
     gnss_init(&device->gnss, site, &device->clock);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc == SH_OK) rc = open_faults(device, err);
+    if (rc == SH_OK) rc = device_restore(device, err);
     if (rc != SH_OK) {
         device_free(device);
         return rc;

@@ -50,6 +50,7 @@ static const struct {
     {"HEAD:PAN", "HEAD:PAN", 1, 1, " 9"},
     {"HEAD:STATE", "HEAD:STAT", 1, 0, ""},
     {"HEAD:REBOOT", "HEAD:REB", 0, 1, ""},
+    {"HEAD:STORE", "HEAD:STOR", 0, 1, ""},
     {"HEAD:STATION", "HEAD:STATION", 1, 1, " 2"},
     {"HEAD:RANGE:MIN", "HEAD:RANG:MIN", 1, 1, " 2"},
     {"HEAD:RANGE:MAX", "HEAD:RANG:MAX", 1, 1, " 20"},
@@ -86,7 +87,7 @@ static const struct {
 static struct command_device device_for(const char *header)
 {
     struct command_device dev = command_test_device();
-    dev.step_allowed = 1;
+    dev.step_allowed = dev.keeps = 1;
     if (strcmp(header, "SCAN:STOP") == 0) dev.state = HEAD_SCANNING;
     return dev;
 }
