@@ -152,24 +152,31 @@ static int query_time(struct command_call *call)
     return command_reply(call, "%lld", (long long)call->dev->t_ns);
 }
 
-/* An empty text: the head does not know the time. */
-static int reply_time_of_day(struct command_call *call, const char *text)
+/* An empty text: the head does not know it. */
+static int reply_time_of_day(struct command_call *call, const char *text, const char *needs)
 {
     if (text[0] == '\0')
         return command_fail(call, CMD_E_SETTINGS, "%s? %s", call->row->header,
                             call->dev->recorded != NULL ? "is not possible: the recording does not have this value"
-                                                        : "needs time.epoch in the configuration");
+                                                        : needs);
     return command_reply(call, "%s", text);
 }
 
+static const char NEEDS_EPOCH[] = "needs time.epoch in the configuration";
+
 static int query_utc(struct command_call *call)
 {
-    return reply_time_of_day(call, call->dev->utc);
+    return reply_time_of_day(call, call->dev->utc, NEEDS_EPOCH);
 }
 
 static int query_gps(struct command_call *call)
 {
-    return reply_time_of_day(call, call->dev->gps);
+    return reply_time_of_day(call, call->dev->gps, NEEDS_EPOCH);
+}
+
+static int query_ptp(struct command_call *call)
+{
+    return reply_time_of_day(call, call->dev->ptp, "needs time.ptp.follower: on in the configuration");
 }
 
 static int act_clear(struct command_call *call)
@@ -241,6 +248,22 @@ static int act_reboot(struct command_call *call)
     return act_event(call, COMMAND_REBOOT);
 }
 
+/* The power-up values; the device writes them to its file. Station and frames are no such settings (stored.h). */
+static int act_store(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    if (!dev->keeps)
+        return command_fail(call, CMD_E_SETTINGS,
+                            "%s needs head.settings_file in the configuration, and no journal that is replayed",
+                            call->row->header);
+    const uint32_t station = dev->defaults.station, frames = dev->defaults.frames;
+    dev->defaults = dev->settings;
+    dev->defaults.station = station;
+    dev->defaults.frames = frames;
+    call->out->effect = COMMAND_STORE;
+    return command_reply(call, "OK");
+}
+
 static int act_step(struct command_call *call)
 {
     int64_t step_ns;
@@ -283,6 +306,7 @@ const struct command_row command_rows[] = {
     QUERY("HEAD:STATe", query_state),
     /* Open to all, as a head's plug is: clients of its maker's protocol know nothing of control. */
     {"HEAD:REBoot", NULL, act_reboot, NULL, NULL, 1, 0, 0, 0, HEAD_EV_POWER_OFF + 1},
+    ACTION("HEAD:STORe", act_store, 0),
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
     VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),
     VALUE("HEAD:RANGe:MAX", unit_m, RANGE_MAX),
@@ -316,6 +340,7 @@ const struct command_row command_rows[] = {
     QUERY("TIME", query_time),
     QUERY("TIME:UTC", query_utc),
     QUERY("TIME:GPS", query_gps),
+    QUERY("TIME:PTP", query_ptp),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
     {.header = NULL},
 };

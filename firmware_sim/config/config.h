@@ -73,6 +73,7 @@ struct config_instrument {
 struct config_head {
     struct head_settings settings;
     char serial[32], name[32];
+    char settings_file[CONFIG_PATH_LEN];
     int start;        /* scan when booted; only the command run uses it */
     double motor_ppm; /* beams: the error of the rotor's speed where nothing holds its phase */
     enum detect_ambiguity ambiguity;

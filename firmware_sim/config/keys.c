@@ -103,6 +103,10 @@ static const struct cfg_key config_keys[] = {
      .help = "resolved: number of zones of c / (2 prr_hz) that the head can resolve; it detects nothing beyond them."},
     {KEY(head.name), CFG_TEXT, .def = "", .example = "north-gate", .flags = CFG_ASCII,
      .help = "The user's name of the head, for protocols that can ask for it (cola: LocationName)."},
+    {KEY(head.settings_file), CFG_PATH, .def = "", .flags = CFG_WRITTEN, .example = "settings.txt",
+     .help = "File for settings that clients store, so that they survive a power cycle and a new start: HEAD:STORe, "
+             "and the store commands of other protocols. They are then the settings of power-up, in place of those "
+             "here. Without it nothing is stored. `scanhead run` alone reads and writes it."},
     {KEY(head.start), CFG_BOOL, .def = "off",
      .help = "on: `scanhead run` scans at once when the head has booted, as with --start."},
 
@@ -255,6 +259,34 @@ static const struct cfg_key config_keys[] = {
      .help = "The head's clock runs fast by this, from power-up."},
     {KEY(time.jump_s), CFG_REAL, "s", "0", -1e6, 1e6, .help = "The head's clock jumps ahead by this, once."},
     {KEY(time.jump_at_s), CFG_REAL, "s", "0", 0, 1e8, .help = "Time of the jump, after power-up."},
+    {"time.ptp", .type = CFG_MAP,
+     .help = "A PTP follower that disciplines the head's clock. No PTP messages are on any network: master and path "
+             "are staged. It needs time.epoch."},
+    {KEY(time.ptp.follower), CFG_BOOL, .def = "off", .help = "The head's clock follows a PTP master, which has the "
+                                                            "true time."},
+    {KEY(time.ptp.grandmaster), CFG_COUNT, NULL, "0x00b0aefffe000001", 1, 18446744073709551615.0, .flags = CFG_HEX,
+     .allowed = "0x1 to 0xffffffffffffffff", .help = "The grandmaster's identity, an EUI-64."},
+    {KEY(time.ptp.clock_class), CFG_COUNT, NULL, "6", 0, 255,
+     .help = "The grandmaster's clock class by IEEE 1588: 6 follows a primary reference, 7 is in holdover, 248 is the "
+             "default."},
+    {KEY(time.ptp.clock_accuracy), CFG_COUNT, NULL, "0x21", 0, 255, .flags = CFG_HEX, .allowed = "0x00 to 0xff",
+     .help = "The grandmaster's clock accuracy by IEEE 1588: 0x21 is within 100 ns, 0xfe is unknown."},
+    {KEY(time.ptp.utc_valid), CFG_BOOL, .def = "on", .help = "The master says that its offset to UTC is valid."},
+    {KEY(time.ptp.announce_ms), CFG_COUNT, "ms", "2000", 100, 64000,
+     .help = "Time between Announce messages. The second one selects a master; without one for 3 of these times it is "
+             "lost."},
+    {KEY(time.ptp.sync_ms), CFG_COUNT, "ms", "1000", 250, 64000,
+     .help = "Time between Sync messages. At each the follower measures its offset and corrects its rate."},
+    {KEY(time.ptp.path_delay_ns), CFG_COUNT, "ns", "0", 0, 1e9, .help = "Mean delay of the two ways, as reported."},
+    {KEY(time.ptp.asymmetry_ns), CFG_REAL, "ns", "0", -1e9, 1e9,
+     .help = "The way from the master is longer than the mean by this much; the head's clock ends up that late."},
+    {KEY(time.ptp.jitter_ns), CFG_COUNT, "ns", "0", 0, 1e9,
+     .help = "Largest random deviation of a measurement to either side (noise.seed)."},
+    {KEY(time.ptp.first_step_threshold_ns), CFG_COUNT, "ns", "20000", 0, 1e15,
+     .help = "Before its first lock the servo steps the clock where the offset is larger; 0: it never does."},
+    {KEY(time.ptp.step_threshold_ns), CFG_COUNT, "ns", "0", 0, 1e15,
+     .help = "Later, where the offset is larger, the servo unlocks and steps the clock; 0: it slews."},
+    {KEY(time.ptp.max_ppm), CFG_REAL, "ppm", "500", 1, 100000, .help = "The most that the servo changes the rate."},
 
     {"gnss", .type = CFG_MAP, .help = "The GNSS receiver, which sends on links of protocol nmea; it needs the time."},
     {KEY(gnss.rate_hz), CFG_COUNT, "Hz", "1", 1, 20, .allowed = "1, 2, 4, 5, 10 or 20 Hz",

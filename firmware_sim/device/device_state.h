@@ -16,6 +16,7 @@
 #include "firmware_sim/device/overrun.h"
 #include "firmware_sim/device/pps.h"
 #include "firmware_sim/device/receiver_line.h"
+#include "firmware_sim/device/ptp.h"
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
@@ -71,11 +72,13 @@ struct device {
     const struct site *site; /* as of now */
     struct device_moves moves;
     struct device_options options;
+    struct settings_file *settings; /* NULL: none, or what it had is just being restored */
     struct device_counters counters;
     struct command_device cmd;
     struct head_clock clock;
     struct gnss gnss;
     struct pps pps;
+    struct ptp ptp;
     struct device_late_pulse {
         int waits; /* a pulse of the head's clock, or of the receiver, comes later than its second */
         int64_t t_ns, tai_s;
@@ -134,6 +137,14 @@ void device_describe(struct device *device, struct device_work *work);
  * that has to be planned and finished before the others. */
 int device_run_replay(struct device *device, uint64_t tick);
 
+void device_carry_out_line(struct device *device, const char *line);
+
+/* stored.c */
+/* HEAD:STORe: the settings are now those of power-up. */
+void device_keep_settings(struct device *device);
+/* Before the first power-up: carries out what the file has, as commands of the device itself, which the journal gets. */
+int device_restore(struct device *device, struct sh_err *err);
+
 /* moves.c */
 /* A move was commanded. The thread that commanded it, or one of its own, has to plan it (device_plan_move). */
 void device_begin_move(struct device *device, uint32_t session, const char *line, int64_t t_ns,
@@ -176,7 +187,11 @@ void device_say_pps(struct device *device, uint64_t tick);
 /* Takes the receiver's pulses and sentences of the tick. */
 void device_follow_receiver(struct device *device, uint64_t tick);
 void device_say_time(struct device *device, uint64_t tick);
-/* Sets the answers to TIME:UTC? and TIME:GPS? at cmd.t_ns. */
+/* Lets the PTP follower, if there is one, take part in a tick. */
+void device_follow_ptp(struct device *device, uint64_t tick);
+/* Fills in what telemetry of a device time says of the time of day. */
+void device_tell_time(const struct device *device, int64_t t_ns, struct native_telemetry *t);
+/* Sets the answers to TIME:UTC?, TIME:GPS? and TIME:PTP? at cmd.t_ns. */
 void device_set_time_texts(struct device *device);
 
 #endif

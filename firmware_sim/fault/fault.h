@@ -56,13 +56,20 @@ enum fault_kind {
     FAULT_CLOCK_DRIFT,   /* gains ppm */
     FAULT_CLOCK_STOP,
     FAULT_PPS_LOST,
-    FAULT_PPS_JITTER,    /* the first pulse and every second one after it are late by for_ms */
-    FAULT_NMEA_LOST,     /* the receiver sends no sentence */
-    FAULT_NMEA_LATE,     /* by for_ms */
-    FAULT_NMEA_VOID,     /* it has no fix */
-    FAULT_NMEA_CHECKSUM, /* its sentences have wrong checksums */
-    FAULT_LEAP_SECOND,   /* at the end of the minute at hand; no table has it */
-    FAULT_COUNTERS_HIGH, /* counters begin n below their wrap at power-up */
+    FAULT_PPS_JITTER,      /* the first pulse and every second one after it are late by for_ms */
+    FAULT_NMEA_LOST,       /* the receiver sends no sentence */
+    FAULT_NMEA_LATE,       /* by for_ms */
+    FAULT_NMEA_VOID,       /* it has no fix */
+    FAULT_NMEA_CHECKSUM,   /* its sentences have wrong checksums */
+    FAULT_PTP_LOST,        /* nothing comes from the master; the clock gains ppm meanwhile */
+    FAULT_PTP_NO_SYNC,     /* the same, but its Announce messages come */
+    FAULT_PTP_FAULTY,      /* the port is faulty; the clock gains ppm meanwhile */
+    FAULT_PTP_GRANDMASTER, /* another one is better; its time is ahead by ns */
+    FAULT_PTP_STEP,        /* the master's time is ahead by ns */
+    FAULT_PTP_ASYMMETRY,   /* the way from the master is longer than the mean by ns */
+    FAULT_PTP_JITTER,      /* of each measurement, up to ns to either side */
+    FAULT_LEAP_SECOND,     /* at the end of the minute at hand; no table has it */
+    FAULT_COUNTERS_HIGH,   /* counters begin n below their wrap at power-up */
     FAULT_N_KINDS
 };
 
@@ -95,7 +102,9 @@ struct fault {
     int64_t byte; /* from 0; -1: any */
     int reseal;
     double for_ms;
-    double factor, deg, hz, loss_db, jump_s, ppm;
+    double factor, deg, hz, loss_db, jump_s, ppm, ns;
+    uint64_t grandmaster; /* its identity */
+    uint32_t clock_class;
 };
 
 struct fault_list {

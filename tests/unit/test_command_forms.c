@@ -50,6 +50,7 @@ static const struct {
     {"HEAD:PAN", "HEAD:PAN", 1, 1, " 9"},
     {"HEAD:STATE", "HEAD:STAT", 1, 0, ""},
     {"HEAD:REBOOT", "HEAD:REB", 0, 1, ""},
+    {"HEAD:STORE", "HEAD:STOR", 0, 1, ""},
     {"HEAD:STATION", "HEAD:STATION", 1, 1, " 2"},
     {"HEAD:RANGE:MIN", "HEAD:RANG:MIN", 1, 1, " 2"},
     {"HEAD:RANGE:MAX", "HEAD:RANG:MAX", 1, 1, " 20"},
@@ -78,6 +79,7 @@ static const struct {
     {"TIME", "TIME", 1, 0, ""},
     {"TIME:UTC", "TIME:UTC", 1, 0, ""},
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
+    {"TIME:PTP", "TIME:PTP", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
     {"FAULT:ADD", "FAUL:ADD", 0, 1, " {kind: drop}"},
     {"FAULT:CLEAR", "FAUL:CLE", 0, 1, " ALL"},
@@ -88,7 +90,7 @@ static const struct {
 static struct command_device device_for(const char *header)
 {
     struct command_device dev = command_test_device();
-    dev.step_allowed = 1;
+    dev.step_allowed = dev.keeps = 1;
     if (strcmp(header, "SCAN:STOP") == 0) dev.state = HEAD_SCANNING;
     return dev;
 }

@@ -116,7 +116,7 @@ static int refused(const struct command_row *row, enum head_state state, uint32_
     char line[256];
     dev.state = state;
     dev.control = control;
-    dev.step_allowed = 1;
+    dev.step_allowed = dev.keeps = 1;
     dev.settings.station = 2; /* so that DEF changes each setting */
     dev.settings.noise = dev.settings.angle_noise = 1;
     dev.settings.range_min_nm = dev.settings.sigma_nm = dev.settings.ball_nm = NANO + 1;
