@@ -77,6 +77,11 @@ static uint32_t near_wrap(void *self)
     return device_near_wrap(self);
 }
 
+static double window_loss_db(void *self)
+{
+    return device_window_loss_db(self);
+}
+
 static int64_t tick_ns(const void *self)
 {
     return device_tick_ns(self);
@@ -128,6 +133,7 @@ const struct loop_source_ops loop_device_source = {
     .power_ons = power_ons,
     .pps = pps,
     .near_wrap = near_wrap,
+    .window_loss_db = window_loss_db,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,

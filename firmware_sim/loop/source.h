@@ -32,6 +32,7 @@ struct loop_source_ops {
     uint32_t (*power_ons)(void *self);
     enum protocol_pps (*pps)(void *self, int64_t t_ns, int *set);
     uint32_t (*near_wrap)(void *self);
+    double (*window_loss_db)(void *self);
 
     /* ---- the run */
     int64_t (*tick_ns)(const void *self);
