@@ -125,6 +125,32 @@ int cola_shape_cut(const struct cola_shape *s, double turns, int32_t *near_um, i
     return 1;
 }
 
+static uint32_t sector_outline(const struct cola_shape *s, double out_m[][2])
+{
+    enum { STEPS = COLA_SHAPE_CORNERS / 2 };
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < 2 * STEPS; i++) { /* out along the outer arc, and back along the inner one */
+        const uint32_t k = i < STEPS ? i : 2 * STEPS - 1 - i;
+        const double angle = TAU * (s->sector.start_e4 + (double)s->sector.span_e4 * k / (STEPS - 1)) / COLA_TURN_E4;
+        const double radius_m = 1e-6 * (i < STEPS ? s->sector.outer_um : s->sector.inner_um);
+        out_m[n][0] = radius_m * cos(angle);
+        out_m[n++][1] = radius_m * sin(angle);
+        if (i >= STEPS && s->sector.inner_um == 0) break; /* the head itself */
+    }
+    return n;
+}
+
+uint32_t cola_shape_outline(const struct cola_shape *shape, double out_m[COLA_SHAPE_CORNERS][2])
+{
+    if (shape->kind == COLA_SHAPE_SECTOR) return sector_outline(shape, out_m);
+    if (shape->kind != COLA_SHAPE_POLYGON) return 0;
+    for (uint32_t i = 0; i < shape->n; i++) {
+        out_m[i][0] = 1e-6 * shape->corner[i].x_um;
+        out_m[i][1] = 1e-6 * shape->corner[i].y_um;
+    }
+    return shape->n;
+}
+
 /* ---- making */
 
 int cola_shape_add(struct cola_shape *shape, double x_um, double y_um)
