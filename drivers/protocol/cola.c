@@ -40,7 +40,9 @@ static int cola_create(const struct protocol_spec *spec, void **protocol, struct
 
 static void open_at(void *protocol, int64_t t_ns)
 {
-    ((struct cola *)protocol)->now_ns = t_ns;
+    struct cola *self = protocol;
+    self->now_ns = t_ns;
+    cola_ports_time(self);
 }
 
 static void send_scan(struct cola *self, const char *head, enum cola_form form)
@@ -100,7 +102,7 @@ static void pass_time(void *protocol, int64_t t_ns)
     if (t_ns > self->now_ns) self->now_ns = t_ns;
     cola_deliver(self);
     cola_geometry_time(self);
-    if (self->host.inputs != NULL) cola_ports_time(self);
+    if (t_ns >= self->ports.next_ns) cola_ports_time(self);
     if (!self->wants_scan || t_ns < self->try_ns) return;
     self->try_ns = t_ns + TRY_NS;
     cola_start_scan(self);
@@ -138,7 +140,8 @@ static int owes(const void *protocol)
 static int64_t next_time(const void *protocol)
 {
     const struct cola *self = protocol;
-    return self->pending || self->next.is_due ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
+    const int64_t next_ns = self->wants_scan && self->try_ns < self->ports.next_ns ? self->try_ns : self->ports.next_ns;
+    return self->pending || self->next.is_due ? self->now_ns : next_ns;
 }
 
 static void take_input(void *protocol, const uint8_t *bytes, size_t len)

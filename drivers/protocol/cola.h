@@ -60,6 +60,7 @@ struct cola {
         uint16_t set;        /* ActiveFieldSet, from 1 */
         uint32_t seen;       /* inputs when they were last looked at, a bit each */
         uint32_t changed_us; /* when they changed, as the scanner counts time */
+        int64_t next_ns;     /* device time of their next change; INT64_MAX: none */
     } ports;
     struct cola_fields fields;
     struct cola_watch watch;

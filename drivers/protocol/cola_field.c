@@ -11,6 +11,19 @@
 
 enum { MM_UM = 1000, MOST_COUNT = 65534 };
 
+uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t *next_ns)
+{
+    uint32_t active = 0;
+    *next_ns = INT64_MAX;
+    for (uint32_t i = 0; i < fields->n_windows; i++) {
+        const struct cola_input_window *w = &fields->window[i];
+        const int64_t edge_ns = t_ns < w->from_ns ? w->from_ns : t_ns < w->until_ns ? w->until_ns : INT64_MAX;
+        if (w->from_ns <= t_ns && t_ns < w->until_ns) active |= 1U << w->input;
+        if (edge_ns < *next_ns) *next_ns = edge_ns;
+    }
+    return active;
+}
+
 /* ---- telegrams */
 
 /* u16 flag of a part: 0 or 1. After the first error every value is 0. */

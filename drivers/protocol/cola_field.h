@@ -13,7 +13,7 @@
 #include "drivers/protocol/cola_telegram.h"
 #include "drivers/protocol/planar_scan.h"
 
-enum { COLA_FIELDS = 48, COLA_FIELD_NAME = 32, COLA_FROM_HEAD = 0xffff };
+enum { COLA_FIELDS = 48, COLA_FIELD_NAME = 32, COLA_FROM_HEAD = 0xffff, COLA_INPUTS = 4, COLA_WINDOWS = 64 };
 
 /* The types as records number them. */
 enum cola_field_type { COLA_FIELD_RADIAL, COLA_FIELD_RECTANGLE, COLA_FIELD_SEGMENTED, COLA_FIELD_DYNAMIC };
@@ -47,10 +47,21 @@ struct cola_field {
     struct cola_record record; /* of a field that was written */
 };
 
-/* By number, from 0. */
+/* A digital input is active from one device time until another. */
+struct cola_input_window {
+    uint32_t input; /* from 0 */
+    int64_t from_ns, until_ns;
+};
+
+/* Fields by number, from 0; and what the inputs do. */
 struct cola_fields {
     struct cola_field field[COLA_FIELDS];
+    struct cola_input_window window[COLA_WINDOWS];
+    uint32_t n_windows;
 };
+
+/* The inputs that are active at a device time, a bit each. *next_ns: when they may change next; INT64_MAX: never. */
+uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t *next_ns);
 
 /* The record of a field with a shape, on the grid of the head's beams. In some models the corner of a rectangle is counted
  * from the first beam, in others from 0. */

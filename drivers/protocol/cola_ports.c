@@ -5,7 +5,7 @@
 
 #include "drivers/protocol/cola.h"
 
-enum { N_INPUTS = 4, N_OUTPUTS_OF_LMS = 3, NOT_USED = 2, FIELDS_OF_SET = 3, SETS = 16 };
+enum { N_OUTPUTS_OF_LMS = 3, NOT_USED = 2, FIELDS_OF_SET = 3, SETS = 16 };
 
 static int cola_ports_is_lms(const struct cola *self)
 {
@@ -216,11 +216,11 @@ enum cola_error cola_write_set(struct cola *self, struct cola_args *args, struct
 /* u16 version, u32 time of the last change, 4 x u8 input, u16 no time of day */
 static void put_inputs(const struct cola *self, struct cola_out *out)
 {
-    const int lms = cola_ports_is_lms(self), has_inputs = self->host.inputs != NULL;
+    const int lms = cola_ports_is_lms(self), is_used = self->fields.n_windows != 0;
     cola_put_u(out, 2, (uint32_t)lms);
     cola_put_u(out, 4, self->ports.changed_us);
-    for (int i = 0; i < N_INPUTS; i++)
-        cola_put_u(out, 1, lms && !has_inputs ? (uint32_t)NOT_USED : self->ports.seen >> i & 1U);
+    for (int i = 0; i < COLA_INPUTS; i++)
+        cola_put_u(out, 1, lms && !is_used ? (uint32_t)NOT_USED : self->ports.seen >> i & 1U);
     cola_put_u(out, 2, 0);
 }
 
@@ -278,7 +278,7 @@ void cola_ports_report(struct cola *self, unsigned news)
 /* Inputs choose the set of fields, unless telegrams do. The first input is the lowest bit. */
 void cola_ports_time(struct cola *self)
 {
-    const uint32_t now = self->host.inputs(self->host.ctx) & ((1U << N_INPUTS) - 1U);
+    const uint32_t now = cola_inputs_at(&self->fields, self->now_ns, &self->ports.next_ns);
     if (now == self->ports.seen) return;
     self->ports.seen = now;
     self->ports.changed_us = cola_time_us(self, self->now_ns);

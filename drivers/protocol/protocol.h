@@ -84,8 +84,6 @@ struct protocol_host {
     /* State of the pulses per second at a device time. *set: by then the time of day was set; else the head counts from
      * power-up. May be NULL: locked where UTC is known. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int *set);
-    /* The digital inputs that are active, a bit each. May be NULL: the head has none. */
-    uint32_t (*inputs)(void *ctx);
     /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
     double (*window_loss_db)(void *ctx);
 };
@@ -106,7 +104,7 @@ struct protocol_identity {
         uint32_t steps;
     } geometry[PROTOCOL_MAX_GEOMETRIES];
     uint32_t n_geometries;
-    const struct cola_fields *fields; /* monitored fields of the configuration; NULL: none */
+    const struct cola_fields *fields; /* monitored fields and inputs of the configuration; NULL: none */
 };
 
 struct protocol_spec {

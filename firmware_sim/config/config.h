@@ -172,6 +172,8 @@ struct config {
     uint32_t n_links;
     struct config_field field[CONFIG_MAX_FIELDS];
     uint32_t n_fields;
+    struct config_input input[CONFIG_MAX_INPUTS];
+    uint32_t n_inputs;
     struct config_beam beam;
     struct config_cast cast;
     struct config_coverage coverage;

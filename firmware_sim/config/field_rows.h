@@ -36,4 +36,11 @@
     {FIELD(output), CFG_COUNT, NULL, "0", 0, 3,
      .help = "LMS1xx: the digital output that is active while the field is infringed; 0: none. Several fields may "
              "share one. TiM7xx: the first field of a set has output 1, and so on."},
+    {"inputs", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_INPUTS, LIST_OF(input, n_inputs),
+     .help = "Digital inputs of a SICK scanner, for links that speak cola: when they are active. In a TiM7xx they choose "
+             "the set of fields: the first input counts 1, the second 2, and so on."},
+    {"inputs[]", .type = CFG_MAP, .help = "A time in which an input is active. An input may have several."},
+    {INPUT(input), CFG_COUNT, NULL, NULL, 1, 4, .example = "1", .help = "Number of the input."},
+    {INPUT(from_s), CFG_REAL, "s", "0", 0, 1e8, .help = "It begins at this device time, as of faults."},
+    {INPUT(until_s), CFG_REAL, "s", "1e8", 0, 1e8, .help = "It ends at this device time."},
     /* clang-format on */

@@ -11,6 +11,7 @@
 #include "firmware_sim/config/table/given.h"
 
 _Static_assert((int)CONFIG_MAX_FIELDS == (int)COLA_FIELDS, "fields by number");
+_Static_assert((int)CONFIG_MAX_INPUTS == (int)COLA_WINDOWS, "inputs");
 _Static_assert((int)CONFIG_MAX_POINTS <= (int)COLA_SHAPE_CORNERS, "corners");
 
 /* The keys of each shape. */
@@ -90,6 +91,10 @@ static void check_number(struct cfg_reader *rd, const struct config *cfg, uint32
 
 void cfg_check_fields(struct cfg_reader *rd, const struct config *cfg)
 {
+    for (uint32_t i = 0; i < cfg->n_inputs; i++)
+        if (cfg->input[i].until_s <= cfg->input[i].from_s && CFG_SOUND(rd, i, "inputs[]"))
+            cfg_fail_key(rd, "inputs[].until_s", i, "%.10g s, but it begins at %.10g s; allowed a later time",
+                         cfg->input[i].until_s, cfg->input[i].from_s);
     if (cfg->n_fields == 0 || !cfg_has_profile(rd)) return;
     const struct cola_model *model = cola_model_find(cfg->profile.model);
     if (model->n_records == 0)
@@ -118,6 +123,11 @@ static void make_sector(const struct config_field *f, struct cola_shape *shape)
 void config_fill_fields(const struct config *cfg, struct cola_fields *out)
 {
     memset(out, 0, sizeof *out);
+    for (; out->n_windows < cfg->n_inputs; out->n_windows++) {
+        const struct config_input *in = &cfg->input[out->n_windows];
+        out->window[out->n_windows] =
+            (struct cola_input_window){in->input - 1, llround(in->from_s * 1e9), llround(in->until_s * 1e9)};
+    }
     for (uint32_t i = 0; i < cfg->n_fields; i++) {
         const struct config_field *f = &cfg->field[i];
         struct cola_field *field = &out->field[f->number - 1];

@@ -31,9 +31,16 @@ struct config_field {
     double blanking_m;
 };
 
+/* A digital input is active from one device time to another. */
+enum { CONFIG_MAX_INPUTS = 64 };
+struct config_input {
+    uint32_t input; /* from 1 */
+    double from_s, until_s;
+};
+
 /* The checks between their keys. */
 void cfg_check_fields(struct cfg_reader *rd, const struct config *cfg);
-/* Fields by number. The configuration is checked. */
+/* Fields by number, and inputs. The configuration is checked. */
 void config_fill_fields(const struct config *cfg, struct cola_fields *out);
 
 #endif

@@ -21,6 +21,7 @@
 #define TRIPOD(member)     "stations[].tripod." #member, IN_STATION(tripod.member)
 #define LINK(member)       "links[]." #member, CFG_MEMBER(struct link_spec, member)
 #define FIELD(member)      "fields[]." #member, CFG_MEMBER(struct config_field, member)
+#define INPUT(member)      "inputs[]." #member, CFG_MEMBER(struct config_input, member)
 #define RULE(member)       "surfaces[]." #member, CFG_MEMBER(struct surface_rule, member)
 #define SURFACE(member)    "surfaces[]." #member, CFG_MEMBER(struct surface_rule, surface.member)
 #define LIST_OF(array, count)                                                                 \

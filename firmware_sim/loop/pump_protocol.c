@@ -127,7 +127,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
-                 host_pps, NULL, host_window_loss_db},
+                 host_pps, host_window_loss_db},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),

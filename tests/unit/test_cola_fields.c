@@ -270,14 +270,7 @@ static void telegrams_choose_the_set(void **state)
     expect_results("200");
 }
 
-static uint32_t inputs;
-static uint32_t read_inputs(void *ctx)
-{
-    (void)ctx;
-    return inputs;
-}
-
-/* Opens the session anew, with inputs, the window's loss and the configuration's fields. */
+/* Opens the session anew, with the window's loss and the configuration's fields. */
 static double loss_db;
 static double read_loss(void *ctx)
 {
@@ -290,24 +283,32 @@ static void open_again(const struct cola_fields *fields)
     struct sh_err err;
     cola.ops->destroy(cola.protocol);
     cola.identity.fields = fields;
-    cola.spec.host.inputs = read_inputs;
     cola.spec.host.window_loss_db = read_loss;
-    inputs = 0;
     loss_db = 0.0;
     assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, &err), 0);
     cola.ops->open(cola.protocol, 0);
     protocol_rig_describe(&cola, 0);
 }
 
-/* sick_scan_xd: the set is one more than the inputs as a number, the first input being the lowest bit. */
+static struct cola_fields fields;
+
+/* sick_scan_xd: the set is one more than the inputs as a number, the first input being the lowest bit. Inputs 1 and 3
+ * are active from 1 ms to 3 ms. */
 static void inputs_choose_the_set(void **state)
 {
     (void)state;
+    memset(&fields, 0, sizeof fields);
+    fields.n_windows = 2;
+    fields.window[0] = (struct cola_input_window){0, 1000000, 3000000};
+    fields.window[1] = (struct cola_input_window){2, 1000000, 3000000};
     cola_open_tim("TiM781");
-    open_again(NULL);
+    open_again(&fields);
+    EXPECT_B("sRN ActiveFieldSet", "sRA ActiveFieldSet \0\1");
     EXPECT_B("sEN LIDinputstate \1", "sEA LIDinputstate \1");
     protocol_rig_clear(&cola);
-    inputs = 5;
+    assert_int_equal(cola.ops->next_ns(cola.protocol), 1000000);
+    cola.ops->time(cola.protocol, 999999);
+    assert_int_equal(cola.n_units, 0);
     cola.ops->time(cola.protocol, 1000000);
     uint8_t frame[64];
     cola_frame_b(frame, "sSN LIDinputstate \0\0\0\0\3\xe8\1\0\1\0\0\0", 18 + 12);
@@ -317,11 +318,12 @@ static void inputs_choose_the_set(void **state)
     assert_int_equal(cola.n_units, 1);
     EXPECT_B("sRN ActiveFieldSet", "sRA ActiveFieldSet \0\6");
     EXPECT_B("sRN LIDinputstate", "sRA LIDinputstate \0\0\0\0\3\xe8\1\0\1\0\0\0");
+    cola.ops->time(cola.protocol, 3000000);
+    EXPECT_B("sRN ActiveFieldSet", "sRA ActiveFieldSet \0\1");
+    assert_true(cola.ops->next_ns(cola.protocol) == INT64_MAX);
 }
 
 /* ---- the configuration's fields */
-
-static struct cola_fields fields;
 
 /* The window's loss, and levels 0 to 3 of LMS manuals. */
 static void a_soiled_window_shows(void **state)

@@ -50,6 +50,8 @@ static void fields_that_say_nothing_are_refused(void **state)
         {"sick-tim781", "{number: 1, shape: rectangle, corner_m: [900, 0], size_m: [100, 1]}", NULL},
         {"sick-tim781", "{" SEGMENT ", output: 1}", "fields[0].output: given, but a TiM781 has an output for each"},
         {"sick-lms111", "{" SEGMENT ", output: 3}", NULL},
+        {"sick-lms111", "{" SEGMENT "}]\ninputs: [{input: 5}", "inputs[0].input: \"5\" is out of range"},
+        {"sick-lms111", "{" SEGMENT "}]\ninputs: [{input: 1, from_s: 2, until_s: 2}", "but it begins at 2 s"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char with[300];
