@@ -75,7 +75,8 @@ static void fields_and_the_window(void **state)
         .profile = "sick-tim781",
         .prr_hz = 16200,
         .lines_hz = 15,
-        .links = "links: [{type: tcp, port: 0, protocol: cola}, {type: pty, path: native}]\n",
+        .links = "loop: {queue_ms: 2000}\n"
+                 "links: [{type: tcp, port: 0, protocol: cola}, {type: pty, path: native}]\n",
         .more = "signal: {model: on}\n"
                 "fields:\n"
                 "  - {number: 1, name: walls, shape: segment, angles_deg: [-45, 225], radii_m: [0, 20]}\n"
@@ -92,6 +93,12 @@ static void fields_and_the_window(void **state)
     read_results(wait_for(&c, "sSN LFErec 3 "), results);
     assert_string_equal(results, "210");
     assert_non_null(strstr(wait_for(&c, "sSN LIDoutputstate 0 "), " 1 1 0 0 0 0 0 0 0 0 0"));
+    static struct client late; /* the first answer has what was seen before it came */
+    late.fd = raw_connect(head_endpoint(&head, "tcp"));
+    send_request(&late, "sRN LFErec");
+    read_results(wait_for(&late, "sRA LFErec 3 "), results);
+    assert_string_equal(results, "210");
+    close(late.fd);
     poll_until(&c, "sRN LCMstate", "sRA LCMstate 0");
     const long soiled = strtol(client_ask(native, "FAULt:ADD {kind: window_soiled, loss_db: 3}"), NULL, 10);
     poll_until(&c, "sRN LCMstate", "sRA LCMstate 2");
