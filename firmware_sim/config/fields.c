@@ -120,6 +120,19 @@ static void make_sector(const struct config_field *f, struct cola_shape *shape)
     shape->sector.outer_um = (int32_t)lround(f->radii_m[1] * 1e6);
 }
 
+void config_make_field(const struct config_field *from, struct cola_field *out)
+{
+    memset(out, 0, sizeof *out);
+    memcpy(out->name, from->name, sizeof out->name);
+    out->response_ms = from->response_ms;
+    out->blanking_um = (uint32_t)lround(from->blanking_m * 1e6);
+    out->output = (uint8_t)from->output;
+    if (from->shape == FIELD_SEGMENT) make_sector(from, &out->shape);
+    if (from->shape == FIELD_RECTANGLE) (void)make_rectangle(from, out); /* it was checked */
+    for (uint32_t k = 0; k < from->points_m.n; k++)
+        cola_shape_add(&out->shape, from->points_m.at[k][0] * 1e6, from->points_m.at[k][1] * 1e6);
+}
+
 void config_fill_fields(const struct config *cfg, struct cola_fields *out)
 {
     memset(out, 0, sizeof *out);
@@ -128,16 +141,6 @@ void config_fill_fields(const struct config *cfg, struct cola_fields *out)
         out->window[out->n_windows] =
             (struct cola_input_window){in->input - 1, llround(in->from_s * 1e9), llround(in->until_s * 1e9)};
     }
-    for (uint32_t i = 0; i < cfg->n_fields; i++) {
-        const struct config_field *f = &cfg->field[i];
-        struct cola_field *field = &out->field[f->number - 1];
-        memcpy(field->name, f->name, sizeof field->name);
-        field->response_ms = f->response_ms;
-        field->blanking_um = (uint32_t)lround(f->blanking_m * 1e6);
-        field->output = (uint8_t)f->output;
-        if (f->shape == FIELD_SEGMENT) make_sector(f, &field->shape);
-        if (f->shape == FIELD_RECTANGLE) (void)make_rectangle(f, field); /* it was checked */
-        for (uint32_t k = 0; k < f->points_m.n; k++)
-            cola_shape_add(&field->shape, f->points_m.at[k][0] * 1e6, f->points_m.at[k][1] * 1e6);
-    }
+    for (uint32_t i = 0; i < cfg->n_fields; i++)
+        config_make_field(&cfg->field[i], &out->field[cfg->field[i].number - 1]);
 }

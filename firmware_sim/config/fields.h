@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 struct cfg_reader;
+struct cola_field;
 struct cola_fields;
 struct config;
 
@@ -40,6 +41,8 @@ struct config_input {
 
 /* The checks between their keys. */
 void cfg_check_fields(struct cfg_reader *rd, const struct config *cfg);
+/* One field with its shape. */
+void config_make_field(const struct config_field *from, struct cola_field *out);
 /* Fields by number, and inputs. The configuration is checked. */
 void config_fill_fields(const struct config *cfg, struct cola_fields *out);
 

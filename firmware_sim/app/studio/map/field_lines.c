@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/studio/map/field_lines.h"
 
-#include <stdlib.h>
-
 #include "core/mat3.h"
 #include "drivers/protocol/cola_field.h"
 #include "firmware_sim/config/config.h"
@@ -27,13 +25,11 @@ static int outline(const struct cola_shape *shape, const struct placement *at, f
 int field_lines_each(const struct config *cfg, const struct placement *at, field_line *take, void *ctx,
                      struct sh_err *err)
 {
-    if (cfg->n_fields == 0) return SH_OK;
-    struct cola_fields *fields = malloc(sizeof *fields);
+    struct cola_field field;
     int rc = SH_OK;
-    if (fields == NULL) return sh_fail(err, SH_ENOMEM, "map: no memory for fields");
-    config_fill_fields(cfg, fields);
-    for (uint32_t i = 0; i < COLA_FIELDS && rc == SH_OK; i++)
-        rc = outline(&fields->field[i].shape, at, take, ctx, err);
-    free(fields);
+    for (uint32_t i = 0; i < cfg->n_fields && rc == SH_OK; i++) {
+        config_make_field(&cfg->field[i], &field);
+        rc = outline(&field.shape, at, take, ctx, err);
+    }
     return rc;
 }
