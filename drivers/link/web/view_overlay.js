@@ -121,10 +121,16 @@ export class Overlay {
   // Draws a field as far as it is before the eye.
   #field(camera, stations, station, {outline_m}) {
     const ends = inScene(stations.placeOf(station), station, outline_m).map((at) => camera.project(at));
-    ends.forEach((to, i) => {
-      const from = ends[(i + ends.length - 1) % ends.length];
-      if (from.w > 0.05 && to.w > 0.05) this.#line([[from.x, from.y], [to.x, to.y]], 1.5, FIELD);
-    });
+    let run = [];
+    const show = () => {
+      if (run.length > 1) this.#line(run, 1.5, FIELD);
+      run = [];
+    };
+    for (const {x, y, w} of [...ends, ...ends.slice(0, 1)]) {
+      if (w > 0.05) run.push([x, y]);
+      else show();
+    }
+    show();
   }
 
   #stations(camera, stations) {
