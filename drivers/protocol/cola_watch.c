@@ -11,8 +11,12 @@
 void cola_watch_select(struct cola_watch *watch, const struct cola_fields *fields, const uint32_t *numbers,
                        const uint8_t *outputs, uint32_t n)
 {
+    for (uint32_t i = 0; i < watch->n; i++)
+        watch->other |= watch->slot[i].result != COLA_RESULT_INVALID;
+    for (uint32_t k = 0; k < COLA_WATCH_OUTPUTS; k++)
+        watch->other |= watch->output[k].active;
     watch->n = n;
-    watch->on = 0;
+    watch->on = watch->other;
     for (uint32_t i = 0; i < n; i++) {
         struct cola_slot *slot = &watch->slot[i];
         memset(slot, 0, sizeof *slot);
@@ -135,7 +139,8 @@ static unsigned switch_outputs(struct cola_watch *watch)
 unsigned cola_watch_scan(struct cola_watch *watch, const struct cola_fields *fields, const struct planar_head *head,
                          const struct planar_turn *turn, enum cola_echoes echoes)
 {
-    unsigned news = 0;
+    unsigned news = watch->other ? COLA_NEW_RESULT : 0;
+    watch->other = 0;
     begin(watch, fields, head);
     for (uint32_t beam = 0; beam < head->n; beam++) {
         struct cola_measured seen[PLANAR_ECHOES];

@@ -25,7 +25,8 @@ enum { COLA_NEW_RESULT = 1, COLA_NEW_OUTPUT = 2 };
 /* All 0: nothing is watched. */
 struct cola_watch {
     uint32_t n;              /* slots */
-    int on;                  /* a slot's field has a shape */
+    int on;                  /* a slot's field has a shape, or `other` */
+    int other;               /* results or active outputs of before are not valid any more: the next scan is news */
     uint32_t steps, n_beams; /* of the turns so far */
     struct cola_slot {
         uint32_t field;
@@ -44,7 +45,7 @@ struct cola_watch {
 };
 
 /* Forgets what was seen, and watches these fields; n at most COLA_WATCH_SLOTS. outputs: that of each field, from 1; 0:
- * none. Outputs keep their state until the next scan. */
+ * none. Outputs keep their state until the next scan, whose results are news where there were some before. */
 void cola_watch_select(struct cola_watch *watch, const struct cola_fields *fields, const uint32_t *numbers,
                        const uint8_t *outputs, uint32_t n);
 /* One scan. Returns the news. */

@@ -290,6 +290,27 @@ static void open_again(const struct cola_fields *fields)
     protocol_rig_describe(&cola, 0);
 }
 
+/* Fields that are no longer watched are invalid, and their output is off; the next scan says so once. */
+static void another_set_is_news(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    cola_expect("sWN FieldSetSelectionMethod 1", "sWA FieldSetSelectionMethod");
+    EXPECT_B("sEN LFErec \1", "sEA LFErec \1");
+    EXPECT_B("sEN LIDoutputstate \1", "sEA LIDoutputstate \1");
+    put_object(350, 5, 1.0);
+    turn();
+    EXPECT_B("sWN ActiveFieldSet \0\2", "sWA ActiveFieldSet ");
+    protocol_rig_clear(&cola);
+    turn();
+    turn();
+    assert_int_equal(cola.n_units, 2);
+    assert_int_equal(result_of(cola.bytes + 8, 0), 0);
+    assert_memory_equal(cola.bytes + cola.end[0] + 8, "sSN LIDoutputstate ", 19);
+    assert_memory_equal(cola.bytes + cola.end[0] + 8 + 25, "\0\0\0\0\1", 5); /* off; it was active once */
+}
+
 static struct cola_fields fields;
 
 /* sick_scan_xd: the set is one more than the inputs as a number, the first input being the lowest bit. Inputs 1 and 3
@@ -496,6 +517,7 @@ int main(void)
         CASE(a_result_has_the_time_of_its_change),
         CASE(scans_carry_the_outputs),
         CASE(telegrams_choose_the_set),
+        CASE(another_set_is_news),
         CASE(inputs_choose_the_set),
         CASE(a_soiled_window_shows),
         CASE(an_object_must_stay),
