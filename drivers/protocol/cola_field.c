@@ -185,7 +185,7 @@ static void add_point(struct cola_record *r, uint32_t beam, int32_t near_um, int
         if (stop > r->point[i - 1].stop) r->point[i - 1].stop = stop;
         return;
     }
-    if (r->n == COLA_SHAPE_LINKS) return; /* a polygon of 128 corners has no more than 64 to be seen by most clients */
+    if (r->n == COLA_SHAPE_LINKS) return; /* only for shapes with more corners than the configuration allows */
     memmove(&r->point[i + 1], &r->point[i], (r->n - i) * sizeof r->point[0]);
     r->point[i].angle = (uint16_t)beam;
     r->point[i].start = start;

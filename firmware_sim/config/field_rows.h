@@ -14,7 +14,7 @@
      .help = "polygon: points_m; segment: angles_deg, radii_m; rectangle: corner_m, size_m, turn_deg."},
     {FIELD(points_m), CFG_POINTS, "m", "", -1000, 1000, .example = "[[-1, 0.5], [1, 0.5], [1, 3], [-1, 3]]",
      .flags = CFG_NEEDED,
-     .help = "polygon: its corners, 3 to 64, as x (right) and y (forward) from the head. It may be concave, and may have "
+     .help = "polygon: its corners, 3 to 62, as x (right) and y (forward) from the head. It may be concave, and may have "
              "the head inside."},
     {FIELD(angles_deg), CFG_PAIR, "deg", "", -360, 720, .example = "[45, 135]",
      .help = "segment: from the first angle counter-clockwise to the second, at most a turn; 0 right, 90 forward. 350 "

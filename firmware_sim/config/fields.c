@@ -12,7 +12,8 @@
 
 _Static_assert((int)CONFIG_MAX_FIELDS == (int)COLA_FIELDS, "fields by number");
 _Static_assert((int)CONFIG_MAX_INPUTS == (int)COLA_WINDOWS, "inputs");
-_Static_assert((int)CONFIG_MAX_POINTS <= (int)COLA_SHAPE_CORNERS, "corners");
+/* The record of a polygon has the directions of its corners, and both ends of the head's view. */
+_Static_assert((int)CONFIG_MAX_POINTS + 2 <= (int)COLA_SHAPE_LINKS, "corners");
 
 /* The keys of each shape. */
 static const struct {

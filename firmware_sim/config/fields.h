@@ -12,7 +12,7 @@ struct cola_field;
 struct cola_fields;
 struct config;
 
-enum { CONFIG_MAX_FIELDS = 48, CONFIG_MAX_POINTS = 64 };
+enum { CONFIG_MAX_FIELDS = 48, CONFIG_MAX_POINTS = 62 };
 enum config_field_shape { FIELD_POLYGON, FIELD_SEGMENT, FIELD_RECTANGLE };
 
 /* The value of a key of CFG_POINTS. */
