@@ -31,7 +31,7 @@ enum {
     MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
     MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
     MAP_MAX_STATIONS = 4096,
-    MAP_MAX_EDGES = 100000, /* an SVG has a line for each */
+    MAP_MAX_EDGES = 100000, /* an SVG has a line for each; and as many lines of fields */
     MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
     MAP_NAME_LEN = 96,
 };
@@ -64,6 +64,9 @@ int map_add_station(struct map *map, const struct map_station *station, struct s
 /* Adds a line from a to b, prcs, such as an open edge of the scene: red, under the stations. Ends outside of the area
  * are moved to its border. Beyond MAP_MAX_EDGES it is left out and counted. SH_ENOMEM. */
 int map_add_edge(struct map *map, const double a[2], const double b[2], struct sh_err *err);
+
+/* The same for a line of a monitored field: blue. */
+int map_add_field(struct map *map, const double a[2], const double b[2], struct sh_err *err);
 
 struct map_counts {
     uint64_t drawn;   /* points that lie in the area */

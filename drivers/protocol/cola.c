@@ -9,6 +9,7 @@ enum { TRY_NS = 100000000, MOST_WAITING = 100 };
 void cola_power_up(struct cola *self)
 {
     cola_settings_reset(self);
+    cola_ports_reset(self);
     self->level = COLA_RUN;
     self->measures = 1;
     self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
@@ -39,7 +40,9 @@ static int cola_create(const struct protocol_spec *spec, void **protocol, struct
 
 static void open_at(void *protocol, int64_t t_ns)
 {
-    ((struct cola *)protocol)->now_ns = t_ns;
+    struct cola *self = protocol;
+    self->now_ns = t_ns;
+    cola_ports_time(self);
 }
 
 static void send_scan(struct cola *self, const char *head, enum cola_form form)
@@ -55,15 +58,22 @@ static void send_scan(struct cola *self, const char *head, enum cola_form form)
     if (self->host.send(self->host.ctx, self->unit, len) == 0) self->telegrams++;
 }
 
-void cola_deliver(struct cola *self)
+static void deliver_scan(struct cola *self)
 {
-    if (!self->pending) return;
-    self->pending = self->wants_scan = 0;
     for (; self->n_waiting != 0; self->n_waiting--)
         send_scan(self, "sRA LMDscandata", self->waiting_form);
     if (!self->streams || !self->measures || ++self->since_sent < self->set.every) return;
     self->since_sent = 0;
     send_scan(self, "sSN LMDscandata", self->stream_form);
+}
+
+void cola_deliver(struct cola *self)
+{
+    if (!self->pending) return;
+    self->pending = self->wants_scan = 0;
+    const unsigned news = self->watch.on ? cola_ports_scan(self) : 0;
+    deliver_scan(self);
+    if (news != 0) cola_ports_report(self, news);
 }
 
 static void take_frame(void *protocol, const uint8_t *frame, size_t len)
@@ -92,6 +102,7 @@ static void pass_time(void *protocol, int64_t t_ns)
     if (t_ns > self->now_ns) self->now_ns = t_ns;
     cola_deliver(self);
     cola_geometry_time(self);
+    if (t_ns >= self->ports.next_ns) cola_ports_time(self);
     if (!self->wants_scan || t_ns < self->try_ns) return;
     self->try_ns = t_ns + TRY_NS;
     cola_start_scan(self);
@@ -122,13 +133,15 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
 static int owes(const void *protocol)
 {
     const struct cola *self = protocol;
-    return self->streams || self->n_waiting != 0 || self->reboots || self->next.is_due || self->outputs_due;
+    return self->streams || self->n_waiting != 0 || self->reboots || self->next.is_due || self->outputs_due ||
+           self->ports.results || self->ports.outputs || self->ports.inputs;
 }
 
 static int64_t next_time(const void *protocol)
 {
     const struct cola *self = protocol;
-    return self->pending || self->next.is_due ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
+    const int64_t next_ns = self->wants_scan && self->try_ns < self->ports.next_ns ? self->try_ns : self->ports.next_ns;
+    return self->pending || self->next.is_due ? self->now_ns : next_ns;
 }
 
 static void take_input(void *protocol, const uint8_t *bytes, size_t len)

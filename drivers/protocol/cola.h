@@ -6,6 +6,7 @@
 #include "drivers/protocol/cola_model.h"
 #include "drivers/protocol/cola_telegram.h"
 #include "drivers/protocol/cola_units.h"
+#include "drivers/protocol/cola_watch.h"
 #include "drivers/protocol/cola_way.h"
 #include "drivers/protocol/protocol.h"
 
@@ -53,7 +54,17 @@ struct cola {
     } next;
     uint32_t field;  /* number in the name of the request at hand, field012 */
     int outputs_due; /* LIDoutputstate is sent once, behind the answer */
-    int wants_scan;  /* measurement was asked for, and no scan has come yet; try_ns: when to look at the head next */
+    struct {         /* which of their changes are sent, and the set of fields that is watched */
+        int results, outputs, inputs;
+        uint8_t by_telegram; /* FieldSetSelectionMethod */
+        uint16_t set;        /* ActiveFieldSet, from 1 */
+        uint32_t seen;       /* inputs when they were last looked at, a bit each */
+        uint32_t changed_us; /* when they changed, as the scanner counts time */
+        int64_t next_ns;     /* device time of their next change; INT64_MAX: none */
+    } ports;
+    struct cola_fields fields;
+    struct cola_watch watch;
+    int wants_scan; /* measurement was asked for, and no scan has come yet; try_ns: when to look at the head next */
     int64_t try_ns;
     int64_t now_ns;
     int64_t power_ns; /* device time of power-up: its clock begins there */
@@ -121,15 +132,29 @@ void cola_look_at_head(struct cola *self);
 void cola_geometry_time(struct cola *self);
 cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
-/* cola_ports.c: fields, inputs and outputs, of which none is active. */
+/* cola_ports.c: fields, inputs and outputs. */
 
 /* 12 of "field012"; UINT32_MAX: another name. */
 uint32_t cola_field_number(const char *name);
 /* A field is a record, or there is none. */
 enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out);
-cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results;
+enum cola_error cola_write_field(struct cola *self, uint32_t field, struct cola_args *args);
+cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_set_method, cola_write_set_method,
+    cola_read_set, cola_write_set, cola_set_results_event, cola_set_outputs_event, cola_set_inputs_event;
 /* The event LIDoutputstate. */
-void cola_send_outputs(struct cola *self);
+void cola_send_outputs(struct cola *self, enum cola_form form);
+/* The active outputs, a bit each. */
+uint32_t cola_outputs(const struct cola *self);
+/* Fields as the configuration gives them. */
+void cola_fields_load(struct cola *self);
+/* The same, and no events, and outputs off. */
+void cola_ports_reset(struct cola *self);
+/* A scan is done: evaluates the fields. */
+unsigned cola_ports_scan(struct cola *self);
+/* Sends what changed, to a client that asked for it. */
+void cola_ports_report(struct cola *self, unsigned news);
+/* Time has passed: inputs may have changed. */
+void cola_ports_time(struct cola *self);
 
 /* cola_device.c: identity, states, log-in and clock. */
 
@@ -156,6 +181,9 @@ cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_lo
     cola_set_clock, cola_start, cola_stop, cola_load_defaults, cola_keep, cola_reboot;
 
 /* cola_commands.c: one request, and its answer. */
+
+/* The value of an event's request: u8 1 on, 0 off. */
+enum cola_error cola_read_switch(struct cola_args *args, int *on);
 void cola_carry_out(struct cola *self, const struct cola_request *request);
 /* sFA with that error. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error);

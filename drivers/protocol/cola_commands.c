@@ -5,7 +5,7 @@
 
 #include "drivers/protocol/cola.h"
 
-static cola_handler set_event, set_outputs_event, set_scan_event;
+static cola_handler set_scan_event;
 
 static const struct command {
     const char *name;
@@ -39,6 +39,10 @@ static const struct command {
     {"LIDinputstate", 'R', COLA_RUN, cola_read_inputs},
     {"LIDoutputstate", 'R', COLA_RUN, cola_read_outputs},
     {"LFErec", 'R', COLA_RUN, cola_read_field_results},
+    {"FieldSetSelectionMethod", 'R', COLA_RUN, cola_read_set_method},
+    {"FieldSetSelectionMethod", 'W', COLA_CLIENT, cola_write_set_method},
+    {"ActiveFieldSet", 'R', COLA_RUN, cola_read_set},
+    {"ActiveFieldSet", 'W', COLA_CLIENT, cola_write_set},
     {"SetAccessMode", 'M', COLA_RUN, cola_log_in},
     {"GetAccessMode", 'M', COLA_RUN, cola_get_level},
     {"CheckPassword", 'M', COLA_RUN, cola_check_password},
@@ -53,9 +57,9 @@ static const struct command {
     {"mSCloadfacdef", 'M', COLA_CLIENT, cola_load_defaults},
     {"mSCreboot", 'M', COLA_CLIENT, cola_reboot},
     {"LMDscandata", 'E', COLA_RUN, set_scan_event},
-    {"LIDinputstate", 'E', COLA_RUN, set_event},
-    {"LIDoutputstate", 'E', COLA_RUN, set_outputs_event},
-    {"LFErec", 'E', COLA_RUN, set_event},
+    {"LIDinputstate", 'E', COLA_RUN, cola_set_inputs_event},
+    {"LIDoutputstate", 'E', COLA_RUN, cola_set_outputs_event},
+    {"LFErec", 'E', COLA_RUN, cola_set_results_event},
 };
 
 /* field000 and on */
@@ -63,9 +67,15 @@ static enum cola_error read_field(struct cola *self, struct cola_args *args, str
 {
     return cola_read_field(self, self->field, args, out);
 }
-static const struct command any_field = {"field", 'R', COLA_RUN, read_field};
+static enum cola_error write_field(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)out;
+    return cola_write_field(self, self->field, args);
+}
+static const struct command any_field = {"field", 'R', COLA_RUN, read_field},
+                            set_field = {"field", 'W', COLA_CLIENT, write_field};
 
-static enum cola_error read_switch(struct cola_args *args, int *on)
+enum cola_error cola_read_switch(struct cola_args *args, int *on)
 {
     const uint32_t v = cola_arg_u(args, 1);
     const enum cola_error error = cola_args_end(args);
@@ -73,30 +83,10 @@ static enum cola_error read_switch(struct cola_args *args, int *on)
     return error == COLA_OK && v > 1 ? COLA_INVALID_DATA : error;
 }
 
-/* Events of which none comes: no input changes, and no field is configured. */
-static enum cola_error set_event(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    int on;
-    const enum cola_error error = read_switch(args, &on);
-    (void)self;
-    cola_put_u(out, 1, (uint32_t)on);
-    return error;
-}
-
-/* A scanner of the LMS kind sends the state once when it is asked for, though nothing has changed. */
-static enum cola_error set_outputs_event(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    int on;
-    const enum cola_error error = read_switch(args, &on);
-    cola_put_u(out, 1, (uint32_t)on);
-    self->outputs_due = error == COLA_OK && on && self->model->ports == COLA_PORTS_LMS;
-    return error;
-}
-
 static enum cola_error set_scan_event(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     int on;
-    const enum cola_error error = read_switch(args, &on);
+    const enum cola_error error = cola_read_switch(args, &on);
     if (error != COLA_OK) return error;
     cola_put_u(out, 1, (uint32_t)on);
     self->streams = on;
@@ -150,6 +140,7 @@ static const struct command *cola_commands_find(const struct cola *self, const s
         other = &commands[i];
     }
     if (p->verb == 'R' && self->field < self->model->n_fields) return &any_field;
+    if (p->verb == 'W' && self->field < self->model->n_records) return &set_field;
     const int read_only = other != NULL && other->verb == 'R' && p->verb == 'W';
     *error = p->verb == 'M'   ? COLA_METHOD_UNKNOWN
              : p->verb == 'E' ? COLA_EVENT_UNKNOWN
@@ -200,6 +191,6 @@ void cola_carry_out(struct cola *self, const struct cola_request *request)
         cola_refuse(self, request->form, error);
     else if (self->host.send(self->host.ctx, self->unit, cola_end(&out)) != 0)
         self->telegrams = telegrams;
-    if (self->outputs_due) cola_send_outputs(self);
+    if (self->outputs_due) cola_send_outputs(self, request->form);
     if (self->reboots) reboot(self);
 }

@@ -95,10 +95,15 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     return cola_args_end(args);
 }
 
+/* u8 0 none, 1 warning, 2 error, 3 serious error */
 enum cola_error cola_read_contamination(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    (void)self;
-    cola_put_u(out, 1, 0);
+    static const double levels_db[] = {1.0, 3.0, 10.0};
+    const double loss_db = self->host.window_loss_db != NULL ? self->host.window_loss_db(self->host.ctx) : 0.0;
+    uint32_t level = 0;
+    while (level < 3 && loss_db >= levels_db[level])
+        level++;
+    cola_put_u(out, 1, level);
     return cola_args_end(args);
 }
 
@@ -259,8 +264,10 @@ enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, st
 {
     const enum cola_error error = cola_args_end(args);
     (void)out;
-    if (error == COLA_OK) cola_settings_reset(self);
-    return error;
+    if (error != COLA_OK) return error;
+    cola_settings_reset(self);
+    cola_fields_load(self);
+    return COLA_OK;
 }
 
 enum cola_error cola_reboot(struct cola *self, struct cola_args *args, struct cola_out *out)

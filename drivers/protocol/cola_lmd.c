@@ -26,9 +26,11 @@ static void put_head(const struct cola *self, struct cola_out *out)
     cola_put_u(out, 2, (uint16_t)(turn->number - self->near_wrap));
     cola_put_u(out, 4, cola_time_us(self, turn->t0_ns));
     cola_put_u(out, 4, cola_time_us(self, self->now_ns));
-    for (int i = 0; i < 4; i++)
-        cola_put_u(out, 1, 0); /* two bytes of inputs, two of outputs */
-    cola_put_i(out, 2, 0);     /* layer angle */
+    cola_put_u(out, 1, 0); /* two bytes of inputs, two of outputs */
+    cola_put_u(out, 1, self->ports.seen);
+    cola_put_u(out, 1, 0);
+    cola_put_u(out, 1, cola_outputs(self));
+    cola_put_i(out, 2, 0); /* layer angle */
     cola_put_u(out, 4, cola_scan_chz(head));
     cola_put_u(out, 4, cola_meas_100hz(head));
 }

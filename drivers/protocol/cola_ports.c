@@ -1,11 +1,71 @@
 /* SPDX-License-Identifier: MIT */
-/* Fields, inputs and outputs. None is active; the answers say so, in the form of the real scanner. COLA.md draws it. */
+/* Fields, inputs and outputs, in the form of the real scanners. COLA.md draws it. */
 #include <stdio.h>
 #include <string.h>
 
 #include "drivers/protocol/cola.h"
 
-enum { N_INPUTS = 4, N_OUTPUTS_OF_LMS = 3, FREE = 0, NOT_USED = 2, SEGMENTED = 2, RESULT_INVALID = 0 };
+enum { N_OUTPUTS_OF_LMS = 3, NOT_USED = 2, FIELDS_OF_SET = 3, SETS = 16 };
+
+static int cola_ports_is_lms(const struct cola *self)
+{
+    return self->model->ports == COLA_PORTS_LMS;
+}
+
+/* ---- what is watched */
+
+/* A TiM watches the three fields of a set, for an output each. An LMS watches all its fields that have a shape. */
+static void select_fields(struct cola *self)
+{
+    uint32_t numbers[COLA_WATCH_SLOTS], n = 0;
+    uint8_t outputs[COLA_WATCH_SLOTS];
+    if (cola_ports_is_lms(self)) {
+        for (uint32_t i = 0; i < self->model->n_records; i++) {
+            const struct cola_field *field = &self->fields.field[i];
+            if (field->shape.kind == COLA_SHAPE_NONE) continue;
+            outputs[n] = field->output;
+            numbers[n++] = i;
+        }
+    } else {
+        for (; n < self->model->n_results; n++) {
+            outputs[n] = (uint8_t)(n + 1);
+            numbers[n] = (self->ports.set - 1U) * FIELDS_OF_SET + n;
+        }
+    }
+    cola_watch_select(&self->watch, &self->fields, numbers, outputs, n);
+}
+
+void cola_fields_load(struct cola *self)
+{
+    if (self->identity->fields != NULL)
+        self->fields = *self->identity->fields;
+    else
+        memset(&self->fields, 0, sizeof self->fields);
+    self->ports.by_telegram = 0;
+    self->ports.set = (uint16_t)(self->ports.seen + 1);
+    select_fields(self);
+}
+
+void cola_ports_reset(struct cola *self)
+{
+    memset(&self->ports, 0, sizeof self->ports);
+    memset(&self->watch, 0, sizeof self->watch);
+    cola_fields_load(self);
+}
+
+unsigned cola_ports_scan(struct cola *self)
+{
+    return cola_watch_scan(&self->watch, &self->fields, &self->scan.head, self->scan.whole,
+                           (enum cola_echoes)self->set.filter);
+}
+
+uint32_t cola_outputs(const struct cola *self)
+{
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < COLA_WATCH_OUTPUTS; i++)
+        bits |= (uint32_t)self->watch.output[i].active << i;
+    return bits;
+}
 
 /* ---- fields */
 
@@ -20,82 +80,166 @@ uint32_t cola_field_number(const char *name)
     return number;
 }
 
-/* float scale, float offset, u32 step, i32 first angle: how a field counts distances and angles */
-static void put_grid(const struct cola *self, struct cola_out *out)
+/* The record of a field without a shape. */
+static void describe_empty(const struct cola *self, uint32_t field, struct cola_record *r)
 {
-    cola_put_float(out, 1.0f);
-    cola_put_float(out, 0.0f);
-    cola_put_u(out, 4, cola_step_angle(cola_head(self)));
-    cola_put_i(out, 4, cola_beam_angle(cola_head(self), 0));
+    *r = (struct cola_record){.scale = 1.0f,
+                              .step_e4 = cola_step_angle(cola_head(self)),
+                              .first_e4 = cola_beam_angle(cola_head(self), 0),
+                              .type = COLA_FIELD_SEGMENTED,
+                              .is_segmented = self->model->named};
+    if (self->model->named) snprintf(r->name, sizeof r->name, "Field%03u", (unsigned)field + 1);
 }
 
-/* grid, u8 type, u8 number, u16 segmented (and u16 points), u16 rectangular, radial, dynamic, u16 1 and text name,
- * u16 no comment */
+/* In a TiM the corner of a rectangle is counted from the first beam, in an LMS1xx from 0. */
 enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out)
 {
-    const struct cola_model *model = self->model;
-    char name[16] = "";
-    if (field >= model->n_records) {
+    const struct cola_field *f = &self->fields.field[field];
+    struct cola_record record;
+    if (field >= self->model->n_records) {
         cola_put_u(out, 1, 0);
         return cola_args_end(args);
     }
     if (!cola_head(self)->known) return COLA_CONDITION;
-    put_grid(self, out);
-    cola_put_u(out, 1, SEGMENTED);
-    cola_put_u(out, 1, model->named ? field + 1 : 0);
-    cola_put_u(out, 2, model->named);
-    if (model->named) cola_put_u(out, 2, 0);
-    for (int i = 0; i < 3; i++)
-        cola_put_u(out, 2, 0);
-    cola_put_u(out, 2, 1);
-    if (model->named) snprintf(name, sizeof name, "Field%03u", (unsigned)field + 1);
-    cola_put_text(out, name);
-    cola_put_u(out, 2, 0);
+    if (f->has_record) {
+        cola_record_put(&f->record, out);
+        return cola_args_end(args);
+    }
+    if (f->shape.kind == COLA_SHAPE_NONE)
+        describe_empty(self, field, &record);
+    else
+        cola_field_describe(f, cola_head(self), !cola_ports_is_lms(self), &record);
+    record.number = (uint8_t)(self->model->named || f->shape.kind != COLA_SHAPE_NONE ? field + 1 : 0);
+    cola_record_put(&record, out);
     return cola_args_end(args);
 }
 
-/* u16 fields, each: u16 version, u8 number, u32 count, grid, u8 result, 3 x u16 0, u16 1 and time of day */
-enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
+/* The field keeps the response time and the blanking size of the configuration: no telegram is known that has them. */
+enum cola_error cola_write_field(struct cola *self, uint32_t field, struct cola_args *args)
 {
-    if (self->model->n_results != 0 && !cola_head(self)->known) return COLA_CONDITION;
-    cola_put_u(out, 2, self->model->n_results);
-    for (uint32_t i = 1; i <= self->model->n_results; i++) {
+    struct cola_field *f = &self->fields.field[field];
+    struct cola_record record;
+    struct cola_shape shape;
+    enum cola_error error = cola_record_take(args, &record);
+    if (error != COLA_OK) return error;
+    if (!cola_head(self)->known) return COLA_CONDITION;
+    error = cola_record_shape(&record, cola_head(self), !cola_ports_is_lms(self), &shape);
+    if (error != COLA_OK) return error;
+    f->record = record;
+    f->has_record = 1;
+    f->shape = shape;
+    select_fields(self);
+    return COLA_OK;
+}
+
+/* ---- results
+
+ * u16 fields, each: u16 version, u8 number, u32 count, grid, u8 result, 3 x u16 0, u16 1 and time of day. The grid is
+ * that of records: float scale, float offset, u32 step, i32 first angle. */
+static void put_results(const struct cola *self, struct cola_out *out)
+{
+    cola_put_u(out, 2, self->watch.n);
+    for (uint32_t i = 0; i < self->watch.n; i++) {
+        const struct cola_slot *slot = &self->watch.slot[i];
         cola_put_u(out, 2, 1);
-        cola_put_u(out, 1, i);
+        cola_put_u(out, 1, cola_ports_is_lms(self) ? slot->field + 1 : i + 1);
         cola_put_u(out, 4, 0);
-        put_grid(self, out);
-        cola_put_u(out, 1, RESULT_INVALID);
+        cola_put_float(out, 1.0f);
+        cola_put_float(out, 0.0f);
+        cola_put_u(out, 4, cola_step_angle(cola_head(self)));
+        cola_put_i(out, 4, cola_beam_angle(cola_head(self), 0));
+        cola_put_u(out, 1, slot->result);
         for (int k = 0; k < 3; k++)
             cola_put_u(out, 2, 0);
         cola_put_u(out, 2, 1);
-        cola_put_time(self, self->now_ns, out);
+        cola_put_time(self, slot->changed_ns != 0 ? slot->changed_ns : self->now_ns, out);
     }
+}
+
+enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    if (self->watch.n != 0 && !cola_head(self)->known) return COLA_CONDITION;
+    put_results(self, out);
     return cola_args_end(args);
+}
+
+/* ---- which set of fields a TiM watches */
+
+enum cola_error cola_read_set_method(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    cola_put_u(out, 1, self->ports.by_telegram);
+    return cola_args_end(args);
+}
+
+static void take_set(struct cola *self, uint32_t set)
+{
+    if (set == self->ports.set) return;
+    self->ports.set = (uint16_t)set;
+    select_fields(self);
+}
+
+enum cola_error cola_write_set_method(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    int by_telegram;
+    (void)out;
+    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    const enum cola_error error = cola_read_switch(args, &by_telegram);
+    if (error != COLA_OK) return error;
+    self->ports.by_telegram = (uint8_t)by_telegram;
+    if (!by_telegram) take_set(self, self->ports.seen + 1);
+    return COLA_OK;
+}
+
+enum cola_error cola_read_set(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    cola_put_u(out, 2, self->ports.set);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_set(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)out;
+    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    const uint32_t set = cola_arg_u(args, 2);
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (set < 1 || set > SETS) return COLA_INVALID_DATA;
+    if (!self->ports.by_telegram) return COLA_CONDITION;
+    take_set(self, set);
+    return COLA_OK;
 }
 
 /* ---- inputs and outputs */
 
 /* u16 version, u32 time of the last change, 4 x u8 input, u16 no time of day */
+static void put_inputs(const struct cola *self, struct cola_out *out)
+{
+    const int lms = cola_ports_is_lms(self), is_used = self->fields.n_windows != 0;
+    cola_put_u(out, 2, (uint32_t)lms);
+    cola_put_u(out, 4, self->ports.changed_us);
+    for (int i = 0; i < COLA_INPUTS; i++)
+        cola_put_u(out, 1, lms && !is_used ? (uint32_t)NOT_USED : self->ports.seen >> i & 1U);
+    cola_put_u(out, 2, 0);
+}
+
 enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const int lms = self->model->ports == COLA_PORTS_LMS;
-    cola_put_u(out, 2, (uint32_t)lms);
-    cola_put_u(out, 4, 0);
-    for (int i = 0; i < N_INPUTS; i++)
-        cola_put_u(out, 1, lms ? NOT_USED : FREE);
-    cola_put_u(out, 2, 0);
+    put_inputs(self, out);
     return cola_args_end(args);
 }
 
-/* u16 version, u32 time, outputs of u8 state, u32 changes, u16 time of day: 0, or 1 and that */
+/* u16 version, u32 time, outputs of u8 state, u32 count, u16 time of day: 0, or 1 and that */
 static void put_outputs(const struct cola *self, struct cola_out *out)
 {
-    const int lms = self->model->ports == COLA_PORTS_LMS;
+    const int lms = cola_ports_is_lms(self);
     cola_put_u(out, 2, (uint32_t)lms);
     cola_put_u(out, 4, cola_time_us(self, self->now_ns));
     for (int i = 0; i < self->model->n_outputs; i++) {
-        cola_put_u(out, 1, lms && i >= N_OUTPUTS_OF_LMS ? NOT_USED : FREE);
-        cola_put_u(out, 4, 0);
+        const struct cola_output none = {0, 0}, *o = i < COLA_WATCH_OUTPUTS ? &self->watch.output[i] : &none;
+        cola_put_u(out, 1, lms && i >= N_OUTPUTS_OF_LMS ? (uint32_t)NOT_USED : o->active);
+        cola_put_u(out, 4, o->count);
     }
     cola_put_u(out, 2, (uint32_t)lms);
     if (lms) cola_put_time(self, self->now_ns, out);
@@ -107,11 +251,64 @@ enum cola_error cola_read_outputs(struct cola *self, struct cola_args *args, str
     return cola_args_end(args);
 }
 
-void cola_send_outputs(struct cola *self)
+/* ---- events */
+
+static void send_event(struct cola *self, enum cola_form form, const char *head,
+                       void (*put)(const struct cola *self, struct cola_out *out))
 {
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
-    self->outputs_due = 0;
-    cola_begin(&out, self->stream_form, "sSN LIDoutputstate");
-    put_outputs(self, &out);
+    cola_begin(&out, form, head);
+    put(self, &out);
     self->host.send(self->host.ctx, self->unit, cola_end(&out));
+}
+
+void cola_send_outputs(struct cola *self, enum cola_form form)
+{
+    self->outputs_due = 0;
+    send_event(self, form, "sSN LIDoutputstate", put_outputs);
+}
+
+void cola_ports_report(struct cola *self, unsigned news)
+{
+    if ((news & COLA_NEW_RESULT) != 0 && self->ports.results)
+        send_event(self, self->stream_form, "sSN LFErec", put_results);
+    if ((news & COLA_NEW_OUTPUT) != 0 && self->ports.outputs) cola_send_outputs(self, self->stream_form);
+}
+
+/* Inputs choose the set of fields, unless telegrams do. The first input is the lowest bit. */
+void cola_ports_time(struct cola *self)
+{
+    const uint32_t now = cola_inputs_at(&self->fields, self->now_ns, &self->ports.next_ns);
+    if (now == self->ports.seen) return;
+    self->ports.seen = now;
+    self->ports.changed_us = cola_time_us(self, self->now_ns);
+    if (!cola_ports_is_lms(self) && !self->ports.by_telegram) take_set(self, now + 1);
+    if (self->ports.inputs) send_event(self, self->stream_form, "sSN LIDinputstate", put_inputs);
+}
+
+static enum cola_error set_event(int *event, struct cola_args *args, struct cola_out *out)
+{
+    int on;
+    const enum cola_error error = cola_read_switch(args, &on);
+    cola_put_u(out, 1, (uint32_t)on);
+    if (error == COLA_OK) *event = on;
+    return error;
+}
+
+enum cola_error cola_set_results_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    return set_event(&self->ports.results, args, out);
+}
+
+enum cola_error cola_set_inputs_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    return set_event(&self->ports.inputs, args, out);
+}
+
+/* A scanner of the LMS kind sends the state once when it is asked for, though nothing has changed. */
+enum cola_error cola_set_outputs_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = set_event(&self->ports.outputs, args, out);
+    self->outputs_due = error == COLA_OK && self->ports.outputs && cola_ports_is_lms(self);
+    return error;
 }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/cola_units.h"
 
+#include <math.h>
+
 enum { TURN_E4 = 3600000, FORWARD_E4 = 900000, MOST_DISTANCE = 65535 };
 
 /* a / b to the nearest, b > 0. */
@@ -18,6 +20,18 @@ int32_t cola_beam_angle(const struct planar_head *head, uint32_t beam)
 int64_t cola_beam_at(const struct planar_head *head, int32_t angle_e4)
 {
     return nearest((int64_t)(angle_e4 - (int64_t)FORWARD_E4) * head->steps, TURN_E4) + head->front - head->first;
+}
+
+int64_t cola_beam_quarters(const struct planar_head *head, uint32_t beam)
+{
+    return 4 * ((int64_t)head->first + beam - head->front) + head->steps;
+}
+
+int64_t cola_beam_near(const struct planar_head *head, double turns)
+{
+    const double beam = floor((turns - 0.25) * head->steps + 0.5) + head->front - head->first;
+    const double turned = floor((beam + 0.5 * (head->steps - head->n)) / head->steps);
+    return (int64_t)(beam - turned * head->steps);
 }
 
 uint32_t cola_step_angle(const struct planar_head *head)

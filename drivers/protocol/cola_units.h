@@ -11,6 +11,10 @@
 int32_t cola_beam_angle(const struct planar_head *head, uint32_t beam);
 /* The beam that is nearest to an angle; below 0, or n and more: beside the beams of the head. */
 int64_t cola_beam_at(const struct planar_head *head, int32_t angle_e4);
+/* The exact direction of a beam, in quarters of a step. */
+int64_t cola_beam_quarters(const struct planar_head *head, uint32_t beam);
+/* The beam that is nearest to a direction in turns; below 0, or n and more, as above. */
+int64_t cola_beam_near(const struct planar_head *head, double turns);
 uint32_t cola_step_angle(const struct planar_head *head);
 uint32_t cola_scan_chz(const struct planar_head *head);    /* scans, 1/100 Hz */
 uint32_t cola_meas_100hz(const struct planar_head *head);  /* pulses, 100 Hz */

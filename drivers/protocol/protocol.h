@@ -91,11 +91,14 @@ struct protocol_host {
      * 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps none. Settings
      * of the head itself, which native commands set, are kept by the command HEAD:STORe. */
     int (*store)(void *ctx, const char *lines);
+    /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
+    double (*window_loss_db)(void *ctx);
 };
 
 enum { PROTOCOL_STORED = 2048 };
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
+struct cola_fields;
 
 /* Facts about the head that the descriptor doesn't have; constant, and outlives the instance. */
 struct protocol_identity {
@@ -110,6 +113,7 @@ struct protocol_identity {
         uint32_t steps;
     } geometry[PROTOCOL_MAX_GEOMETRIES];
     uint32_t n_geometries;
+    const struct cola_fields *fields; /* monitored fields and inputs of the configuration; NULL: none */
 };
 
 struct protocol_spec {

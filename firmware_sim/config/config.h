@@ -24,6 +24,7 @@
 #include "drivers/link/link.h"
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/config/epoch.h"
+#include "firmware_sim/config/fields.h"
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/config/profile.h"
@@ -174,6 +175,10 @@ struct config {
     struct config_output output;
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
+    struct config_field field[CONFIG_MAX_FIELDS];
+    uint32_t n_fields;
+    struct config_input input[CONFIG_MAX_INPUTS];
+    uint32_t n_inputs;
     struct config_beam beam;
     struct config_cast cast;
     struct config_coverage coverage;

@@ -20,6 +20,8 @@
 #define STATION(member)    "stations[]." #member, IN_STATION(member)
 #define TRIPOD(member)     "stations[].tripod." #member, IN_STATION(tripod.member)
 #define LINK(member)       "links[]." #member, CFG_MEMBER(struct link_spec, member)
+#define FIELD(member)      "fields[]." #member, CFG_MEMBER(struct config_field, member)
+#define INPUT(member)      "inputs[]." #member, CFG_MEMBER(struct config_input, member)
 #define RULE(member)       "surfaces[]." #member, CFG_MEMBER(struct surface_rule, member)
 #define SURFACE(member)    "surfaces[]." #member, CFG_MEMBER(struct surface_rule, surface.member)
 #define LIST_OF(array, count)                                                                 \
@@ -229,6 +231,8 @@ static const struct cfg_key config_keys[] = {
              "these digits, not *IDN?."},
 
 #include "firmware_sim/config/measurement_rows.h"
+
+#include "firmware_sim/config/field_rows.h"
 
     {"loop", .type = CFG_MAP, .help = "The fixed-rate loop."},
     {KEY(loop.tick_hz), CFG_REAL, "Hz", "1000", 100, 10000,

@@ -25,7 +25,7 @@ static const char *type_name(const struct cfg_key *key)
         [CFG_MAP] = "section",        [CFG_LIST] = "list",          [CFG_BOOL] = "switch",
         [CFG_ENUM] = "word",          [CFG_COUNT] = "whole number", [CFG_MICRO] = "number, exact to 1e-6",
         [CFG_REAL] = "number",        [CFG_TEXT] = "text",          [CFG_PATH] = "path",
-        [CFG_VEC3] = "three numbers", [CFG_PAIR] = "two numbers"};
+        [CFG_VEC3] = "three numbers", [CFG_PAIR] = "two numbers",   [CFG_POINTS] = "list of points"};
     return names[key->type];
 }
 

@@ -216,6 +216,15 @@ void device_turn_beam(struct device_beam *beam, int64_t until_ns)
     beam->edge = find_edge(beam, pulse);
 }
 
+double device_beam_loss_db(const struct device_beam *beam)
+{
+    double loss_db = 0.0;
+    for (uint32_t i = 0; i < beam->n; i++)
+        if (beam->fault[i].strikes && beam->fault[i].entry.fault.kind == FAULT_WINDOW_SOILED)
+            loss_db += beam->fault[i].entry.fault.loss_db;
+    return loss_db;
+}
+
 void device_end_beam(struct device_beam *beam, int64_t t_ns)
 {
     for (uint32_t i = 0; i < beam->n; i++) {

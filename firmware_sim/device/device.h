@@ -220,6 +220,10 @@ uint32_t device_power_ons(struct device *device);
 /* Since the last power-up counters begin this far below their wrap; 0: they begin at 0. */
 uint32_t device_near_wrap(struct device *device);
 
+/* Loss of optical power at the window by injected faults, both ways together, dB; 0 without a scan. It is that of the
+ * last tick that was claimed. */
+double device_window_loss_db(struct device *device);
+
 /* The number of the last scan that began, which is how many have begun; 0: none. *station: where it stands, from 1;
  * NULL: not asked for. */
 uint32_t device_last_scan(struct device *device, uint32_t *station);

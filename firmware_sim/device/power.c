@@ -160,6 +160,14 @@ uint32_t device_power_ons(struct device *device)
     return n;
 }
 
+double device_window_loss_db(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    const double loss_db = device_beam_loss_db(&device->beam);
+    pthread_mutex_unlock(&device->lock);
+    return loss_db;
+}
+
 uint32_t device_near_wrap(struct device *device)
 {
     pthread_mutex_lock(&device->lock);

@@ -87,6 +87,11 @@ static int stored(const void *self, const char *name, char text[SETTINGS_FILE_TE
     return device_stored(self, name, text);
 }
 
+static double window_loss_db(void *self)
+{
+    return device_window_loss_db(self);
+}
+
 static int64_t tick_ns(const void *self)
 {
     return device_tick_ns(self);
@@ -140,6 +145,7 @@ const struct loop_source_ops loop_device_source = {
     .near_wrap = near_wrap,
     .store = store,
     .stored = stored,
+    .window_loss_db = window_loss_db,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,

@@ -60,6 +60,8 @@ static void identify(struct links *links, const struct config *cfg)
     for (uint32_t i = 0; i < id->n_geometries; i++)
         id->geometry[i] = (struct protocol_geometry){cfg->profile.arrangement.geometry[i].lines_uhz,
                                                      cfg->profile.arrangement.geometry[i].steps_per_turn};
+    config_fill_fields(cfg, &links->fields);
+    id->fields = cfg->n_fields + cfg->n_inputs != 0 ? &links->fields : NULL;
     links->fixes_hz = cfg->gnss.rate_hz;
     for (uint32_t i = cfg->n_links; i-- > 0;) {
         if (cfg->link[i].protocol != PROTOCOL_VELODYNE || cfg->link[i].type != LINK_UDP) continue;

@@ -6,6 +6,7 @@
 #ifndef FIRMWARE_SIM_LOOP_LINKS_H
 #define FIRMWARE_SIM_LOOP_LINKS_H
 
+#include "drivers/protocol/cola_field.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/loop/mover.h"
 #include "firmware_sim/loop/source.h"
@@ -39,8 +40,9 @@ struct links {
     const struct sh_report *report; /* NULL: none */
     const struct web_source *web;   /* of links of type web; NULL: none */
     struct protocol_identity identity;
-    uint32_t fixes_hz;     /* of the GNSS receiver */
-    char data_address[64]; /* where the first velodyne link sends; empty: there is none */
+    struct cola_fields fields; /* of the identity, where there are some */
+    uint32_t fixes_hz;         /* of the GNSS receiver */
+    char data_address[64];     /* where the first velodyne link sends; empty: there is none */
     int data_port;
 
     struct pump *pump[STREAM_MAX_LINKS];

@@ -79,6 +79,13 @@ static int host_store(void *ctx, const char *lines)
     return source->ops->store == NULL || source->ops->store(source->self, s->pump->protocol->name, lines);
 }
 
+static double host_window_loss_db(void *ctx)
+{
+    const struct session *s = ctx;
+    const struct loop_source *source = s->pump->links->source;
+    return source->ops->window_loss_db(source->self);
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -108,6 +115,20 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
     }
 }
 
+/* A device has watched its fields before the client came. A new session looks at the ticks that the ring still has, since
+ * power came, so that results are there at once. It sends nothing meanwhile: its client has asked for nothing. */
+static void look_back(const struct pump *pump, struct session *s)
+{
+    const struct loop_source *source = pump->links->source;
+    const uint64_t ticks = pump->stream->ring.queue_ticks / 4 * 3; /* with room for those that come meanwhile */
+    if (pump->links->identity.fields == NULL || pump->stream->waits) return;
+    const uint64_t power = (uint64_t)(source->ops->power_ns(source->self) / pump->stream->tick_ns);
+    uint64_t from = s->cursor > ticks ? s->cursor - ticks : 0;
+    if (from < power) from = power;
+    s->power_from = s->cursor; /* power that went before the client came doesn't end its session */
+    if (from < s->cursor) s->cursor = from;
+}
+
 /* Gives the protocol the descriptor, emitter and anchor from before the tick at the cursor. */
 static void greet(struct pump *pump, struct session *s)
 {
@@ -118,6 +139,7 @@ static void greet(struct pump *pump, struct session *s)
         s->cursor = stream_released(pump->stream);
         len = latched_copy(&pump->stream->latched, frames, &version);
     } while (version != before);
+    look_back(pump, s);
     pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     give_frames(pump->protocol, s, frames, len);
 }
@@ -131,7 +153,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
-                 host_pps, host_store},
+                 host_pps, host_store, host_window_loss_db},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .power_ns = source->ops->power_ns(source->self),

@@ -34,6 +34,7 @@ struct loop_source_ops {
     uint32_t (*near_wrap)(void *self);
     int (*store)(void *self, const char *name, const char *text);
     int (*stored)(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
+    double (*window_loss_db)(void *self);
 
     /* ---- the run */
     int64_t (*tick_ns)(const void *self);

@@ -284,6 +284,12 @@ static uint32_t near_wrap(void *self)
     return 0;
 }
 
+static double window_loss_db(void *self)
+{
+    (void)self;
+    return 0.0;
+}
+
 static int64_t tick_ns(const void *self)
 {
     return ((const struct replay *)self)->tick_ns;
@@ -341,6 +347,7 @@ const struct loop_source_ops replay_source = {
     .power_ns = power_ns,
     .power_ons = power_ons,
     .near_wrap = near_wrap,
+    .window_loss_db = window_loss_db,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,

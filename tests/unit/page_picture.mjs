@@ -6,7 +6,7 @@ import {Camera, FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, 
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
 import {nearest} from '../../drivers/link/web/view_pick.js';
 import {Budget, restShares, shares} from '../../drivers/link/web/view_draw.js';
-import {Stations} from '../../drivers/link/web/view_stations.js';
+import {Stations, inScene} from '../../drivers/link/web/view_stations.js';
 import {featureEdges, legsMesh, parseScene} from '../../drivers/link/web/view_mesh.js';
 import {runTests, test} from './page_tap.mjs';
 
@@ -249,6 +249,16 @@ test('a station that is dragged tells where it is, once it is let go', () => {
   same([told[0].station, told[0].z, told[0].heading_deg, stations.pending], [4, 0, 10, true], 'the rest');
   stations.set(stations.list); // it is refused, so all is as before
   same(stations.placeOf(stations.list[0]).at, [0, 0, 0], 'back');
+});
+
+test('outlines of fields: right, forward and up of a head that is turned', () => {
+  const place = {at: [10, 20, 1], heading_deg: 90};
+  const points = (station, corners) => inScene(place, station, corners).flat();
+  points({}, [0, 2, 3, 0]).forEach((v, i) => near(v, [12, 20, 1, 10, 17, 1][i], 1e-12, 'east and south'));
+  points({pitch_deg: 90}, [0, 2, 3, 0]).forEach((v, i) => near(v, [10, 20, 3, 10, 17, 1][i], 1e-12, 'forward rises'));
+  points({roll_deg: 90}, [0, 2, 3, 0]).forEach((v, i) => near(v, [12, 20, 1, 10, 20, -2][i], 1e-12, 'right sinks'));
+  // with the pitch before it, what sinks by the roll goes forward, which is east
+  points({pitch_deg: 90, roll_deg: 90}, [3, 0]).forEach((v, i) => near(v, [13, 20, 1][i], 1e-12, 'both'));
 });
 
 test('a station that is grabbed beside its middle does not jump; keys turn it', () => {

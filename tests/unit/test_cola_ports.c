@@ -34,7 +34,8 @@ static void an_lms_has_ten_empty_fields(void **state)
     cola_expect("sRN field009", "sRA field009 3F800000 00000000 9C4 FFF92230 2 0 0 0 0 0 1 0 0");
     cola_expect("sRN field010", "sRA field010 0");
     cola_expect("sRN field048", "sFA 3");
-    cola_expect("sWN field001 0", "sFA 3");
+    cola_expect("sWN field001 0", "sFA A"); /* without a log-in */
+    cola_expect("sWN field010 0", "sFA 3");
 }
 
 static void a_tim7_has_48_named_fields(void **state)

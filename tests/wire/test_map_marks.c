@@ -142,11 +142,40 @@ static void test_open_edges(void **state)
     free(err);
 }
 
+/* A rectangle of 1 m by 2 m, 1 m ahead. The first station looks east, so that right is south; a pixel is a centimetre. */
+static void test_fields(void **state)
+{
+    struct wire *wire = *state;
+    static const double corner[5][2] = {{100, 0}, {100, 100}, {300, 100}, {300, 0}, {100, 0}};
+    const char *const more[] = {"--pixel-m", "0.01", "--set",
+                                "fields=[{number: 1, shape: rectangle, corner_m: [0, 1], size_m: [1, 2]}]", NULL};
+    char *svg = draw(wire, more, "map.svg", 0);
+    const struct mark first = mark_of(svg, "first");
+    const char *p = strstr(svg, "<title>monitored fields</title>");
+    assert_non_null(p);
+    for (int i = 0; i < 4; i++, p++) {
+        struct mark line;
+        assert_non_null(p = strstr(p, "<line x1="));
+        assert_int_equal(
+            sscanf(p, "<line x1=\"%lf\" y1=\"%lf\" x2=\"%lf\" y2=\"%lf\"", &line.x, &line.y, &line.to_x, &line.to_y),
+            4);
+        expect("a corner's x", line.x - first.x, corner[i][0]);
+        expect("a corner's y", line.y - first.y, corner[i][1]);
+        expect("the next one's x", line.to_x - first.x, corner[i + 1][0]);
+        expect("the next one's y", line.to_y - first.y, corner[i + 1][1]);
+    }
+    free(svg);
+    svg = draw(wire, (const char *const[]){NULL}, "map.svg", 0);
+    assert_null(strstr(svg, "monitored fields"));
+    free(svg);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_marks, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_open_edges, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_fields, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_heights, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_cuts, wire_setup, wire_teardown),
     };

@@ -21,6 +21,7 @@ static const char CONFIG[] =
     "  - {name: second, position_m: [-2.2, 1.3, 1.5], heading_deg: 200}\n"
     "beam: {mode: single}\n"
     "coverage: {cell_m: 0.25}\n"
+    "fields: [{number: 3, name: gate, shape: rectangle, corner_m: [-1, 0.5], size_m: [2, 1]}]\n"
     "output: {layout: geo, crs: utm}\n"
     "loop: {pace: fast}\n"
     "links: [{type: tcp}, {type: web, waits: 'yes'}]\n";
@@ -197,6 +198,8 @@ static void check_move(const struct head *head, struct scanhead *sh)
     char *json = get(head, "/head", &len);
     same("x", number(json, "\"name\":\"first\"", "x_m"), 1.5, 0);
     same("roll", number(json, "\"name\":\"first\"", "roll_deg"), -3, 0);
+    assert_non_null(strstr(json, "\"fields\":[{\"number\":3,\"name\":\"gate\","
+                                 "\"outline_m\":[-1,0.5,1,0.5,1,1.5,-1,1.5]}]"));
     free(json);
     json = scan_from(head, sh, 1, 3);
     assert_non_null(strstr(json, "\"judgement\":\"within\""));

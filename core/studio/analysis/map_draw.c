@@ -16,7 +16,8 @@ enum {
 const struct picture_type map_name_type = {11.5, 1, 2.5}, map_height_type = {10, 0, 2.5};
 static const struct picture_type caption = {11, 0, 0};
 
-static const uint8_t ink[3] = {40, 44, 52}, red[3] = {214, 39, 40}, white[3] = {255, 255, 255};
+static const uint8_t ink[3] = {40, 44, 52}, red[3] = {214, 39, 40}, blue[3] = {31, 119, 180},
+                     white[3] = {255, 255, 255};
 
 /* Heights between which the hues spread. The ends are those of 99 % of the pixels, so that a single stray
  * point does not take the colours from all others. */
@@ -126,17 +127,30 @@ void map_station_place(const struct map *map, uint32_t station, double place[2])
     map_draw_place_of(map, map->station[station].x_m, map->station[station].y_m, place);
 }
 
+static void draw_lines(const struct map *map, double (*const line)[2][2], uint64_t n, struct pen *pen,
+                       const uint8_t rgb[3])
+{
+    for (uint64_t i = 0; i < n; i++) {
+        double from[2], to[2];
+        map_draw_place_of(map, line[i][0][0], line[i][0][1], from);
+        map_draw_place_of(map, line[i][1][0], line[i][1][1], to);
+        pen->line(pen->on, from, to, 2, rgb);
+    }
+    pen->end(pen->on);
+}
+
 static void draw_edges(const struct map *map, struct pen *pen)
 {
     if (map->counts.edges == 0) return;
     pen->begin(pen->on, "edges", "open edges of the scene");
-    for (uint64_t i = 0; i < map->counts.edges; i++) {
-        double from[2], to[2];
-        map_draw_place_of(map, map->edge[i][0][0], map->edge[i][0][1], from);
-        map_draw_place_of(map, map->edge[i][1][0], map->edge[i][1][1], to);
-        pen->line(pen->on, from, to, 2, red);
-    }
-    pen->end(pen->on);
+    draw_lines(map, map->edge, map->counts.edges, pen, red);
+}
+
+static void draw_fields(const struct map *map, struct pen *pen)
+{
+    if (map->n_fields == 0) return;
+    pen->begin(pen->on, "fields", "monitored fields");
+    draw_lines(map, map->field, map->n_fields, pen, blue);
 }
 
 static void draw_triangle_about(struct pen *pen, const double at[2], double size, const uint8_t rgb[3])
@@ -265,6 +279,7 @@ int map_draw_marks(const struct map *map, struct pen *pen, struct sh_err *err)
     const struct height_range range = find_heights(map);
     const long margin = at.left < 24 ? (long)at.left : 24, row = (long)(at.top + at.map_height) + 30;
     draw_edges(map, pen);
+    draw_fields(map, pen);
     draw_scale(map, margin, row, pen);
     if (range.high_m > range.low_m) draw_heights(range, margin + BAR_PX + 30, row, pen);
     draw_north((long)at.width - margin - 30, row, pen);

@@ -23,6 +23,9 @@ struct map {
     struct map_station station[MAP_MAX_STATIONS];
     double (*edge)[2][2]; /* [counts.edges] ends, x and y */
     size_t room_edges;
+    double (*field)[2][2]; /* [n_fields] the same, of monitored fields */
+    size_t room_fields;
+    uint64_t n_fields;
     struct map_counts counts;
 };
 

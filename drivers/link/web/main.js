@@ -109,6 +109,7 @@ function startHead(cloud, view, names, keepsPast) {
     names.add(info.surfaces ?? []);
     bar.name(info);
     session.paced(info.pace);
+    if (view) view.stations.fields = info.fields ?? [];
     stations.reload(info.stations ?? []).catch(() => {}); // it is gone again
     showPlan();
     display.setScene(await fetchScene());

@@ -3,8 +3,10 @@
 // a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
 
 import {roundBelow} from './view_camera.js';
+import {inScene} from './view_stations.js';
 
 const FONT = '12px system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
+const FIELD = '#1f77b4'; // as in a map
 const AXES = [['x', [1, 0, 0], '#e0524d'], ['N', [0, 1, 0], '#4aa651'], ['z', [0, 0, 1], '#4a83e0']];
 
 // "20 mm", "5 m", "2 km"
@@ -116,8 +118,24 @@ export class Overlay {
     }
   }
 
+  // Draws a field as far as it is before the eye.
+  #field(camera, stations, station, {outline_m}) {
+    const ends = inScene(stations.placeOf(station), station, outline_m).map((at) => camera.project(at));
+    let run = [];
+    const show = () => {
+      if (run.length > 1) this.#line(run, 1.5, FIELD);
+      run = [];
+    };
+    for (const {x, y, w} of [...ends, ...ends.slice(0, 1)]) {
+      if (w > 0.05) run.push([x, y]);
+      else show();
+    }
+    show();
+  }
+
   #stations(camera, stations) {
     for (const station of stations.list) {
+      if (station.served !== false) for (const field of stations.fields) this.#field(camera, stations, station, field);
       const ring = stations.ring(camera, station);
       if (ring === null) continue;
       const head = camera.project(ring.at);

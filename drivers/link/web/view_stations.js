@@ -9,8 +9,22 @@ import {toSegment} from './view_pick.js';
 const GRAB_PX = 18;
 const KEYS_END_MS = 700; // after so long without a key the station is let go
 
+// Returns corners of the head's frame (x right, y forward: x0, y0, x1, y1 ...) as places in the scene. The station has
+// pitch_deg and roll_deg; place is what placeOf() returns. The head is turned by its heading, then pitch, then roll.
+export function inScene(place, station, corners) {
+  const h = radians(place.heading_deg), p = radians(station.pitch_deg ?? 0), r = radians(station.roll_deg ?? 0);
+  const places = [];
+  for (let i = 0; i + 1 < corners.length; i += 2) {
+    const x = corners[i] * Math.cos(r), sunk = -corners[i] * Math.sin(r);
+    const y = corners[i + 1] * Math.cos(p) - sunk * Math.sin(p), z = corners[i + 1] * Math.sin(p) + sunk * Math.cos(p);
+    places.push([place.at[0] + x * Math.cos(h) + y * Math.sin(h), place.at[1] - x * Math.sin(h) + y * Math.cos(h), place.at[2] + z]);
+  }
+  return places;
+}
+
 export class Stations {
   list = [];
+  fields = []; // the head's monitored fields are {number, name, outline_m}
   selected = null; // number
   moved = null; // {number, x, y, z, heading_deg, what} is the place to which it is being moved
   pending = false; // it was let go, but setStations() has not confirmed it yet

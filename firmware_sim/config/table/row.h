@@ -10,18 +10,19 @@
 #include <stdint.h>
 
 enum cfg_type {
-    CFG_MAP,   /* a section, or one element of a list; nothing is stored */
-    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements. The next row is an
+    CFG_MAP,    /* a section, or one element of a list; nothing is stored */
+    CFG_LIST,   /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements. The next row is an
                 * element: of type CFG_MAP, or of CFG_TEXT. */
-    CFG_BOOL,  /* off|on -> int */
-    CFG_ENUM,  /* names[value] -> int or enum; false and true are read as off and on here, too */
-    CFG_COUNT, /* whole number -> 4 or 8 bytes */
-    CFG_MICRO, /* decimal number, exact to 1e-6 -> int64_t in 1e-6 units */
-    CFG_REAL,  /* double */
-    CFG_TEXT,  /* char[size] */
-    CFG_PATH,  /* char[size]; relative to the file that has it, or, in --set, to the working directory */
-    CFG_VEC3,  /* [x, y, z] -> double[3] */
-    CFG_PAIR,  /* [low, high] -> double[2] */
+    CFG_BOOL,   /* off|on -> int */
+    CFG_ENUM,   /* names[value] -> int or enum; false and true are read as off and on here, too */
+    CFG_COUNT,  /* whole number -> 4 or 8 bytes */
+    CFG_MICRO,  /* decimal number, exact to 1e-6 -> int64_t in 1e-6 units */
+    CFG_REAL,   /* double */
+    CFG_TEXT,   /* char[size] */
+    CFG_PATH,   /* char[size]; relative to the file that has it, or, in --set, to the working directory */
+    CFG_VEC3,   /* [x, y, z] -> double[3] */
+    CFG_PAIR,   /* [low, high] -> double[2] */
+    CFG_POINTS, /* [[x, y], ...] -> struct config_points */
 };
 
 enum cfg_flags {
@@ -32,7 +33,7 @@ enum cfg_flags {
     CFG_NEEDED = 8,   /* has no default that suits most configurations: the example gives it a value */
 };
 
-enum { CFG_MAX_ROWS = 288, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96 };
+enum { CFG_MAX_ROWS = 320, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96 };
 
 struct cfg_key {
     const char *path;

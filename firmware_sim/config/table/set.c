@@ -175,7 +175,7 @@ static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const cha
     if (list != NULL && reach_item(rd, &set, list) != SH_OK) return;
     cfg_forget_copies(rd, key, set.item);
     const int is_copies = strcmp(key->path, "scene.meshes[].copies") == 0 && equals[1] == '[';
-    if (key->type == CFG_MAP || key->type == CFG_LIST || is_copies) {
+    if (key->type == CFG_MAP || key->type == CFG_LIST || key->type == CFG_POINTS || is_copies) {
         replace(rd, doc, &set, key, equals + 1, n_before);
         return;
     }

@@ -104,10 +104,11 @@ static void profile_limit(const char *path, double any, const struct config_prof
 static void allowed_range(const struct cfg_key *key, const struct config_profile *profile, char *buf)
 {
     char low[64], high[64];
-    const char *kind = key->type == CFG_COUNT  ? "a whole number, "
-                       : key->type == CFG_VEC3 ? "[x, y, z], each "
-                       : key->type == CFG_PAIR ? "[low, high], each "
-                                               : "";
+    const char *kind = key->type == CFG_COUNT    ? "a whole number, "
+                       : key->type == CFG_VEC3   ? "[x, y, z], each "
+                       : key->type == CFG_PAIR   ? "[low, high], each "
+                       : key->type == CFG_POINTS ? "[[x, y], ...], each "
+                                                 : "";
     snprintf(low, sizeof low, "%.10g", key->min);
     snprintf(high, sizeof high, "%.10g", key->max);
     if (key->type == CFG_COUNT && key->max >= 0x1p64) snprintf(high, sizeof high, "%" PRIu64, UINT64_MAX);
@@ -280,6 +281,13 @@ int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
 {
     struct place at = {rd, key, item, line};
     return store_real(&at, (double *)cfg_address(rd, key, item) + axis, text);
+}
+
+int cfg_store_point(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
+                    const char *text)
+{
+    struct place at = {rd, key, item, line};
+    return store_real(&at, dst, text);
 }
 
 int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,

@@ -19,6 +19,9 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
               const char *base_dir);
 int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
                    const char *text);
+/* One number of a point of CFG_POINTS, into dst. */
+int cfg_store_point(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
+                    const char *text);
 /* The values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of all
  * profiles. */
 enum { CFG_ALLOWED_MAX = 900 }; /* room for the longest list of words, the kinds of faults */

@@ -104,6 +104,36 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
     }
 }
 
+static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    struct config_points *points = cfg_address(w->rd, key, item);
+    char allowed[CFG_ALLOWED_MAX];
+    if (node->type != YAML_SEQUENCE_NODE) {
+        wrong_kind(w, key, item, node);
+        return;
+    }
+    const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
+    if (top - first > CONFIG_MAX_POINTS) {
+        cfg_fail_value(w->rd, key, item, line_of(w, node), "has %td points; allowed up to %d", top - first,
+                       CONFIG_MAX_POINTS);
+        return;
+    }
+    points->n = (uint32_t)(top - first);
+    for (uint32_t i = 0; i < points->n; i++) {
+        const yaml_node_t *pair = yaml_document_get_node(w->doc, first[i]);
+        if (pair->type != YAML_SEQUENCE_NODE || pair->data.sequence.items.top - pair->data.sequence.items.start != 2) {
+            cfg_fail_value(w->rd, key, item, line_of(w, pair), "point %u is not two numbers; %s", i + 1,
+                           cfg_allowed(key, w->rd->profile, allowed));
+            return;
+        }
+        for (uint32_t axis = 0; axis < 2; axis++) {
+            const yaml_node_t *number = yaml_document_get_node(w->doc, pair->data.sequence.items.start[axis]);
+            if (check_scalar(w, key, item, number) == SH_OK)
+                cfg_store_point(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
+        }
+    }
+}
+
 /* The number of a word among names; -1: none of them. */
 static int word_of(const yaml_node_t *node, const char *const *names)
 {
@@ -272,6 +302,8 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
         wrong_kind(w, key, item, node);
     } else if (key->type == CFG_LIST) {
         read_list(w, key, node);
+    } else if (key->type == CFG_POINTS) {
+        read_points(w, key, item, node);
     } else if (key->type == CFG_VEC3 || key->type == CFG_PAIR) {
         read_vec3(w, key, item, node);
     } else {

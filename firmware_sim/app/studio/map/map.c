@@ -11,6 +11,7 @@
 #include "core/studio/map.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/studio/map/field_lines.h"
 #include "firmware_sim/app/studio/map/view.h"
 #include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/config/config.h"
@@ -26,6 +27,7 @@ struct map_run {
     struct map_view_options view;
     struct map_view_plan plan;
     struct map *map;
+    const struct config *cfg; /* with the monitored fields */
     struct heads heads;
     uint32_t marked; /* stations that are in the map */
     /* 1: a scene in ECEF, drawn in east, north, up of station 1. 0: drawn along the axes of the scene. */
@@ -103,13 +105,25 @@ static int add_station(struct map_run *run, const struct site_station *station, 
     return map_add_station(run->map, &mark, err);
 }
 
+static int add_field_line(void *ctx, const double a[3], const double b[3], struct sh_err *err)
+{
+    struct map_run *run = ctx;
+    double from[3], to[3];
+    to_map(run, a, from);
+    to_map(run, b, to);
+    return map_add_field(run->map, from, to, err);
+}
+
 /* The height of a head is in the site of its own scanner alone. */
 static int prepare(void *ctx, uint32_t station, struct sh_err *err)
 {
     struct map_run *run = ctx;
     int rc = heads_prepare(&run->heads, station, err);
-    for (; rc == SH_OK && run->marked < station; run->marked++)
-        rc = add_station(run, &heads_site(&run->heads)->station[run->marked], err);
+    for (; rc == SH_OK && run->marked < station; run->marked++) {
+        const struct site_station *at = &heads_site(&run->heads)->station[run->marked];
+        rc = add_station(run, at, err);
+        if (rc == SH_OK) rc = field_lines_each(run->cfg, &at->at, add_field_line, run, err);
+    }
     return rc;
 }
 
@@ -124,6 +138,22 @@ static void include_copies(const struct map_run *run, const struct scene_copied 
             to_map(run, v, p);
             include(spec, p);
         }
+}
+
+struct map_fields {
+    const struct map_run *run;
+    struct map_spec *spec;
+};
+
+static int include_line(void *ctx, const double a[3], const double b[3], struct sh_err *err)
+{
+    const struct map_fields *fields = ctx;
+    double p[3];
+    (void)b;
+    (void)err;
+    to_map(fields->run, a, p);
+    include(fields->spec, p);
+    return SH_OK;
 }
 
 static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
@@ -146,6 +176,8 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
     for (uint32_t s = 0; s < site->n_stations; s++) {
         to_map(run, site->station[s].at.position_m, mark);
         include(&spec, mark);
+        rc = field_lines_each(run->cfg, &site->station[s].at, include_line, &(struct map_fields){run, &spec}, err);
+        if (rc != SH_OK) return rc;
     }
     double span_m = fmax(spec.max_m[0] - spec.min_m[0], spec.max_m[1] - spec.min_m[1]);
     for (int i = 0; i < 2; i++) { /* a margin, so that nothing sticks to the border */
@@ -213,6 +245,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                                         .interrupted = app_interrupted};
     app_catch_signals();
     cfg->output.layout = LINE_GEO;
+    run->cfg = cfg;
     int rc = newfile_check(run->output, err);
     if (rc == SH_OK) rc = heads_load(cfg, heads, err);
     if (rc == SH_OK) rc = heads_open(heads, NULL, 0.0, &app_report_stderr, err);

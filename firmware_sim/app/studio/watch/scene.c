@@ -8,6 +8,7 @@
 #include "core/mat3.h"
 #include "core/studio/decimate.h"
 #include "core/vec3.h"
+#include "drivers/protocol/cola_field.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/config/config.h"
@@ -119,6 +120,29 @@ static void put_tripod(struct json *json, const struct device_station *s)
     json_close_object(json);
 }
 
+/* Outlines in the head's frame: x right, y forward, metres. */
+static void put_fields(struct json *json, const struct config *cfg)
+{
+    double corner_m[COLA_SHAPE_CORNERS][2];
+    struct cola_field field;
+    json_open_array(json, "fields");
+    for (uint32_t i = 0; i < cfg->n_fields; i++) {
+        config_make_field(&cfg->field[i], &field);
+        const uint32_t n = cola_shape_outline(&field.shape, corner_m);
+        json_open_object(json, NULL);
+        json_uint(json, "number", cfg->field[i].number);
+        json_string(json, "name", field.name);
+        json_open_array(json, "outline_m");
+        for (uint32_t k = 0; k < n; k++) {
+            json_double(json, NULL, corner_m[k][0]);
+            json_double(json, NULL, corner_m[k][1]);
+        }
+        json_close_array(json);
+        json_close_object(json);
+    }
+    json_close_array(json);
+}
+
 static void put_station(struct json *json, const struct watch *w, uint32_t i)
 {
     struct device_station s;
@@ -166,6 +190,7 @@ static void put_head(struct json *json, const void *ctx)
     for (uint32_t i = 0; i < w->site->n_stations; i++)
         put_station(json, w, i);
     json_close_array(json);
+    put_fields(json, cfg);
     put_surfaces(json, w->site);
     page_put_bounds(json, w->site->scene->min_m, w->site->scene->max_m);
     json_close_object(json);

@@ -1,0 +1,256 @@
+/* SPDX-License-Identifier: MIT */
+/* CoLa: monitored fields by telegram, their evaluation, and the events of results and outputs. Records of fields are
+ * those of real scanners, as the test server and the files of sick_scan_xd quote them. */
+#include "tests/unit/cola_fields_rig.h"
+
+static void open_tim(void)
+{
+    cola_open_tim("TiM781");
+    fields_open(NULL);
+    cola_authorise();
+}
+
+/* ---- records */
+
+#define RECORD_OF_TIM(number, rest) "\x3f\x80\0\0\0\0\0\0\0\0\x0d\x05\xff\xf9\x22\x30\2" number "\0\1" rest
+#define ENDING(name)                "\0\0\0\0\0\0\0\1\0\x8" name "\0\0"
+
+static void a_record_is_read_back_as_it_was_written(void **state)
+{
+    (void)state;
+    static const char two[] = RECORD_OF_TIM("\2", "\0\2\0\xf6\xff\xff\0\xfa\1\x95\xff\xff\1\x2c" ENDING("Field002"));
+    uint8_t request[128] = "sWN field001 ", answer[128] = "sRA field001 ";
+    open_tim();
+    memcpy(request + 13, two, sizeof two - 1);
+    memcpy(answer + 13, two, sizeof two - 1);
+    cola_expect_b(request, 13 + sizeof two - 1, "sWA field001 ", 13);
+    cola_expect_b("sRN field001", 12, answer, 13 + sizeof two - 1);
+    cola_expect("sRN field001",
+                "sRA field001 3F800000 00000000 D05 FFF92230 2 2 1 2 F6 FFFF FA 195 FFFF 12C 0 0 0 1 8 Field002 0");
+    cola_expect("sWN field002 3F800000 00000000 D05 FFF92230 2 2 1 2 F6 FFFF FA 195 FFFF 12C 0 0 0 1 8 Field002 0",
+                "sWA field002");
+    /* another grid and a scale of 2 mm, as an LMS5xx has them; a rectangle */
+    cola_expect("sWN field003 40000000 00000000 683 FFFF3CB0 2 1 1 3 12C FFFF 162 1D2 FFFF 1A3 1E6 FFFF CE 0 0 0 1 B "
+                "segmented_1 0",
+                "sWA field003");
+    cola_expect("sWN field004 40000000 00000000 683 FFFF3CB0 1 3 0 1 F756B 7F 6DDD0 C8 C8 0 0 1 10 rectfield_45_deg 0",
+                "sWA field004");
+    cola_expect("sRN field004",
+                "sRA field004 40000000 00000000 683 FFFF3CB0 1 3 0 1 F756B 7F 6DDD0 C8 C8 0 0 1 10 rectfield_45_deg 0");
+}
+
+static void records_that_say_nothing_are_refused(void **state)
+{
+    (void)state;
+    open_tim();
+#define HEAD "sWN field001 3F800000 00000000 D05 FFF92230 2 2 "
+    cola_expect(HEAD "1 2 F6 FFFF FA F6 FFFF 12C 0 0 0 1 8 Field002 0", "sFA 5");    /* twice one direction */
+    cola_expect(HEAD "1 1 F6 FB FA 0 0 0 1 8 Field002 0", "sFA 5");                  /* start beyond stop */
+    cola_expect(HEAD "0 0 1 0 1 8 Field002 0", "sFA 5");                             /* radial */
+    cola_expect(HEAD "0 0 0 1 1B7740 FA 0 3E8 12C 960 5DC 1 8 Field002 0", "sFA 5"); /* dynamic */
+    cola_expect(HEAD "2 0 0 0 1 8 Field002 0", "sFA 5");
+    cola_expect(HEAD "1 41", "sFA 5");                     /* 65 points */
+    cola_expect(HEAD "0 0 0 0 1 8 Field002 1 0", "sFA 5"); /* a comment */
+    cola_expect(HEAD "0 0 0 0 1 8 Field002", "sFA 8");
+    cola_expect(HEAD "0 0 0 0 1 8 Field002 0 0", "sFA 7");
+    fields_expect("000");
+    cola_expect("sMN Run", "sAN Run 1");
+    cola_expect(HEAD "0 0 0 0 1 8 Field002 0", "sFA A");
+}
+
+/* ---- evaluation */
+
+/* Field 1: 0.5 to 2 m between the beams 300 and 500. */
+static void write_field_1(void)
+{
+    cola_expect("sWN field000 3F800000 00000000 D05 FFF92230 2 1 1 2 12C 1F4 7D0 1F4 1F4 7D0 0 0 0 1 1 A 0",
+                "sWA field000");
+}
+
+static void results_follow_the_scan(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    fields_expect("000");
+    fields_turn();
+    fields_expect("100");
+    fields_object(300, 1, 2.0); /* the limits belong to the field */
+    fields_turn();
+    fields_expect("200");
+    static const struct {
+        int beam;
+        double range_m;
+        char result;
+    } cases[] = {{299, 1.0, '1'}, {300, 1.0, '2'},    {500, 1.0, '2'}, {501, 1.0, '1'},
+                 {300, 0.5, '2'}, {300, 0.4999, '1'}, {500, 2.0, '2'}, {500, 2.001, '1'},
+                 {400, 0.0, '1'}, {400, 0.3, '1'},    {400, 1.0, '2'}, {400, 0.02, '1'}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        fields_object(cases[i].beam, 1, cases[i].range_m);
+        fields_shot[cases[i].beam].n = cases[i].range_m > 0.0;
+        fields_turn();
+        const char results[] = {cases[i].result, '0', '0', 0};
+        fields_expect(results);
+    }
+}
+
+/* Between the beams 300 and 500, which are 200 / 3 degrees apart, the far limit is the chord: at beam 400 it is 2 m times
+ * cos(100 / 3 degrees), 1.670976 m, and the near one is 0.417744 m. */
+static void chords(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    static const struct {
+        double range_m;
+        char result;
+    } cases[] = {{1.67097, '2'}, {1.67098, '1'}, {0.41774, '1'}, {0.41775, '2'}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        fields_object(400, 1, cases[i].range_m);
+        fields_turn();
+        const char results[] = {cases[i].result, '0', '0', 0};
+        fields_expect(results);
+    }
+}
+
+/* The event has the time of the scan in which the result changed, and comes once. */
+static void changes_are_sent(void **state)
+{
+    (void)state;
+    uint8_t frame[256];
+    open_tim();
+    write_field_1();
+    fields_turn();
+    EXPECT_B("sEN LFErec \1", "sEA LFErec \1");
+    EXPECT_B("sEN LIDoutputstate \1", "sEA LIDoutputstate \1");
+    protocol_rig_clear(&cola);
+    fields_turn();
+    assert_int_equal(cola.n_units, 0);
+    for (int i = 0; i < 2; i++) {
+        protocol_rig_clear(&cola);
+        fields_object(350, 5, 1.0);
+        fields_turn();
+        fields_turn();
+        assert_int_equal(cola.n_units, 2);
+        assert_memory_equal(cola.bytes + 8, "sSN", 3);
+        assert_int_equal(fields_result(cola.bytes + 8, 0), 2);
+        uint8_t outputs[19 + 33] = "sSN LIDoutputstate ";
+        outputs[19 + 6] = 1;
+        outputs[19 + 6 + 4] = (uint8_t)(i + 1); /* how often it became active */
+        cola_frame_b(frame, outputs, sizeof outputs);
+        const uint8_t *sent = cola.bytes + cola.end[0];
+        assert_int_equal(cola.len - cola.end[0], sizeof outputs + 9);
+        assert_memory_equal(sent, frame, 8 + 19 + 2);                            /* to the version */
+        assert_memory_equal(sent + 8 + 25, frame + 8 + 25, sizeof outputs - 25); /* from the outputs on */
+        protocol_rig_clear(&cola);
+        fields_wall(10.0);
+        fields_turn();
+        assert_int_equal(cola.n_units, 2);
+        assert_int_equal(fields_result(cola.bytes + 8, 0), 1);
+    }
+    EXPECT_B("sEN LFErec \0", "sEA LFErec \0");
+    EXPECT_B("sEN LIDoutputstate \0", "sEA LIDoutputstate \0");
+    protocol_rig_clear(&cola);
+    fields_object(350, 5, 1.0);
+    fields_turn();
+    assert_int_equal(cola.n_units, 0);
+    fields_expect("200");
+}
+
+/* Scan k begins at k / 15 s; the clock counts from 1970 without UTC. */
+static void a_result_has_the_time_of_its_change(void **state)
+{
+    (void)state;
+    uint8_t frame[64];
+    open_tim();
+    write_field_1();
+    for (int i = 0; i < 30; i++)
+        fields_turn();
+    fields_object(350, 5, 1.0);
+    for (int i = 0; i < 20; i++)
+        fields_turn();
+    protocol_rig_clear(&cola);
+    cola_input(frame, cola_frame_b(frame, "sRN LFErec", 10));
+    const uint8_t *time = cola.bytes + 8 + 13 + 43 - 11;               /* year, month, day, hour, minute, second, us */
+    assert_memory_equal(time - 2, "\0\1\7\xb2\1\1\0\0\2\0\0\0\0", 13); /* scan 30: 2 s */
+}
+
+/* LMDscandata has the outputs in the second of its two bytes, field 14. */
+static void scans_carry_the_outputs(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    cola_stream(1);
+    fields_object(350, 5, 1.0);
+    protocol_rig_clear(&cola);
+    fields_turn();
+    assert_memory_equal(cola.bytes + 46, "\0\0\0\1", 4);
+}
+
+/* ---- sets of fields */
+
+static void telegrams_choose_the_set(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    fields_object(350, 5, 1.0);
+    fields_turn();
+    fields_expect("200");
+    cola_expect("sRN FieldSetSelectionMethod", "sRA FieldSetSelectionMethod 0");
+    cola_expect("sRN ActiveFieldSet", "sRA ActiveFieldSet 1");
+    cola_expect("sWN ActiveFieldSet 2", "sFA 4");
+    cola_expect("sWN FieldSetSelectionMethod 1", "sWA FieldSetSelectionMethod");
+    cola_expect("sWN ActiveFieldSet 0", "sFA 5");
+    cola_expect("sWN ActiveFieldSet 17", "sFA 5");
+    cola_expect("sWN ActiveFieldSet 02", "sWA ActiveFieldSet");
+    fields_expect("000");
+    fields_turn();
+    fields_expect("000");
+    cola_expect("sWN field005 3F800000 00000000 D05 FFF92230 2 6 1 2 12C FFFF 7D0 1F4 FFFF 7D0 0 0 0 1 1 A 0",
+                "sWA field005");
+    fields_turn();
+    fields_expect("002"); /* the third field of the second set */
+    cola_expect("sWN ActiveFieldSet 1", "sWA ActiveFieldSet");
+    fields_turn();
+    fields_expect("200");
+}
+
+/* Fields that are no longer watched are invalid, and their output is off; the next scan says so once. */
+static void another_set_is_news(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    cola_expect("sWN FieldSetSelectionMethod 1", "sWA FieldSetSelectionMethod");
+    EXPECT_B("sEN LFErec \1", "sEA LFErec \1");
+    EXPECT_B("sEN LIDoutputstate \1", "sEA LIDoutputstate \1");
+    fields_object(350, 5, 1.0);
+    fields_turn();
+    EXPECT_B("sWN ActiveFieldSet \0\2", "sWA ActiveFieldSet ");
+    protocol_rig_clear(&cola);
+    fields_turn();
+    fields_turn();
+    assert_int_equal(cola.n_units, 2);
+    assert_int_equal(fields_result(cola.bytes + 8, 0), 0);
+    assert_memory_equal(cola.bytes + cola.end[0] + 8, "sSN LIDoutputstate ", 19);
+    assert_memory_equal(cola.bytes + cola.end[0] + 8 + 25, "\0\0\0\0\1", 5); /* off; it was active once */
+}
+
+int main(void)
+{
+#define CASE(f) cmocka_unit_test_teardown(f, fields_close)
+    const struct CMUnitTest tests[] = {
+        CASE(a_record_is_read_back_as_it_was_written),
+        CASE(records_that_say_nothing_are_refused),
+        CASE(results_follow_the_scan),
+        CASE(chords),
+        CASE(changes_are_sent),
+        CASE(a_result_has_the_time_of_its_change),
+        CASE(scans_carry_the_outputs),
+        CASE(telegrams_choose_the_set),
+        CASE(another_set_is_news),
+    };
+    return cmocka_run_group_tests_name("cola fields", tests, NULL, NULL);
+}

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: MIT */
+/* Monitored fields of a configuration: what is refused, and the shapes that are made of the keys. */
+#include "drivers/protocol/cola_field.h"
+#include "tests/unit/config_rig.h"
+
+/* The configuration with another head and these fields. */
+static void load_fields(const char *profile, const char *fields)
+{
+    char *text = edited("output:", fields), *head = strstr(text, "  prr_hz"), *rest = strstr(text, "scene:");
+    char *whole = calloc(1, strlen(text) + 100);
+    assert_true(head != NULL && rest != NULL && whole != NULL);
+    snprintf(whole, strlen(text) + 100, "head: {profile: %s}\n%s", profile, rest);
+    load_text(whole);
+    free(whole);
+    free(text);
+}
+
+#define SEGMENT "number: 1, shape: segment, angles_deg: [0, 90], radii_m: [0, 1]"
+
+static void fields_that_say_nothing_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *profile, *field, *says;
+    } cases[] = {
+        {"sick-tim781", "{" SEGMENT "}", NULL},
+        {"sick-tim571", "{" SEGMENT "}", "fields: a TiM571 evaluates no fields"},
+        {"sick-tim781", "{shape: segment, angles_deg: [0, 90], radii_m: [0, 1]}", "fields[0].number: missing"},
+        {"sick-tim781", "{number: 1}", "fields[0].shape: missing"},
+        {"sick-tim781", "{number: 49, shape: segment}", "allowed a whole number, 1 to 48"},
+        {"sick-lms111", "{number: 11, shape: segment, angles_deg: [0, 90], radii_m: [0, 1]}",
+         "fields[0].number: 11, but a LMS111 has 10 fields; allowed 1 to 10"},
+        {"sick-tim781", "{" SEGMENT "}, {" SEGMENT "}", "fields[1].number: 1 is the number of fields[0], too"},
+        {"sick-tim781", "{" SEGMENT ", size_m: [1, 1]}", "fields[0].size_m: given, but the field is a segment"},
+        {"sick-tim781", "{number: 1, shape: segment, angles_deg: [0, 90]}",
+         "fields[0].radii_m: missing; required with "},
+        {"sick-tim781", "{number: 1, shape: segment, angles_deg: [90, 0], radii_m: [0, 1]}",
+         "a second angle of 0 to 360"},
+        {"sick-tim781", "{number: 1, shape: segment, angles_deg: [0, 361], radii_m: [0, 1]}",
+         "a second angle of 0 to "},
+        {"sick-tim781", "{number: 1, shape: segment, angles_deg: [0, 9], radii_m: [2, 1]}",
+         "that is not below the inner"},
+        {"sick-tim781", "{number: 1, shape: polygon}", "fields[0].points_m: missing; required with shape: polygon"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1, 1]]}", "2 corners; allowed 3 to 62"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: 3}", "allowed [[x, y], ...], each -1000 to 1000 m"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1], [1, 1]]}", "point 2 is not two numbers"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1, x], [1, 1]]}", "\"x\" is not a number"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1, 1001], [1, 1]]}", "out of range"},
+        {"sick-tim781", "{number: 1, shape: rectangle, corner_m: [900, 0], size_m: [200, 1]}", "reaches farther than"},
+        {"sick-tim781", "{number: 1, shape: rectangle, corner_m: [900, 0], size_m: [100, 1]}", NULL},
+        {"sick-tim781", "{" SEGMENT ", output: 1}", "fields[0].output: given, but a TiM781 has an output for each"},
+        {"sick-lms111", "{" SEGMENT ", output: 3}", NULL},
+        {"sick-lms111", "{" SEGMENT "}]\ninputs: [{input: 5}", "inputs[0].input: \"5\" is out of range"},
+        {"sick-lms111", "{" SEGMENT "}]\ninputs: [{input: 1, from_s: 2, until_s: 2}", "but it begins at 2 s"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char with[300];
+        snprintf(with, sizeof with, "fields: [%s]\noutput:", cases[i].field);
+        load_fields(cases[i].profile, with);
+        if (cases[i].says == NULL ? err.code != SH_OK
+                                  : err.code != SH_EINPUT || strstr(err.text, cases[i].says) == NULL)
+            fail_msg("%s: \"%s\", expected \"%s\"", cases[i].field, err.text,
+                     cases[i].says != NULL ? cases[i].says : "nothing");
+    }
+}
+
+static void keys_make_shapes(void **state)
+{
+    (void)state;
+    static struct cola_fields made;
+    load_fields(
+        "sick-tim781",
+        "fields:\n"
+        "  - {number: 2, name: left, shape: polygon, points_m: [[-1, 0.5], [1.25, 0.5], [0, 2]], response_ms: 134}\n"
+        "  - {number: 48, shape: segment, angles_deg: [350, 370.5], radii_m: [0.25, 3], blanking_m: 0.1}\n"
+        "  - {number: 5, shape: rectangle, corner_m: [1, 2], size_m: [3, 4], turn_deg: 90}\n"
+        "output:");
+    assert_int_equal(err.code, SH_OK);
+    config_fill_fields(cfg, &made);
+    const struct cola_field *f = &made.field[1];
+    assert_string_equal(f->name, "left");
+    assert_int_equal(f->response_ms, 134);
+    assert_int_equal(f->shape.kind, COLA_SHAPE_POLYGON);
+    assert_int_equal(f->shape.n, 3);
+    assert_true(f->shape.corner[1].x_um == 1250000 && f->shape.corner[1].y_um == 500000);
+    f = &made.field[47];
+    assert_int_equal(f->shape.kind, COLA_SHAPE_SECTOR);
+    assert_int_equal(f->blanking_um, 100000);
+    assert_true(f->shape.sector.start_e4 == 3500000 && f->shape.sector.span_e4 == 205000);
+    assert_true(f->shape.sector.inner_um == 250000 && f->shape.sector.outer_um == 3000000);
+    f = &made.field[4];
+    assert_int_equal(f->shape.n, 4);
+    assert_true(f->shape.corner[2].x_um == -3000000 && f->shape.corner[2].y_um == 5000000);
+    assert_int_equal(made.field[0].shape.kind, COLA_SHAPE_NONE);
+}
+
+/* A list of points can be set, and it replaces the one before. */
+static void points_can_be_set(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"fields.0.points_m=[[0, 0], [2, 0], [2, 2]]"};
+    load_fields("sick-tim781",
+                "fields: [{number: 1, shape: polygon, points_m: [[0, 0], [1, 0], [1, 1], [0, 1]]}]\noutput:");
+    assert_int_equal(err.code, SH_OK);
+    load_sets(sets, 1);
+    assert_int_equal(err.code, SH_OK);
+    assert_int_equal(cfg->field[0].points_m.n, 3);
+    assert_true(cfg->field[0].points_m.at[2][1] == 2.0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(fields_that_say_nothing_are_refused),
+                                       cmocka_unit_test(keys_make_shapes), cmocka_unit_test(points_can_be_set)};
+    return cmocka_run_group_tests_name("config fields", tests, set_up, tear_down);
+}

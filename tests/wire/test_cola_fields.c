@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: MIT */
+/* A TiM781 watches fields of its configuration: a client polls the results and gets the changes. Faults make them
+ * change: a laser that is off, and a soiled window. */
+#include "tests/wire/room.h"
+#include "tests/wire/wire.h"
+
+struct client {
+    int fd;
+    char bytes[1 << 16], text[1 << 16];
+    size_t len;
+};
+
+/* Returns the next telegram without its marks. */
+static const char *next(struct client *c)
+{
+    for (;;) {
+        const char *end = memchr(c->bytes, 3, c->len);
+        if (end != NULL) {
+            const size_t n = (size_t)(end - c->bytes);
+            memcpy(c->text, c->bytes + 1, n - 1);
+            c->text[n - 1] = '\0';
+            memmove(c->bytes, end + 1, c->len -= n + 1);
+            return c->text;
+        }
+        struct pollfd slot = {.fd = c->fd, .events = POLLIN};
+        assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+        const ssize_t got = read(c->fd, c->bytes + c->len, sizeof c->bytes - c->len);
+        assert_true(got > 0);
+        c->len += (size_t)got;
+    }
+}
+
+static void send_request(struct client *c, const char *request)
+{
+    char line[64];
+    const int n = snprintf(line, sizeof line, "\2%s\3", request);
+    assert_int_equal(send(c->fd, line, (size_t)n, MSG_NOSIGNAL), n);
+}
+
+/* Waits for a telegram that begins so. */
+static const char *wait_for(struct client *c, const char *begin)
+{
+    const char *text;
+    while (strncmp(text = next(c), begin, strlen(begin)) != 0)
+        continue;
+    return text;
+}
+
+/* The results of LFErec as "210". Each of three records has 18 values in CoLa-A, where the time has 7. */
+static void read_results(const char *telegram, char results[4])
+{
+    const char *at = telegram;
+    for (int i = 0; i < 3; i++) /* verb, name, count */
+        at = strchr(at, ' ') + 1;
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 19; i++, at = strchr(at, ' ') != NULL ? strchr(at, ' ') + 1 : at)
+            if (i == 7) results[k] = *at;
+    results[3] = '\0';
+}
+
+static void poll_until(struct client *c, const char *request, const char *answer)
+{
+    do
+        send_request(c, request);
+    while (strcmp(wait_for(c, "sRA "), answer) != 0);
+}
+
+/* The head stands in a closed room, so that the walls are in the one field and not in the other. */
+static void fields_and_the_window(void **state)
+{
+    struct wire *wire = *state;
+    static struct client c;
+    char results[4];
+    const struct room_config config = {
+        .profile = "sick-tim781",
+        .prr_hz = 16200,
+        .lines_hz = 15,
+        .links = "loop: {queue_ms: 2000}\n"
+                 "links: [{type: tcp, port: 0, protocol: cola}, {type: pty, path: native}]\n",
+        .more = "signal: {model: on}\n"
+                "fields:\n"
+                "  - {number: 1, name: walls, shape: segment, angles_deg: [-45, 225], radii_m: [0, 20]}\n"
+                "  - {number: 2, name: near, shape: rectangle, corner_m: [-0.2, -0.2], size_m: [0.4, 0.4]}\n"};
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    struct scanhead *native = client_open(head_endpoint(&head, "pty"));
+    c.fd = raw_connect(head_endpoint(&head, "tcp"));
+    send_request(&c, "sEN LFErec 1");
+    send_request(&c, "sEN LIDoutputstate 1");
+    send_request(&c, "sMN SetAccessMode 03 F4724744");
+    wait_for(&c, "sAN SetAccessMode 1");
+    send_request(&c, "sMN LMCstartmeas");
+    read_results(wait_for(&c, "sSN LFErec 3 "), results);
+    assert_string_equal(results, "210");
+    assert_non_null(strstr(wait_for(&c, "sSN LIDoutputstate 0 "), " 1 1 0 0 0 0 0 0 0 0 0"));
+    static struct client late; /* the first answer has what was seen before it came */
+    late.fd = raw_connect(head_endpoint(&head, "tcp"));
+    send_request(&late, "sRN LFErec");
+    read_results(wait_for(&late, "sRA LFErec 3 "), results);
+    assert_string_equal(results, "210");
+    close(late.fd);
+    poll_until(&c, "sRN LCMstate", "sRA LCMstate 0");
+    const long soiled = strtol(client_ask(native, "FAULt:ADD {kind: window_soiled, loss_db: 3}"), NULL, 10);
+    poll_until(&c, "sRN LCMstate", "sRA LCMstate 2");
+    char line[40];
+    snprintf(line, sizeof line, "FAULt:CLEar %ld", soiled);
+    assert_string_equal(client_ask(native, line), "OK");
+    poll_until(&c, "sRN LCMstate", "sRA LCMstate 0");
+    client_ask(native, "FAULt:ADD {kind: laser_off}");
+    read_results(wait_for(&c, "sSN LFErec 3 "), results);
+    assert_string_equal(results, "110"); /* shots without echo are no objects */
+    assert_non_null(strstr(wait_for(&c, "sSN LIDoutputstate 0 "), " 0 1 0 0 0 0 0 0 0 0 0"));
+    close(c.fd);
+    scanhead_close(native);
+    head_end(&head, SIGTERM);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(fields_and_the_window, wire_setup, wire_teardown)};
+    return cmocka_run_group_tests_name("cola fields", tests, NULL, NULL);
+}
