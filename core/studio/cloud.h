@@ -61,6 +61,10 @@ enum cloud_column {
  * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
+/* Positions alone, of software that is not ours: PLY and LAS as above; PCD (text, binary, compressed); and text, a line
+ * a point, with blanks, commas or semicolons between numbers. There a line of names that has x, y and z says where they
+ * stand; else they come first. Lines that are no points are left out, with a warning of more than one. */
+int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
 /* How cloud_compare maps a point to the scene. */

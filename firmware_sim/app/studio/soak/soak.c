@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. */
+/* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. With
+ * --client it runs somebody else's instead (verdicts.h). */
 #include "drivers/link/link.h"
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/client.h"
@@ -9,6 +10,7 @@
 #include "firmware_sim/app/studio/soak/ledger.h"
 #include "firmware_sim/app/studio/soak/sheet.h"
 #include "firmware_sim/app/studio/soak/usb.h"
+#include "firmware_sim/app/studio/soak/verdicts.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/loop/loop.h"
@@ -27,7 +29,8 @@ struct soak_options {
     struct device_options device;
     double duration_s;
     long link;
-    const char *json;
+    double match_mm;
+    struct verdicts verdicts;
     int quiet;
 };
 
@@ -153,7 +156,7 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
 {
     soak_conclude(soak);
     soak_print(soak, stdout);
-    const int rc = o->json != NULL ? app_write_json(o->json, soak_put, soak, err) : SH_OK;
+    const int rc = o->verdicts.json != NULL ? app_write_json(o->verdicts.json, soak_put, soak, err) : SH_OK;
     if (rc != SH_OK || soak->n_failures == 0) return rc;
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
@@ -228,12 +231,47 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
+static int take_scenario(void *values, const char *text)
+{
+    struct soak_options *o = values;
+    if (o->verdicts.n == VERDICTS_MAX_SCENARIOS)
+        return app_usage(&app_soak, "--scenario %s: at most %d are allowed", text, VERDICTS_MAX_SCENARIOS);
+    o->verdicts.scenario[o->verdicts.n++] = o->in.scenario = text;
+    return APP_OK;
+}
+
+/* Options that go only with a client, and those that go only with one scenario. */
+static int check_options(const struct soak_options *o)
+{
+    const struct verdicts *v = &o->verdicts;
+    const int is_theirs = v->options.command != NULL;
+    if (!is_theirs && (v->options.file != NULL || v->options.folder != NULL || v->junit != NULL || o->match_mm >= 0.0))
+        return app_usage(&app_soak, "--junit, --match-mm and --client-... need --client");
+    if (!is_theirs && v->n > 1) return app_usage(&app_soak, "several --scenario need --client");
+    if (v->n > 1 && o->device.truth != NULL)
+        return app_usage(&app_soak, "--truth is one file, and %u scenarios are given; allowed is one", v->n);
+    return APP_GO_ON;
+}
+
+static int run_theirs(struct soak_options *o)
+{
+    struct verdict_options *v = &o->verdicts.options;
+    v->truth = o->device.truth;
+    v->duration_s = o->duration_s;
+    v->match_m = 1e-3 * o->match_mm;
+    v->link = o->link != 0 ? (uint32_t)o->link : 1;
+    return verdicts_run(&o->verdicts, &o->in);
+}
+
 static int soak_run_command(int argc, char **argv)
 {
-    struct soak_options o = {.duration_s = 30.0};
-    const int status = app_parse(&app_soak, argc, argv, &o.in, &o);
+    struct soak_options o = {
+        .duration_s = 30.0, .match_mm = -1.0, .verdicts.options = {.limit_s = 10.0, .grace_s = 5.0}};
+    int status = app_parse(&app_soak, argc, argv, &o.in, &o);
+    if (status == APP_GO_ON) status = check_options(&o);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
+    if (o.verdicts.options.command != NULL) return run_theirs(&o);
     return app_with_config(&o.in, soak_head, &o);
 }
 
@@ -241,13 +279,31 @@ static int soak_run_command(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
-     .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults"},
+    {APP_CALL, "scenario", "FILE", .apply = take_scenario, .file = APP_READS,
+     .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults. With "
+             "--client it may be repeated: each is run in turn"},
     {APP_NUMBER, "duration", "S", .min = 0.1, .max = 1e8, .at = AT(duration_s),
      .help = "inject faults for S seconds from the first points on (default 30), in the pace fast of device time"},
     {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
-     .help = "connect a client only to this link of the configuration"},
-    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES,
+     .help = "connect a client only to this link of the configuration; with --client: the link that it gets (default 1)"},
+    {APP_TEXT, "client", "COMMAND", .at = AT(verdicts.options.command),
+     .help = "run this by sh -c in place of our own clients, and judge it; {endpoint}, {host}, {port}, {path} and {out} "
+             "are filled in"},
+    {APP_TEXT, "client-file", "FILE", .at = AT(verdicts.options.file),
+     .help = "compare the points that the client leaves in this file (PLY, LAS, PCD, or text) with those of the head; - "
+             "is its standard output"},
+    {APP_TEXT, "client-folder", "DIR", .at = AT(verdicts.options.folder),
+     .help = "put logs and {out} there (default: a new folder in TMPDIR)"},
+    {APP_NUMBER, "reconnect-limit", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.limit_s),
+     .help = "the client has to connect within S seconds, and after a disturbance again (default 10)"},
+    {APP_NUMBER, "client-grace", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.grace_s),
+     .help = "the client has to end within S seconds of SIGTERM (default 5)"},
+    {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
+     .help = "coordinates of points agree within MM and what the file rounds to (default 0.01; scip and cola 2, velodyne "
+             "20)"},
+    {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,
+     .help = "write the verdict on the client as JUnit XML, too"},
+    {APP_TEXT, "json", "FILE", .at = AT(verdicts.json), .file = APP_WRITES,
      .help = "write the results as JSON, too; - is standard output"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
