@@ -181,6 +181,7 @@ static int take_compressed(struct pcd *g, struct sh_err *err)
     const size_t left = (size_t)(g->t.end - g->t.p);
     if (left < 8 || le_get32(in) > left - 8) return pcd_fail(g, err, "the file is cut off within its compressed points");
     const size_t len = le_get32(in + 4);
+    if (len / 100 > le_get32(in)) return pcd_fail(g, err, "its compressed points are damaged"); /* LZF reaches 1 : 88 */
     uint8_t *out = malloc(len + 1);
     if (out == NULL) return text_fail(&g->t, 0, SH_ENOMEM, err, "no memory for %zu bytes", len);
     int rc = unpack_lzf(in + 8, le_get32(in), out, len) ? SH_OK : pcd_fail(g, err, "its compressed points are damaged");
@@ -223,6 +224,7 @@ static int take_points(struct pcd *g, struct sh_err *err)
         return pcd_fail(g, err, "DATA is neither ascii, binary nor binary_compressed");
     const int rc = cloud_reserve(g->cloud, (size_t)g->n, 0, err);
     if (rc != SH_OK) return rc;
+    g->cloud->is_text = is_text;
     if (is_text) return take_text(g, err);
     return take_binary(g, (const uint8_t *)g->t.p, (size_t)(g->t.end - g->t.p), false, err);
 }

@@ -135,7 +135,8 @@ static int read_body(struct reading *g, struct sh_err *err)
         has_points |= h->element[i].kind == PLY_VERTEX;
     if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "it has no element vertex, so no points");
     int rc = ply_walk(&g->r, &user, err);
-    if (h->format == PLY_ASCII) g->cloud->count_m = 1e-6;
+    g->cloud->is_text = h->format == PLY_ASCII;
+    if (g->cloud->is_text) g->cloud->count_m = 1e-6;
     if (rc == SH_OK && g->r.is_single) cloud_note_single(g->cloud, g->r.t.path, g->report);
     return rc;
 }

@@ -84,6 +84,7 @@ static int read_lines(struct table *g, const struct sh_report *report, struct sh
         if (rc == SH_OK && g->t.line % 65536 == 0) rc = sh_check_stop(report, err);
     }
     g->cloud->n = g->n;
+    g->cloud->is_text = 1;
     if (rc != SH_OK) return rc;
     if (g->n == 0)
         return text_fail(&g->t, 0, SH_EINPUT, err,

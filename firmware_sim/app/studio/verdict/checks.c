@@ -247,5 +247,6 @@ void checks_points(struct verdict *v, const struct match *m, const double unknow
     else if (m->repeated != 0)
         say(v, VERDICT_POINTS_ONCE, VERDICT_FOUND, "%zu points more than it was sent", m->repeated);
     else
-        say(v, VERDICT_POINTS_ONCE, VERDICT_PASSED, "%zu points were sent", m->sent);
+        say(v, VERDICT_POINTS_ONCE, VERDICT_PASSED, "%zu points were sent%s", m->sent,
+            2 * m->again < m->sent ? "" : ", most of them several times: with noise.range on they are told apart");
 }

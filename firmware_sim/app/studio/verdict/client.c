@@ -126,6 +126,7 @@ int client_has_ended(struct client *client)
         if (pid == client->pid) client->status = status;
     if (pid == 0) return 0;
     client->ended_ns = clock_now_ns();
+    prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0);
     return 1;
 }
 

@@ -177,6 +177,7 @@ static void count_points(struct match_index *index, const struct cloud *cloud, c
         const struct match_entry *e = &index->entry[i];
         if (e->parent != i) continue;
         m->sent += e->sent;
+        m->again += e->sent > 0 ? e->sent - 1 : 0;
         if (e->got > e->sent) m->repeated += e->got - e->sent;
     }
 }
@@ -186,6 +187,7 @@ double match_unit_m(const struct cloud *cloud)
     const size_t step = cloud->n / TRIED_POINTS + 1;
     int decimals = 0, digits = 0;
     double largest = 0.0;
+    if (!cloud->is_text) return cloud->count_m;
     for (size_t i = 0; i < cloud->n; i++)
         for (int k = 0; k < 3; k++) {
             const double v = fabs(cloud->xyz_m[i][k]);
@@ -205,7 +207,7 @@ double match_unit_m(const struct cloud *cloud)
     /* A file has as many decimals for each coordinate, or as many digits. */
     const int exponent = largest > 0.0 ? (int)floor(log10(largest)) : 0;
     const int last = decimals < digits - 1 - exponent ? decimals : digits - 1 - exponent;
-    return fmax(pow(10.0, -last), cloud->count_m);
+    return pow(10.0, -last);
 }
 
 int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,

@@ -14,6 +14,7 @@ struct match {
     size_t unknown;   /* no pulse had them */
     size_t repeated;  /* the client has them more often than they were sent */
     size_t sent;      /* points of the head that some session was sent, once for each */
+    size_t again;     /* of sent, those at a place that was sent before: a repeated one may go unseen there */
     size_t first_unknown;    /* index in the cloud */
     const char *frame;       /* the coordinate frame in which they agree best */
     double unit_m, within_m; /* what the file rounds to; how far a coordinate may differ */
@@ -23,8 +24,8 @@ struct match {
 int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,
                  double match_m, struct match *match, struct sh_err *err);
 
-/* What a file's coordinates are rounded to: the unit of the last digit that they have, of the largest one; at least what the
- * format says. */
+/* What a file's coordinates are rounded to. Of text the unit of the last digit that the largest one has; else what the format
+ * says (count_m). */
 double match_unit_m(const struct cloud *cloud);
 
 #endif

@@ -138,7 +138,7 @@ static void settle(struct run *r)
     int64_t from_ns = atomic_load(&r->stream.points_ns), until_ns = in_s(r->options->limit_s);
     while (!app_interrupted() && !client_has_ended(&r->client)) {
         const int64_t over_ns = watch_over_ns(&r->watch) + (int64_t)(1e9 * r->options->limit_s);
-        c->is_open = watch_is_whole(&r->watch, r->options->link);
+        c->is_open = watch_is_whole(&r->watch);
         c->scans = atomic_load(&r->stream.points_ns) > from_ns + AT_LEAST_NS;
         if ((c->is_open || !c->has_sessions) && c->scans) return;
         if (clock_now_ns() > until_ns && clock_now_ns() > over_ns) return;
@@ -213,7 +213,7 @@ static int compare(struct run *r, struct sh_err *err)
         checks_no_points(r->verdict, VERDICT_FOUND, why.text);
         return SH_OK;
     }
-    if (cloud_read_positions(r->points, &app_report_stderr, &cloud, &why) != SH_OK) {
+    if (cloud_read_positions(r->points, &app_report_quiet, &cloud, &why) != SH_OK) {
         checks_no_points(r->verdict, VERDICT_FOUND, why.text);
         return SH_OK;
     }
@@ -246,7 +246,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     r->options = options;
     r->verdict = verdict;
     r->stream.keeps = options->file != NULL;
-    watch_begin(&r->watch);
+    watch_begin(&r->watch, cfg->n_links, options->link);
     r->checks = (struct checks){.options = options,
                                 .watch = &r->watch,
                                 .client = &r->client,

@@ -8,10 +8,10 @@
 #include "firmware_sim/app/studio/verdict/watch.h"
 #include "firmware_sim/base/clock.h"
 
-static struct watch_link *link_of(struct watch *w, uint32_t session, uint32_t *number)
+/* Returns its number, from 1. */
+static uint32_t link_of(uint32_t session)
 {
-    *number = (session - 1) / LINK_MAX_SESSIONS + 1;
-    return &w->link[*number - 1];
+    return (session - 1) / LINK_MAX_SESSIONS + 1;
 }
 
 /* ---- sessions */
@@ -27,14 +27,15 @@ static void add_break(struct watch *w, const struct watch_break *broken)
 
 static void begin_session(struct watch *w, uint32_t session, int64_t t_ns)
 {
-    uint32_t number;
-    struct watch_link *link = link_of(w, session, &number);
+    const uint32_t number = link_of(session);
+    struct watch_link *link = &w->link[number - 1];
     const int64_t now_ns = clock_now_ns();
     link->open++;
     link->acted = 0;
-    if (w->first_open_ns == 0) w->first_open_ns = now_ns;
     for (size_t i = 0; i < w->n_broken; i++)
         if (w->broken[i].link == number && w->broken[i].back_ns == 0) w->broken[i].back_ns = now_ns;
+    if (number != w->chosen) return;
+    if (w->first_open_ns == 0) w->first_open_ns = now_ns;
     if (!grow(&w->span, &w->room_span, w->n_span + 1, sizeof *w->span)) {
         w->is_short = 1;
         return;
@@ -44,8 +45,8 @@ static void begin_session(struct watch *w, uint32_t session, int64_t t_ns)
 
 static void end_session(struct watch *w, uint32_t session, const char *peer, int64_t t_ns)
 {
-    uint32_t number;
-    struct watch_link *link = link_of(w, session, &number);
+    const uint32_t number = link_of(session);
+    struct watch_link *link = &w->link[number - 1];
     link->open -= link->open != 0;
     for (size_t i = w->n_span; i-- > 0;)
         if (w->span[i].session == session && w->span[i].to_ns == INT64_MAX) w->span[i].to_ns = t_ns;
@@ -58,6 +59,7 @@ static void end_session(struct watch *w, uint32_t session, const char *peer, int
 static void on_session(void *ctx, uint32_t session, int begins, const char *peer, int64_t t_ns)
 {
     struct watch *w = ctx;
+    if (link_of(session) > w->n_links) return;
     pthread_mutex_lock(&w->lock);
     if (begins)
         begin_session(w, session, t_ns);
@@ -80,7 +82,7 @@ static void keep_printable(char *to, size_t cap, const void *bytes, size_t len)
 static void on_heard(void *ctx, uint32_t session, const void *bytes, size_t len)
 {
     struct watch *w = ctx;
-    (void)session;
+    if (link_of(session) > w->n_links) return;
     pthread_mutex_lock(&w->lock);
     w->heard_bytes += len;
     keep_printable(w->last, sizeof w->last, bytes, len);
@@ -98,7 +100,7 @@ static int is_of_state(const char *reply)
 static void on_refused(void *ctx, uint32_t session, const char *line, const char *reply)
 {
     struct watch *w = ctx;
-    (void)session;
+    if (link_of(session) > w->n_links) return;
     pthread_mutex_lock(&w->lock);
     if (reply != NULL && is_of_state(reply)) {
         w->wrong_state++;
@@ -124,7 +126,7 @@ static int ends_sessions(enum fault_kind kind)
 static void act(struct watch *w, const struct fault_note *note)
 {
     const int64_t over_ns = clock_now_ns() + (int64_t)(1e6 * note->for_ms);
-    for (uint32_t i = 0; i < CONFIG_MAX_LINKS; i++) {
+    for (uint32_t i = 0; i < w->n_links; i++) {
         if (note->link != 0 && note->link != i + 1) continue;
         struct watch_link *link = &w->link[i];
         if (link->acted && link->over_ns > over_ns) continue;
@@ -170,10 +172,10 @@ void watch_note(void *ctx, const struct fault_note *note)
 
 /* ---- for the run */
 
-int watch_is_whole(struct watch *w, uint32_t link)
+int watch_is_whole(struct watch *w)
 {
     pthread_mutex_lock(&w->lock);
-    int whole = w->link[link - 1].open != 0;
+    int whole = w->link[w->chosen - 1].open != 0;
     for (size_t i = 0; i < w->n_broken; i++)
         whole &= w->broken[i].back_ns != 0;
     pthread_mutex_unlock(&w->lock);
@@ -198,9 +200,11 @@ int64_t watch_first_open_ns(struct watch *w)
     return first_ns;
 }
 
-void watch_begin(struct watch *w)
+void watch_begin(struct watch *w, uint32_t n_links, uint32_t chosen)
 {
     memset(w, 0, sizeof *w);
+    w->n_links = n_links;
+    w->chosen = chosen;
     pthread_mutex_init(&w->lock, NULL);
     w->observer = (struct links_observer){w, on_session, on_heard, on_refused};
 }

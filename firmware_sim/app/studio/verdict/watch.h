@@ -44,26 +44,28 @@ enum { WATCH_REFUSED = 3, WATCH_LINE = 80 };
 struct watch {
     pthread_mutex_t lock;
     struct links_observer observer;
-    int is_over; /* what follows is the end of the run, and no client's doing */
-    int is_short; /* memory was */
-    struct watch_link link[CONFIG_MAX_LINKS + 1];
+    uint32_t n_links, chosen; /* chosen: the client's, from 1 */
+    int is_over;              /* what follows is the end of the run, and no client's doing */
+    int is_short;             /* memory was */
+    struct watch_link link[CONFIG_MAX_LINKS];
     struct watch_break *broken;
-    struct watch_span *span;
+    struct watch_span *span; /* of the chosen link */
     struct watch_spoiled *spoiled;
     size_t n_broken, room_broken, n_span, room_span, n_spoiled, room_spoiled;
-    int64_t first_open_ns;
+    int64_t first_open_ns; /* of the chosen link */
     uint64_t injected, stalls, heard_bytes, wrong, wrong_state;
     char refused[WATCH_REFUSED][2 * WATCH_LINE]; /* the first wrong requests */
     char last[WATCH_LINE];                       /* what was heard last, printable */
 };
 
-void watch_begin(struct watch *watch);
+/* Links after the first n_links are not watched. */
+void watch_begin(struct watch *watch, uint32_t n_links, uint32_t chosen);
 void watch_end(struct watch *watch);
 void watch_free(struct watch *watch);
 /* The listener of the board. */
 void watch_note(void *watch, const struct fault_note *note);
-/* Whether all clients that a disturbance sent away are back, and the link has a session. */
-int watch_is_whole(struct watch *watch, uint32_t link);
+/* Whether all clients that a disturbance sent away are back, and the chosen link has a session. */
+int watch_is_whole(struct watch *watch);
 /* When the last disturbance so far is over. */
 int64_t watch_over_ns(struct watch *watch);
 int64_t watch_first_open_ns(struct watch *watch);
