@@ -129,6 +129,8 @@ static void judge_requests(const struct checks *c, struct verdict *v)
     v->figures.refused = w->wrong;
     v->figures.refused_by_state = w->wrong_state;
     v->figures.heard_bytes = w->heard_bytes;
+    for (uint64_t i = 0; i < w->wrong && i < WATCH_REFUSED; i++)
+        snprintf(v->figures.wrong_lines[i], sizeof v->figures.wrong_lines[i], "%s", w->refused[i]);
     if (w->wrong != 0)
         say(v, VERDICT_ASKS_RIGHT, VERDICT_FOUND, "%" PRIu64 " refused; the first: %s", w->wrong, w->refused[0]);
     else if (w->heard_bytes == 0)

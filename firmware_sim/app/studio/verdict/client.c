@@ -70,7 +70,8 @@ char *client_fill(const char *text, const struct client_words *words)
 
 /* ---- the process */
 
-static int set_up(posix_spawnattr_t *attr, posix_spawn_file_actions_t *files, const char *log, const char *out)
+static int set_up(posix_spawnattr_t *attr, posix_spawn_file_actions_t *files, int in_fd, const char *log,
+                  const char *out)
 {
     sigset_t all, none;
     sigfillset(&all);
@@ -78,7 +79,7 @@ static int set_up(posix_spawnattr_t *attr, posix_spawn_file_actions_t *files, co
     int rc = posix_spawnattr_setflags(attr, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
     rc |= posix_spawnattr_setpgroup(attr, 0) | posix_spawnattr_setsigdefault(attr, &all);
     rc |= posix_spawnattr_setsigmask(attr, &none);
-    rc |= posix_spawn_file_actions_addopen(files, 0, "/dev/null", O_RDONLY, 0);
+    rc |= posix_spawn_file_actions_adddup2(files, in_fd, 0);
     rc |= posix_spawn_file_actions_addopen(files, 2, log, O_WRONLY | O_APPEND, 0);
     rc |= out == NULL ? posix_spawn_file_actions_adddup2(files, 2, 1)
                       : posix_spawn_file_actions_addopen(files, 1, out, O_WRONLY, 0);
@@ -99,19 +100,23 @@ int client_start(struct client *client, const char *line, const char *log, const
     posix_spawnattr_t attr;
     posix_spawn_file_actions_t files;
     char *const argv[] = {(char *)"sh", (char *)"-c", (char *)line, NULL};
-    *client = (struct client){0};
+    int in[2];
+    *client = (struct client){.in_fd = -1};
     int rc = make_empty(log, err);
     if (rc == SH_OK && out != NULL) rc = make_empty(out, err);
+    if (rc == SH_OK && pipe2(in, O_CLOEXEC) != 0) rc = sh_fail(err, SH_EIO, "pipe: %s", strerror(errno));
     if (rc != SH_OK) return rc;
+    client->in_fd = in[1];
     /* What the shell leaves behind becomes a child of this process, which can then wait for it. */
     prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0);
     posix_spawnattr_init(&attr);
     posix_spawn_file_actions_init(&files);
-    rc = set_up(&attr, &files, log, out);
+    rc = set_up(&attr, &files, in[0], log, out);
     client->started_ns = clock_now_ns();
     if (rc == 0) rc = posix_spawn(&client->pid, "/bin/sh", &files, &attr, argv, environ);
     posix_spawn_file_actions_destroy(&files);
     posix_spawnattr_destroy(&attr);
+    close(in[0]);
     if (rc == 0) return SH_OK;
     client->pid = 0;
     return sh_fail(err, SH_EIO, "--client: sh can't be started: %s", strerror(rc));
@@ -141,10 +146,12 @@ static int wait_for_end(struct client *client, double s)
 void client_end(struct client *client, double grace_s)
 {
     static const double KILLED_WITHIN_S = 5.0; /* a process that the kernel holds is not waited for */
-    if (client->pid == 0 || client_has_ended(client)) return;
-    kill(-client->pid, SIGTERM);
-    if (wait_for_end(client, grace_s)) return;
-    client->had_to_be_killed = 1;
-    kill(-client->pid, SIGKILL);
-    wait_for_end(client, KILLED_WITHIN_S);
+    if (client->pid != 0 && !client_has_ended(client)) {
+        kill(-client->pid, SIGTERM);
+        client->had_to_be_killed = !wait_for_end(client, grace_s);
+        if (client->had_to_be_killed) kill(-client->pid, SIGKILL);
+        wait_for_end(client, KILLED_WITHIN_S);
+    }
+    if (client->in_fd >= 0) close(client->in_fd);
+    client->in_fd = -1;
 }

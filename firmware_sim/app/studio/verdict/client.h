@@ -19,6 +19,7 @@ struct client_words {
 char *client_fill(const char *text, const struct client_words *words);
 
 struct client {
+    int in_fd; /* its standard input, which stays open and has nothing: some clients end with it, or at a key */
     pid_t pid; /* of the shell, and of the group; 0: none was started */
     int64_t started_ns, ended_ns; /* ended_ns 0: some process of the group is there */
     int status; /* the shell's, as waitpid has it */
@@ -29,7 +30,7 @@ struct client {
 int client_start(struct client *client, const char *line, const char *log, const char *out, struct sh_err *err);
 /* 1: the whole group has ended. */
 int client_has_ended(struct client *client);
-/* SIGTERM, after grace_s SIGKILL. */
+/* SIGTERM, after grace_s SIGKILL. Due after each start. */
 void client_end(struct client *client, double grace_s);
 
 #endif

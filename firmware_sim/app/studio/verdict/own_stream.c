@@ -4,9 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/grow.h"
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/verdict/own_stream.h"
+#include "firmware_sim/command/head.h"
 
 enum { NEXT_MS = 200, AT_ONCE = 512 };
 
@@ -60,6 +62,19 @@ static void keep_points(struct own_stream *s, const struct scanhead_frame *frame
     s->frame[s->n_frames++] = (struct own_frame){frame->seq, frame->t_ns, s->n};
 }
 
+/* By its events, and by its telemetry each second (EVENTS.md). */
+static void see_state(struct own_stream *s, const struct scanhead_frame *frame)
+{
+    uint64_t state;
+    if (frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE)
+        state = frame->event_value[0];
+    else if (frame->type == SCANHEAD_TELEMETRY && frame->payload_len >= 4)
+        state = le_get32(frame->payload);
+    else
+        return;
+    if (state != HEAD_OFF && state != HEAD_BOOT) atomic_store(&s->is_up, 1);
+}
+
 static void *own_stream_read(void *arg)
 {
     struct own_stream *s = arg;
@@ -67,6 +82,7 @@ static void *own_stream_read(void *arg)
     struct scanhead_stats stats;
     int rc;
     while ((rc = scanhead_next(s->sh, &frame, NEXT_MS)) == SCANHEAD_OK || rc == SCANHEAD_ETIMEOUT) {
+        if (rc == SCANHEAD_OK) see_state(s, &frame);
         if (rc != SCANHEAD_OK || frame.type != SCANHEAD_POINTS) continue;
         if (s->keeps) keep_points(s, &frame);
         atomic_store(&s->points_ns, frame.t_ns);

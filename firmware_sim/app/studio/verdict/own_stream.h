@@ -23,6 +23,7 @@ struct own_stream {
     struct scanhead *sh;
     pthread_t thread;
     int running, keeps; /* keeps: the points, too */
+    atomic_int is_up;          /* the head has booted */
     _Atomic int64_t points_ns; /* device time of the last frame of points; 0: none so far */
     /* Of the thread, until it is joined: */
     struct own_frame *frame;

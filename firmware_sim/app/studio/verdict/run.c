@@ -21,6 +21,7 @@
 #include "firmware_sim/loop/loop.h"
 
 enum { WAIT_MS = 10 };
+static const double UP_WITHIN_S = 60.0;
 static const int64_t AT_LEAST_NS = 100000000; /* device time of points that show that a scan goes on */
 
 struct run {
@@ -103,7 +104,8 @@ static int start_client(struct run *r, struct sh_err *err)
 static int wait_until(struct run *r, int (*is_so)(struct run *r), int64_t until_ns)
 {
     while (!is_so(r)) {
-        if (app_interrupted() || client_has_ended(&r->client) || clock_now_ns() > until_ns) return 0;
+        const int gone = r->client.pid != 0 && client_has_ended(&r->client);
+        if (gone || app_interrupted() || clock_now_ns() > until_ns) return 0;
         poll(NULL, 0, WAIT_MS);
     }
     return 1;
@@ -112,6 +114,11 @@ static int wait_until(struct run *r, int (*is_so)(struct run *r), int64_t until_
 static int64_t in_s(double s)
 {
     return clock_now_ns() + (int64_t)(1e9 * s);
+}
+
+static int is_up(struct run *r)
+{
+    return atomic_load(&r->stream.is_up);
 }
 
 static int is_connected(struct run *r)
@@ -168,6 +175,8 @@ static int serve(struct run *r, struct sh_err *err)
     const int64_t from_ns = clock_now_ns();
     int rc = loop_start(r->loop, err);
     if (rc == SH_OK) rc = own_stream_start(&r->stream, err);
+    if (rc == SH_OK && !wait_until(r, is_up, in_s(UP_WITHIN_S)) && !app_interrupted())
+        rc = sh_fail(err, SH_ESTATE, "soak: the head did not boot within %g s", UP_WITHIN_S);
     if (rc == SH_OK) rc = start_client(r, err);
     r->checks.start_ns = r->client.started_ns;
     if (rc == SH_OK) run_client(r);
@@ -242,6 +251,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
 {
     struct run *r = calloc(1, sizeof *r);
     if (r == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    r->client.in_fd = -1;
     r->cfg = cfg;
     r->options = options;
     r->verdict = verdict;

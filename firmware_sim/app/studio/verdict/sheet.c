@@ -74,6 +74,10 @@ void verdict_put(const struct verdict *v, struct json *json)
     json_uint(json, "refused_by_state", f->refused_by_state);
     json_uint(json, "left_out_frames", f->left_out);
     json_uint(json, "lost_pulses", f->lost_pulses);
+    json_open_array(json, "refused_lines");
+    for (size_t i = 0; i < sizeof f->wrong_lines / sizeof f->wrong_lines[0]; i++)
+        if (f->wrong_lines[i][0] != '\0') json_string(json, NULL, f->wrong_lines[i]);
+    json_close_array(json);
     json_string(json, "exit", f->exit);
     put_points(&v->points, json);
     put_checks(v, json);

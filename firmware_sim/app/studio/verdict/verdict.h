@@ -46,7 +46,8 @@ struct verdict_points {
 struct verdict_figures {
     double wall_s, connected_s, back_mean_s, back_max_s; /* NaN: none */
     uint64_t sessions, breaks, injected, heard_bytes, refused, refused_by_state, left_out, lost_pulses;
-    char exit[96]; /* how the client ended */
+    char exit[96];            /* how the client ended */
+    char wrong_lines[3][160]; /* the first wrong requests, with their replies; empty: there were not as many */
 };
 
 struct verdict {
