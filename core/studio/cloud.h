@@ -36,7 +36,7 @@ struct cloud {
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
     double count_m; /* what the file rounds coordinates to, on the ground: of LAS the scale, of a PLY as text the 1e-6
                          * m that our recorder writes, in single precision two units in the last place; 0: nothing */
-    int is_text;        /* 1: the file holds coordinates as decimal numbers */
+    int is_text;    /* 1: the file holds coordinates as decimal numbers */
     int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
     /* Where they were asked for and the file has them, else NULL: */
     double *time_s;        /* [n] PLY: since the scan's start; LAS: as the file counts it */

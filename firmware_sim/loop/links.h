@@ -47,8 +47,8 @@ struct links {
     struct stream *stream;
     const struct loop_source *source;
     struct mover mover;
-    const struct sh_report *report; /* NULL: none */
-    const struct web_source *web;   /* of links of type web; NULL: none */
+    const struct sh_report *report;        /* NULL: none */
+    const struct web_source *web;          /* of links of type web; NULL: none */
     const struct links_observer *observer; /* NULL: none */
     struct protocol_identity identity;
     uint32_t fixes_hz;     /* of the GNSS receiver */

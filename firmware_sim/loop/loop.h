@@ -23,12 +23,12 @@ struct loop;
 struct config;
 
 struct loop_options {
-    int hash;                       /* keep stream_sha256 */
-    const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
-    const struct web_source *web;   /* what links of type web serve beside the page; NULL: nothing */
-    const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
+    int hash;                              /* keep stream_sha256 */
+    const struct link_spec *extra;         /* one more link than the configuration has; NULL: none */
+    const struct web_source *web;          /* what links of type web serve beside the page; NULL: nothing */
+    const struct sh_report *report;        /* warnings while running (from any thread); NULL: none */
     const struct links_observer *observer; /* NULL: none; it must outlive the loop */
-    double planned_ns;              /* for a pulse; warns where it takes much more; 0: as the site's plan has */
+    double planned_ns;                     /* for a pulse; warns where it takes much more; 0: as the site's plan has */
 };
 
 struct loop_stats {

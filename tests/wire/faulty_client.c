@@ -23,7 +23,7 @@ struct client {
     int fd;
     uint8_t in[ROOM];
     size_t n;
-    int have_seq, have_anchor, scans;
+    int have_seq, have_anchor, have_points, scans;
     uint32_t seq;
     double anchor[3], scale[3];
 };
@@ -63,13 +63,14 @@ static void take_anchor(struct client *c, const uint8_t *p)
     c->have_anchor = 1;
 }
 
-static void take_points(const struct client *c, const uint8_t *p, size_t len)
+static void take_points(struct client *c, const uint8_t *p, size_t len)
 {
     const uint32_t n = le_get32(p + 36);
     if (!c->have_anchor || 40 + (size_t)20 * n > len) return;
     for (uint32_t i = 0; i < n; i++) {
         const uint8_t *at = p + 40 + (size_t)20 * i;
         if (le_get32(at + 16) >> 28 == 0) continue; /* a shot without echo */
+        c->have_points = 1;
         for (int k = 0; k < 3; k++)
             fprintf(c->out, "%.6f%c", c->anchor[k] + c->scale[k] * (double)(int32_t)le_get32(at + 4 * k),
                     k < 2 ? ' ' : '\n');
@@ -117,8 +118,10 @@ static void take_bytes(struct client *c)
 /* Asks until the head scans. A command that the state does not allow changes nothing. */
 static void ask(const struct client *c)
 {
-    static const char LINES[] = "SCAN:STARt\nHEAD:STATe?\n";
-    if (write(c->fd, LINES, sizeof LINES - 1) < 0) return; /* the next read shows why */
+    const char *lines = has_fault(c, 'a')   ? "SCAN:BEGIN\nSCAN:STARt\nHEAD:STATe?\n"
+                        : has_fault(c, 'n') ? "HEAD:STATe?\n"
+                                            : "SCAN:STARt\nHEAD:STATe?\n";
+    if (write(c->fd, lines, strlen(lines)) < 0) return; /* the next read shows why */
 }
 
 /* Reads until the connection ends. */
@@ -136,6 +139,7 @@ static void follow(struct client *c)
         if (got <= 0) return;
         c->n += (size_t)got;
         take_bytes(c);
+        if (c->have_points && has_fault(c, 'd')) raise(SIGKILL);
     }
 }
 
@@ -157,7 +161,8 @@ int faulty_client(int argc, char **argv)
     c->out = fopen(argv[4], "w");
     c->head = (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[3]))};
     if (c->out == NULL || inet_pton(AF_INET, argv[2], &c->head.sin_addr) != 1) return 1;
-    signal(SIGTERM, end);
+    setvbuf(c->out, NULL, _IOLBF, ROOM); /* who kills it finds whole lines */
+    signal(SIGTERM, has_fault(c, 'k') ? SIG_IGN : end);
     signal(SIGPIPE, SIG_IGN);
     for (int met = 0; !is_over;) {
         if (met && has_fault(c, 's')) {
@@ -167,6 +172,8 @@ int faulty_client(int argc, char **argv)
         if (!client_connect(c)) continue;
         met = 1;
         follow(c);
+        while (!is_over && has_fault(c, 'h'))
+            pause();
         close(c->fd);
     }
     const int status = fclose(c->out) == 0 ? 0 : 1;

@@ -6,13 +6,14 @@
 static const char *program; /* of this test, which is also the client */
 
 /* Some 600 frames a second, of 16 points. No two pulses have the same direction. */
-static const struct room_config ROOM = {.prr_hz = 10000,
-                                        .lines_hz = 50,
-                                        .pan_deg_s = 20,
-                                        .pan_stop_deg = 360,
-                                        .frames = 1,
-                                        .links = LINK_YAML_TCP,
-                                        .more = "output: {layout: geo, crs: local}\nloop: {late_ms: 5000, queue_ms: 5000}\n"};
+static const struct room_config ROOM = {
+    .prr_hz = 10000,
+    .lines_hz = 50,
+    .pan_deg_s = 20,
+    .pan_stop_deg = 360,
+    .frames = 1,
+    .links = LINK_YAML_TCP,
+    .more = "output: {layout: geo, crs: local}\nloop: {late_ms: 5000, queue_ms: 5000}\n"};
 
 /* The byte is in x of a frame's first point, where a bit is some 3 m or more: PROTOCOL.md, POINTS.md (28 + 40 + 2). */
 static const char FAULTS[] = "faults:\n"
@@ -34,32 +35,47 @@ static const char *in_folder(const struct wire *wire, const char *name, const ch
     return wire_path(wire, file);
 }
 
-static pid_t start(struct wire *wire, const char *name, const char *client, const char *file, const char *scenario)
-{
-    char config[352], scenario_path[352], folder[352], json[352], junit[352], out[64], err[64];
-    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
-    snprintf(scenario_path, sizeof scenario_path, "%s",
-             strchr(scenario, '.') != NULL ? wire_path(wire, scenario) : scenario);
-    snprintf(folder, sizeof folder, "%s", wire->dir);
-    snprintf(json, sizeof json, "%s", in_folder(wire, name, "json"));
-    snprintf(junit, sizeof junit, "%s", in_folder(wire, name, "xml"));
-    snprintf(out, sizeof out, "%s.out", name);
-    snprintf(err, sizeof err, "%s.err", name);
-    const char *const args[] = {"soak",          config,       "--scenario",        scenario_path, "--client",   client,
-                                "--client-file", file,         "--client-folder",   folder,        "--json",     json,
-                                "--junit",       junit,        "--reconnect-limit", "2",           "--duration", "0.8",
-                                "--quiet",       NULL};
-    return wire_spawn(wire, args, out, err, -1);
-}
+/* A right client needs none of its limits, which are far beyond the time of a busy machine. Where the fault is that nothing
+ * happens, the whole limit is waited for. */
+struct planted {
+    const char *faults, *findings, *limit_s, *grace_s;
+};
 
 /* Each has a scenario file of its own, whose name is also that of the log. */
-static pid_t start_case(struct wire *wire, const char *faults, const char *client)
+static pid_t start_case(struct wire *wire, const struct planted *planted, const char *config, const char *client)
 {
-    char command[512], scenario[64];
-    snprintf(scenario, sizeof scenario, "%s.yaml", faults);
-    wire_write_text(wire, scenario, FAULTS);
-    snprintf(command, sizeof command, "exec %s {host} {port} {out} %s", client, faults);
-    return start(wire, faults, command, "{out}", scenario);
+    char config_path[352], scenario[352], command[512], json[352], junit[352], name[64], err[64];
+    snprintf(config_path, sizeof config_path, "%s", wire_path(wire, config));
+    snprintf(name, sizeof name, "%s.yaml", planted->faults);
+    snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, name, FAULTS));
+    snprintf(command, sizeof command, "exec %s {host} {port} {out} %s", client, planted->faults);
+    snprintf(json, sizeof json, "%s", in_folder(wire, planted->faults, "json"));
+    snprintf(junit, sizeof junit, "%s", in_folder(wire, planted->faults, "xml"));
+    snprintf(name, sizeof name, "%s.out", planted->faults);
+    snprintf(err, sizeof err, "%s.err", planted->faults);
+    const char *const args[] = {"soak",
+                                config_path,
+                                "--scenario",
+                                scenario,
+                                "--client",
+                                command,
+                                "--json",
+                                json,
+                                "--junit",
+                                junit,
+                                "--client-file",
+                                "{out}",
+                                "--client-folder",
+                                wire->dir,
+                                "--reconnect-limit",
+                                planted->limit_s,
+                                "--client-grace",
+                                planted->grace_s,
+                                "--duration",
+                                "0.8",
+                                "--quiet",
+                                NULL};
+    return wire_spawn(wire, args, name, err, -1);
 }
 
 /* What the sheet has as findings, in its order and with blanks between them. */
@@ -92,33 +108,48 @@ static void expect(struct wire *wire, pid_t pid, const char *name, const char *f
     free(json);
 }
 
-static const struct {
-    const char *faults, *findings;
-} CASES[] = {
-    {"none", ""},
-    {"c", "points-known"},
-    {"s", "comes-back"},
-    {"t", "points-once"},
-    {"cst", "comes-back points-known points-once"},
+static const struct planted PLANTED[] = {
+    {"none", "", "60", "60"},
+    {"c", "points-known", "60", "60"},
+    {"s", "comes-back", "4", "60"},
+    {"t", "points-once", "60", "60"},
+    {"cst", "comes-back points-known points-once", "4", "60"},
 };
-enum { N_CASES = sizeof CASES / sizeof CASES[0] };
+static const struct planted OTHERS[] = {
+    {"h", "lets-go", "4", "60"},
+    {"a", "asks-right", "60", "60"},
+    {"d", "lives", "60", "60"},
+    {"k", "ends", "60", "0.5"},
+    {"n", "scans points-read", "4", "60"},
+};
+enum { N_CASES = 5 };
 
 /* All at once: they mostly wait. */
-static void try_cases(struct wire *wire, const char *client)
+static void try_cases(struct wire *wire, const char *client, const struct planted cases[N_CASES])
 {
     pid_t pid[N_CASES];
     write_files(wire);
     for (int i = 0; i < N_CASES; i++)
-        pid[i] = start_case(wire, CASES[i].faults, client);
+        pid[i] = start_case(wire, &cases[i], "config.yaml", client);
     for (int i = 0; i < N_CASES; i++)
-        expect(wire, pid[i], CASES[i].faults, CASES[i].findings);
+        expect(wire, pid[i], cases[i].faults, cases[i].findings);
+}
+
+static const char *client_in_c(void)
+{
+    static char client[352];
+    snprintf(client, sizeof client, "%s client", program);
+    return client;
 }
 
 static void test_a_client_in_c(void **state)
 {
-    char client[352];
-    snprintf(client, sizeof client, "%s client", program);
-    try_cases(*state, client);
+    try_cases(*state, client_in_c(), PLANTED);
+}
+
+static void test_other_faults(void **state)
+{
+    try_cases(*state, client_in_c(), OTHERS);
 }
 
 static void test_a_client_in_python(void **state)
@@ -127,7 +158,7 @@ static void test_a_client_in_python(void **state)
         print_message("# /usr/bin/python3 is missing\n");
         skip();
     }
-    try_cases(*state, "/usr/bin/python3 tests/wire/faulty_client.py");
+    try_cases(*state, "/usr/bin/python3 tests/wire/faulty_client.py", PLANTED);
 }
 
 int main(int argc, char **argv)
@@ -136,6 +167,7 @@ int main(int argc, char **argv)
     if (argc > 1 && strcmp(argv[1], "client") == 0) return faulty_client(argc, argv);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_a_client_in_c, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_other_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_in_python, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

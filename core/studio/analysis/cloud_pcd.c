@@ -179,7 +179,8 @@ static int take_compressed(struct pcd *g, struct sh_err *err)
 {
     const uint8_t *in = (const uint8_t *)g->t.p;
     const size_t left = (size_t)(g->t.end - g->t.p);
-    if (left < 8 || le_get32(in) > left - 8) return pcd_fail(g, err, "the file is cut off within its compressed points");
+    if (left < 8 || le_get32(in) > left - 8)
+        return pcd_fail(g, err, "the file is cut off within its compressed points");
     const size_t len = le_get32(in + 4);
     if (len / 100 > le_get32(in)) return pcd_fail(g, err, "its compressed points are damaged"); /* LZF reaches 1 : 88 */
     uint8_t *out = malloc(len + 1);

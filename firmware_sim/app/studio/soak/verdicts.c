@@ -33,8 +33,9 @@ static int judge_one(struct config *cfg, void *ctx, struct sh_err *err)
     struct verdict *made = &work->made[work->n];
     const struct verdict_options *o = &work->verdicts->options;
     if (cfg->loop.pace != PACE_REALTIME)
-        return sh_fail(err, SH_EINPUT, "--client: loop.pace is not realtime, and the client has no other time; allowed is "
-                                       "realtime");
+        return sh_fail(err, SH_EINPUT,
+                       "--client: loop.pace is not realtime, and the client has no other time; allowed is "
+                       "realtime");
     if (o->link > cfg->n_links)
         return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
     name_scenario(work->verdicts, work->n, made->scenario, sizeof made->scenario);

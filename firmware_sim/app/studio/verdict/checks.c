@@ -54,7 +54,8 @@ static void judge_connects(const struct checks *c, struct verdict *v)
         say(v, VERDICT_CONNECTS, VERDICT_NOT_JUDGED, "the link sends to whoever is there");
     else if (c->watch->first_open_ns == 0)
         say(v, VERDICT_CONNECTS, c->was_there ? VERDICT_FOUND : VERDICT_NOT_JUDGED,
-            c->was_there ? "it did not connect within %g s" : "it ended before; the limit is %g s", c->options->limit_s);
+            c->was_there ? "it did not connect within %g s" : "it ended before; the limit is %g s",
+            c->options->limit_s);
     else
         say(v, VERDICT_CONNECTS, VERDICT_PASSED, "after %.2f s", v->figures.connected_s);
 }
@@ -233,8 +234,8 @@ void checks_no_points(struct verdict *v, enum verdict_state state, const char *w
 
 void checks_points(struct verdict *v, const struct match *m, const double unknown[3])
 {
-    v->points = (struct verdict_points){m->n,      m->empty,  m->unknown,  m->repeated,
-                                        m->sent,   m->unit_m, m->within_m, m->frame};
+    v->points =
+        (struct verdict_points){m->n, m->empty, m->unknown, m->repeated, m->sent, m->unit_m, m->within_m, m->frame};
     say(v, VERDICT_POINTS_READ, VERDICT_PASSED, "%zu points, %zu shots without echo", m->n, m->empty);
     if (m->unknown != 0)
         say(v, VERDICT_POINTS_KNOWN, VERDICT_FOUND,

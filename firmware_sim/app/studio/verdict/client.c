@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -70,56 +69,55 @@ char *client_fill(const char *text, const struct client_words *words)
 
 /* ---- the process */
 
-static int set_up(posix_spawnattr_t *attr, posix_spawn_file_actions_t *files, int in_fd, const char *log,
-                  const char *out)
+/* In the new process, which has only the thread that forked: signals and descriptors as a new program expects them. It ends
+ * with this program, however that ends. */
+static void become_client(int in_fd, int log_fd, int out_fd, const char *line)
 {
-    sigset_t all, none;
-    sigfillset(&all);
+    sigset_t none;
     sigemptyset(&none);
-    int rc = posix_spawnattr_setflags(attr, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
-    rc |= posix_spawnattr_setpgroup(attr, 0) | posix_spawnattr_setsigdefault(attr, &all);
-    rc |= posix_spawnattr_setsigmask(attr, &none);
-    rc |= posix_spawn_file_actions_adddup2(files, in_fd, 0);
-    rc |= posix_spawn_file_actions_addopen(files, 2, log, O_WRONLY | O_APPEND, 0);
-    rc |= out == NULL ? posix_spawn_file_actions_adddup2(files, 2, 1)
-                      : posix_spawn_file_actions_addopen(files, 1, out, O_WRONLY, 0);
-    rc |= posix_spawn_file_actions_addclosefrom_np(files, 3);
-    return rc;
+    for (int number = 1; number < NSIG; number++)
+        signal(number, SIG_DFL);
+    sigprocmask(SIG_SETMASK, &none, NULL);
+    if (setpgid(0, 0) != 0 || dup2(in_fd, 0) < 0 || dup2(out_fd, 1) < 0 || dup2(log_fd, 2) < 0 ||
+        close_range(3, ~0U, 0) != 0 || prctl(PR_SET_PDEATHSIG, SIGKILL) != 0)
+        _exit(127);
+    execl("/bin/sh", "sh", "-c", line, (char *)NULL);
+    _exit(127);
 }
 
-static int make_empty(const char *path, struct sh_err *err)
+static int open_empty(const char *path, int *fd, struct sh_err *err)
 {
-    const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (fd < 0) return sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
-    close(fd);
+    *fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
+    return *fd >= 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+}
+
+static int client_fork(struct client *client, int log_fd, int out_fd, const char *line, struct sh_err *err)
+{
+    int in[2];
+    if (pipe2(in, O_CLOEXEC) != 0) return sh_fail(err, SH_EIO, "pipe: %s", strerror(errno));
+    client->in_fd = in[1];
+    client->started_ns = clock_now_ns();
+    /* What the shell leaves behind becomes a child of this process, which can then wait for it. */
+    prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0);
+    const pid_t pid = fork();
+    if (pid == 0) become_client(in[0], log_fd, out_fd, line);
+    close(in[0]);
+    if (pid < 0) return sh_fail(err, SH_EIO, "--client: no process: %s", strerror(errno));
+    setpgid(pid, pid); /* both processes do so: neither waits for the other */
+    client->pid = pid;
     return SH_OK;
 }
 
 int client_start(struct client *client, const char *line, const char *log, const char *out, struct sh_err *err)
 {
-    posix_spawnattr_t attr;
-    posix_spawn_file_actions_t files;
-    char *const argv[] = {(char *)"sh", (char *)"-c", (char *)line, NULL};
-    int in[2];
+    int log_fd = -1, out_fd = -1;
     *client = (struct client){.in_fd = -1};
-    int rc = make_empty(log, err);
-    if (rc == SH_OK && out != NULL) rc = make_empty(out, err);
-    if (rc == SH_OK && pipe2(in, O_CLOEXEC) != 0) rc = sh_fail(err, SH_EIO, "pipe: %s", strerror(errno));
-    if (rc != SH_OK) return rc;
-    client->in_fd = in[1];
-    /* What the shell leaves behind becomes a child of this process, which can then wait for it. */
-    prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0);
-    posix_spawnattr_init(&attr);
-    posix_spawn_file_actions_init(&files);
-    rc = set_up(&attr, &files, in[0], log, out);
-    client->started_ns = clock_now_ns();
-    if (rc == 0) rc = posix_spawn(&client->pid, "/bin/sh", &files, &attr, argv, environ);
-    posix_spawn_file_actions_destroy(&files);
-    posix_spawnattr_destroy(&attr);
-    close(in[0]);
-    if (rc == 0) return SH_OK;
-    client->pid = 0;
-    return sh_fail(err, SH_EIO, "--client: sh can't be started: %s", strerror(rc));
+    int rc = open_empty(log, &log_fd, err);
+    if (rc == SH_OK && out != NULL) rc = open_empty(out, &out_fd, err);
+    if (rc == SH_OK) rc = client_fork(client, log_fd, out != NULL ? out_fd : log_fd, line, err);
+    if (log_fd >= 0) close(log_fd);
+    if (out_fd >= 0) close(out_fd);
+    return rc;
 }
 
 int client_has_ended(struct client *client)

@@ -22,7 +22,7 @@ struct client {
     int in_fd; /* its standard input, which stays open and has nothing: some clients end with it, or at a key */
     pid_t pid; /* of the shell, and of the group; 0: none was started */
     int64_t started_ns, ended_ns; /* ended_ns 0: some process of the group is there */
-    int status; /* the shell's, as waitpid has it */
+    int status;                   /* the shell's, as waitpid has it */
     int had_to_be_killed;
 };
 

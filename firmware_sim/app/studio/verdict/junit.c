@@ -56,7 +56,8 @@ int verdict_write_junit(const char *path, const struct verdict *verdict, uint32_
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n; i++)
         found += verdict_count(&verdict[i], VERDICT_FOUND);
-    fprintf(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%" PRIu32 "\" failures=\"%" PRIu32 "\">\n",
+    fprintf(out,
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%" PRIu32 "\" failures=\"%" PRIu32 "\">\n",
             n * (uint32_t)VERDICT_N_CHECKS, found);
     for (uint32_t i = 0; i < n; i++)
         put_suite(out, &verdict[i]);

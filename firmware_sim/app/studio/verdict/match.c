@@ -19,8 +19,8 @@ enum { TRIED_POINTS = 2000, MAX_WAYS = 4 };
 /* Takes a point of the client's to the stream's frame. */
 struct way {
     const char *frame;
-    int is_forward;         /* x forward, y left first becomes x right, y forward */
-    double turn[9], at[3];  /* then this rotation, row by row, and this place */
+    int is_forward;        /* x forward, y left first becomes x right, y forward */
+    double turn[9], at[3]; /* then this rotation, row by row, and this place */
 };
 
 static const double UNTURNED[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -116,7 +116,8 @@ static uint32_t count_sent(const struct watch *watch, int64_t tick_ns, const str
         const struct watch_span *span = &watch->span[i];
         const struct watch_spoiled key = {span->session, frame->seq};
         if (frame->t_ns < span->from_ns - 2 * tick_ns || frame->t_ns / 2 > span->to_ns / 2 + tick_ns) continue;
-        n += watch->n_spoiled == 0 || bsearch(&key, watch->spoiled, watch->n_spoiled, sizeof key, compare_spoiled) == NULL;
+        n += watch->n_spoiled == 0 ||
+             bsearch(&key, watch->spoiled, watch->n_spoiled, sizeof key, compare_spoiled) == NULL;
     }
     return n;
 }

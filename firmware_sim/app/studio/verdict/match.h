@@ -9,12 +9,12 @@
 #include "firmware_sim/app/studio/verdict/watch.h"
 
 struct match {
-    size_t empty;     /* shots without echo: NaN three times, or 0 three times */
-    size_t n;         /* other points */
-    size_t unknown;   /* no pulse had them */
-    size_t repeated;  /* the client has them more often than they were sent */
-    size_t sent;      /* points of the head that some session was sent, once for each */
-    size_t again;     /* of sent, those at a place that was sent before: a repeated one may go unseen there */
+    size_t empty;            /* shots without echo: NaN three times, or 0 three times */
+    size_t n;                /* other points */
+    size_t unknown;          /* no pulse had them */
+    size_t repeated;         /* the client has them more often than they were sent */
+    size_t sent;             /* points of the head that some session was sent, once for each */
+    size_t again;            /* of sent, those at a place that was sent before: a repeated one may go unseen there */
     size_t first_unknown;    /* index in the cloud */
     const char *frame;       /* the coordinate frame in which they agree best */
     double unit_m, within_m; /* what the file rounds to; how far a coordinate may differ */

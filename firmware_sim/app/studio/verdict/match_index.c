@@ -76,8 +76,7 @@ size_t match_index_near(const struct match_index *index, const double p[3], void
     for (int side = 0; side < 9; side++) { /* a column of three cells each */
         const int64_t first[3] = {middle[0] + side / 3 - 1, middle[1] + side % 3 - 1, middle[2] - 1};
         const int64_t last[3] = {first[0], first[1], middle[2] + 1};
-        for (size_t i = first_in(index, first);
-             i < index->n && compare_cells(index->entry[i].cell, last) <= 0; i++) {
+        for (size_t i = first_in(index, first); i < index->n && compare_cells(index->entry[i].cell, last) <= 0; i++) {
             if (!agrees(index, &index->entry[i], p)) continue;
             n++;
             if (hit != NULL) hit(ctx, i);

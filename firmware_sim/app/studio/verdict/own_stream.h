@@ -22,7 +22,7 @@ struct own_stream {
     struct link_spec link; /* for the loop, beside those of the configuration */
     struct scanhead *sh;
     pthread_t thread;
-    int running, keeps; /* keeps: the points, too */
+    int running, keeps;        /* keeps: the points, too */
     atomic_int is_up;          /* the head has booted */
     _Atomic int64_t points_ns; /* device time of the last frame of points; 0: none so far */
     /* Of the thread, until it is joined: */

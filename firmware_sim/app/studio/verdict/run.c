@@ -55,9 +55,10 @@ static void prepare(struct run *r)
         if (cfg->faults.fault[i].kind != FAULT_FLIP || !cfg->faults.fault[i].reseal)
             cfg->faults.fault[n++] = cfg->faults.fault[i];
     if (n != cfg->faults.n)
-        sh_warn(&app_report_stderr,
-                "soak: %u faults flip with reseal are left out: no client can notice them, and its points would be unknown",
-                cfg->faults.n - n);
+        sh_warn(
+            &app_report_stderr,
+            "soak: %u faults flip with reseal are left out: no client can notice them, and its points would be unknown",
+            cfg->faults.n - n);
     cfg->faults.n = n;
 }
 
@@ -65,9 +66,8 @@ static int open_head(struct run *r, struct sh_err *err)
 {
     struct config *cfg = r->cfg;
     const struct link_spec *link = &cfg->link[r->options->link - 1];
-    const struct device_options device = {.start = cfg->head.start || link->type == LINK_UDP,
-                                          .truth = r->options->truth,
-                                          .report = &app_report_stderr};
+    const struct device_options device = {
+        .start = cfg->head.start || link->type == LINK_UDP, .truth = r->options->truth, .report = &app_report_stderr};
     const struct loop_options options = {
         .extra = &r->stream.link, .report = &app_report_stderr, .observer = &r->watch.observer};
     int rc = site_load(cfg, &app_report_stderr, &r->site, err);
@@ -163,7 +163,7 @@ static void run_client(struct run *r)
     fault_board_remove(device_faults(r->device), 0);
     if (c->has_sessions ? is_connected(r) : there) settle(r);
     c->was_there = !client_has_ended(&r->client);
-    c->holds = held_any(&r->watch);
+    c->holds = c->was_there && held_any(&r->watch, r->client.pid);
     c->ended_ns = clock_now_ns();
     watch_end(&r->watch);
     client_end(&r->client, o->grace_s);

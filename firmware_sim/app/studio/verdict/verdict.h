@@ -58,15 +58,15 @@ struct verdict {
 };
 
 struct verdict_options {
-    const char *command;  /* for sh -c, with placeholders */
-    const char *file;     /* of points, with placeholders; "-": the client prints them; NULL: none */
-    const char *folder;   /* for logs and what the client writes; it exists */
-    const char *truth;    /* as device_options has it */
-    double duration_s;    /* from the first points on */
-    double limit_s;       /* for the first connection, for each that follows a disturbance, and for points at the end */
-    double grace_s;       /* from SIGTERM to SIGKILL */
-    double match_m;       /* beside what the file rounds to; negative: by the link's protocol */
-    uint32_t link;        /* from 1 */
+    const char *command; /* for sh -c, with placeholders */
+    const char *file;    /* of points, with placeholders; "-": the client prints them; NULL: none */
+    const char *folder;  /* for logs and what the client writes; it exists */
+    const char *truth;   /* as device_options has it */
+    double duration_s;   /* from the first points on */
+    double limit_s;      /* for the first connection, for each that follows a disturbance, and for points at the end */
+    double grace_s;      /* from SIGTERM to SIGKILL */
+    double match_m;      /* beside what the file rounds to; negative: by the link's protocol */
+    uint32_t link;       /* from 1 */
     int quiet;
 };
 

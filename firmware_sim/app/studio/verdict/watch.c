@@ -117,12 +117,13 @@ static void on_refused(void *ctx, uint32_t session, const char *line, const char
 
 /* ---- faults */
 
+/* Ends sessions, or may make a client end its own: it was silent for a while. */
 static int ends_sessions(enum fault_kind kind)
 {
-    return kind == FAULT_DISCONNECT || kind == FAULT_UNPLUG || kind == FAULT_USB_RESET || kind == FAULT_POWER_CYCLE;
+    return fault_is_act(kind) || kind == FAULT_POWER_CYCLE || kind == FAULT_STALL;
 }
 
-/* A session that such a fault has ended is told later, by the thread of its link. */
+/* Which sessions have ended by such a fault is told later, by the thread of their link. */
 static void act(struct watch *w, const struct fault_note *note)
 {
     const int64_t over_ns = clock_now_ns() + (int64_t)(1e6 * note->for_ms);
@@ -140,8 +141,7 @@ static void act(struct watch *w, const struct fault_note *note)
 static void power_is_back(struct watch *w)
 {
     for (size_t i = 0; i < w->n_broken; i++)
-        if (w->broken[i].kind == FAULT_POWER_CYCLE && w->broken[i].back_ns == 0)
-            w->broken[i].over_ns = clock_now_ns();
+        if (w->broken[i].kind == FAULT_POWER_CYCLE && w->broken[i].back_ns == 0) w->broken[i].over_ns = clock_now_ns();
 }
 
 static void spoil(struct watch *w, const struct fault_note *note)

@@ -16,9 +16,9 @@
 struct watch_break {
     uint32_t link; /* from 1 */
     enum fault_kind kind;
-    int64_t over_ns;  /* from when on a client can come back */
-    int64_t back_ns;  /* when one did */
-    char peer[64];    /* of the session that ended */
+    int64_t over_ns; /* from when on a client can come back */
+    int64_t back_ns; /* when one did */
+    char peer[64];   /* of the session that ended */
 };
 
 /* Device time of the stream that a session was given. */
@@ -33,8 +33,8 @@ struct watch_spoiled {
 };
 
 struct watch_link {
-    uint32_t open;          /* sessions */
-    int acted;              /* a fault ends its sessions now, or soon: */
+    uint32_t open; /* sessions */
+    int acted;     /* a fault ends its sessions now, or soon: */
     enum fault_kind kind;
     int64_t over_ns;
 };
