@@ -116,11 +116,8 @@ static const struct planted PLANTED[] = {
     {"cst", "comes-back points-known points-once", "4", "60"},
 };
 static const struct planted OTHERS[] = {
-    {"h", "lets-go", "4", "60"},
-    {"a", "asks-right", "60", "60"},
-    {"d", "lives", "60", "60"},
-    {"k", "ends", "60", "0.5"},
-    {"n", "scans points-read", "4", "60"},
+    {"h", "lets-go", "4", "60"}, {"a", "asks-right", "60", "60"},       {"d", "lives", "60", "60"},
+    {"k", "ends", "60", "0.5"},  {"n", "scans points-read", "4", "60"},
 };
 enum { N_CASES = 5 };
 

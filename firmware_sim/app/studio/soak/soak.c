@@ -17,6 +17,7 @@
 
 #include <poll.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/soak/soak.h"
@@ -240,13 +241,25 @@ static int take_scenario(void *values, const char *text)
     return APP_OK;
 }
 
+static int take_allowed(void *values, const char *text)
+{
+    struct soak_options *o = values;
+    for (int check = 0; check < VERDICT_N_CHECKS; check++) {
+        if (strcmp(text, verdict_names[check]) != 0) continue;
+        o->verdicts.options.allowed |= 1U << check;
+        return APP_OK;
+    }
+    return app_usage(&app_soak, "--allow %s: there is no such check; allowed are those of --help", text);
+}
+
 /* Options that go only with a client, and those that go only with one scenario. */
 static int check_options(const struct soak_options *o)
 {
     const struct verdicts *v = &o->verdicts;
     const int is_theirs = v->options.command != NULL;
-    if (!is_theirs && (v->options.file != NULL || v->options.folder != NULL || v->junit != NULL || o->match_mm >= 0.0))
-        return app_usage(&app_soak, "--junit, --match-mm and --client-... need --client");
+    if (!is_theirs && (v->options.file != NULL || v->options.folder != NULL || v->junit != NULL || o->match_mm >= 0.0 ||
+                       v->options.allowed != 0))
+        return app_usage(&app_soak, "--allow, --junit, --match-mm, --client-file and --client-folder need --client");
     if (!is_theirs && v->n > 1) return app_usage(&app_soak, "several --scenario need --client");
     if (v->n > 1 && o->device.truth != NULL)
         return app_usage(&app_soak, "--truth is one file, and %u scenarios are given; allowed is one", v->n);
@@ -289,7 +302,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "client", "COMMAND", .at = AT(verdicts.options.command),
      .help = "run this by sh -c in place of our own clients, and judge it; {endpoint}, {host}, {port}, {path} and {out} "
              "are filled in"},
-    {APP_TEXT, "client-file", "FILE", .at = AT(verdicts.options.file),
+    {APP_TEXT, "client-file", "FILE", .at = AT(verdicts.options.file), .file = APP_READS,
      .help = "compare the points that the client leaves in this file (PLY, LAS, PCD, or text) with those of the head; - "
              "is its standard output"},
     {APP_TEXT, "client-folder", "DIR", .at = AT(verdicts.options.folder),
@@ -301,6 +314,8 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
      .help = "coordinates of points agree within MM and what the file rounds to (default 0.01; scip and cola 2, velodyne "
              "20)"},
+    {APP_CALL, "allow", "CHECK", .apply = take_allowed, .choices = verdict_names, .n_choices = VERDICT_N_CHECKS,
+     .help = "a finding of this check does not count; may be repeated"},
     {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,
      .help = "write the verdict on the client as JUnit XML, too"},
     {APP_TEXT, "json", "FILE", .at = AT(verdicts.json), .file = APP_WRITES,
@@ -314,6 +329,7 @@ static const struct app_option OPTIONS[] = {
 };
 /* clang-format on */
 
+#define CHECK_LINE(id, name, asks) "  " name ": " asks "\n"
 static const char NOTES[] =
     "The results have a row for each link and kind of fault: how often it was injected, how often the client\n"
     "noticed it at its place, frames that the client lost by it, and frames that it accepted although they differ\n"
@@ -321,7 +337,10 @@ static const char NOTES[] =
     "\n"
     "Exit status 0: each fault that can be noticed was noticed; frames were lost only by faults; all frames that\n"
     "were wrongly accepted have flipped bits with a corrected checksum; the head is healthy. 1: one of these is\n"
-    "not so.\n";
+    "not so.\n"
+    "\n"
+    "With --client the results are checks of that client, by what the head sees of it. Exit status 0: there are no\n"
+    "findings; 1: there are. The checks, with what each asks for:\n" VERDICT_CHECKS(CHECK_LINE);
 
 const struct app_command app_soak = {
     .name = "soak",

@@ -9,6 +9,8 @@
 #include "firmware_sim/app/studio/soak/verdicts.h"
 #include "firmware_sim/config/config.h"
 
+enum { VERDICTS_PATH = 512 };
+
 struct verdicts_work {
     struct verdicts *verdicts;
     struct verdict *made; /* of the scenarios so far */
@@ -96,14 +98,27 @@ static int say_findings(const struct verdicts_work *work, struct sh_err *err)
     return found == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "soak: the client has findings: %u", found);
 }
 
+/* The logs, so that none of them is a file that is read. `paths` keeps their names. */
+static int add_logs(const struct verdicts *v, struct app_input *in, char (*paths)[VERDICTS_PATH], uint32_t n)
+{
+    char name[64];
+    for (uint32_t i = 0; i < n; i++) {
+        name_scenario(v, i, name, sizeof name);
+        snprintf(paths[i], VERDICTS_PATH, "%.400s/%s.log", v->options.folder, name);
+        const struct app_file file = {.option = "client-folder", .path = paths[i], .use = APP_WRITES};
+        if (app_add_file(in, &file) != APP_OK) return APP_USAGE;
+    }
+    return APP_OK;
+}
+
 int verdicts_run(struct verdicts *v, struct app_input *in)
 {
     const uint32_t n = v->n != 0 ? v->n : 1;
     struct sh_err err = {0};
-    char own[352];
+    char own[352], logs[VERDICTS_MAX_SCENARIOS][VERDICTS_PATH];
     struct verdicts_work work = {.verdicts = v, .made = calloc(n, sizeof *work.made)};
     int rc = work.made != NULL ? make_folder(v, own, sizeof own, &err) : sh_fail(&err, SH_ENOMEM, "no memory");
-    int status = APP_OK;
+    int status = rc == SH_OK ? add_logs(v, in, logs, n) : APP_OK;
     for (uint32_t i = 0; rc == SH_OK && i < n && status == APP_OK && !app_interrupted(); i++) {
         in->scenario = v->n != 0 ? v->scenario[i] : NULL;
         status = app_with_config(in, judge_one, &work);

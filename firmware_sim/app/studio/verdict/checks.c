@@ -10,25 +10,10 @@
 #include "firmware_sim/app/studio/verdict/checks.h"
 #include "firmware_sim/fault/fault.h"
 
-/* clang-format off */
-const char *const verdict_names[VERDICT_N_CHECKS] = {
-    "connects", "comes-back", "lets-go", "asks-right", "scans", "keeps-up", "lives", "ends", "points-read",
-    "points-known", "points-once",
-};
-const char *const verdict_asks[VERDICT_N_CHECKS] = {
-    "a first connection within the limit",
-    "a new connection within the limit, each time that the head had ended one",
-    "no connection is kept that the head has ended",
-    "no request is refused as wrong",
-    "the head scans at the end",
-    "the client reads as fast as the head sends",
-    "the client does not end by itself",
-    "the client ends when it is asked to",
-    "the client's points can be read",
-    "each point is one that a pulse had",
-    "no point is there more often than it was sent",
-};
-/* clang-format on */
+#define NAME(id, name, asks) name,
+#define ASKS(id, name, asks) asks,
+const char *const verdict_names[VERDICT_N_CHECKS] = {VERDICT_CHECKS(NAME)};
+const char *const verdict_asks[VERDICT_N_CHECKS] = {VERDICT_CHECKS(ASKS)};
 
 __attribute__((format(printf, 4, 5))) static void say(struct verdict *v, enum verdict_check check,
                                                       enum verdict_state state, const char *fmt, ...)

@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "core/newfile.h"
 #include "firmware_sim/app/studio/verdict/client.h"
 #include "firmware_sim/base/clock.h"
 
@@ -85,12 +86,6 @@ static void become_client(int in_fd, int log_fd, int out_fd, const char *line)
     _exit(127);
 }
 
-static int open_empty(const char *path, int *fd, struct sh_err *err)
-{
-    *fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
-    return *fd >= 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
-}
-
 static int client_fork(struct client *client, int log_fd, int out_fd, const char *line, struct sh_err *err)
 {
     int in[2];
@@ -112,8 +107,8 @@ int client_start(struct client *client, const char *line, const char *log, const
 {
     int log_fd = -1, out_fd = -1;
     *client = (struct client){.in_fd = -1};
-    int rc = open_empty(log, &log_fd, err);
-    if (rc == SH_OK && out != NULL) rc = open_empty(out, &out_fd, err);
+    int rc = newfile_open(log, &log_fd, err);
+    if (rc == SH_OK && out != NULL) rc = newfile_open(out, &out_fd, err);
     if (rc == SH_OK) rc = client_fork(client, log_fd, out != NULL ? out_fd : log_fd, line, err);
     if (log_fd >= 0) close(log_fd);
     if (out_fd >= 0) close(out_fd);

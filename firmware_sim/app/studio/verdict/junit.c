@@ -21,7 +21,7 @@ static void put_attribute(FILE *out, const char *name, const char *value)
 
 static void put_case(FILE *out, const struct verdict *v, int check)
 {
-    static const char *const elements[] = {"skipped", NULL, "failure"};
+    static const char *const elements[] = {"skipped", NULL, "failure", "skipped"};
     const struct verdict_result *r = &v->check[check];
     fputs("    <testcase", out);
     put_attribute(out, "classname", v->scenario);
@@ -42,7 +42,8 @@ static void put_suite(FILE *out, const struct verdict *v)
     fputs("  <testsuite", out);
     put_attribute(out, "name", v->scenario);
     fprintf(out, " tests=\"%d\" failures=\"%" PRIu32 "\" skipped=\"%" PRIu32 "\" errors=\"0\" time=\"%.3f\">\n",
-            VERDICT_N_CHECKS, verdict_count(v, VERDICT_FOUND), verdict_count(v, VERDICT_NOT_JUDGED), v->figures.wall_s);
+            VERDICT_N_CHECKS, verdict_count(v, VERDICT_FOUND),
+            verdict_count(v, VERDICT_NOT_JUDGED) + verdict_count(v, VERDICT_ALLOWED), v->figures.wall_s);
     for (int check = 0; check < VERDICT_N_CHECKS; check++)
         put_case(out, v, check);
     fputs("  </testsuite>\n", out);

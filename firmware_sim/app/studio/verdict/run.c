@@ -265,6 +265,9 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     int rc = open_head(r, err);
     if (rc == SH_OK) rc = serve(r, err);
     if (rc == SH_OK) rc = judge(r, err);
+    for (int check = 0; check < VERDICT_N_CHECKS; check++)
+        if (verdict->check[check].state == VERDICT_FOUND && (options->allowed >> check & 1) != 0)
+            verdict->check[check].state = VERDICT_ALLOWED;
     loop_free(r->loop);
     own_stream_close(&r->stream);
     device_free(r->device);

@@ -4,8 +4,8 @@
 
 #include "firmware_sim/app/studio/verdict/verdict.h"
 
-static const char *const STATES[] = {"-", "passed", "FINDING"};
-static const char *const STATE_KEYS[] = {"not_judged", "passed", "finding"};
+static const char *const STATES[] = {"-", "passed", "FINDING", "allowed"};
+static const char *const STATE_KEYS[] = {"not_judged", "passed", "finding", "allowed"};
 
 uint32_t verdict_count(const struct verdict *v, enum verdict_state state)
 {

@@ -12,25 +12,26 @@
 
 struct config;
 
-/* In the order of the sheet. */
-enum verdict_check {
-    VERDICT_CONNECTS,
-    VERDICT_COMES_BACK,
-    VERDICT_LETS_GO,
-    VERDICT_ASKS_RIGHT,
-    VERDICT_SCANS,
-    VERDICT_KEEPS_UP,
-    VERDICT_LIVES,
-    VERDICT_ENDS,
-    VERDICT_POINTS_READ,
-    VERDICT_POINTS_KNOWN,
-    VERDICT_POINTS_ONCE,
-    VERDICT_N_CHECKS
-};
-/* By check: its name, and what it asks for. */
-extern const char *const verdict_names[VERDICT_N_CHECKS], *const verdict_asks[VERDICT_N_CHECKS];
+/* The only list of checks, in the order of the sheet: name, and what is asked for. */
+#define VERDICT_CHECKS(X)                                                                               \
+    X(CONNECTS, "connects", "a first connection within the limit")                                      \
+    X(COMES_BACK, "comes-back", "a new connection within the limit, each time that the head ended one") \
+    X(LETS_GO, "lets-go", "no connection is kept that the head has ended")                              \
+    X(ASKS_RIGHT, "asks-right", "no request is refused as wrong")                                       \
+    X(SCANS, "scans", "the head scans at the end")                                                      \
+    X(KEEPS_UP, "keeps-up", "the client reads as fast as the head sends")                               \
+    X(LIVES, "lives", "the client does not end by itself")                                              \
+    X(ENDS, "ends", "the client ends when it is asked to")                                              \
+    X(POINTS_READ, "points-read", "the client's points can be read")                                    \
+    X(POINTS_KNOWN, "points-known", "each point is one that a pulse had")                               \
+    X(POINTS_ONCE, "points-once", "no point is there more often than it was sent")
 
-enum verdict_state { VERDICT_NOT_JUDGED, VERDICT_PASSED, VERDICT_FOUND };
+#define VERDICT_ENUM(id, name, asks) VERDICT_##id,
+enum verdict_check { VERDICT_CHECKS(VERDICT_ENUM) VERDICT_N_CHECKS };
+extern const char *const verdict_names[VERDICT_N_CHECKS], *const verdict_asks[VERDICT_N_CHECKS]; /* by check */
+
+/* ALLOWED: found, and the user knows it. */
+enum verdict_state { VERDICT_NOT_JUDGED, VERDICT_PASSED, VERDICT_FOUND, VERDICT_ALLOWED };
 
 struct verdict_result {
     enum verdict_state state;
@@ -67,7 +68,7 @@ struct verdict_options {
     double grace_s;      /* from SIGTERM to SIGKILL */
     double match_m;      /* beside what the file rounds to; negative: by the link's protocol */
     uint32_t link;       /* from 1 */
-    int quiet;
+    uint32_t allowed;    /* bit per check */
 };
 
 /* Runs the client once. `verdict` begins with the scenario's name. On failure there is no verdict. */
