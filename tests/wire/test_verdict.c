@@ -22,10 +22,24 @@ static const char FAULTS[] = "faults:\n"
                              "  - {kind: drop, from: 35, every: 40, from_pulse: 1}\n"
                              "  - {kind: disconnect, at: 300, count: 1}\n";
 
+/* 40 scans a second. Noise of 0.1 m tells apart the scans of a head that stands still. */
+static const char SCIP[] =
+    "head: {profile: hokuyo-utm-30lx}\n"
+    "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 0.2]}]\n"
+    "noise: {range: on, sigma_m: 0.1}\nbeam: {mode: single}\n"
+    "loop: {late_ms: 5000, queue_ms: 5000}\nlinks: [{type: tcp, port: 0, protocol: scip}]\n";
+
+/* The byte is the first of a value, where a bit is 4 m or more: SCIP.md, 16 + 4 + 6 bytes and then lines of 66. */
+static const char SCIP_FAULTS[] = "faults:\n"
+                                  "  - {kind: flip, byte: 500, from: 4, every: 6}\n"
+                                  "  - {kind: duplicate, from: 5, every: 6}\n"
+                                  "  - {kind: disconnect, at: 18, count: 1}\n";
+
 static void write_files(const struct wire *wire)
 {
     room_write(wire);
     room_config_write(wire, &ROOM);
+    wire_write_text(wire, "scip.yaml", SCIP);
 }
 
 static const char *in_folder(const struct wire *wire, const char *name, const char *ending)
@@ -44,10 +58,11 @@ struct planted {
 /* Each has a scenario file of its own, whose name is also that of the log. */
 static pid_t start_case(struct wire *wire, const struct planted *planted, const char *config, const char *client)
 {
+    const char *faults = strcmp(config, "config.yaml") == 0 ? FAULTS : SCIP_FAULTS;
     char config_path[352], scenario[352], command[512], json[352], junit[352], name[64], err[64];
     snprintf(config_path, sizeof config_path, "%s", wire_path(wire, config));
     snprintf(name, sizeof name, "%s.yaml", planted->faults);
-    snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, name, FAULTS));
+    snprintf(scenario, sizeof scenario, "%s", wire_write_text(wire, name, faults));
     snprintf(command, sizeof command, "exec %s {host} {port} {out} %s", client, planted->faults);
     snprintf(json, sizeof json, "%s", in_folder(wire, planted->faults, "json"));
     snprintf(junit, sizeof junit, "%s", in_folder(wire, planted->faults, "xml"));
@@ -122,12 +137,12 @@ static const struct planted OTHERS[] = {
 enum { N_CASES = 5 };
 
 /* All at once: they mostly wait. */
-static void try_cases(struct wire *wire, const char *client, const struct planted cases[N_CASES])
+static void try_cases(struct wire *wire, const char *config, const char *client, const struct planted cases[N_CASES])
 {
     pid_t pid[N_CASES];
     write_files(wire);
     for (int i = 0; i < N_CASES; i++)
-        pid[i] = start_case(wire, &cases[i], "config.yaml", client);
+        pid[i] = start_case(wire, &cases[i], config, client);
     for (int i = 0; i < N_CASES; i++)
         expect(wire, pid[i], cases[i].faults, cases[i].findings);
 }
@@ -141,21 +156,31 @@ static const char *client_in_c(void)
 
 static void test_a_client_in_c(void **state)
 {
-    try_cases(*state, client_in_c(), PLANTED);
+    try_cases(*state, "config.yaml", client_in_c(), PLANTED);
 }
 
 static void test_other_faults(void **state)
 {
-    try_cases(*state, client_in_c(), OTHERS);
+    try_cases(*state, "config.yaml", client_in_c(), OTHERS);
+}
+
+static void need_python(void)
+{
+    if (access("/usr/bin/python3", X_OK) == 0) return;
+    print_message("# /usr/bin/python3 is missing\n");
+    skip();
 }
 
 static void test_a_client_in_python(void **state)
 {
-    if (access("/usr/bin/python3", X_OK) != 0) {
-        print_message("# /usr/bin/python3 is missing\n");
-        skip();
-    }
-    try_cases(*state, "/usr/bin/python3 tests/wire/faulty_client.py", PLANTED);
+    need_python();
+    try_cases(*state, "config.yaml", "/usr/bin/python3 tests/wire/faulty_client.py", PLANTED);
+}
+
+static void test_a_client_of_scip(void **state)
+{
+    need_python();
+    try_cases(*state, "scip.yaml", "/usr/bin/python3 tests/wire/faulty_scip.py", PLANTED);
 }
 
 int main(int argc, char **argv)
@@ -166,6 +191,7 @@ int main(int argc, char **argv)
         cmocka_unit_test_setup_teardown(test_a_client_in_c, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_other_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_in_python, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_client_of_scip, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

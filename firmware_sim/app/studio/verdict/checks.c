@@ -236,5 +236,5 @@ void checks_points(struct verdict *v, const struct match *m, const double unknow
         say(v, VERDICT_POINTS_ONCE, VERDICT_FOUND, "%zu points more than it was sent", m->repeated);
     else
         say(v, VERDICT_POINTS_ONCE, VERDICT_PASSED, "%zu points were sent%s", m->sent,
-            2 * m->again < m->sent ? "" : ", most of them several times: with noise.range on they are told apart");
+            2 * m->again < m->sent ? "" : ", most of them as near to others: a repeated one can go unseen");
 }
