@@ -106,6 +106,26 @@ static void find_names(const char *json, char *names, size_t cap)
     }
 }
 
+static int count_of(const char *text, const char *what)
+{
+    int n = 0;
+    for (const char *at = text; (at = strstr(at, what)) != NULL; at += strlen(what))
+        n++;
+    return n;
+}
+
+/* The XML has a test case for each check, and a failure for each finding. */
+static void expect_junit(const struct wire *wire, const char *name, const char *findings)
+{
+    char *xml = wire_read(in_folder(wire, name, "xml"), NULL), total[64];
+    const int n = findings[0] != '\0' ? 1 + count_of(findings, " ") : 0;
+    snprintf(total, sizeof total, "<testsuites tests=\"11\" failures=\"%d\">", n);
+    assert_int_equal(count_of(xml, total), 1);
+    assert_int_equal(count_of(xml, "<testcase classname="), 11);
+    assert_int_equal(count_of(xml, "<failure message="), n);
+    free(xml);
+}
+
 static void expect(struct wire *wire, pid_t pid, const char *name, const char *findings)
 {
     char names[256];
@@ -121,18 +141,19 @@ static void expect(struct wire *wire, pid_t pid, const char *name, const char *f
         fail_msg("%s: status %d, findings '%s' instead of '%s'", name, status, json != NULL ? names : "?", findings);
     }
     free(json);
+    expect_junit(wire, name, findings);
 }
 
 static const struct planted PLANTED[] = {
     {"none", "", "60", "60"},
     {"c", "points-known", "60", "60"},
-    {"s", "comes-back", "4", "60"},
+    {"s", "comes-back", "3", "60"},
     {"t", "points-once", "60", "60"},
-    {"cst", "comes-back points-known points-once", "4", "60"},
+    {"cst", "comes-back points-known points-once", "3", "60"},
 };
 static const struct planted OTHERS[] = {
-    {"h", "lets-go", "4", "60"}, {"a", "asks-right", "60", "60"},       {"d", "lives", "60", "60"},
-    {"k", "ends", "60", "0.5"},  {"n", "scans points-read", "4", "60"},
+    {"h", "lets-go", "3", "60"}, {"a", "asks-right", "60", "60"},       {"d", "lives", "60", "60"},
+    {"k", "ends", "60", "0.5"},  {"n", "scans points-read", "3", "60"},
 };
 enum { N_CASES = 5 };
 
@@ -164,6 +185,56 @@ static void test_other_faults(void **state)
     try_cases(*state, "config.yaml", client_in_c(), OTHERS);
 }
 
+/* Two scenarios in turn; points on standard output; a finding that the user allows. */
+static void test_scenarios_in_turn(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], first[352], second[352], json[352], command[512];
+    write_files(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(first, sizeof first, "%s", wire_write_text(wire, "first.yaml", FAULTS));
+    snprintf(second, sizeof second, "%s", wire_write_text(wire, "second.yaml", "faults: [{kind: refuse, at: 1}]\n"));
+    snprintf(json, sizeof json, "%s", wire_path(wire, "turn.json"));
+    snprintf(command, sizeof command, "exec %s {host} {port} /dev/stdout c", client_in_c());
+    const char *args[] = {"soak",       config,     "--scenario",      first,     "--scenario",
+                          second,       "--client", command,           "--json",  json,
+                          "--duration", "0.3",      "--client-folder", wire->dir, "--client-file",
+                          "-",          "--allow",  "points-known",    "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *text = wire_read(json, NULL);
+    assert_int_equal(count_of(text, "\"result\": \"allowed\""), 1);
+    assert_int_equal(count_of(text, "\"scenario\": \"1-first\""), 1);
+    assert_int_equal(count_of(text, "\"scenario\": \"2-second\""), 1);
+    assert_int_equal(count_of(text, "at most (refuse)"), 1);
+    free(text);
+}
+
+static void expect_usage(struct wire *wire, const char *const *args, const char *says)
+{
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(text, says) == NULL) fail_msg("'%s' is not in: %s", says, text);
+    free(text);
+}
+
+static void test_wrong_usage(void **state)
+{
+    struct wire *wire = *state;
+    char c[352];
+    write_files(wire);
+    snprintf(c, sizeof c, "%s", wire_path(wire, "config.yaml"));
+    expect_usage(wire, (const char *const[]){"soak", c, "--junit", "x", NULL}, "need --client");
+    expect_usage(wire, (const char *const[]){"soak", c, "--scenario", "a", "--scenario", "b", NULL}, "need --client");
+    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--allow", "speed", NULL}, "no such check");
+    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--pace", "fast", NULL},
+                 "allowed is realtime");
+    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--link", "2", NULL}, "allowed 1 to 1");
+    expect_usage(wire,
+                 (const char *const[]){"soak", c, "--client", "true", "--truth", "t", "--scenario", "flaky-usb",
+                                       "--scenario", "brown-out", NULL},
+                 "--truth is one file");
+}
+
 static void need_python(void)
 {
     if (access("/usr/bin/python3", X_OK) == 0) return;
@@ -190,6 +261,8 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_a_client_in_c, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_other_faults, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_scenarios_in_turn, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_in_python, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_of_scip, wire_setup, wire_teardown),
     };
