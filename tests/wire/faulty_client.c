@@ -89,14 +89,21 @@ static void take_frame(struct client *c, const uint8_t *frame, size_t len)
     if (frame[1] == POINTS) take_points(c, frame + HEADER, len);
 }
 
+/* Replies are printable; another byte belongs to nothing. */
+static size_t take_line(struct client *c, const uint8_t *p, size_t n)
+{
+    size_t len = 0;
+    while (len < n && p[len] >= 0x20 && p[len] <= 0x7e)
+        len++;
+    if (len == n) return 0;
+    if (len >= 8 && memcmp(p, "scanning", 8) == 0) c->scans = 1;
+    return len > 0 ? len : 1;
+}
+
 /* Returns how many bytes the piece at p takes; 0: it is not whole. */
 static size_t take_piece(struct client *c, const uint8_t *p, size_t n)
 {
-    if (*p != SYNC) {
-        const uint8_t *end_of_line = memchr(p, '\n', n);
-        if (n >= 8 && memcmp(p, "scanning", 8) == 0) c->scans = 1;
-        return end_of_line != NULL ? 1 + (size_t)(end_of_line - p) : 0;
-    }
+    if (*p != SYNC) return take_line(c, p, n);
     if (n < HEADER) return 0;
     const size_t len = le_get32(p + 4);
     if (crc32c(p, 24) != le_get32(p + 24) || len > 65536) return 1;

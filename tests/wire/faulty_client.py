@@ -57,12 +57,20 @@ class Client:
         if kind == POINTS:
             self.take_points(payload)
 
+    # Replies are printable; another byte belongs to nothing.
+    def take_line(self, data, at):
+        end = at
+        while end < len(data) and 0x20 <= data[end] <= 0x7E:
+            end += 1
+        if end == len(data):
+            return 0
+        self.scans |= data[at:at + 8] == b"scanning"
+        return max(end - at, 1)
+
     # Returns how many bytes the piece at `at` takes; 0: it is not whole.
     def take_piece(self, data, at):
         if data[at] != SYNC:
-            end = data.find(b"\n", at)
-            self.scans |= data[at:at + 8] == b"scanning"
-            return end + 1 - at if end >= 0 else 0
+            return self.take_line(data, at)
         if len(data) - at < HEADER:
             return 0
         length, = struct.unpack_from("<I", data, at + 4)

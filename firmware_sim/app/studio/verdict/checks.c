@@ -221,7 +221,8 @@ void checks_points(struct verdict *v, const struct match *m, const double unknow
 {
     v->points =
         (struct verdict_points){m->n, m->empty, m->unknown, m->repeated, m->sent, m->unit_m, m->within_m, m->frame};
-    say(v, VERDICT_POINTS_READ, VERDICT_PASSED, "%zu points, %zu shots without echo", m->n, m->empty);
+    say(v, VERDICT_POINTS_READ, VERDICT_PASSED, "%zu points, of %zu that were sent; %zu shots without echo", m->n,
+        m->sent, m->empty);
     if (m->unknown != 0)
         say(v, VERDICT_POINTS_KNOWN, VERDICT_FOUND,
             "%zu of %zu points are none that a pulse had (frame: %s, within %.6g mm); the first is number %zu: %.9g %.9g "
@@ -233,8 +234,8 @@ void checks_points(struct verdict *v, const struct match *m, const double unknow
     if (m->unknown > m->n / 2)
         say(v, VERDICT_POINTS_ONCE, VERDICT_NOT_JUDGED, "most of its points are unknown");
     else if (m->repeated != 0)
-        say(v, VERDICT_POINTS_ONCE, VERDICT_FOUND, "%zu points more than it was sent", m->repeated);
+        say(v, VERDICT_POINTS_ONCE, VERDICT_FOUND, "%zu more than were sent", m->repeated);
     else
-        say(v, VERDICT_POINTS_ONCE, VERDICT_PASSED, "%zu points were sent%s", m->sent,
-            2 * m->again < m->sent ? "" : ", most of them as near to others: a repeated one can go unseen");
+        say(v, VERDICT_POINTS_ONCE, VERDICT_PASSED, "none is repeated%s",
+            2 * m->again < m->sent ? "" : "; but most were sent as near to others: a repeated one can go unseen");
 }
