@@ -264,6 +264,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     prepare(r);
     int rc = open_head(r, err);
     if (rc == SH_OK) rc = serve(r, err);
+    if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* half a run is no verdict */
     if (rc == SH_OK) rc = judge(r, err);
     for (int check = 0; check < VERDICT_N_CHECKS; check++)
         if (verdict->check[check].state == VERDICT_FOUND && (options->allowed >> check & 1) != 0)
