@@ -229,6 +229,8 @@ static void test_wrong_usage(void **state)
     expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--pace", "fast", NULL},
                  "allowed is realtime");
     expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--link", "2", NULL}, "allowed 1 to 1");
+    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: 'null'}]", NULL},
+                 "allowed are tcp, pty");
     expect_usage(wire,
                  (const char *const[]){"soak", c, "--client", "true", "--truth", "t", "--scenario", "flaky-usb",
                                        "--scenario", "brown-out", NULL},

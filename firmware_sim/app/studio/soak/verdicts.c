@@ -40,6 +40,11 @@ static int judge_one(struct config *cfg, void *ctx, struct sh_err *err)
                        "realtime");
     if (o->link > cfg->n_links)
         return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
+    const struct link_spec *link = &cfg->link[o->link - 1];
+    if (link->type == LINK_FILE || link->type == LINK_NULL)
+        return sh_fail(err, SH_EINPUT,
+                       "--link %u: no client can have a link of type %s; allowed are tcp, pty, udp, usb and web",
+                       o->link, link_ops_get(link->type)->name);
     name_scenario(work->verdicts, work->n, made->scenario, sizeof made->scenario);
     const int rc = verdict_run(cfg, o, made, err);
     if (rc != SH_OK) return rc;
