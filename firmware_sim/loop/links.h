@@ -31,7 +31,7 @@ struct link_counts {
     uint64_t sent_units, lost_units, lost_points, unsent_pulses, wrong_requests, lost_input_bytes;
 };
 
-/* What a caller wants to know of the clients, as it happens. The threads of the links call it. */
+/* It is told of the clients, as things happen. The threads of the links call it. */
 struct links_observer {
     void *ctx;
     /* A session begins (1) or ends (0). t_ns: device time from which on, or up to which, it is given the stream. */

@@ -101,7 +101,7 @@ static void test_repeated(void **state)
     /* The second was sent nothing of that frame, which is number 5: more than two ticks after its end. */
     span[1].to_ns = 2 * TICK_NS;
     assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
-    /* Nor was it where a fault took that frame away. */
+    /* A fault took that frame away from it. */
     span[1].to_ns = INT64_MAX;
     struct watch_spoiled spoiled[] = {{2, 30}, {2, 5}, {1, 9}};
     watch.spoiled = spoiled;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the head sees of clients: who was sent away and came back, what was asked wrongly, which frames were sent. Session
+/* The clients as the head sees them: who was sent away and came back, what was asked wrongly, what was sent. Session
  * numbers are 8 a link, from 1 (COMMANDS.md, Sessions and control). */
 #include <stdarg.h>
 #include <stddef.h>
@@ -140,7 +140,7 @@ static void test_spans_of_the_chosen_link(void **state)
     assert_true(w.n_spoiled == 1 && w.spoiled[0].session == 2 && w.spoiled[0].seq == 77);
 }
 
-/* What the end of the run does is no fault of anybody. */
+/* A session that the end of the run ends is no disturbance. */
 static void test_the_end(void **state)
 {
     (void)state;

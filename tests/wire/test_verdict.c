@@ -93,7 +93,7 @@ static pid_t start_case(struct wire *wire, const struct planted *planted, const 
     return wire_spawn(wire, args, name, err, -1);
 }
 
-/* What the sheet has as findings, in its order and with blanks between them. */
+/* Writes the names of findings, in the order of the sheet and with blanks between them. */
 static void find_names(const char *json, char *names, size_t cap)
 {
     size_t len = 0;
@@ -224,6 +224,7 @@ static void test_wrong_usage(void **state)
     write_files(wire);
     snprintf(c, sizeof c, "%s", wire_path(wire, "config.yaml"));
     expect_usage(wire, (const char *const[]){"soak", c, "--junit", "x", NULL}, "need --client");
+    expect_usage(wire, (const char *const[]){"soak", c, "--reconnect-limit", "3", NULL}, "need --client");
     expect_usage(wire, (const char *const[]){"soak", c, "--scenario", "a", "--scenario", "b", NULL}, "need --client");
     expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--allow", "speed", NULL}, "no such check");
     expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--pace", "fast", NULL},

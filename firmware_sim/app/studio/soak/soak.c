@@ -252,14 +252,16 @@ static int take_allowed(void *values, const char *text)
     return app_usage(&app_soak, "--allow %s: there is no such check; allowed are those of --help", text);
 }
 
-/* Options that go only with a client, and those that go only with one scenario. */
+/* Some options go only with a client, and --truth goes only with one scenario. */
 static int check_options(const struct soak_options *o)
 {
     const struct verdicts *v = &o->verdicts;
     const int is_theirs = v->options.command != NULL;
-    if (!is_theirs && (v->options.file != NULL || v->options.folder != NULL || v->junit != NULL || o->match_mm >= 0.0 ||
-                       v->options.allowed != 0))
-        return app_usage(&app_soak, "--allow, --junit, --match-mm, --client-file and --client-folder need --client");
+    const int has_texts = v->options.file != NULL || v->options.folder != NULL || v->junit != NULL;
+    const int has_numbers = v->options.limit_s > 0.0 || v->options.grace_s > 0.0 || o->match_mm >= 0.0;
+    if (!is_theirs && (has_texts || has_numbers || v->options.allowed != 0))
+        return app_usage(&app_soak, "--client-file, --client-folder, --client-grace, --reconnect-limit, --match-mm, "
+                                    "--allow and --junit need --client");
     if (!is_theirs && v->n > 1) return app_usage(&app_soak, "several --scenario need --client");
     if (v->n > 1 && o->device.truth != NULL)
         return app_usage(&app_soak, "--truth is one file, and %u scenarios are given; allowed is one", v->n);
@@ -272,14 +274,15 @@ static int run_theirs(struct soak_options *o)
     v->truth = o->device.truth;
     v->duration_s = o->duration_s;
     v->match_m = 1e-3 * o->match_mm;
+    if (v->limit_s <= 0.0) v->limit_s = 10.0;
+    if (v->grace_s <= 0.0) v->grace_s = 5.0;
     v->link = o->link != 0 ? (uint32_t)o->link : 1;
     return verdicts_run(&o->verdicts, &o->in);
 }
 
 static int soak_run_command(int argc, char **argv)
 {
-    struct soak_options o = {
-        .duration_s = 30.0, .match_mm = -1.0, .verdicts.options = {.limit_s = 10.0, .grace_s = 5.0}};
+    struct soak_options o = {.duration_s = 30.0, .match_mm = -1.0};
     int status = app_parse(&app_soak, argc, argv, &o.in, &o);
     if (status == APP_GO_ON) status = check_options(&o);
     if (status != APP_GO_ON) return status;

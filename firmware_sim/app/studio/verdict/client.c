@@ -92,7 +92,7 @@ static int client_fork(struct client *client, int log_fd, int out_fd, const char
     if (pipe2(in, O_CLOEXEC) != 0) return sh_fail(err, SH_EIO, "pipe: %s", strerror(errno));
     client->in_fd = in[1];
     client->started_ns = clock_now_ns();
-    /* What the shell leaves behind becomes a child of this process, which can then wait for it. */
+    /* Processes that the shell leaves behind become children of this one, which can then wait for them. */
     prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0);
     const pid_t pid = fork();
     if (pid == 0) become_client(in[0], log_fd, out_fd, line);

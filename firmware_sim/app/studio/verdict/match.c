@@ -25,7 +25,7 @@ struct way {
 
 static const double UNTURNED[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
-static void go(const struct way *way, const double from[3], double to[3])
+static void match_go(const struct way *way, const double from[3], double to[3])
 {
     const double p[3] = {way->is_forward ? -from[1] : from[0], way->is_forward ? from[0] : from[1], from[2]};
     for (int k = 0; k < 3; k++)
@@ -40,7 +40,7 @@ static struct way *add_way(struct way ways[MAX_WAYS], int *n, const char *frame,
     return way;
 }
 
-/* Of a head that stands, in a scene without a CRS, also the head's own frame, and that with x forward as ROS has it. */
+/* The stream's own frame is one. A head that stands, in a scene without a CRS, adds its own, and that with x forward. */
 static int find_ways(const struct own_stream *stream, struct way ways[MAX_WAYS])
 {
     const struct scanhead_info *info = &stream->info;
@@ -89,7 +89,7 @@ static const struct way *best_way(const struct match_index *index, const struct 
         for (size_t i = 0; i < cloud->n; i += step) {
             double p[3];
             if (is_empty(cloud->xyz_m[i])) continue;
-            go(&ways[k], cloud->xyz_m[i], p);
+            match_go(&ways[k], cloud->xyz_m[i], p);
             n += match_index_near(index, p, NULL, NULL) != 0;
         }
         if (n <= most) continue;
@@ -148,7 +148,7 @@ struct taker {
     size_t first; /* of the entries that the point at hand agrees with; SIZE_MAX: none so far */
 };
 
-static void take(void *ctx, size_t entry)
+static void match_take(void *ctx, size_t entry)
 {
     struct taker *taker = ctx;
     if (taker->first == SIZE_MAX)
@@ -167,8 +167,8 @@ static void count_points(struct match_index *index, const struct cloud *cloud, c
             continue;
         }
         m->n++;
-        go(way, cloud->xyz_m[i], p);
-        match_index_near(index, p, take, &taker);
+        match_go(way, cloud->xyz_m[i], p);
+        match_index_near(index, p, match_take, &taker);
         if (taker.first != SIZE_MAX)
             index->entry[match_index_root(index, taker.first)].got++;
         else if (m->unknown++ == 0)

@@ -24,8 +24,8 @@ struct match {
 int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,
                  double match_m, struct match *match, struct sh_err *err);
 
-/* What a file's coordinates are rounded to. Of text the unit of the last digit that the largest one has; else what the format
- * says (count_m). */
+/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, else
+ * count_m. */
 double match_unit_m(const struct cloud *cloud);
 
 #endif

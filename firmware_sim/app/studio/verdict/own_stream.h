@@ -25,7 +25,7 @@ struct own_stream {
     int running, keeps;        /* keeps: the points, too */
     atomic_int is_up;          /* the head has booted */
     _Atomic int64_t points_ns; /* device time of the last frame of points; 0: none so far */
-    /* Of the thread, until it is joined: */
+    /* The thread has these, until it is joined: */
     struct own_frame *frame;
     double (*xyz_m)[3]; /* in the stream's frame; of a head that moves, and polar, in the scene's */
     size_t n_frames, room_frames, n, room;

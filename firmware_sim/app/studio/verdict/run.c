@@ -43,7 +43,7 @@ struct run {
 
 /* ---- the head */
 
-static void prepare(struct run *r)
+static void run_prepare(struct run *r)
 {
     static const double PATIENCE_MS = 3000.0; /* as a soak: a busy machine is no fault of the client's */
     struct config *cfg = r->cfg;
@@ -133,7 +133,7 @@ static int has_points(struct run *r)
     return atomic_load(&r->stream.points_ns) != 0;
 }
 
-/* Nothing to wait for, but the time. */
+/* The time alone is waited for. */
 static int never(struct run *r)
 {
     (void)r;
@@ -141,7 +141,7 @@ static int never(struct run *r)
 }
 
 /* Waits until all who were sent away are back and, after that, points come. */
-static void settle(struct run *r)
+static void run_settle(struct run *r)
 {
     struct checks *c = &r->checks;
     int64_t from_ns = atomic_load(&r->stream.points_ns), until_ns = in_s(r->options->limit_s);
@@ -163,7 +163,7 @@ static void run_client(struct run *r)
                       wait_until(r, has_points, in_s(o->limit_s));
     if (there) wait_until(r, never, in_s(o->duration_s));
     fault_board_remove(device_faults(r->device), 0);
-    if (c->has_sessions ? is_connected(r) : there) settle(r);
+    if (c->has_sessions ? is_connected(r) : there) run_settle(r);
     c->was_there = !client_has_ended(&r->client);
     c->holds = c->was_there && held_any(&r->watch, r->client.pid);
     c->ended_ns = clock_now_ns();
@@ -171,7 +171,7 @@ static void run_client(struct run *r)
     client_end(&r->client, o->grace_s);
 }
 
-static int serve(struct run *r, struct sh_err *err)
+static int run_serve(struct run *r, struct sh_err *err)
 {
     struct link_counts counts = {0};
     const int64_t from_ns = clock_now_ns();
@@ -205,7 +205,7 @@ static int is_new(const struct run *r)
            now.st_mtim.tv_sec != r->before.st_mtim.tv_sec || now.st_mtim.tv_nsec != r->before.st_mtim.tv_nsec;
 }
 
-/* What a link's own numbers round coordinates to, m: half a millimetre of range and of angles (SCIP, CoLa); for a VLP-16
+/* Returns what a link's own numbers round coordinates to, m: half a millimetre of range, and angles (SCIP, CoLa); for a VLP-16
  * half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream does not. */
 static double match_of(const struct run *r)
 {
@@ -214,7 +214,7 @@ static double match_of(const struct run *r)
     return strncmp(r->place.protocol, "velodyne", 8) == 0 ? 2e-2 : 2e-3;
 }
 
-static int compare(struct run *r, struct sh_err *err)
+static int run_compare(struct run *r, struct sh_err *err)
 {
     struct cloud cloud;
     struct match match;
@@ -237,7 +237,7 @@ static int compare(struct run *r, struct sh_err *err)
     return rc;
 }
 
-static int judge(struct run *r, struct sh_err *err)
+static int run_judge(struct run *r, struct sh_err *err)
 {
     checks_judge(&r->checks, r->verdict);
     if (r->points == NULL)
@@ -245,7 +245,7 @@ static int judge(struct run *r, struct sh_err *err)
     else if (r->stream.short_of[0] != '\0')
         checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
     else
-        return compare(r, err);
+        return run_compare(r, err);
     return SH_OK;
 }
 
@@ -263,11 +263,11 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
                                 .watch = &r->watch,
                                 .client = &r->client,
                                 .has_sessions = cfg->link[options->link - 1].type != LINK_UDP};
-    prepare(r);
+    run_prepare(r);
     int rc = open_head(r, err);
-    if (rc == SH_OK) rc = serve(r, err);
+    if (rc == SH_OK) rc = run_serve(r, err);
     if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* half a run is no verdict */
-    if (rc == SH_OK) rc = judge(r, err);
+    if (rc == SH_OK) rc = run_judge(r, err);
     for (int check = 0; check < VERDICT_N_CHECKS; check++)
         if (verdict->check[check].state == VERDICT_FOUND && (options->allowed >> check & 1) != 0)
             verdict->check[check].state = VERDICT_ALLOWED;

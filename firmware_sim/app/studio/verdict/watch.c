@@ -124,7 +124,7 @@ static int ends_sessions(enum fault_kind kind)
 }
 
 /* Which sessions have ended by such a fault is told later, by the thread of their link. */
-static void act(struct watch *w, const struct fault_note *note)
+static void watch_act(struct watch *w, const struct fault_note *note)
 {
     const int64_t over_ns = clock_now_ns() + (int64_t)(1e6 * note->for_ms);
     for (uint32_t i = 0; i < w->n_links; i++) {
@@ -144,7 +144,7 @@ static void power_is_back(struct watch *w)
         if (w->broken[i].kind == FAULT_POWER_CYCLE && w->broken[i].back_ns == 0) w->broken[i].over_ns = clock_now_ns();
 }
 
-static void spoil(struct watch *w, const struct fault_note *note)
+static void watch_spoil(struct watch *w, const struct fault_note *note)
 {
     if (!grow(&w->spoiled, &w->room_spoiled, w->n_spoiled + 1, sizeof *w->spoiled)) {
         w->is_short = 1;
@@ -162,11 +162,11 @@ void watch_note(void *ctx, const struct fault_note *note)
     if (note->kind == FAULT_POWER_CYCLE && note->ended)
         power_is_back(w);
     else if (ends_sessions(note->kind))
-        act(w, note);
+        watch_act(w, note);
     else if (note->kind == FAULT_REFUSE && note->link != 0)
         add_break(w, &(struct watch_break){.link = note->link, .kind = note->kind, .over_ns = clock_now_ns()});
     else if (note->has_seq && (note->kind == FAULT_DROP || note->kind == FAULT_TRUNCATE))
-        spoil(w, note);
+        watch_spoil(w, note);
     pthread_mutex_unlock(&w->lock);
 }
 
