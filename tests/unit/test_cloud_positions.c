@@ -86,6 +86,10 @@ static void test_text(void **state)
     expect_error("hello\n", 6, "no line of it is a point");
     expect_error("1 2 inf\n", 8, "is not a position");
     expect_error("1 2 3\nnan 2 3\n", 14, "line 2");
+    struct cloud cloud;
+    struct sh_err err;
+    assert_int_equal(cloud_read_positions("/nowhere/a.PTX", NULL, &cloud, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "PTX is not read"));
 }
 
 static size_t put_header(char *to, const char *fields, unsigned n, const char *data)

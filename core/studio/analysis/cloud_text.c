@@ -3,6 +3,8 @@
  * unless a line of names says which columns they are. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
+#include <strings.h>
 
 #include "core/studio/analysis/cloud_readers.h"
 #include "core/text.h"
@@ -93,8 +95,16 @@ static int read_lines(struct table *g, const struct sh_report *report, struct sh
     return rc;
 }
 
+/* Its lines look like points, and those of its header do, too. */
+static int is_ptx(const char *path)
+{
+    const char *ending = strrchr(path, '.');
+    return ending != NULL && strcasecmp(ending, ".ptx") == 0;
+}
+
 int cloud_read_text(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
 {
+    if (is_ptx(path)) return sh_fail(err, SH_EINPUT, "%s: PTX is not read; allowed are PLY, LAS, PCD and text", path);
     struct table g = {.cloud = out, .column = {0, 1, 2}, .n_columns = 3};
     int rc = text_open(&g.t, path, NULL, NULL, err);
     if (rc == SH_OK) rc = read_lines(&g, report, err);

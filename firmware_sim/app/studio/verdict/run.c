@@ -266,6 +266,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     run_prepare(r);
     int rc = open_head(r, err);
     if (rc == SH_OK) rc = run_serve(r, err);
+    if (rc == SH_OK && r->watch.is_short) rc = sh_fail(err, SH_ENOMEM, "no memory for what the client does");
     if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* half a run is no verdict */
     if (rc == SH_OK) rc = run_judge(r, err);
     for (int check = 0; check < VERDICT_N_CHECKS; check++)
