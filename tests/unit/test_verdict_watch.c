@@ -108,6 +108,21 @@ static void test_silence(void **state)
     assert_true(watch_is_whole(&w));
 }
 
+/* A device that sends only what was asked for. */
+static void test_a_link_on_which_clients_must_ask(void **state)
+{
+    (void)state;
+    w.must_ask = 1;
+    session(1, 1);
+    note(FAULT_DISCONNECT, 1, 0.0);
+    session(1, 0);
+    w.observer.heard(w.observer.ctx, 1, "MD", 2); /* read late: nobody is there any more */
+    session(2, 1);
+    assert_false(watch_is_whole(&w));
+    w.observer.heard(w.observer.ctx, 2, "MD", 2);
+    assert_true(watch_is_whole(&w));
+}
+
 static void test_requests(void **state)
 {
     (void)state;
@@ -160,6 +175,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_whom_a_fault_concerns, begin, end),
         cmocka_unit_test_setup_teardown(test_silence, begin, end),
         cmocka_unit_test_setup_teardown(test_requests, begin, end),
+        cmocka_unit_test_setup_teardown(test_a_link_on_which_clients_must_ask, begin, end),
         cmocka_unit_test_setup_teardown(test_spans_of_the_chosen_link, begin, end),
         cmocka_unit_test_setup_teardown(test_the_end, begin, end),
     };

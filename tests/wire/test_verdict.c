@@ -206,6 +206,7 @@ static void test_scenarios_in_turn(void **state)
     assert_int_equal(count_of(text, "\"scenario\": \"1-first\""), 1);
     assert_int_equal(count_of(text, "\"scenario\": \"2-second\""), 1);
     assert_int_equal(count_of(text, "at most (refuse)"), 1);
+    assert_int_equal(count_of(text, "\"kind\": \"refuse\""), 1);
     free(text);
 }
 

@@ -85,10 +85,20 @@ static void judge_missing(const struct checks *c, const struct absences *a, stru
         say(v, VERDICT_LETS_GO, VERDICT_FOUND, "%.1f s after %s it still had the connection from before", s, kind);
 }
 
+static void keep_absences(const struct watch *w, struct verdict *v)
+{
+    v->figures.breaks = w->n_broken;
+    for (size_t i = 0; i < w->n_broken && i < VERDICT_MAX_BREAKS; i++) {
+        const struct watch_break *b = &w->broken[i];
+        v->broken[i] = (struct verdict_break){fault_names[b->kind], b->link,
+                                              b->back_ns != 0 ? s_between(b->over_ns, b->back_ns) : (double)NAN};
+    }
+}
+
 static void judge_absences(const struct checks *c, struct verdict *v)
 {
     const struct absences a = find_absences(c->watch);
-    v->figures.breaks = c->watch->n_broken;
+    keep_absences(c->watch, v);
     v->figures.back_mean_s = a.n > 0 ? a.sum_s / (double)a.n : (double)NAN;
     v->figures.back_max_s = a.n > 0 ? a.max_s : (double)NAN;
     say(v, VERDICT_LETS_GO, a.n > 0 ? VERDICT_PASSED : VERDICT_NOT_JUDGED, "%s",

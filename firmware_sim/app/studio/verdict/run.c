@@ -259,6 +259,9 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     r->verdict = verdict;
     r->stream.keeps = options->file != NULL;
     watch_begin(&r->watch, cfg->n_links, options->link);
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].protocol == PROTOCOL_SCIP || cfg->link[i].protocol == PROTOCOL_COLA)
+            r->watch.must_ask |= 1U << i;
     r->checks = (struct checks){.options = options,
                                 .watch = &r->watch,
                                 .client = &r->client,

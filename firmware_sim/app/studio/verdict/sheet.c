@@ -41,6 +41,19 @@ static void put_checks(const struct verdict *v, struct json *json)
     json_close_array(json);
 }
 
+static void put_breaks(const struct verdict *v, struct json *json)
+{
+    json_open_array(json, "disturbances");
+    for (uint64_t i = 0; i < v->figures.breaks && i < VERDICT_MAX_BREAKS; i++) {
+        json_open_object(json, NULL);
+        json_string(json, "kind", v->broken[i].kind);
+        json_uint(json, "link", v->broken[i].link);
+        json_double(json, "back_s", v->broken[i].back_s);
+        json_close_object(json);
+    }
+    json_close_array(json);
+}
+
 static void put_points(const struct verdict_points *p, struct json *json)
 {
     if (p->frame == NULL) return;
@@ -79,6 +92,7 @@ void verdict_put(const struct verdict *v, struct json *json)
         if (f->wrong_lines[i][0] != '\0') json_string(json, NULL, f->wrong_lines[i]);
     json_close_array(json);
     json_string(json, "exit", f->exit);
+    put_breaks(v, json);
     put_points(&v->points, json);
     put_checks(v, json);
     json_uint(json, "findings", verdict_count(v, VERDICT_FOUND));

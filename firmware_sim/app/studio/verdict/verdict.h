@@ -44,6 +44,14 @@ struct verdict_points {
     const char *frame;      /* in which they were compared; NULL: they were not */
 };
 
+/* A connection that a fault ended, or did not let begin. */
+struct verdict_break {
+    const char *kind;
+    uint32_t link;
+    double back_s; /* from the fault's end until the client was back; NaN: it was not */
+};
+enum { VERDICT_MAX_BREAKS = 64 };
+
 struct verdict_figures {
     double wall_s, connected_s, back_mean_s, back_max_s; /* NaN: none */
     uint64_t sessions, breaks, injected, heard_bytes, refused, refused_by_state, left_out, lost_pulses;
@@ -56,6 +64,7 @@ struct verdict {
     struct verdict_result check[VERDICT_N_CHECKS];
     struct verdict_points points;
     struct verdict_figures figures;
+    struct verdict_break broken[VERDICT_MAX_BREAKS]; /* the first figures.breaks of them */
 };
 
 struct verdict_options {

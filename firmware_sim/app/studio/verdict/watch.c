@@ -25,17 +25,23 @@ static void add_break(struct watch *w, const struct watch_break *broken)
     w->broken[w->n_broken++] = *broken;
 }
 
+/* A client is back on the link of that number. */
+static void come_back(struct watch *w, uint32_t number)
+{
+    const int64_t now_ns = clock_now_ns();
+    for (size_t i = 0; i < w->n_broken; i++)
+        if (w->broken[i].link == number && w->broken[i].back_ns == 0) w->broken[i].back_ns = now_ns;
+}
+
 static void begin_session(struct watch *w, uint32_t session, int64_t t_ns)
 {
     const uint32_t number = link_of(session);
     struct watch_link *link = &w->link[number - 1];
-    const int64_t now_ns = clock_now_ns();
     link->open++;
     link->acted = 0;
-    for (size_t i = 0; i < w->n_broken; i++)
-        if (w->broken[i].link == number && w->broken[i].back_ns == 0) w->broken[i].back_ns = now_ns;
+    if ((w->must_ask >> (number - 1) & 1) == 0) come_back(w, number);
     if (number != w->chosen) return;
-    if (w->first_open_ns == 0) w->first_open_ns = now_ns;
+    if (w->first_open_ns == 0) w->first_open_ns = clock_now_ns();
     if (!grow(&w->span, &w->room_span, w->n_span + 1, sizeof *w->span)) {
         w->is_short = 1;
         return;
@@ -85,6 +91,7 @@ static void on_heard(void *ctx, uint32_t session, const void *bytes, size_t len)
     if (link_of(session) > w->n_links) return;
     pthread_mutex_lock(&w->lock);
     w->heard_bytes += len;
+    if (w->link[link_of(session) - 1].open != 0) come_back(w, link_of(session));
     keep_printable(w->last, sizeof w->last, bytes, len);
     pthread_mutex_unlock(&w->lock);
 }

@@ -45,8 +45,9 @@ struct watch {
     pthread_mutex_t lock;
     struct links_observer observer;
     uint32_t n_links, chosen; /* chosen: the client's, from 1 */
-    int is_over;              /* what follows is the end of the run, and no client's doing */
-    int is_short;             /* memory was */
+    uint32_t must_ask; /* bit per link: who has come back there gets nothing before a request, and is back with it */
+    int is_over;       /* what follows is the end of the run, and no client's doing */
+    int is_short;      /* memory was */
     struct watch_link link[CONFIG_MAX_LINKS];
     struct watch_break *broken;
     struct watch_span *span; /* of the chosen link */
