@@ -96,7 +96,10 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
     if (what == PROTOCOL_PULSES_UNSENT) counts->unsent_pulses += n;
-    s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
+    if (what != PROTOCOL_INPUT_LOST && what != PROTOCOL_WRONG) return;
+    s->commands.wrong++;
+    const struct links_observer *observer = s->pump->links->observer;
+    if (observer != NULL) observer->refused(observer->ctx, s->id, NULL, NULL);
 }
 
 static void host_hang_up(void *ctx)
