@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults of a link: acts at frames, clients that are turned away, and USB enumerations that go wrong.
  *
- * Connections are counted from 1 on the link, those that are turned away too. On a USB link, each time that a host gets
- * the device is a connection. */
+ * Connections are counted from 1 on the link, those that are turned away too, but not those that come while the head has
+ * no power: nobody is there to count them. On a USB link, each time that a host gets the device is a connection. */
 #include <stdio.h>
 #include <string.h>
 
@@ -184,6 +184,7 @@ static int connect_next(struct faulty_link *f, int session)
 int faulty_turns_away(struct faulty_link *f, int session)
 {
     if (f->spec.board == NULL || (f->can & LINK_FAULT_BIT(LINK_FAULT_REFUSE)) == 0) return 0;
+    if (f->spec.is_off(f->spec.owner)) return 0;
     if (connect_next(f, session)) return 1;
     return clock_now_ns() < f->refuse_until_ns && f->inner->fault(f->link, LINK_FAULT_REFUSE, session, 0, 0.0) == SH_OK;
 }
@@ -193,5 +194,5 @@ void faulty_plugged(struct faulty_link *f)
     if (f->spec.board == NULL) return;
     f->inner->fault(f->link, LINK_FAULT_SLOW_ENUMERATION, 0, 0, 0.0);
     f->inner->fault(f->link, LINK_FAULT_DESCRIPTOR_LENGTH, 0, 0, 0.0);
-    connect_next(f, -1);
+    if (!f->spec.is_off(f->spec.owner)) connect_next(f, -1);
 }
