@@ -35,6 +35,7 @@ struct link_spec {
     int usual_port;     /* udp: 1: another source_port will do where this one can't be had; a notice says so */
     int ttl;            /* udp: of the packets; 0: 1 to a multicast group, else the system's */
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
+    int baud;           /* pty: of the head's UART; clients with another rate get, and send, other bytes. 0: any rate */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
