@@ -73,8 +73,9 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     link->datagrams = soak->datagrams[i];
     link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
                        : link->datagrams == NULL  ? why_not(place, &soak->cfg->link[i])
-                       : begins_anew(soak) ? "its packets restart with power or plug, or miss, so they can not be compared"
-                                           : NULL;
+                       : begins_anew(soak)
+                           ? "its packets restart with power, plug or cable, so they can not be compared"
+                           : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
     link->fact = soak_ledger_open();
