@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/link/pty_line.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -37,7 +36,6 @@ ssize_t pty_line_write(struct pty_line *line, int master, const void *buf, size_
         return write(master, buf, len);
     if (line->out_room < len * UART_MOST_PER_BYTE) {
         uint8_t *out = realloc(line->out, len * UART_MOST_PER_BYTE);
-        errno = ENOMEM;
         if (out == NULL) return 0; /* the reader loses frames, which is counted */
         line->out = out;
         line->out_room = len * UART_MOST_PER_BYTE;
