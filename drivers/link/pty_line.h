@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The serial line of a pty link: bytes to and from a client whose rate may differ from the head's. Private to the link.
+/* Carries the bytes of a pty link to and from a client whose bit rate may differ from the head's. Private to the link.
  *
  * Where both rates are the same, or the head has none, bytes only pass through. Else they are what a UART reads of them
  * (uart.h): each write, and all bytes that are read together, are sent one after the other, and the line rests before

@@ -21,7 +21,7 @@ int pty_rate_from_client(int master, uint32_t baud, struct uart *uart)
     return SH_OK;
 }
 
-/* As Linux's drivers do: without INPCK no byte is looked at for errors. PARMRK's marks can't be made on a
+/* Without INPCK Linux's drivers pass on a byte with a wrong stop bit as it was sampled. PARMRK's marks can't be made on a
  * pseudo terminal, whose line discipline would mark them again, so its client gets 0. */
 int pty_rate_to_client(int master, uint32_t baud, struct uart *uart)
 {

@@ -267,7 +267,7 @@ static int tcp_cut(struct tcp_link *tcp, int session)
     return SH_OK;
 }
 
-/* The sockets of the link: its listener, and its sessions' from 1 on. */
+/* Collects the sockets of the link: its listener's, and its sessions' from 1 on. */
 static void tcp_sockets(const struct tcp_link *tcp, int fds[1 + LINK_MAX_SESSIONS])
 {
     fds[0] = tcp->listener;

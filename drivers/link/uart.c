@@ -3,8 +3,8 @@
 
 enum { START = 0, STOP = 9, BITS = 10 };
 
-/* The bit of the sender that the receiver's sample number k lies in, counted from the falling edge: (k + 1/2) times the
- * ratio of the rates, without rounding. */
+/* Returns the bit of the sender that the receiver's sample number k lies in, counted from the falling edge: (k + 1/2)
+ * times the ratio of the rates, without rounding. */
 static uint64_t bit_at(const struct uart *uart, unsigned k)
 {
     return (2 * k + UINT64_C(1)) * uart->sender_baud / (2 * (uint64_t)uart->receiver_baud);
@@ -18,7 +18,7 @@ int uart_reads_right(const struct uart *uart)
     return k == BITS;
 }
 
-/* The level of the line at a bit of the sender. */
+/* Returns the level of the line at a bit of the sender. */
 static unsigned level_at(const uint8_t *sent, size_t n, uint64_t bit)
 {
     const uint64_t byte = bit / BITS;

@@ -34,7 +34,7 @@ static void web_break_all(struct web_link *web)
         if (web->conn[i].wsi != NULL) web_break(web->conn[i].wsi);
 }
 
-/* The sockets of all its clients. */
+/* Collects the sockets of all its clients. */
 static void web_sockets(const struct web_link *web, int fds[WEB_PLACES])
 {
     for (int i = 0; i < WEB_PLACES; i++)

@@ -131,7 +131,7 @@ static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 void web_refused(struct web_link *web, const char *peer);
 /* Forgets a connection whose wsi has ended or belongs to nobody any more. Twice does no harm. */
 void web_conn_end(struct web_conn *conn);
-/* The session, if its owner may use it; else NULL. */
+/* Returns the session, if its owner may use it; else NULL. */
 struct web_session *web_session(struct web_link *web, int session);
 /* The connection's session is over; LINK_CLOSED is to be reported. */
 void web_session_gone(struct web_conn *conn);

@@ -25,7 +25,7 @@ static struct tcp_info info_of(int fd)
     return info;
 }
 
-/* A connection that is begun and not waited for. */
+/* Begins a connection, and does not wait for it. */
 static int begin_dial(const struct bench *bench, int family)
 {
     struct sockaddr_in v4 = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
