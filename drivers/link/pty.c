@@ -56,33 +56,6 @@ static int pty_watch(struct pty_link *pty)
     return pty->watch < 0 ? SH_EIO : SH_OK;
 }
 
-static int pty_open(const struct link_spec *spec, void **link, struct sh_err *err)
-{
-    struct pty_link *pty = calloc(1, sizeof *pty);
-    if (pty == NULL) return sh_fail(err, SH_ENOMEM, "link pty:%s: no memory", spec->path);
-    pty->inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
-    if (pty->inotify < 0) {
-        int error = errno;
-        free(pty);
-        return sh_fail(err, SH_EIO, "link pty:%s: inotify: %s%s", spec->path, strerror(error),
-                       error == EMFILE ? "; see /proc/sys/fs/inotify/max_user_instances" : "");
-    }
-    int rc = pty_device_open(&pty->device, spec->path, err);
-    if (rc == SH_OK && pty_watch(pty) != SH_OK) {
-        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave, strerror(errno));
-        pty_device_close(&pty->device);
-    }
-    if (rc != SH_OK) {
-        close(pty->inotify);
-        free(pty);
-        return rc;
-    }
-    pthread_mutex_init(&pty->naming, NULL);
-    pty->line.baud = (uint32_t)spec->baud;
-    *link = pty;
-    return SH_OK;
-}
-
 static void pty_endpoint(const void *link, char *buf, size_t len)
 {
     const struct pty_link *pty = link;
@@ -158,6 +131,33 @@ static int pty_wait_for_client(struct pty_link *pty)
     } else if ((now & POLLIN) != 0) {
         pty_begin(pty, 0); /* it has written and left: the next open event is another client's */
     }
+    return SH_OK;
+}
+
+static int pty_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    struct pty_link *pty = calloc(1, sizeof *pty);
+    if (pty == NULL) return sh_fail(err, SH_ENOMEM, "link pty:%s: no memory", spec->path);
+    pty->inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (pty->inotify < 0) {
+        int error = errno;
+        free(pty);
+        return sh_fail(err, SH_EIO, "link pty:%s: inotify: %s%s", spec->path, strerror(error),
+                       error == EMFILE ? "; see /proc/sys/fs/inotify/max_user_instances" : "");
+    }
+    int rc = pty_device_open(&pty->device, spec->path, err);
+    if (rc == SH_OK && pty_wait_for_client(pty) != SH_OK) { /* one may be there as soon as the symlink is */
+        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave, strerror(errno));
+        pty_device_close(&pty->device);
+    }
+    if (rc != SH_OK) {
+        close(pty->inotify);
+        free(pty);
+        return rc;
+    }
+    pthread_mutex_init(&pty->naming, NULL);
+    pty->line.baud = (uint32_t)spec->baud;
+    *link = pty;
     return SH_OK;
 }
 
