@@ -165,6 +165,9 @@ static const struct cfg_key config_keys[] = {
      .of = CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_USB), .of_backend = CFG_KIND(USB_BACKEND_USBREDIR),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
+    {LINK(baud), CFG_COUNT, NULL, "0", 0, 4000000, .example = "115200", .of = CFG_KIND(LINK_PTY),
+     .help = "pty: bit rate of the head's serial port. A client that has set another one gets, and sends, the bytes that "
+             "a UART reads at that rate. 0: any rate will do."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
      .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 "

@@ -27,6 +27,13 @@ static int64_t device_time_ns(void *owner)
     return (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
 }
 
+/* In the pace step links are there while power is not. */
+static int has_no_power(void *owner)
+{
+    const struct pump *pump = owner;
+    return pump->power_seen % 2 != 0;
+}
+
 static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t index, struct sh_err *err)
 {
     const struct loop_source *source = pump->links->source;
@@ -38,6 +45,7 @@ static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t i
         .room = pump->out_cap,
         .owner = pump,
         .time_ns = device_time_ns,
+        .is_off = has_no_power,
         .say = pump_say,
         .source = source->self,
         .report = source->ops->report,
