@@ -117,6 +117,9 @@ struct protocol_spec {
     int port;
 };
 
+struct native_descriptor;
+struct native_emitter;
+
 struct protocol_ops {
     const char *name;  /* of links[].protocol */
     uint32_t needs;    /* enum protocol_needs */
@@ -131,6 +134,11 @@ struct protocol_ops {
      * reseal: makes the checksums right. NULL: units have none. */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
+    /* Whether the device can be a head: SH_OK, or SH_EINPUT with what it can't have, and what it can. The emitter is of
+     * a kind and a number of beams that are allowed above; beams are those of its payload. NULL: it can be any such head.
+     * Pure. */
+    int (*check_head)(const struct native_descriptor *descriptor, const struct native_emitter *emitter,
+                      const uint8_t *beams, struct sh_err *err);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
 
     /* When it fails, nothing of it stays. */

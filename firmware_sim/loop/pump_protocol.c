@@ -93,6 +93,14 @@ static void host_hang_up(void *ctx)
 
 /* ---- the session */
 
+/* Gives the frames of a recording the device time of the run, which their protocol has from its clock. Their checksums
+ * are not looked at any more. */
+static void shift_times(uint8_t *frames, size_t len, int64_t shift_ns)
+{
+    for (size_t at = 0; at < len; at += native_frame_len(frames + at))
+        native_shift_time(frames + at, shift_ns);
+}
+
 static void give_frames(const struct protocol_ops *ops, struct session *s, const uint8_t *frames, size_t len)
 {
     for (size_t at = 0, n; ops->frame != NULL && at < len; at += n) {
@@ -187,6 +195,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (got == RING_READ) {
         uint32_t lost = session_check_lost(pump, s, &tick, released);
         if (lost != 0 && ops->gap != NULL) ops->gap(s->protocol, lost);
+        if (tick.shift_ns != 0) shift_times(tick.buf, tick.len, tick.shift_ns);
         give_frames(ops, s, tick.buf, tick.len);
     }
     s->cursor++;

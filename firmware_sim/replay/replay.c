@@ -99,6 +99,13 @@ static void rebase(struct replay *r, uint64_t tick)
     r->base = r->last = tick_of(r, r->frame.t_ns);
 }
 
+/* The first time that it is played, the time of day becomes the recorded one. */
+static void set_clock(struct replay *r)
+{
+    r->shift_ns = ((int64_t)r->start_tick - r->base) * r->tick_ns;
+    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns -= r->shift_ns;
+}
+
 /* The tick with which the next frame goes out. */
 static uint64_t due_tick(struct replay *r, uint64_t tick)
 {
@@ -146,6 +153,7 @@ static void replay_begin(struct replay *r, uint64_t tick)
     pthread_mutex_lock(&r->lock);
     r->playing = 1;
     r->times++;
+    set_clock(r);
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
     if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
@@ -161,6 +169,7 @@ static void replay_fill(struct replay *r, uint64_t tick, int may_skip)
         if (due > tick) r->start_tick -= due - tick;    /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
         replay_add(r, r->frame.bytes, r->frame.len, tick);
+        r->shift_ns = ((int64_t)r->start_tick - r->base) * r->tick_ns;
         r->has_frame = 0;
     }
     stop(r, tick, found == 0 && r->options.loop);
@@ -213,7 +222,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     if (r->playing) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
-        replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX); /* --duration counts such time */
+        /* --duration counts such time, and protocols measure it */
+        replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX && !r->is_device);
         replay_count(r);
         r->tick.n_cast += before.n_cast;
         r->tick.n_fired += before.n_fired;
@@ -223,6 +233,7 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     *out = r->tick;
     out->bytes = r->bytes;
     out->len = r->len;
+    out->shift_ns = r->shift_ns;
     return LOOP_SOURCE_TICK;
 }
 
@@ -333,6 +344,11 @@ static void replay_end(void *self)
 const struct loop_source_ops replay_source = {
     .command = replay_command,
     .overlong = replay_overlong,
+    .command_once = replay_command_once,
+    .utc_ns = replay_utc_ns,
+    .next_fix_ns = replay_next_fix_ns,
+    .fix = replay_fix,
+    .pps = replay_pps,
     .session_opened = replay_session_opened,
     .session_closed = replay_session_closed,
     .report = replay_report,
@@ -369,7 +385,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->end_tick = options->duration_s > 0.0 && !options->start ? r->n_ticks : UINT64_MAX;
     r->wants_start = options->start;
     for (uint32_t i = 0; i < cfg->n_links; i++) /* such a link opens a session for itself */
-        r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;
+        r->n_clients -=
+            cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL || cfg->link[i].type == LINK_UDP;
     r->ends_then = options->start && !options->loop;
     r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");

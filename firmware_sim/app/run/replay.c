@@ -104,7 +104,7 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     const struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
     int rc = o->view ? run_add_view(cfg, err) : SH_OK;
     if (rc == SH_OK && cfg->n_links == 0)
-        rc = sh_fail(err, SH_EINPUT, "%s: links: none; a replay needs at least one of pty, tcp, usb, web, file, null",
+        rc = sh_fail(err, SH_EINPUT, "%s: links: none; a replay needs at least one of pty, tcp, udp, usb, web, file, null",
                      cfg->file);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
         rc = sh_fail(err, SH_EINPUT, "--speed: allowed only with the pace realtime");
