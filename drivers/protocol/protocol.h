@@ -26,6 +26,7 @@ enum protocol_id {
     PROTOCOL_VELODYNE,          /* data packets */
     PROTOCOL_VELODYNE_POSITION, /* position packets */
     PROTOCOL_VELODYNE_HTTP,     /* settings */
+    PROTOCOL_CAPTURE,           /* what a device said in a capture (talk.h) */
     PROTOCOL_N
 };
 
@@ -84,6 +85,8 @@ struct protocol_host {
     /* State of the pulses per second at a device time. *set: by then the time of day was set; else the head counts from
      * power-up. May be NULL: locked where UTC is known. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int *set);
+    /* Tells the user a line about this link; the same one only once. May be NULL. */
+    void (*tell_once)(void *ctx, const char *text);
 };
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
@@ -103,6 +106,9 @@ struct protocol_identity {
     uint32_t n_geometries;
 };
 
+struct talk;
+struct talk_options;
+
 struct protocol_spec {
     const struct protocol_identity *identity;
     struct protocol_host host;
@@ -115,6 +121,9 @@ struct protocol_spec {
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];
     int port;
+    /* capture: what to say; outlive the instance. NULL for all others */
+    const struct talk *talk;
+    const struct talk_options *talk_options;
 };
 
 struct native_descriptor;

@@ -6,7 +6,9 @@
  * Answers are lost only where they have no room. In the paces that wait for readers nothing is lost: the
  * session takes no further tick until there is room. */
 #include <stdio.h>
+#include <string.h>
 
+#include "drivers/protocol/crc32c.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -72,6 +74,17 @@ static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int *set)
     return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, set);
 }
 
+static void host_tell_once(void *ctx, const char *text)
+{
+    struct pump *pump = ((struct session *)ctx)->pump;
+    const uint32_t mark = crc32c(0, text, strlen(text));
+    for (uint32_t i = 0; i < pump->n_told; i++)
+        if (pump->told[i] == mark) return;
+    if (pump->n_told == MAX_TOLD) return;
+    pump->told[pump->n_told++] = mark;
+    pump_say(pump, pump->n_told < MAX_TOLD ? text : "more is not told here; the statistics count it");
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -128,7 +141,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
-                 host_pps},
+                 host_pps, host_tell_once},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),
@@ -139,6 +152,8 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     };
     struct sh_err err;
     snprintf(spec.address, sizeof spec.address, "%s", pump->links->data_address);
+    const struct loop_source *source = pump->links->source;
+    if (source->ops->talk != NULL) spec.talk = source->ops->talk(source->self, pump->index, &spec.talk_options);
     s->pump = pump;
     s->hang_up = 0;
     if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;

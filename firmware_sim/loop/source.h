@@ -32,6 +32,8 @@ struct loop_source_ops {
     uint32_t (*power_ons)(void *self);
     enum protocol_pps (*pps)(void *self, int64_t t_ns, int *set);
     uint32_t (*near_wrap)(void *self);
+    /* What a link of the protocol `capture`, counted from 0, has to say; NULL: the source has none. */
+    const struct talk *(*talk)(const void *self, uint32_t link, const struct talk_options **options);
 
     /* ---- the run */
     int64_t (*tick_ns)(const void *self);

@@ -324,6 +324,13 @@ static uint64_t scans(void *self)
     return n;
 }
 
+static const struct talk *talk(const void *self, uint32_t link, const struct talk_options **options)
+{
+    const struct replay *r = self;
+    *options = &r->options.talk_options;
+    return r->options.talk != NULL && link < r->cfg->n_links ? r->options.talk[link] : NULL;
+}
+
 static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)
 {
     (void)self;
@@ -357,6 +364,7 @@ const struct loop_source_ops replay_source = {
     .power_ns = power_ns,
     .power_ons = power_ons,
     .near_wrap = near_wrap,
+    .talk = talk,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,

@@ -53,6 +53,11 @@ int replay_check_links(struct replay *r, const struct native_descriptor *d, cons
         const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)cfg->link[i].protocol);
         struct sh_err why;
         if (ops == NULL || ops->passes_native) continue;
+        if (cfg->link[i].protocol == PROTOCOL_CAPTURE)
+            return sh_fail(err, SH_EINPUT,
+                           "%s: links[%u].protocol capture: %s is a recording, no capture; allowed are "
+                           "the other protocols",
+                           cfg->file, i, r->options.path);
         const char *lack = lacks(r, ops, d, e);
         if (lack != NULL)
             return sh_fail(err, SH_EINPUT, "%s: links[%u].protocol %s: %s %s", cfg->file, i, ops->name, r->options.path,

@@ -135,6 +135,11 @@ int replay_open_recording(struct replay *r, struct sh_err *err)
     int rc = check_faults(r->cfg, err);
     r->is_device = is_device(r->cfg);
     r->utc0_ns = INT64_MIN;
+    if (r->options.talk != NULL) {
+        replay_open_commands(r);
+        r->cmd.idn = r->idn;
+        return rc;
+    }
     if (rc == SH_OK) rc = recording_open(&r->recording, r->options.path, err);
     if (rc == SH_OK) rc = read_front(r, err);
     if (rc != SH_OK) return rc;
