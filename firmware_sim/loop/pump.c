@@ -246,7 +246,7 @@ static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
     uint32_t want_write = 0;
-    int at_once = 0; /* there is something to do without waiting for events */
+    int at_once = 1; /* there is something to do without waiting for events: sessions may be open from the start */
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
