@@ -42,7 +42,9 @@ static int replay_look(struct replay *r)
         if (got < 0) return replay_fail(r, &err), -1;
         if (got == 0) return 0;
         const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
-        if (!r->in_range && since_ns < r->options.from_s * 1e9) {
+        /* A device that is asked for scans has booted, so that part of a recording is left out. */
+        const int is_early = since_ns < r->options.from_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
+        if (!r->in_range && is_early) {
             replay_keep_front(&r->front, r->frame.bytes);
             r->has_skipped = 1;
             continue;
