@@ -18,8 +18,8 @@ struct capture_segment {
 struct capture_flow {
     int is_tcp;
     struct ethernet_end end[2]; /* 0: who sent the first packet */
-    int device;                 /* side of the device */
-    uint64_t n_sent[2];
+    int device, has_begin;      /* side of the device, which a SYN says */
+    uint64_t n_sent[2], bytes_sent[2];
     struct capture_segment *segment; /* in the order of the file */
     size_t n, room;
     int is_closed; /* TCP: a new SYN begins another connection */

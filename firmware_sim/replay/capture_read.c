@@ -10,6 +10,7 @@
 
 enum { FRONT_BYTES = 4096, MAX_FLOWS = 1000 };
 static const size_t MAX_FILE = (size_t)2 << 30;
+static const int64_t MAX_SPAN_NS = INT64_C(10000000000000000); /* sums of times then fit */
 
 int capture_is(const char *path)
 {
@@ -77,8 +78,6 @@ static struct capture_flow *add_flow(struct replay_capture *c, const struct ip_p
     if (c->n_flows == MAX_FLOWS || !grow(&c->flow, &c->flow_room, c->n_flows + 1, sizeof *c->flow)) return NULL;
     struct capture_flow *f = &c->flow[c->n_flows++];
     *f = (struct capture_flow){.is_tcp = p->is_tcp, .end = {p->from, p->to}, .t0_ns = t_ns};
-    /* Without its beginning, the device of a connection is the end with the lower port. */
-    f->device = p->to.port <= p->from.port;
     return f;
 }
 
@@ -90,11 +89,15 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
     if (f == NULL)
         return sh_fail(err, SH_EINPUT, "more than %d connections, which are allowed, or no memory for them",
                        (int)MAX_FLOWS);
-    if (p->is_tcp && (p->flags & TCP_SYN) != 0) f->device = (p->flags & TCP_ACK) != 0 ? side : !side;
+    if (p->is_tcp && (p->flags & TCP_SYN) != 0) {
+        f->device = (p->flags & TCP_ACK) != 0 ? side : !side;
+        f->has_begin = 1;
+    }
     if (p->is_tcp && (p->flags & (TCP_FIN | TCP_RST)) != 0) f->is_closed = 1;
     c->counts.missing_bytes += p->missing;
     if (p->len == 0 && (p->flags & TCP_SYN) == 0) return SH_OK;
     f->n_sent[side] += p->len != 0;
+    f->bytes_sent[side] += p->len;
     if (!grow(&f->segment, &f->room, f->n + 1, sizeof *f->segment)) return sh_fail(err, SH_ENOMEM, "no memory");
     f->segment[f->n++] = (struct capture_segment){t_ns, p->data, p->len, p->seq, (uint8_t)p->flags, side};
     return SH_OK;
@@ -105,6 +108,10 @@ static int take_packet(struct replay_capture *c, const struct pcapng_packet *pac
     struct ip_packet p;
     const int64_t t_ns = packet->has_time && packet->t_ns > c->last_ns ? packet->t_ns : c->last_ns;
     if (c->counts.packets++ == 0) c->first_ns = t_ns;
+    if (t_ns - c->first_ns > MAX_SPAN_NS)
+        return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",
+                       (unsigned long long)c->counts.packets, 1e-9 * (double)(t_ns - c->first_ns),
+                       1e-9 * (double)MAX_SPAN_NS);
     c->last_ns = t_ns; /* the order of the file goes before its times */
     switch (ip_packet_read(packet->link, packet->data, packet->len, &p)) {
     case IP_PACKET_FOUND:

@@ -48,7 +48,7 @@ static int collect(const struct capture_flow *f, uint32_t side, struct parts *pa
         parts->part[parts->n] = (struct part){s->data, s->len, from, s->t_ns, parts->n};
         parts->n++;
     }
-    qsort(parts->part, parts->n, sizeof *parts->part, by_place);
+    if (parts->n != 0) qsort(parts->part, parts->n, sizeof *parts->part, by_place);
     return SH_OK;
 }
 
