@@ -14,9 +14,10 @@ int capture_load(const char *path, struct replay_capture **out, struct sh_err *e
     int rc = capture_read_flows(c, path, err);
     if (rc == SH_OK && (rc = capture_build(c, &why)) != SH_OK) sh_fail(err, rc, "%s: %s", path, why.text);
     if (rc == SH_OK && c->n_places == 0)
-        rc = sh_fail(err, SH_EFORMAT,
-                     "%s: no device sends anything in its %llu packets; required is TCP or UDP with data", path,
-                     (unsigned long long)c->counts.packets);
+        rc = sh_fail(
+            err, SH_EFORMAT,
+            "%s: no device sends anything in its %llu packets; required is TCP or UDP with data, or a recording of a head",
+            path, (unsigned long long)c->counts.packets);
     for (size_t i = 0; i < c->n_flows; i++)
         free(c->flow[i].segment);
     free(c->flow);
