@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "core/bytes.h"
+#include "tests/wire/grabber.h"
 #include "tests/wire/replay_rig.h"
 
 enum { MOST = 1 << 14, MM = 1000, VLP_PACKET = 1206 };
@@ -143,6 +144,36 @@ static void test_scip(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* Debian's rawlog-grabber reads the recording as it reads a UST-10LX. */
+static void test_grabber(void **state)
+{
+    struct wire *wire = *state;
+    enum { SCANS = 12 };
+    static double range_m[MOST];
+    static struct grabber grabber;
+    struct rawlog log;
+    char sensor[120];
+    grabber_or_skip();
+    record(wire, "hokuyo-ust-10lx", "0.6", "");
+    const uint32_t n = read_ranges(wire, 2, range_m);
+    struct head head = serve(wire, "type: tcp, protocol: scip");
+    grabber_hurry(head.pid);
+    snprintf(sensor, sizeof sensor, "driver = CHokuyoURG\nIP_DIR = 127.0.0.1\nPORT_DIR = %d\n",
+             endpoint_port(head_endpoint(&head, "tcp")));
+    grabber_start_and_wait(wire, "REC", sensor, SCANS, &grabber);
+    grabber_end(&grabber);
+    head_end(&head, SIGTERM);
+    rawlog_read(&grabber, &log);
+    assert_true(log.n_items >= SCANS && log.item[0].kind == RAWLOG_SCAN && log.item[0].n == n);
+    uint32_t n_valid = 0;
+    for (uint32_t i = 0; i < n; i++)
+        n_valid += log.item[0].valid[i] != 0;
+    assert_true(n_valid > n / 2);
+    for (uint32_t i = 0; i < n; i++) /* and floats, which are better than 1e-6 m here */
+        if (log.item[0].valid[i]) check_range(i, rawlog_range_m(&log.item[0], i), range_m[i], 1.0 / MM + 2e-6);
+    rawlog_free(&log);
+}
+
 /* VELODYNE.md: 12 blocks of 32 ranges of 2 mm. The recorded head had sent the same packets. */
 static void test_velodyne(void **state)
 {
@@ -191,6 +222,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_cola, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_scip, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_grabber, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_velodyne, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
     };
