@@ -10,7 +10,7 @@
 #include "drivers/protocol/protocol.h"
 #include "drivers/protocol/talk.h"
 
-enum { MAX_PLAYED = 64, NO_REQUEST = -1 };
+enum { MAX_PLAYED = 64, NO_REQUEST = -1, LEAST_SPAN_NS = 1000000 };
 
 /* A run that is being sent. */
 struct played {
@@ -71,20 +71,22 @@ static void talk_begin(struct capture_session *s, int run, int request)
     s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, r->n);
 }
 
-/* A stream that begins again goes on as evenly as it was: after its last message, its mean period passes. */
+/* A stream that begins again goes on as evenly as it was: after its last message, its mean period passes. Messages that
+ * came all at once have no period, and are not repeated. */
 static void talk_advance(const struct capture_session *s, struct played *p)
 {
     const struct talk_run *run = p->run;
     if (++p->next < run->n) return;
     const uint32_t from = run->loop_from;
-    if (!s->options.loop || from >= run->n - 1) {
+    const struct talk_message *m = &s->talk->message[run->first];
+    const int repeats = s->options.loop && from < run->n - 1;
+    const int64_t span_ns = repeats ? m[run->n - 1].after_ns - m[from].after_ns : 0;
+    if (span_ns < LEAST_SPAN_NS) {
         p->run = NULL;
         return;
     }
-    const struct talk_message *m = &s->talk->message[run->first];
-    const int64_t span_ns = m[run->n - 1].after_ns - m[from].after_ns, n = run->n - 1 - from;
     p->next = from;
-    p->t0_ns += span_ns + (span_ns / n > 0 ? span_ns / n : 1);
+    p->t0_ns += span_ns + span_ns / (run->n - 1 - from);
 }
 
 static void talk_send(const struct capture_session *s, const struct talk_message *m)
@@ -95,7 +97,7 @@ static void talk_send(const struct capture_session *s, const struct talk_message
     }
 }
 
-/* Sends what is due, in the order of time. At most as many messages as the capture has go out at once. */
+/* Sends what is due, in the order of time. The rest goes out with the next tick where it is very much. */
 static void send_due(struct capture_session *s)
 {
     enum { MOST_AT_ONCE = 10000 };

@@ -101,11 +101,17 @@ static void rebase(struct replay *r, uint64_t tick)
     r->base = r->last = tick_of(r, r->frame.t_ns);
 }
 
+/* A recording may have any times: this wraps instead of overflowing. */
+static void set_shift(struct replay *r)
+{
+    r->shift_ns = (int64_t)((r->start_tick - (uint64_t)r->base) * (uint64_t)r->tick_ns);
+}
+
 /* The first time that it is played, the time of day becomes the recorded one. */
 static void set_clock(struct replay *r)
 {
-    r->shift_ns = ((int64_t)r->start_tick - r->base) * r->tick_ns;
-    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns -= r->shift_ns;
+    set_shift(r);
+    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = (int64_t)((uint64_t)r->utc0_ns - (uint64_t)r->shift_ns);
 }
 
 /* The tick with which the next frame goes out. */
@@ -171,7 +177,7 @@ static void replay_fill(struct replay *r, uint64_t tick, int may_skip)
         if (due > tick) r->start_tick -= due - tick;    /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
         replay_add(r, r->frame.bytes, r->frame.len, tick);
-        r->shift_ns = ((int64_t)r->start_tick - r->base) * r->tick_ns;
+        set_shift(r);
         r->has_frame = 0;
     }
     stop(r, tick, found == 0 && r->options.loop);

@@ -76,13 +76,16 @@ int replay_check_links(struct replay *r, const struct native_descriptor *d, cons
 
 /* ---- time of day */
 
+/* A recording may have any number there; dates end in 2199 (core/utc.h). */
 int64_t replay_utc_ns(void *self, int64_t t_ns)
 {
+    static const int64_t LAST_NS = INT64_C(7258118400) * UTC_SECOND_NS;
     struct replay *r = self;
     pthread_mutex_lock(&r->lock);
-    const int64_t utc_ns = r->utc0_ns == INT64_MIN ? INT64_MIN : r->utc0_ns + t_ns;
+    const int is_known = r->utc0_ns != INT64_MIN;
+    const int64_t utc_ns = (int64_t)((uint64_t)r->utc0_ns + (uint64_t)t_ns);
     pthread_mutex_unlock(&r->lock);
-    return utc_ns;
+    return is_known && utc_ns > 0 && utc_ns < LAST_NS ? utc_ns : INT64_MIN;
 }
 
 enum protocol_pps replay_pps(void *self, int64_t t_ns, int *set)

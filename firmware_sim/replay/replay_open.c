@@ -53,11 +53,12 @@ static int read_clock(struct replay *r, struct sh_err *err)
     struct native_telemetry t;
     struct native_header header;
     int got;
-    while ((got = recording_next(&r->recording, &frame, err)) == 1 && frame.t_ns - r->first_ns <= LONG_ENOUGH_NS) {
+    while ((got = recording_next(&r->recording, &frame, err)) == 1 &&
+           (double)frame.t_ns - (double)r->first_ns <= LONG_ENOUGH_NS) {
         native_read_header(frame.bytes, &header);
         if (header.type != NATIVE_TELEMETRY) continue;
         if (native_decode_telemetry(frame.bytes + NATIVE_HEADER_LEN, header.length, &t) != SH_OK) continue;
-        if (t.utc_ns != 0) r->utc0_ns = t.utc_ns - header.t_ns;
+        if (t.utc_ns > 0) r->utc0_ns = (int64_t)((uint64_t)t.utc_ns - (uint64_t)header.t_ns);
         break;
     }
     return got < 0 ? got : recording_rewind(&r->recording, err);

@@ -13,6 +13,7 @@ struct capture_run {
     struct run_options *o;
     struct replay_capture *capture;
     const struct talk *talk[CONFIG_MAX_LINKS];
+    uint64_t taken; /* bit per place that a link serves */
 };
 
 /* ---- links */
@@ -61,14 +62,13 @@ static void name_places(const struct capture_run *run, char *text, size_t cap)
 }
 
 /* The place that a link serves: one with its port, else the first one that no link has. */
-static const struct capture_place *place_for(const struct capture_run *run, const struct link_spec *spec,
-                                             uint64_t taken)
+static const struct capture_place *place_for(const struct capture_run *run, const struct link_spec *spec)
 {
     const struct capture_place *found = NULL;
     for (uint32_t i = 0; i < capture_n(run->capture); i++) {
         const struct capture_place *place = capture_place(run->capture, i);
         const int fits = place->is_tcp == (spec->type != LINK_UDP) && is_wanted(run->o, place);
-        if (!fits || (taken & UINT64_C(1) << i) != 0) continue;
+        if (!fits || (run->taken & UINT64_C(1) << i) != 0) continue;
         if (place->port == spec->port) return place;
         if (found == NULL) found = place;
     }
@@ -78,10 +78,9 @@ static const struct capture_place *place_for(const struct capture_run *run, cons
 static int join_links(struct capture_run *run, struct config *cfg, struct sh_err *err)
 {
     char places[400];
-    uint64_t taken = 0;
     for (uint32_t i = 0; i < cfg->n_links; i++) {
         struct link_spec *spec = &cfg->link[i];
-        const struct capture_place *place = place_for(run, spec, taken);
+        const struct capture_place *place = place_for(run, spec);
         if (spec->protocol != PROTOCOL_CAPTURE)
             return sh_fail(err, SH_EINPUT, "%s: links[%u].protocol: %s is a capture; allowed is only capture",
                            cfg->file, i, run->o->in.operand[0]);
@@ -89,7 +88,7 @@ static int join_links(struct capture_run *run, struct config *cfg, struct sh_err
         if (place == NULL)
             return sh_fail(err, SH_EINPUT, "%s: links[%u]: no port of %s is left for it%s; it has %s", cfg->file, i,
                            run->o->in.operand[0], run->o->device_port != 0 ? " with --device-port" : "", places);
-        taken |= UINT64_C(1) << (place - capture_place(run->capture, 0));
+        run->taken |= UINT64_C(1) << (place - capture_place(run->capture, 0));
         run->talk[i] = &place->talk;
         if (spec->type != LINK_UDP || spec->source_port != 0) continue;
         spec->source_port = place->source_port;
@@ -116,6 +115,12 @@ static void warn_of_capture(const struct capture_run *run)
 {
     const char *file = run->o->in.operand[0];
     struct capture_counts c;
+    for (uint32_t i = 0; i < capture_n(run->capture); i++) {
+        const struct capture_place *p = capture_place(run->capture, i);
+        if (is_wanted(run->o, p) && (run->taken & UINT64_C(1) << i) == 0)
+            sh_warn(&app_report_stderr, "%s: %s port %d of %s is not served: no link is left for it", file,
+                    p->is_tcp ? "tcp" : "udp", p->port, p->device);
+    }
     capture_get_counts(run->capture, &c);
     if (c.missing_bytes != 0)
         sh_warn(&app_report_stderr, "%s: %llu bytes are missing in it; what follows them may be wrong", file,
