@@ -11,9 +11,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/bytes.h"
-#include "drivers/protocol/ip_packet.h"
-#include "drivers/protocol/pcap.h"
+#include "drivers/protocol/ethernet.h"
+#include "drivers/protocol/pcapng.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/replay/capture.h"
 
