@@ -343,6 +343,29 @@ static void test_datagrams(void **state)
     capture_free(capture);
 }
 
+/* A device that is asked in datagrams, and answers each. */
+static void test_asked_datagrams(void **state)
+{
+    (void)state;
+    static struct made m;
+    uint8_t frame[ETHERNET_MAX_FRAME];
+    const struct talk_options options = {0};
+    struct client c;
+    made_begin(&m);
+    made_add(&m, 10, frame, ethernet_put_udp(frame, &DRIVER, &DEVICE, "ask", 3));
+    made_add(&m, 14, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "one", 3));
+    made_add(&m, 20, frame, ethernet_put_udp(frame, &DRIVER, &DEVICE, "ask", 3));
+    made_add(&m, 21, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "two", 3));
+    struct replay_capture *capture = made_load(&m);
+    assert_int_equal(capture_n(capture), 1);
+    assert_int_equal(capture_place(capture, 0)->port, DRIVER.port);
+    client_open(&c, &capture_place(capture, 0)->talk, &options);
+    assert_string_equal(client_ask(&c, "ask", 6), "4:one|");
+    assert_string_equal(client_ask(&c, "ask", 6), "7:two|");
+    client_close(&c);
+    capture_free(capture);
+}
+
 /* Each beginning of a file, and files with a byte changed: they load, or are refused in one line. */
 static void test_hostile(void **state)
 {
@@ -377,6 +400,7 @@ int main(void)
         cmocka_unit_test(test_scip),
         cmocka_unit_test(test_turns),
         cmocka_unit_test(test_datagrams),
+        cmocka_unit_test(test_asked_datagrams),
         cmocka_unit_test(test_hostile),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
