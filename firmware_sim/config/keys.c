@@ -157,7 +157,7 @@ static const struct cfg_key config_keys[] = {
     {LINK(protocol), CFG_ENUM, .def = "native",
      WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", [PROTOCOL_SCIP] = "scip", [PROTOCOL_COLA] = "cola",
            [PROTOCOL_VELODYNE] = "velodyne", [PROTOCOL_VELODYNE_POSITION] = "velodyne-position",
-           [PROTOCOL_VELODYNE_HTTP] = "velodyne-http"),
+           [PROTOCOL_VELODYNE_HTTP] = "velodyne-http", [PROTOCOL_CAPTURE] = "capture"),
      .help = "native: the head's own stream and commands; nmea: the GNSS receiver, which sends NMEA 0183 and takes no "
              "commands; scip: as a Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, "
              "velodyne-position: position packets, velodyne-http: settings, as a VLP-16."},
