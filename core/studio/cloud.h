@@ -36,6 +36,7 @@ struct cloud {
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
     double count_m; /* what the file rounds coordinates to, on the ground: of LAS the scale, of a PLY as text the 1e-6
                          * m that our recorder writes, in single precision two units in the last place; 0: nothing */
+    int is_text;    /* 1: the file holds coordinates as decimal numbers */
     int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
     /* Where they were asked for and the file has them, else NULL: */
     double *time_s;        /* [n] PLY: since the scan's start; LAS: as the file counts it */
@@ -61,6 +62,10 @@ enum cloud_column {
  * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
+/* Positions alone, of software that is not ours: PLY and LAS as above; PCD (text, binary, compressed); and text, a line
+ * a point, with blanks, commas or semicolons between numbers. There a line of names that has x, y and z says where they
+ * stand; else they come first. Lines that are no points are left out, with a warning of more than one. */
+int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
 /* How cloud_compare maps a point to the scene. */

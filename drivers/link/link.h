@@ -35,6 +35,7 @@ struct link_spec {
     int usual_port;     /* udp: 1: another source_port will do where this one can't be had; a notice says so */
     int ttl;            /* udp: of the packets; 0: 1 to a multicast group, else the system's */
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
+    int baud;           /* pty: of the head's UART; clients with another rate get, and send, other bytes. 0: any rate */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
@@ -75,13 +76,14 @@ struct link_event {
 enum link_fault {
     LINK_FAULT_DISCONNECT,        /* ends the session at once; what was not taken by the other side is lost */
     LINK_FAULT_UNPLUG,            /* ends all sessions, and the endpoint is not there until LINK_FAULT_PLUG */
+    LINK_FAULT_CABLE,             /* nothing comes in or goes out until LINK_FAULT_PLUG; sessions stay */
     LINK_FAULT_BUS_RESET,         /* usb */
     LINK_FAULT_ENDPOINT_STALL,    /* usb: the session's endpoint to the host is halted until the host clears it */
     LINK_FAULT_SHORT_PACKETS,     /* usb: each of the session's next n transfers ends early, in a short packet */
     LINK_FAULT_REFUSE,            /* ends the session before a byte went out; to be called at LINK_OPENED */
     LINK_FAULT_SLOW_ENUMERATION,  /* usb: until changed, each control request takes for_ms; at LINK_PLUGGED */
     LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until changed, the configuration claims n bytes too many; at LINK_PLUGGED */
-    LINK_FAULT_PLUG,              /* ends LINK_FAULT_UNPLUG */
+    LINK_FAULT_PLUG,              /* ends LINK_FAULT_UNPLUG and LINK_FAULT_CABLE; n 1: resets what a cable left */
 };
 #define LINK_FAULT_BIT(fault) (UINT32_C(1) << (fault))
 
@@ -127,8 +129,9 @@ struct link_ops {
      * this link can't be ended. */
     void (*end)(void *link, int session);
 
-    /* Injects a fault, as enum link_fault says. A LINK_CLOSED follows for each session that ends by it. Returns 0, or
-     * SH_ESTATE when it can't be done now (PLUG: somebody else has the endpoint). NULL where `faults` is 0. */
+    /* Injects a fault, as enum link_fault says. A LINK_CLOSED follows for each session that ends by it. CABLE may wait
+     * 200 ms for the peers' confirmations. Returns 0, or SH_ESTATE when it can't be done now (PLUG: somebody else has
+     * the endpoint). NULL where `faults` is 0. */
     int (*fault)(void *link, enum link_fault what, int session, uint32_t n, double for_ms);
 
     /* Closes everything, removes what open made (symlink). link is void afterwards. */

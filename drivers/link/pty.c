@@ -36,10 +36,12 @@
 
 #include "drivers/link/link_poll.h"
 #include "drivers/link/pty_device.h"
+#include "drivers/link/pty_line.h"
 
 struct pty_link {
     pthread_mutex_t naming; /* for a new device: pty_endpoint is called from other threads */
     struct pty_device device;
+    struct pty_line line;
     int unplugged; /* there is no pair, and no symlink */
     int inotify, watch;
     int open;                   /* a session is on, as the caller knows or is about to learn */
@@ -52,32 +54,6 @@ static int pty_watch(struct pty_link *pty)
 {
     pty->watch = inotify_add_watch(pty->inotify, pty->device.slave, IN_OPEN | IN_CLOSE);
     return pty->watch < 0 ? SH_EIO : SH_OK;
-}
-
-static int pty_open(const struct link_spec *spec, void **link, struct sh_err *err)
-{
-    struct pty_link *pty = calloc(1, sizeof *pty);
-    if (pty == NULL) return sh_fail(err, SH_ENOMEM, "link pty:%s: no memory", spec->path);
-    pty->inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
-    if (pty->inotify < 0) {
-        int error = errno;
-        free(pty);
-        return sh_fail(err, SH_EIO, "link pty:%s: inotify: %s%s", spec->path, strerror(error),
-                       error == EMFILE ? "; see /proc/sys/fs/inotify/max_user_instances" : "");
-    }
-    int rc = pty_device_open(&pty->device, spec->path, err);
-    if (rc == SH_OK && pty_watch(pty) != SH_OK) {
-        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave, strerror(errno));
-        pty_device_close(&pty->device);
-    }
-    if (rc != SH_OK) {
-        close(pty->inotify);
-        free(pty);
-        return rc;
-    }
-    pthread_mutex_init(&pty->naming, NULL);
-    *link = pty;
-    return SH_OK;
 }
 
 static void pty_endpoint(const void *link, char *buf, size_t len)
@@ -100,6 +76,7 @@ static void pty_begin(struct pty_link *pty, unsigned count)
 {
     pty->open = 1;
     pty->count = count;
+    pty_line_forget(&pty->line);
     pty->due_opened = 1;
     pty->open_event_due = 0;
 }
@@ -157,11 +134,39 @@ static int pty_wait_for_client(struct pty_link *pty)
     return SH_OK;
 }
 
+static int pty_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    struct pty_link *pty = calloc(1, sizeof *pty);
+    if (pty == NULL) return sh_fail(err, SH_ENOMEM, "link pty:%s: no memory", spec->path);
+    pty->inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (pty->inotify < 0) {
+        int error = errno;
+        free(pty);
+        return sh_fail(err, SH_EIO, "link pty:%s: inotify: %s%s", spec->path, strerror(error),
+                       error == EMFILE ? "; see /proc/sys/fs/inotify/max_user_instances" : "");
+    }
+    int rc = pty_device_open(&pty->device, spec->path, err);
+    if (rc == SH_OK && pty_wait_for_client(pty) != SH_OK) { /* one may be there as soon as the symlink is */
+        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave, strerror(errno));
+        pty_device_close(&pty->device);
+    }
+    if (rc != SH_OK) {
+        close(pty->inotify);
+        free(pty);
+        return rc;
+    }
+    pthread_mutex_init(&pty->naming, NULL);
+    pty->line.baud = (uint32_t)spec->baud;
+    *link = pty;
+    return SH_OK;
+}
+
 /* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
 static int pty_end(struct pty_link *pty)
 {
     pty->open = pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
     pty->count = 0;
+    pty_line_forget(&pty->line);
     pty->due_closed = 1;
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);
@@ -197,7 +202,7 @@ static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     struct pollfd fds[3] = {{.fd = wake_fd, .events = POLLIN},
                             {.fd = pty->inotify, .events = POLLIN},
                             {.fd = pty->open ? pty->device.master : -1, .events = POLLIN}};
-    if ((want_write & 1u) != 0) fds[2].events |= POLLOUT;
+    if ((want_write & 1u) != 0 || pty->line.n_out != 0) fds[2].events |= POLLOUT;
     if (link_wait(fds, 3, events.n > 0 || !reported ? 0 : timeout_ms) != SH_OK) return SH_EIO;
     link_take_wake(&fds[0], &events);
     if ((fds[1].revents & POLLIN) != 0) pty_read_inotify(pty, 1);
@@ -208,7 +213,8 @@ static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
         return rc != SH_OK ? rc : events.n;
     }
     if ((fds[2].revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
-    if ((fds[2].revents & POLLOUT) != 0) link_events_push(&events, LINK_WRITABLE, 0, NULL);
+    if ((fds[2].revents & POLLOUT) != 0 && pty_line_flush(&pty->line, pty->device.master) && (want_write & 1u) != 0)
+        link_events_push(&events, LINK_WRITABLE, 0, NULL);
     return events.n;
 }
 
@@ -220,7 +226,7 @@ static ssize_t pty_read(void *link, int session, void *buf, size_t len)
      * dropped with what is left of this one. */
     pty_read_inotify(pty, 1);
     if (pty->due_closed || pty->due_opened) return 0;
-    ssize_t n = read(pty->device.master, buf, len);
+    ssize_t n = pty_line_read(&pty->line, pty->device.master, buf, len);
     if (n >= 0) return n;
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED; /* EIO: hung up, and all is read */
 }
@@ -231,7 +237,7 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     if (session != 0 || !pty->open) return SH_ECLOSED;
     pty_read_inotify(pty, 1);
     if (pty->due_closed || pty->due_opened) return 0;
-    ssize_t n = write(pty->device.master, buf, len);
+    ssize_t n = pty_line_write(&pty->line, pty->device.master, buf, len);
     if (n >= 0) return n;
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
@@ -250,7 +256,7 @@ static int pty_unread(void *link, int session)
     if (fd < 0) return 0;
     if (ioctl(fd, FIONREAD, &n) != 0) n = 0;
     close(fd);
-    return n;
+    return n + (int)pty->line.n_out;
 }
 
 /* ---- injected faults */
@@ -261,6 +267,7 @@ static void pty_let_go(struct pty_link *pty)
     pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
     pty->open = pty->due_opened = pty->open_event_due = 0;
     pty->count = 0;
+    pty_line_forget(&pty->line);
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);
 }
@@ -317,6 +324,7 @@ static void pty_close(void *link)
     close(pty->inotify);
     if (!pty->unplugged) pty_device_close(&pty->device);
     pthread_mutex_destroy(&pty->naming);
+    pty_line_free(&pty->line);
     free(pty);
 }
 

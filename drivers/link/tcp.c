@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "drivers/link/link_poll.h"
+#include "drivers/socket/silence.h"
 #include "drivers/socket/socket.h"
 
 enum { SEND_BUFFER_BYTES = 1 << 20 };
@@ -30,6 +31,7 @@ struct tcp_session {
 
 struct tcp_link {
     int listener;   /* -1: unplugged */
+    int is_silent;  /* its cable is pulled */
     int reserve_fd; /* given up for a moment to turn a client away when descriptors run out */
     int n_sessions, brief;
     uint64_t turns;
@@ -191,6 +193,7 @@ static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     struct tcp_link *tcp = link;
     struct link_events events = {event, 0, max};
     struct pollfd fds[2 + LINK_MAX_SESSIONS];
+    if (tcp->is_silent) return link_poll_sink(wake_fd, 0, timeout_ms, &events);
     fds[0] = (struct pollfd){.fd = wake_fd, .events = POLLIN};
     fds[1] = (struct pollfd){.fd = tcp->listener, .events = POLLIN};
     for (int s = 0; s < tcp->n_sessions; s++) {
@@ -234,19 +237,23 @@ static ssize_t tcp_read(void *link, int session, void *buf, size_t len)
 
 static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
 {
+    const struct tcp_link *tcp = link;
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return SH_ECLOSED;
+    if (tcp->is_silent) return 0;
     return moved(link, self, socket_write_heard(self->fd, buf, len));
 }
 
 /* Sends what was written, then the end of the stream, and does not wait for the client's own end. */
 static void tcp_end(void *link, int session)
 {
+    const struct tcp_link *tcp = link;
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return;
+    self->state = TCP_ENDED; /* with a pulled cable the end goes out after it, when poll closes the socket */
+    if (tcp->is_silent) return;
     shutdown(self->fd, SHUT_WR);
     socket_drain(self->fd);
-    self->state = TCP_ENDED;
 }
 
 /* ---- injected faults */
@@ -260,9 +267,40 @@ static int tcp_cut(struct tcp_link *tcp, int session)
     return SH_OK;
 }
 
+/* Collects the sockets of the link: its listener's, and its sessions' from 1 on. */
+static void tcp_sockets(const struct tcp_link *tcp, int fds[1 + LINK_MAX_SESSIONS])
+{
+    fds[0] = tcp->listener;
+    for (int s = 0; s < LINK_MAX_SESSIONS; s++)
+        fds[1 + s] = tcp->session[s].state != TCP_FREE ? tcp->session[s].fd : -1;
+}
+
+static int tcp_silence(struct tcp_link *tcp)
+{
+    int fds[1 + LINK_MAX_SESSIONS];
+    if (tcp->listener < 0 || tcp->is_silent) return SH_ESTATE;
+    tcp_sockets(tcp, fds);
+    if (sockets_silence(fds, 1) != SH_OK) return SH_ESTATE; /* first: no new client comes while it waits */
+    tcp->is_silent = sockets_silence(fds + 1, LINK_MAX_SESSIONS) == SH_OK;
+    if (!tcp->is_silent) sockets_speak(fds, 1);
+    return tcp->is_silent ? SH_OK : SH_ESTATE;
+}
+
+static void tcp_speak(struct tcp_link *tcp, int resets)
+{
+    int fds[1 + LINK_MAX_SESSIONS];
+    if (!tcp->is_silent) return;
+    tcp_sockets(tcp, fds);
+    sockets_speak(fds, 1 + LINK_MAX_SESSIONS);
+    tcp->is_silent = 0;
+    for (int s = 0; s < tcp->n_sessions && resets; s++)
+        tcp_cut(tcp, s);
+}
+
 static int tcp_unplug(struct tcp_link *tcp)
 {
     if (tcp->listener < 0) return SH_ESTATE;
+    tcp->is_silent = 0;   /* what is left of its sockets ends here */
     close(tcp->listener); /* who waits there is turned away by the system */
     tcp->listener = -1;
     for (int s = 0; s < tcp->n_sessions; s++)
@@ -270,26 +308,29 @@ static int tcp_unplug(struct tcp_link *tcp)
     return SH_OK;
 }
 
-static int tcp_plug(struct tcp_link *tcp)
+static int tcp_plug(struct tcp_link *tcp, int resets)
 {
     const struct socket_place place = {.what = "link tcp", .host = tcp->host, .port = tcp->port};
     char at[72];
     struct sh_err err;
+    tcp_speak(tcp, resets);
     if (tcp->listener >= 0) return SH_OK;
     return socket_open(&place, &tcp->listener, at, sizeof at, &err) == SH_OK ? SH_OK : SH_ESTATE;
 }
 
 static int tcp_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
 {
-    (void)n, (void)for_ms;
+    (void)for_ms;
     switch (what) {
     case LINK_FAULT_DISCONNECT:
     case LINK_FAULT_REFUSE:
         return tcp_cut(link, session);
     case LINK_FAULT_UNPLUG:
         return tcp_unplug(link);
+    case LINK_FAULT_CABLE:
+        return tcp_silence(link);
     case LINK_FAULT_PLUG:
-        return tcp_plug(link);
+        return tcp_plug(link, (int)n);
     default:
         return SH_ESTATE;
     }
@@ -298,6 +339,7 @@ static int tcp_fault(void *link, enum link_fault what, int session, uint32_t n, 
 static void tcp_close(void *link)
 {
     struct tcp_link *tcp = link;
+    tcp_speak(tcp, 0); /* else its clients would not hear of the end */
     for (int s = 0; s < tcp->n_sessions; s++)
         if (tcp->session[s].state != TCP_FREE) close(tcp->session[s].fd);
     if (tcp->reserve_fd >= 0) close(tcp->reserve_fd);
@@ -307,8 +349,8 @@ static void tcp_close(void *link)
 
 const struct link_ops link_tcp = {
     .name = "tcp",
-    .faults =
-        LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) | LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
+              LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_CABLE),
     .open = tcp_open,
     .endpoint = tcp_endpoint,
     .poll = tcp_poll,

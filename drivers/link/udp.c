@@ -37,7 +37,8 @@ struct udp_link {
     int fd;
     int reported_opened;
     int unplugged;
-    int closing; /* LINK_CLOSED is to be reported */
+    int is_silent; /* its cable is pulled */
+    int closing;   /* LINK_CLOSED is to be reported */
     uint64_t refused;
     char name[80];
     char notice[200]; /* to be reported; empty: none */
@@ -327,7 +328,8 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (!udp->reported_opened && !udp->unplugged)
         udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
     if (udp->notice[0] != '\0' && link_events_push(&events, LINK_NOTICE, 0, udp->notice)) udp->notice[0] = '\0';
-    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = udp->unplugged ? -1 : udp->fd, .events = POLLIN}};
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN},
+                            {.fd = udp->unplugged || udp->is_silent ? -1 : udp->fd, .events = POLLIN}};
     if ((want_write & 1u) != 0) fds[1].events = POLLIN | POLLOUT;
     int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
     if (rc != SH_OK) return rc;
@@ -346,6 +348,7 @@ static ssize_t udp_read(void *link, int session, void *buf, size_t len)
 {
     struct udp_link *udp = link;
     if (session != 0 || udp->unplugged || udp->closing) return SH_ECLOSED;
+    if (udp->is_silent) return 0;
     ssize_t n = recv(udp->fd, buf, len, MSG_DONTWAIT);
     return n > 0 ? n : 0;
 }
@@ -355,14 +358,14 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
 {
     struct udp_link *udp = link;
     if (session != 0 || udp->unplugged || udp->closing) return SH_ECLOSED;
-    for (int tries = 0; tries < 2; tries++) {
+    for (int tries = 0; tries < 2 && !udp->is_silent; tries++) {
         if (send(udp->fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return (ssize_t)len;
         if (errno == EAGAIN || errno == EWOULDBLOCK) return 0;
         if (errno != ECONNREFUSED && errno != EINTR) break;
         udp->refused += errno == ECONNREFUSED;
     }
     udp->refused++;
-    return (ssize_t)len; /* no route, no memory: gone as on any way */
+    return (ssize_t)len; /* no cable, no route, no memory: gone as on any way */
 }
 
 /* The socket stays, so that the source of the datagrams stays the same. What came meanwhile is dropped. */
@@ -373,13 +376,19 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
     (void)session, (void)n, (void)for_ms;
     if (what == LINK_FAULT_UNPLUG && !udp->unplugged) {
         udp->unplugged = 1;
+        udp->is_silent = 0;
         udp->closing = udp->reported_opened;
         return SH_OK;
     }
+    if (what == LINK_FAULT_CABLE && !udp->unplugged && !udp->is_silent) {
+        udp->is_silent = 1;
+        return SH_OK;
+    }
     if (what != LINK_FAULT_PLUG) return SH_ESTATE;
-    for (int i = 0; i < DRAIN_READS && udp->unplugged && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0; i++)
+    const int was_away = udp->unplugged || udp->is_silent;
+    for (int i = 0; i < DRAIN_READS && was_away && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0; i++)
         continue; /* who sends faster than this reads is not waited for */
-    udp->unplugged = 0;
+    udp->unplugged = udp->is_silent = 0;
     return SH_OK;
 }
 
@@ -399,7 +408,7 @@ static void udp_close(void *link)
 const struct link_ops link_udp = {
     .name = "udp",
     .datagrams = 1,
-    .faults = LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .faults = LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_CABLE),
     .open = udp_open,
     .endpoint = udp_endpoint,
     .poll = udp_poll,

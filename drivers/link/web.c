@@ -17,7 +17,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/link/link_events.h"
+#include "drivers/link/link_poll.h"
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/socket.h"
 
@@ -135,7 +135,7 @@ static int turn_away(struct web_link *web, struct lws *wsi)
     return -1;
 }
 
-static void session_gone(struct web_conn *conn)
+void web_session_gone(struct web_conn *conn)
 {
     struct web_session *s = conn->session;
     if (s == NULL) return;
@@ -147,7 +147,7 @@ static void session_gone(struct web_conn *conn)
 
 void web_conn_end(struct web_conn *conn)
 {
-    session_gone(conn);
+    web_session_gone(conn);
     free(conn->owned);
     conn->owned = NULL;
     conn->wsi = NULL;
@@ -159,7 +159,7 @@ static int close_for(struct web_conn *conn, enum lws_close_status status, const 
 {
     unsigned char words[80];
     int n = snprintf((char *)words, sizeof words, "%s", why);
-    session_gone(conn);
+    web_session_gone(conn);
     web_lws.lws_close_reason(conn->wsi, status, words, (size_t)n);
     return -1;
 }
@@ -221,7 +221,7 @@ static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason,
         if (is_closing(wsi)) return 0; /* a close frame is the last one */
         return conn->session != NULL ? send_message(conn->session, wsi) : turn_away(web, wsi);
     case LWS_CALLBACK_CLOSED:
-        session_gone(conn);
+        web_session_gone(conn);
         return 0;
     case LWS_CALLBACK_WSI_DESTROY:
         web_conn_end(conn);
@@ -256,7 +256,7 @@ static int take_wake_fd(struct web_link *web, int wake_fd)
 
 static void report_session(struct web_session *s, int slot, uint32_t want_write, struct link_events *events)
 {
-    if (s->wsi != NULL && is_closing(s->wsi)) session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
+    if (s->wsi != NULL && is_closing(s->wsi)) web_session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
     if (s->state == WEB_ENDED && link_events_push(events, LINK_CLOSED, slot, s->peer)) s->state = WEB_FREE;
     if (s->state == WEB_OPENING && link_events_push(events, LINK_OPENED, slot, s->peer)) s->state = WEB_OPEN;
     if (s->state != WEB_OPEN) return;
@@ -282,6 +282,7 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 {
     struct web_link *web = link;
     struct link_events events = {event, 0, max};
+    if (web->is_silent) return link_poll_sink(wake_fd, 0, timeout_ms, &events);
     if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
     web_report(web, want_write, &events);
     if (events.n > 0) timeout_ms = 0;
@@ -293,7 +294,7 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     return events.n;
 }
 
-static struct web_session *web_session(struct web_link *web, int session)
+struct web_session *web_session(struct web_link *web, int session)
 {
     if (session < 0 || session >= web->n_sessions || web->session[session].state != WEB_OPEN) return NULL;
     return &web->session[session];
@@ -315,7 +316,7 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
 {
     struct web_session *s = web_session(link, session);
     if (s == NULL) return SH_ECLOSED;
-    if (s->out_len != 0 || len == 0) return 0;
+    if (s->out_len != 0 || len == 0 || ((const struct web_link *)link)->is_silent) return 0;
     if (len > s->out_room) {
         unsigned char *out = realloc(s->out, LWS_PRE + len);
         if (out == NULL) return 0; /* the reader loses frames, which is counted */
@@ -326,66 +327,6 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
     s->out_len = len;
     web_lws.lws_callback_on_writable(s->wsi);
     return (ssize_t)len;
-}
-
-/* ---- injected faults */
-
-void web_break(struct lws *wsi)
-{
-    const int fd = web_lws.lws_get_socket_fd(wsi);
-    if (wsi == web_link_of(wsi)->listening)
-        shutdown(fd, SHUT_RDWR); /* nobody is accepted any more, and who waits is turned away */
-    else
-        socket_break(fd);
-}
-
-/* Without a word: no close frame, and nothing of what waits. */
-static int web_cut(struct web_link *web, int session)
-{
-    struct web_session *s = web_session(web, session);
-    if (s == NULL) return SH_ESTATE;
-    web_break(s->wsi);
-    session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
-    return SH_OK;
-}
-
-static int web_unplug(struct web_link *web)
-{
-    if (web->listening == NULL) return SH_ESTATE;
-    web_break(web->listening); /* first: who is cut off finds nobody there */
-    for (int s = 0; s < web->n_sessions; s++)
-        web_cut(web, s);
-    for (int i = 0; i < WEB_PLACES; i++)
-        if (web->conn[i].wsi != NULL) web_break(web->conn[i].wsi);
-    web->listening = NULL;
-    return SH_OK;
-}
-
-static int web_plug(struct web_link *web)
-{
-    const struct socket_place place = {.what = "link web", .host = web->host, .port = web->port};
-    char at[72];
-    struct sh_err err;
-    if (web->listening != NULL) return SH_OK;
-    if (socket_open(&place, &web->listener, at, sizeof at, &err) != SH_OK) return SH_ESTATE;
-    web->listening = web_wait_for(web, web->listener, NULL);
-    return web->listening != NULL ? SH_OK : SH_ESTATE;
-}
-
-static int web_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
-{
-    (void)n, (void)for_ms;
-    switch (what) {
-    case LINK_FAULT_DISCONNECT:
-    case LINK_FAULT_REFUSE:
-        return web_cut(link, session);
-    case LINK_FAULT_UNPLUG:
-        return web_unplug(link);
-    case LINK_FAULT_PLUG:
-        return web_plug(link);
-    default:
-        return SH_ESTATE;
-    }
 }
 
 static int any_session(const struct web_link *web)
@@ -414,6 +355,7 @@ static void say_goodbye(struct web_link *web)
 static void web_close(void *link)
 {
     struct web_link *web = link;
+    web_speak(web, 0); /* else its clients would not hear of the end */
     say_goodbye(web);
     web_lws.lws_context_destroy(web->context);
     if (web->reserve_fd >= 0) close(web->reserve_fd);
@@ -425,8 +367,8 @@ static void web_close(void *link)
 const struct link_ops link_web = {
     .name = "web",
     .messages = 1,
-    .faults =
-        LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) | LINK_FAULT_BIT(LINK_FAULT_UNPLUG),
+    .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
+              LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_CABLE),
     .open = web_open,
     .endpoint = web_endpoint,
     .poll = web_poll,

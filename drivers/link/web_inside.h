@@ -102,6 +102,7 @@ struct web_link {
     struct lws_context *context;
     struct lws_vhost *vhost;
     struct lws *listening, *wake; /* listening NULL: unplugged */
+    int is_silent;                /* its cable is pulled */
     lws_sorted_usec_list_t timer;
     int listener, wake_fd, woken;
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
@@ -130,8 +131,16 @@ static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 void web_refused(struct web_link *web, const char *peer);
 /* Forgets a connection whose wsi has ended or belongs to nobody any more. Twice does no harm. */
 void web_conn_end(struct web_conn *conn);
-/* Breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
-void web_break(struct lws *wsi);
+/* Returns the session, if its owner may use it; else NULL. */
+struct web_session *web_session(struct web_link *web, int session);
+/* The connection's session is over; LINK_CLOSED is to be reported. */
+void web_session_gone(struct web_conn *conn);
+
+/* web_faults.c */
+/* The link's fault(). */
+int web_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms);
+/* Ends the silence of a pulled cable, if it is pulled. resets: then its connections are reset, too. */
+void web_speak(struct web_link *web, int resets);
 
 /* web_accept.c: the protocol of descriptors that are not HTTP yet, no more, or never: the listening socket, the owner's
  * wake-up, connections whose request has not come whole or whose answer is out. */

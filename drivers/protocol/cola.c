@@ -4,7 +4,7 @@
 
 #include "drivers/protocol/cola.h"
 
-enum { TRY_NS = 100000000, MOST_WAITING = 100 };
+enum { TRY_NS = 100000000, MOST_WAITING = 100, COLA_MIN_STEPS = 55 };
 
 void cola_power_up(struct cola *self)
 {
@@ -162,6 +162,17 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
     if (lost != 0) self->host.count(self->host.ctx, PROTOCOL_INPUT_LOST, lost);
 }
 
+/* Telegrams have the angle of a step as u16, 1/10000 degree. */
+static int check_head(const struct native_descriptor *d, const struct native_emitter *e, const uint8_t *beams,
+                      struct sh_err *err)
+{
+    (void)beams;
+    if (e->steps < COLA_MIN_STEPS)
+        return sh_fail(err, SH_EINPUT, "%u steps a turn; allowed are %d and more, of 6.5535 degrees at most", e->steps,
+                       (int)COLA_MIN_STEPS);
+    return planar_scan_check(d, e, INT32_MAX / 2, err);
+}
+
 const struct protocol_ops protocol_cola = {
     .name = "cola",
     .needs = PROTOCOL_NEEDS_POLAR,
@@ -169,6 +180,7 @@ const struct protocol_ops protocol_cola = {
     .max_unit = COLA_MAX_UNIT,
     .content = cola_content,
     .reseal = cola_reseal,
+    .check_head = check_head,
     .create = cola_create,
     .destroy = free,
     .open = open_at,

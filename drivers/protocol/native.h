@@ -73,6 +73,12 @@ static inline size_t native_frame_len(const uint8_t *frame)
     return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
 }
 
+/* Adds to the device time of the whole frame at `frame`. Its checksums are as before, and so wrong. */
+static inline void native_shift_time(uint8_t *frame, int64_t by_ns)
+{
+    le_put64(frame + 16, le_get64(frame + 16) + (uint64_t)by_ns);
+}
+
 enum native_layout { NATIVE_POLAR = 0, NATIVE_GEO = 1 };
 
 struct native_descriptor {

@@ -16,6 +16,24 @@ void planar_scan_init(struct planar_scan *s)
 
 /* ---- the head */
 
+int planar_scan_check(const struct native_descriptor *d, const struct native_emitter *e, uint32_t max_steps,
+                      struct sh_err *err)
+{
+    const int64_t n = (int64_t)e->last_step - e->first_step + 1;
+    if (e->steps == 0 || e->steps > max_steps || e->last_step < 0 || (uint32_t)e->last_step >= e->steps)
+        return sh_fail(err, SH_EINPUT, "steps up to %d of %u a turn; allowed are %u a turn at most", e->last_step,
+                       e->steps, max_steps);
+    if (e->first_step < 0 || n < 1 || n > PLANAR_MAX_STEPS)
+        return sh_fail(err, SH_EINPUT, "a field of view of steps %d to %d; allowed are 1 to %d steps of a turn",
+                       e->first_step, e->last_step, (int)PLANAR_MAX_STEPS);
+    if (e->front_step < 0 || (uint32_t)e->front_step >= e->steps || !(d->pan_counts_per_turn >= 1))
+        return sh_fail(err, SH_EINPUT,
+                       "step %d in front, and %.10g encoder counts a turn; allowed are a step of the "
+                       "turn, and 1 count and more",
+                       e->front_step, d->pan_counts_per_turn);
+    return SH_OK;
+}
+
 static void take_head(struct planar_scan *s)
 {
     const struct native_emitter *e = &s->emitter;

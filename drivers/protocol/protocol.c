@@ -10,6 +10,7 @@ extern const struct protocol_ops protocol_cola;
 extern const struct protocol_ops protocol_velodyne;
 extern const struct protocol_ops protocol_velodyne_position;
 extern const struct protocol_ops protocol_velodyne_http;
+extern const struct protocol_ops protocol_capture;
 
 static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = &protocol_native,
@@ -19,6 +20,7 @@ static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_VELODYNE] = &protocol_velodyne,
     [PROTOCOL_VELODYNE_POSITION] = &protocol_velodyne_position,
     [PROTOCOL_VELODYNE_HTTP] = &protocol_velodyne_http,
+    [PROTOCOL_CAPTURE] = &protocol_capture,
 };
 
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)

@@ -26,6 +26,7 @@ enum protocol_id {
     PROTOCOL_VELODYNE,          /* data packets */
     PROTOCOL_VELODYNE_POSITION, /* position packets */
     PROTOCOL_VELODYNE_HTTP,     /* settings */
+    PROTOCOL_CAPTURE,           /* what a device said in a capture (talk.h) */
     PROTOCOL_N
 };
 
@@ -93,6 +94,8 @@ struct protocol_host {
     int (*store)(void *ctx, const char *lines);
     /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
     double (*window_loss_db)(void *ctx);
+    /* Tells the user a line about this link; the same one only once. May be NULL. */
+    void (*tell_once)(void *ctx, const char *text);
 };
 
 enum { PROTOCOL_STORED = 2048 };
@@ -116,6 +119,9 @@ struct protocol_identity {
     const struct cola_fields *fields; /* monitored fields and inputs of the configuration; NULL: none */
 };
 
+struct talk;
+struct talk_options;
+
 struct protocol_spec {
     const struct protocol_identity *identity;
     struct protocol_host host;
@@ -130,7 +136,13 @@ struct protocol_spec {
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];
     int port;
+    /* capture: what to say; outlive the instance. NULL for all others */
+    const struct talk *talk;
+    const struct talk_options *talk_options;
 };
+
+struct native_descriptor;
+struct native_emitter;
 
 struct protocol_ops {
     const char *name;  /* of links[].protocol */
@@ -146,6 +158,11 @@ struct protocol_ops {
      * reseal: makes the checksums right. NULL: units have none. */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
+    /* Whether the device can be a head: SH_OK, or SH_EINPUT with what it can't have, and what it can. The emitter is of
+     * a kind and a number of beams that are allowed above; beams are those of its payload. NULL: it can be any such head.
+     * Pure. */
+    int (*check_head)(const struct native_descriptor *descriptor, const struct native_emitter *emitter,
+                      const uint8_t *beams, struct sh_err *err);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
 
     /* When it fails, nothing of it stays. */

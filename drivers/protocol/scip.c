@@ -144,6 +144,13 @@ static int64_t next_ns(const void *protocol)
     return s->reboot_ns != INT64_MIN && s->reboot_ns < idle_ns ? s->reboot_ns : idle_ns;
 }
 
+static int check_head(const struct native_descriptor *d, const struct native_emitter *e, const uint8_t *beams,
+                      struct sh_err *err)
+{
+    (void)beams;
+    return planar_scan_check(d, e, SCIP_MAX_STEPS, err);
+}
+
 const struct protocol_ops protocol_scip = {
     .name = "scip",
     .needs = PROTOCOL_NEEDS_POLAR,
@@ -151,6 +158,7 @@ const struct protocol_ops protocol_scip = {
     .max_unit = SCIP_MAX_UNIT,
     .content = scip_content,
     .reseal = scip_reseal,
+    .check_head = check_head,
     .create = scip_create,
     .destroy = free,
     .open = open_session,

@@ -22,6 +22,8 @@
  *   1206 +----------------------------------------------+ */
 enum { AT_TIME = 1200, AT_MODE = 1204, AT_MODEL = 1205, ENTRY_LEN = 3, FLAG = 0xeeff };
 
+enum { VELODYNE_VLP16 = 0x22, VELODYNE_HI_RES = 0x24 }; /* VLP-16 and Puck LITE; Puck Hi-Res */
+
 /* Range of the table of reflectivities, 0.01 dB. A reflectance below it gives 0, one above it 255. */
 enum { REFL_LEAST_CDB = -2302, REFL_MOST_CDB = 3080, N_REFL = REFL_MOST_CDB - REFL_LEAST_CDB + 1 };
 
@@ -101,13 +103,13 @@ static void take_descriptor(struct velodyne *v, const uint8_t *payload, size_t l
     v->azimuth_per_count = 36000.0 / (d.pan_counts_per_turn > 0.0 ? d.pan_counts_per_turn : 4294967296.0);
 }
 
-/* Models by the elevations of their beams in the order of firing, which is the order in a packet. */
+/* Models by the elevations of their beams in the order of firing, which is the order in a packet. 0: none of them. */
 static uint8_t model_of(const struct native_beam *beam)
 {
     static const struct {
         uint8_t model;
         int32_t step_udeg;
-    } models[] = {{0x22, 2000000}, {0x24, 1333333}}; /* VLP-16 and Puck LITE; Puck Hi-Res */
+    } models[] = {{VELODYNE_VLP16, 2000000}, {VELODYNE_HI_RES, 1333333}};
     for (size_t m = 0; m < sizeof models / sizeof models[0]; m++) {
         int k = 0;
         for (; k < VELODYNE_BEAMS; k++) {
@@ -117,7 +119,7 @@ static uint8_t model_of(const struct native_beam *beam)
         }
         if (k == VELODYNE_BEAMS) return models[m].model;
     }
-    return models[0].model;
+    return 0;
 }
 
 static void take_emitter(struct velodyne *v, const uint8_t *payload, size_t len)
@@ -135,6 +137,7 @@ static void take_emitter(struct velodyne *v, const uint8_t *payload, size_t len)
             native_decode_beam(payload, i, &beam[i]);
         mode = modes[e.echoes];
         model = model_of(beam);
+        if (model == 0) model = VELODYNE_VLP16;
     }
     if (mode != v->mode || model != v->model) fall_out_of_step(v);
     v->mode = mode;
@@ -278,6 +281,29 @@ static void gap(void *protocol, uint32_t n_frames)
     fall_out_of_step(v);
 }
 
+/* Readers take elevations and times of firing from the model's number. */
+static int check_head(const struct native_descriptor *d, const struct native_emitter *e, const uint8_t *beams,
+                      struct sh_err *err)
+{
+    enum { FIRING_NS = 2304, SEQUENCE_NS = 55296 };
+    struct native_beam beam[VELODYNE_BEAMS];
+    (void)d;
+    int are_times = e->sequence_ns_num == e->sequence_ns_den * SEQUENCE_NS && e->turn > 0;
+    for (uint32_t i = 0; i < VELODYNE_BEAMS; i++) {
+        native_decode_beam(beams, i, &beam[i]);
+        are_times &= beam[i].offset_ns == i * FIRING_NS && beam[i].azimuth_udeg == 0;
+    }
+    if (model_of(beam) == 0)
+        return sh_fail(err, SH_EINPUT,
+                       "rings at other elevations; allowed are those of a VLP-16 (2 degrees apart) or a "
+                       "Puck Hi-Res (4/3 degrees), in its order of firing");
+    if (!are_times)
+        return sh_fail(err, SH_EINPUT,
+                       "another firing sequence; allowed is that of a VLP-16: clockwise, 55.296 us, with "
+                       "a beam each 2.304 us");
+    return SH_OK;
+}
+
 static void nothing_at(void *protocol, int64_t t_ns)
 {
     (void)protocol;
@@ -313,6 +339,7 @@ const struct protocol_ops protocol_velodyne = {
     .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_DATA_LEN,
     .content = mark_entries,
+    .check_head = check_head,
     .create = velodyne_create,
     .destroy = free,
     .open = nothing_at,

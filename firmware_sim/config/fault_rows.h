@@ -11,7 +11,7 @@
     {"faults[]", .type = CFG_MAP, .help = "A fault. Keys that its kind doesn't have are refused."},
     {FAULT(kind), CFG_ENUM, .example = "drop", .names = fault_names,
      .help = "On the wire, at a frame: drop, duplicate, reorder, delay, jitter, truncate, flip, stall, split, merge, "
-             "garbage, disconnect, unplug, usb_reset, endpoint_stall, short_packets; at a reply: no_reply, "
+             "garbage, disconnect, unplug, cable, usb_reset, endpoint_stall, short_packets; at a reply: no_reply, "
              "late_reply, wrong_reply, echo; at a connection: refuse, slow_enumeration, descriptor_length. All other "
              "kinds are in the head, and change the measurement."},
     {FAULT(link), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_LINKS,
@@ -29,7 +29,7 @@
                                                             "keys select."},
     {FAULT(count), CFG_COUNT, NULL, "0", 0, 1e15,
      .help = "Largest number of times; 0: no limit. It counts in each session. At connections, and for disconnect, "
-             "unplug, usb_reset, endpoint_stall and short_packets, it counts on the link."},
+             "unplug, cable, usb_reset, endpoint_stall and short_packets, it counts on the link."},
     {FAULT(from_pulse), CFG_COUNT, NULL, "0", 0, 1e17,
      .help = "From this pulse of a scan on, counted from 0. Then only frames of points are hit."},
     {FAULT(until_pulse), CFG_COUNT, NULL, "", 0, 1e17, .example = "1000000",
@@ -54,6 +54,8 @@
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
      .help = "Duration; jitter: the largest one. On the wire it is time of the clock, in the head device time. "
              "pps_jitter: how late every second pulse is, up to 400; nmea_late: how late sentences are, up to 5000."},
+    {FAULT(reset), CFG_BOOL, .def = "off",
+     .help = "cable: connections are reset once it is plugged in again; else they go on."},
     {FAULT(factor), CFG_REAL, NULL, "0.5", 0.01, 2, .help = "mirror_slow: the mirror's speed is multiplied by it."},
     {FAULT(deg), CFG_REAL, "deg", "1", -180, 180,
      .help = "pan_slip: how much farther the beam goes than the encoder; mirror_wobble: largest deviation to either "

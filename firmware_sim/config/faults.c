@@ -50,8 +50,8 @@ static const struct {
 };
 
 /* Keys that say what a fault does. */
-static const char *const what[] = {"n",       "byte",   "reseal", "for_ms", "factor",      "deg",        "hz",
-                                   "loss_db", "jump_s", "ppm",    "ns",     "grandmaster", "clock_class"};
+static const char *const what[] = {"n",  "byte",    "reseal", "for_ms", "reset", "factor",      "deg",
+                                   "hz", "loss_db", "jump_s", "ppm",    "ns",    "grandmaster", "clock_class"};
 
 /* The keys that a kind has, and its largest n. needs_ms: for_ms above 0 must be given. */
 static const struct {
@@ -72,6 +72,7 @@ static const struct {
     [FAULT_LATE_REPLY] = {"for_ms", 0, 1},
     [FAULT_DISCONNECT] = {"for_ms", 0, 0},
     [FAULT_UNPLUG] = {"for_ms", 0, 1},
+    [FAULT_CABLE] = {"for_ms, reset", 0, 1},
     [FAULT_SHORT_PACKETS] = {"n", 1e6, 0},
     [FAULT_SLOW_ENUMERATION] = {"for_ms", 0, 1},
     [FAULT_DESCRIPTOR_LENGTH] = {"n", 1000, 0},
@@ -206,7 +207,8 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
 int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
     const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
-    return !is_of_link || (link_faults(link) & LINK_FAULT_BIT(kind - FAULT_DISCONNECT)) != 0;
+    const uint32_t can = link_faults(link);
+    return !is_of_link || (can & LINK_FAULT_BIT(fault_act_of(kind, can) - FAULT_DISCONNECT)) != 0;
 }
 
 static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)

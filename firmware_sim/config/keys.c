@@ -165,7 +165,7 @@ static const struct cfg_key config_keys[] = {
     {LINK(protocol), CFG_ENUM, .def = "native",
      WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", [PROTOCOL_SCIP] = "scip", [PROTOCOL_COLA] = "cola",
            [PROTOCOL_VELODYNE] = "velodyne", [PROTOCOL_VELODYNE_POSITION] = "velodyne-position",
-           [PROTOCOL_VELODYNE_HTTP] = "velodyne-http"),
+           [PROTOCOL_VELODYNE_HTTP] = "velodyne-http", [PROTOCOL_CAPTURE] = "capture"),
      .help = "native: the head's own stream and commands; nmea: the GNSS receiver, which sends NMEA 0183 and takes no "
              "commands; scip: as a Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, "
              "velodyne-position: position packets, velodyne-http: settings, as a VLP-16."},
@@ -173,6 +173,9 @@ static const struct cfg_key config_keys[] = {
      .of = CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_USB), .of_backend = CFG_KIND(USB_BACKEND_USBREDIR),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
+    {LINK(baud), CFG_COUNT, NULL, "0", 0, 4000000, .example = "115200", .of = CFG_KIND(LINK_PTY),
+     .help = "pty: bit rate of the head's serial port. A client that has set another one gets, and sends, the bytes that "
+             "a UART reads at that rate. 0: any rate will do."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
      .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 "

@@ -26,6 +26,7 @@ static const struct {
     [PROTOCOL_VELODYNE] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
     [PROTOCOL_VELODYNE_POSITION] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
     [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
+    [PROTOCOL_CAPTURE] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP, "pty, tcp, udp"},
 };
 
 _Static_assert((int)HEAD_MAX_RATES == (int)PROTOCOL_MAX_GEOMETRIES, "geometries");
@@ -104,6 +105,10 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
     const struct emitter *emitter = &cfg->profile.emitter;
     char where[40], allowed[64] = "";
     if (!cfg_has_profile(rd) || cfg_protocol_fits(ops, emitter)) return;
+    if (cfg->link[i].protocol == PROTOCOL_CAPTURE) {
+        cfg_fail_key(rd, PROTOCOL_KEY, i, "capture is for `run FILE.pcap`; allowed for a head are all other protocols");
+        return;
+    }
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
         if ((ops->emitters & 1u << kind) != 0)
             snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",

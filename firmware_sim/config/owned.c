@@ -59,7 +59,7 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     static const char *const has[] = {
         [LINK_NULL] = "type, waits, protocol",
         [LINK_FILE] = "type, path, waits, protocol",
-        [LINK_PTY] = "type, path, waits, protocol",
+        [LINK_PTY] = "type, path, baud, waits, protocol",
         [LINK_TCP] = "type, address, port, max_sessions, waits, protocol",
         [LINK_USB] = ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
                       "waits, protocol"),

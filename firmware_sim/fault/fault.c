@@ -21,6 +21,7 @@ const char *const fault_names[] = {
     [FAULT_ECHO] = "echo",
     [FAULT_DISCONNECT] = "disconnect",
     [FAULT_UNPLUG] = "unplug",
+    [FAULT_CABLE] = "cable",
     [FAULT_USB_RESET] = "usb_reset",
     [FAULT_ENDPOINT_STALL] = "endpoint_stall",
     [FAULT_SHORT_PACKETS] = "short_packets",
@@ -68,6 +69,11 @@ enum fault_place fault_place_of(enum fault_kind kind)
 int fault_is_act(enum fault_kind kind)
 {
     return kind >= FAULT_DISCONNECT && kind <= FAULT_SHORT_PACKETS;
+}
+
+enum fault_kind fault_act_of(enum fault_kind kind, uint32_t acts)
+{
+    return kind == FAULT_CABLE && (acts >> (FAULT_CABLE - FAULT_DISCONNECT) & 1U) == 0 ? FAULT_UNPLUG : kind;
 }
 
 uint32_t fault_n(const struct fault *fault)

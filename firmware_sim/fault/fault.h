@@ -35,6 +35,7 @@ enum fault_kind {
     /* of the link, at a frame: for all its sessions where not said otherwise */
     FAULT_DISCONNECT,     /* the session at hand ends before the frame */
     FAULT_UNPLUG,         /* the link is not there for for_ms */
+    FAULT_CABLE,          /* nothing comes or goes for for_ms; reset: what was connected is reset after that */
     FAULT_USB_RESET,      /* the bus is reset */
     FAULT_ENDPOINT_STALL, /* the endpoint of the stream is halted, until the host clears it */
     FAULT_SHORT_PACKETS,  /* of the next n transfers each ends early, and goes on in the next */
@@ -100,7 +101,7 @@ struct fault {
     /* what: as the kinds say */
     uint32_t n;   /* 0: the kind's own */
     int64_t byte; /* from 0; -1: any */
-    int reseal;
+    int reseal, reset;
     double for_ms;
     double factor, deg, hz, loss_db, jump_s, ppm, ns;
     uint64_t grandmaster; /* its identity */
@@ -124,6 +125,9 @@ extern const char *const fault_names[]; /* by kind, NULL at the end */
 enum fault_place fault_place_of(enum fault_kind kind);
 /* Whether it is an act of the link, at a frame: disconnect to short_packets. */
 int fault_is_act(enum fault_kind kind);
+/* The kind by which a link carries out an act. acts: those that it can do; bit 0 is FAULT_DISCONNECT, and so on. For a
+ * link that can't fall silent, a pulled cable is an unplugging. */
+enum fault_kind fault_act_of(enum fault_kind kind, uint32_t acts);
 /* n, or what the kind takes without it. */
 uint32_t fault_n(const struct fault *fault);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults of a link: acts at frames, clients that are turned away, and USB enumerations that go wrong.
  *
- * Connections are counted from 1 on the link, those that are turned away too. On a USB link, each time that a host gets
- * the device is a connection. */
+ * Connections are counted from 1 on the link, those that are turned away too, but not those that come while the head has
+ * no power: nobody is there to count them. On a USB link, each time that a host gets the device is a connection. */
 #include <stdio.h>
 #include <string.h>
 
@@ -13,6 +13,7 @@
 static const int64_t AGAIN_NS = 100000000; /* between attempts to plug the link in again */
 
 _Static_assert((int)LINK_FAULT_UNPLUG == FAULT_UNPLUG - FAULT_DISCONNECT &&
+                   (int)LINK_FAULT_CABLE == FAULT_CABLE - FAULT_DISCONNECT &&
                    (int)LINK_FAULT_BUS_RESET == FAULT_USB_RESET - FAULT_DISCONNECT &&
                    (int)LINK_FAULT_ENDPOINT_STALL == FAULT_ENDPOINT_STALL - FAULT_DISCONNECT &&
                    (int)LINK_FAULT_SHORT_PACKETS == FAULT_SHORT_PACKETS - FAULT_DISCONNECT &&
@@ -47,29 +48,46 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
     const enum fault_kind kind = (enum fault_kind)act->act;
     const enum link_fault what = link_fault_of(kind);
     const double for_ms = act->for_ms;
+    const uint32_t n = act->n;
     const struct fault_note note = *wire_act_note(act);
-    const int rc = f->inner->fault(f->link, what, session, act->n, for_ms);
+    const int rc = f->inner->fault(f->link, what, session, n, for_ms);
     wire_pop(wire);
     if (what == LINK_FAULT_BUS_RESET) f->plug_ns = in_ms(0.0); /* a reset may unplug, and fail to plug in again */
     if (rc != SH_OK) {
         wire_go_on(wire);
         char text[96];
-        snprintf(text, sizeof text, "the fault %s could not be carried out now", fault_names[kind]);
+        snprintf(text, sizeof text, "the fault %s could not be carried out now", fault_names[note.kind]);
         f->spec.say(f->spec.owner, text);
         return;
     }
     fault_board_note(f->spec.board, &note);
-    if (what == LINK_FAULT_UNPLUG) f->plug_ns = in_ms(for_ms);
+    if (what == LINK_FAULT_UNPLUG || what == LINK_FAULT_CABLE) f->plug_ns = in_ms(for_ms);
+    if (note.kind == FAULT_CABLE) f->pulled = note;
+    if (what == LINK_FAULT_CABLE) f->resets = (int)n;
     if (what == LINK_FAULT_DISCONNECT && for_ms > 0.0) f->refuse_until_ns = in_ms(for_ms);
     end_sessions(f, session, what);
+}
+
+/* Notes that a cable which was pulled is plugged in, or that another act took its place. */
+static void faulty_acts_end_cable(struct faulty_link *f)
+{
+    struct fault_note over = f->pulled;
+    if (f->pulled.fault == 0) return;
+    f->pulled.fault = 0;
+    over = (struct fault_note){.fault = over.fault, .kind = over.kind, .link = over.link, .of = over.of};
+    over.t_ns = f->spec.time_ns(f->spec.owner);
+    over.byte = -1;
+    over.ended = 1;
+    fault_board_note(f->spec.board, &over);
 }
 
 void faulty_plug(struct faulty_link *f)
 {
     if (f->plug_ns == 0 || clock_now_ns() < f->plug_ns) return;
-    if (f->inner->fault(f->link, LINK_FAULT_PLUG, 0, 0, 0.0) == SH_OK) {
+    if (f->inner->fault(f->link, LINK_FAULT_PLUG, 0, (uint32_t)f->resets, 0.0) == SH_OK) {
         if (f->plug_failed) f->spec.say(f->spec.owner, "is there again");
-        f->plug_ns = f->plug_failed = 0;
+        f->plug_ns = f->plug_failed = f->resets = 0;
+        faulty_acts_end_cable(f);
         return;
     }
     if (!f->plug_failed)
@@ -83,7 +101,8 @@ int faulty_fault(void *link, enum link_fault what, int session, uint32_t n, doub
 {
     struct faulty_link *f = link;
     if (what != LINK_FAULT_PLUG) {
-        f->plug_ns = f->refuse_until_ns = 0;
+        f->plug_ns = f->refuse_until_ns = f->resets = 0;
+        faulty_acts_end_cable(f);
         return f->inner->fault(f->link, what, session, n, for_ms);
     }
     f->plug_ns = clock_now_ns(); /* now, or once its endpoint is free */
@@ -165,6 +184,7 @@ static int connect_next(struct faulty_link *f, int session)
 int faulty_turns_away(struct faulty_link *f, int session)
 {
     if (f->spec.board == NULL || (f->can & LINK_FAULT_BIT(LINK_FAULT_REFUSE)) == 0) return 0;
+    if (f->spec.is_off(f->spec.owner)) return 0;
     if (connect_next(f, session)) return 1;
     return clock_now_ns() < f->refuse_until_ns && f->inner->fault(f->link, LINK_FAULT_REFUSE, session, 0, 0.0) == SH_OK;
 }
@@ -174,5 +194,5 @@ void faulty_plugged(struct faulty_link *f)
     if (f->spec.board == NULL) return;
     f->inner->fault(f->link, LINK_FAULT_SLOW_ENUMERATION, 0, 0, 0.0);
     f->inner->fault(f->link, LINK_FAULT_DESCRIPTOR_LENGTH, 0, 0, 0.0);
-    connect_next(f, -1);
+    if (!f->spec.is_off(f->spec.owner)) connect_next(f, -1);
 }

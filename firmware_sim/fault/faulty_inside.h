@@ -37,9 +37,11 @@ struct faulty_link {
     struct fault_tally tally; /* of what the link does */
     struct faulty_session session[LINK_MAX_SESSIONS];
     struct faulty_connections connections;
-    int64_t plug_ns;         /* clock: when an unplugged link is there again; 0: it is */
-    int plug_failed;         /* it could not come back so far, and that was reported */
-    int64_t refuse_until_ns; /* clock: until then clients are turned away */
+    int64_t plug_ns;          /* clock: when an unplugged link is there again; 0: it is */
+    struct fault_note pulled; /* the cable that is pulled; fault 0: none is */
+    int resets;               /* and what was connected is reset after it */
+    int plug_failed;          /* it could not come back so far, and that was reported */
+    int64_t refuse_until_ns;  /* clock: until then clients are turned away */
 };
 
 /* faulty_acts.c */

@@ -27,6 +27,7 @@ struct faulty_spec {
     /* called by the link's thread */
     void *owner;
     int64_t (*time_ns)(void *owner);                            /* device time now */
+    int (*is_off)(void *owner);                                 /* the head has no power now */
     void (*say)(void *owner, const char *text);                 /* to the person who runs the head */
     void *source;                                               /* source.h */
     void (*report)(void *source, int number, const char *text); /* into the error queue */

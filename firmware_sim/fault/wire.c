@@ -60,6 +60,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     switch (f->kind) {
     case FAULT_DISCONNECT:
     case FAULT_UNPLUG:
+    case FAULT_CABLE:
     case FAULT_USB_RESET:
         return 0;
     case FAULT_DROP:
@@ -85,7 +86,8 @@ static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
 static int concerns(struct wire *wire, struct wire_fault *fault, int of)
 {
     const struct fault *f = &fault->entry.fault;
-    if (fault_is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (f->kind - FAULT_DISCONNECT)) == 0) return 0;
+    const enum fault_kind act = fault_act_of(f->kind, wire->spec.acts);
+    if (fault_is_act(f->kind) && (wire->spec.acts & UINT32_C(1) << (act - FAULT_DISCONNECT)) == 0) return 0;
     if (f->count != 0 && *hits_of(wire, fault) >= f->count) return 0;
     return fault_place_of(f->kind) == FAULT_AT_REPLY   ? of == FAULT_OF_REPLIES
            : fault_place_of(f->kind) == FAULT_AT_FRAME ? of == f->of

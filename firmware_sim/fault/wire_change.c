@@ -2,6 +2,7 @@
 /* Applies each kind of fault to one frame, unit or reply. Each function returns 1; 0: there is nothing for it to do; or
  * SH_ENOMEM. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "core/err.h"
@@ -233,12 +234,14 @@ static int act(struct change *c)
     const struct fault *f = &c->fault->entry.fault;
     c->note.for_ms = f->for_ms;
     if (f->kind == FAULT_SHORT_PACKETS) c->note.n = fault_n(f);
+    if (f->reset) snprintf(c->note.text, sizeof c->note.text, "reset");
     struct wire_piece *piece = wire_piece_new(WIRE_ACT, &c->note, sizeof c->note);
     if (piece == NULL) return SH_ENOMEM;
-    piece->act = f->kind;
-    piece->n = fault_n(f);
+    piece->act = fault_act_of(f->kind, c->wire->spec.acts);
+    piece->n = f->kind == FAULT_CABLE ? (uint32_t)f->reset : fault_n(f);
     piece->for_ms = f->for_ms;
-    if (f->kind <= FAULT_USB_RESET && end_session(c) != SH_OK) { /* disconnect, unplug, usb_reset */
+    const int ends = piece->act <= FAULT_USB_RESET && piece->act != FAULT_CABLE; /* disconnect, unplug, usb_reset */
+    if (ends && end_session(c) != SH_OK) {
         wire_piece_free(piece);
         return SH_ENOMEM;
     }

@@ -32,13 +32,25 @@ struct link_counts {
     uint64_t sent_units, lost_units, lost_points, unsent_pulses, wrong_requests, lost_input_bytes;
 };
 
+/* It is told of the clients, as things happen. The threads of the links call it. */
+struct links_observer {
+    void *ctx;
+    /* A session begins (1) or ends (0). t_ns: device time from which on, or up to which, it is given the stream. */
+    void (*session)(void *ctx, uint32_t session, int begins, const char *peer, int64_t t_ns);
+    /* Its client sent these bytes. */
+    void (*heard)(void *ctx, uint32_t session, const void *bytes, size_t len);
+    /* A request was answered with an error, or could not be read. reply: of a native line; NULL in other protocols. */
+    void (*refused)(void *ctx, uint32_t session, const char *line, const char *reply);
+};
+
 struct links {
     /* set by the caller */
     struct stream *stream;
     const struct loop_source *source;
     struct mover mover;
-    const struct sh_report *report; /* NULL: none */
-    const struct web_source *web;   /* of links of type web; NULL: none */
+    const struct sh_report *report;        /* NULL: none */
+    const struct web_source *web;          /* of links of type web; NULL: none */
+    const struct links_observer *observer; /* NULL: none */
     struct protocol_identity identity;
     struct cola_fields fields; /* of the identity, where there are some */
     uint32_t fixes_hz;         /* of the GNSS receiver */

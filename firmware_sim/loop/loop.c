@@ -63,6 +63,7 @@ static struct loop *loop_begin(const struct config *cfg, const struct loop_sourc
     loop->links.stream = &loop->stream;
     loop->links.source = &loop->source;
     loop->links.report = options->report;
+    loop->links.observer = options->observer;
     return loop;
 }
 
@@ -128,6 +129,13 @@ int loop_get_place(const struct loop *loop, uint32_t i, struct link_place *place
     if (i > loop->links.n || loop->feed == NULL) return 0;
     *place = (struct link_place){.type = "pose"};
     pose_feed_endpoint(loop->feed, place->endpoint, sizeof place->endpoint);
+    return 1;
+}
+
+int loop_get_counts(const struct loop *loop, uint32_t i, struct link_counts *counts)
+{
+    if (i >= loop->links.n) return 0;
+    pump_get_counts(loop->links.pump[i], counts);
     return 1;
 }
 

@@ -23,11 +23,12 @@ struct loop;
 struct config;
 
 struct loop_options {
-    int hash;                       /* keep stream_sha256 */
-    const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
-    const struct web_source *web;   /* what links of type web serve beside the page; NULL: nothing */
-    const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
-    double planned_ns;              /* for a pulse; warns where it takes much more; 0: as the site's plan has */
+    int hash;                              /* keep stream_sha256 */
+    const struct link_spec *extra;         /* one more link than the configuration has; NULL: none */
+    const struct web_source *web;          /* what links of type web serve beside the page; NULL: nothing */
+    const struct sh_report *report;        /* warnings while running (from any thread); NULL: none */
+    const struct links_observer *observer; /* NULL: none; it must outlive the loop */
+    double planned_ns;                     /* for a pulse; warns where it takes much more; 0: as the site's plan has */
 };
 
 struct loop_stats {
@@ -54,6 +55,9 @@ void loop_put_endpoints(const struct loop *loop, struct json *json);
 void loop_put_links(const struct loop *loop, struct json *json);
 /* Link i; after the links the socket for poses. 0: there is no such link. */
 int loop_get_place(const struct loop *loop, uint32_t i, struct link_place *place);
+
+/* After loop_join: what the readers of link i got and lost. 0: there is no such link. */
+int loop_get_counts(const struct loop *loop, uint32_t i, struct link_counts *counts);
 
 /* Starts the threads. */
 int loop_start(struct loop *loop, struct sh_err *err);

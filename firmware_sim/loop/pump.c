@@ -13,7 +13,7 @@
 /* At the end a reader may take this long between two bytes, and bytes held back by faults this long in all. */
 static const int64_t DRAIN_NS = 2000000000;
 
-static void pump_say(void *owner, const char *text)
+void pump_say(void *owner, const char *text)
 {
     const struct pump *pump = owner;
     struct link_place place;
@@ -27,6 +27,13 @@ static int64_t device_time_ns(void *owner)
     return (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
 }
 
+/* In the pace step links are there while power is not. */
+static int has_no_power(void *owner)
+{
+    const struct pump *pump = owner;
+    return pump->power_seen % 2 != 0;
+}
+
 static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t index, struct sh_err *err)
 {
     const struct loop_source *source = pump->links->source;
@@ -38,6 +45,7 @@ static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t i
         .room = pump->out_cap,
         .owner = pump,
         .time_ns = device_time_ns,
+        .is_off = has_no_power,
         .say = pump_say,
         .source = source->self,
         .report = source->ops->report,
@@ -53,6 +61,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     struct pump *pump = calloc(1, sizeof *pump);
     if (pump == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     pump->links = links;
+    pump->index = index;
     pump->stream = links->stream;
     pump->is_clean = spec->type == LINK_FD || spec->clean;
     pump->can_unplug = (link_faults(spec) & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
@@ -245,7 +254,7 @@ static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
     uint32_t want_write = 0;
-    int at_once = 0; /* there is something to do without waiting for events */
+    int at_once = 1; /* there is something to do without waiting for events: sessions may be open from the start */
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;

@@ -51,6 +51,9 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
     else
         source->ops->command(source->self, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
     s->commands.wrong += result.error != 0;
+    const struct links_observer *observer = pump->links->observer;
+    if (observer != NULL && result.error != 0)
+        observer->refused(observer->ctx, s->id, s->commands.lines.buf, result.reply);
     if (result.effect == COMMAND_FAULTS) faulty_changed(pump->link, session_index(pump, s), count_replies(s) + 1);
     if (result.effect == COMMAND_STEP) {
         start_step(pump, s, &result);
@@ -109,6 +112,8 @@ void pump_read(struct pump *pump, struct session *s, int index)
     c->in_pos = 0;
     ssize_t n =
         c->in_len < READ_BYTES ? pump->ops->read(pump->link, index, c->in + c->in_len, READ_BYTES - c->in_len) : 0;
+    const struct links_observer *observer = pump->links->observer;
+    if (n > 0 && observer != NULL) observer->heard(observer->ctx, s->id, c->in + c->in_len, (size_t)n);
     if (n > 0) c->in_len += (uint32_t)n;
 }
 

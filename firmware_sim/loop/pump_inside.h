@@ -16,6 +16,7 @@ enum {
     READ_BYTES = 65536,
     WRONG_AT_ONCE = 128, /* wrong lines of a session, and then a rest of so long for its link: */
     REST_NS = 2000000,
+    MAX_TOLD = 64,
 };
 
 /* Command lines of a client, and the replies to them. */
@@ -74,18 +75,23 @@ struct pump {
     uint8_t *tick; /* frames of the tick at hand, for a protocol; NULL: it is native */
     int wake_fd;
     struct stream_listener *listener;
-    uint32_t out_cap;    /* of each session */
-    int holds;           /* its readers hold back the paces fast and step */
-    int is_clean;        /* its readers see nothing of faults, power cycles included */
-    int can_unplug;      /* its endpoint goes when power goes */
-    uint32_t power_seen; /* changes of power that were done here */
-    int is_off;          /* the head has no power */
+    uint32_t index;                  /* of the link, from 0 */
+    uint32_t n_told, told[MAX_TOLD]; /* lines that a protocol told the user: their checksums */
+    uint32_t out_cap;                /* of each session */
+    int holds;                       /* its readers hold back the paces fast and step */
+    int is_clean;                    /* its readers see nothing of faults, power cycles included */
+    int can_unplug;                  /* its endpoint goes when power goes */
+    uint32_t power_seen;             /* changes of power that were done here */
+    int is_off;                      /* the head has no power */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
     int64_t over_ns; /* clock: when it was first seen that the run is over; 0: it is not */
     int failed;      /* a write failed; the reason is still to come */
 };
+
+/* pump.c: warns the user, with the link's name. */
+void pump_say(void *pump, const char *text);
 
 /* session.c */
 void session_open(struct pump *pump, struct session *s, const char *peer);

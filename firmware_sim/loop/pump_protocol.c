@@ -6,7 +6,9 @@
  * Answers are lost only where they have no room. In the paces that wait for readers nothing is lost: the
  * session takes no further tick until there is room. */
 #include <stdio.h>
+#include <string.h>
 
+#include "drivers/protocol/crc32c.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -86,6 +88,17 @@ static double host_window_loss_db(void *ctx)
     return source->ops->window_loss_db(source->self);
 }
 
+static void host_tell_once(void *ctx, const char *text)
+{
+    struct pump *pump = ((struct session *)ctx)->pump;
+    const uint32_t mark = crc32c(0, text, strlen(text));
+    for (uint32_t i = 0; i < pump->n_told; i++)
+        if (pump->told[i] == mark) return;
+    if (pump->n_told == MAX_TOLD) return;
+    pump->told[pump->n_told++] = mark;
+    pump_say(pump, pump->n_told < MAX_TOLD ? text : "more is not told here; the statistics count it");
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -96,7 +109,10 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
     if (what == PROTOCOL_PULSES_UNSENT) counts->unsent_pulses += n;
-    s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
+    if (what != PROTOCOL_INPUT_LOST && what != PROTOCOL_WRONG) return;
+    s->commands.wrong++;
+    const struct links_observer *observer = s->pump->links->observer;
+    if (observer != NULL) observer->refused(observer->ctx, s->id, NULL, NULL);
 }
 
 static void host_hang_up(void *ctx)
@@ -106,6 +122,14 @@ static void host_hang_up(void *ctx)
 }
 
 /* ---- the session */
+
+/* Gives the frames of a recording the device time of the run, which their protocol has from its clock. Their checksums
+ * are not looked at any more. */
+static void shift_times(uint8_t *frames, size_t len, int64_t shift_ns)
+{
+    for (size_t at = 0; at < len; at += native_frame_len(frames + at))
+        native_shift_time(frames + at, shift_ns);
+}
 
 static void give_frames(const struct protocol_ops *ops, struct session *s, const uint8_t *frames, size_t len)
 {
@@ -152,8 +176,18 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     char stored[SETTINGS_FILE_TEXT] = "";
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
-        .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
-                 host_pps, host_store, host_window_loss_db},
+        .host = {.ctx = s,
+                 .send = host_send,
+                 .command = host_command,
+                 .utc_ns = host_utc_ns,
+                 .fix = host_fix,
+                 .count = host_count,
+                 .hang_up = host_hang_up,
+                 .next_fix_ns = host_next_fix_ns,
+                 .pps = host_pps,
+                 .store = host_store,
+                 .window_loss_db = host_window_loss_db,
+                 .tell_once = host_tell_once},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .power_ns = source->ops->power_ns(source->self),
@@ -166,6 +200,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     };
     struct sh_err err;
     snprintf(spec.address, sizeof spec.address, "%s", pump->links->data_address);
+    if (source->ops->talk != NULL) spec.talk = source->ops->talk(source->self, pump->index, &spec.talk_options);
     s->pump = pump;
     s->hang_up = 0;
     if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;
@@ -222,6 +257,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (got == RING_READ) {
         uint32_t lost = session_check_lost(pump, s, &tick, released);
         if (lost != 0 && ops->gap != NULL) ops->gap(s->protocol, lost);
+        if (tick.shift_ns != 0) shift_times(tick.buf, tick.len, tick.shift_ns);
         give_frames(ops, s, tick.buf, tick.len);
     }
     s->cursor++;

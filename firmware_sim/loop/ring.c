@@ -152,6 +152,7 @@ enum ring_read ring_look(struct ring *ring, int reader, uint64_t tick, struct ri
     copy->first_seq = slot->first_seq;
     copy->n_cast = slot->tick.n_cast;
     copy->pulses_before = slot->pulses_before;
+    copy->shift_ns = slot->tick.shift_ns;
     return RING_READ;
 }
 

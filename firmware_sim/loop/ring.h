@@ -55,6 +55,7 @@ struct ring_tick {
     uint64_t n_fired, n_cast, n_lines;
     struct ring_hits hits; /* of the whole tick */
     struct ring_hits tail; /* after the last mark */
+    int64_t shift_ns;      /* run's device time less that of the frames; only a recording's differ */
 };
 
 struct ring_slot {
@@ -109,6 +110,7 @@ struct ring_copy {
     uint32_t cap;                      /* of buf; the reader sets both */
     uint32_t len, n_frames, first_seq; /* first_seq: number of the first frame; without frames, of the next one */
     uint64_t n_cast, pulses_before;    /* pulses in the frames, and those that were delivered before */
+    int64_t shift_ns;                  /* as struct ring_tick has it */
 };
 enum ring_read { RING_READ, RING_NONE, RING_LOST };
 /* Copies the frames of `tick`. RING_NONE: it is not released yet. RING_LOST: it is too old, or the head

@@ -21,6 +21,13 @@ static void clear(struct session *s)
     memset(&c->lines, 0, sizeof c->lines);
 }
 
+static void tell_observer(const struct pump *pump, const struct session *s, int begins)
+{
+    const struct links_observer *observer = pump->links->observer;
+    const int64_t t_ns = (int64_t)s->cursor * pump->stream->tick_ns;
+    if (observer != NULL) observer->session(observer->ctx, s->id, begins, s->peer, t_ns);
+}
+
 void session_open(struct pump *pump, struct session *s, const char *peer)
 {
     const int native = pump->protocol->passes_native;
@@ -41,12 +48,14 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     char who[COMMAND_PEER_LEN];
     snprintf(who, sizeof who, "%s %s", pump->ops->name, s->peer);
     source->ops->session_opened(source->self, s->id, who);
+    tell_observer(pump, s, 1);
     stream_poke(pump->stream);
 }
 
 void session_cut(struct pump *pump, struct session *s)
 {
     s->open = 0;
+    tell_observer(pump, s, 0);
     session_gone(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
     if (!pump->protocol->passes_native) session_close_protocol(pump, s);

@@ -42,7 +42,9 @@ static int replay_look(struct replay *r)
         if (got < 0) return replay_fail(r, &err), -1;
         if (got == 0) return 0;
         const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
-        if (!r->in_range && since_ns < r->options.from_s * 1e9) {
+        /* A device that is asked for scans has booted, so that part of a recording is left out. */
+        const int is_early = since_ns < r->options.from_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
+        if (!r->in_range && is_early) {
             replay_keep_front(&r->front, r->frame.bytes);
             r->has_skipped = 1;
             continue;
@@ -99,6 +101,19 @@ static void rebase(struct replay *r, uint64_t tick)
     r->base = r->last = tick_of(r, r->frame.t_ns);
 }
 
+/* A recording may have any times: this wraps instead of overflowing. */
+static void set_shift(struct replay *r)
+{
+    r->shift_ns = (int64_t)((r->start_tick - (uint64_t)r->base) * (uint64_t)r->tick_ns);
+}
+
+/* The first time that it is played, the time of day becomes the recorded one. */
+static void set_clock(struct replay *r)
+{
+    set_shift(r);
+    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = (int64_t)((uint64_t)r->utc0_ns - (uint64_t)r->shift_ns);
+}
+
 /* The tick with which the next frame goes out. */
 static uint64_t due_tick(struct replay *r, uint64_t tick)
 {
@@ -146,6 +161,7 @@ static void replay_begin(struct replay *r, uint64_t tick)
     pthread_mutex_lock(&r->lock);
     r->playing = 1;
     r->times++;
+    set_clock(r);
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
     if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
@@ -161,6 +177,7 @@ static void replay_fill(struct replay *r, uint64_t tick, int may_skip)
         if (due > tick) r->start_tick -= due - tick;    /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > MOST_BYTES) return; /* the rest comes with the next tick */
         replay_add(r, r->frame.bytes, r->frame.len, tick);
+        set_shift(r);
         r->has_frame = 0;
     }
     stop(r, tick, found == 0 && r->options.loop);
@@ -213,7 +230,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     if (r->playing) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
-        replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX); /* --duration counts such time */
+        /* --duration counts such time, and protocols measure it */
+        replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX && !r->is_device);
         replay_count(r);
         r->tick.n_cast += before.n_cast;
         r->tick.n_fired += before.n_fired;
@@ -223,6 +241,7 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     *out = r->tick;
     out->bytes = r->bytes;
     out->len = r->len;
+    out->shift_ns = r->shift_ns;
     return LOOP_SOURCE_TICK;
 }
 
@@ -319,6 +338,13 @@ static uint64_t scans(void *self)
     return n;
 }
 
+static const struct talk *talk(const void *self, uint32_t link, const struct talk_options **options)
+{
+    const struct replay *r = self;
+    *options = &r->options.talk_options;
+    return r->options.talk != NULL && link < r->cfg->n_links ? r->options.talk[link] : NULL;
+}
+
 static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)
 {
     (void)self;
@@ -339,6 +365,11 @@ static void replay_end(void *self)
 const struct loop_source_ops replay_source = {
     .command = replay_command,
     .overlong = replay_overlong,
+    .command_once = replay_command_once,
+    .utc_ns = replay_utc_ns,
+    .next_fix_ns = replay_next_fix_ns,
+    .fix = replay_fix,
+    .pps = replay_pps,
     .session_opened = replay_session_opened,
     .session_closed = replay_session_closed,
     .report = replay_report,
@@ -348,6 +379,7 @@ const struct loop_source_ops replay_source = {
     .power_ons = power_ons,
     .near_wrap = near_wrap,
     .window_loss_db = window_loss_db,
+    .talk = talk,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,
@@ -376,7 +408,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->end_tick = options->duration_s > 0.0 && !options->start ? r->n_ticks : UINT64_MAX;
     r->wants_start = options->start;
     for (uint32_t i = 0; i < cfg->n_links; i++) /* such a link opens a session for itself */
-        r->n_clients -= cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL;
+        r->n_clients -=
+            cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL || cfg->link[i].type == LINK_UDP;
     r->ends_then = options->start && !options->loop;
     r->bytes = malloc(MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");

@@ -13,18 +13,22 @@
 #ifndef FIRMWARE_SIM_REPLAY_REPLAY_H
 #define FIRMWARE_SIM_REPLAY_REPLAY_H
 
+#include "drivers/protocol/talk.h"
 #include "firmware_sim/loop/source.h"
 
 struct replay;
 
 struct replay_options {
     const char *path;
-    double speed;                   /* > 0; 1 in all paces but realtime */
-    double from_s, to_s;            /* device time since the recording's first frame; to_s 0: up to its end */
-    int loop;                       /* at its end it begins anew */
-    int start;                      /* play at once; and end the run at the end, unless loop */
-    uint32_t clients;               /* with start: once so many clients are there; 0: at once */
-    double duration_s;              /* > 0: end the run after that time; with start: after that time of playing */
+    double speed;        /* > 0; 1 in all paces but realtime */
+    double from_s, to_s; /* device time since the recording's first frame; to_s 0: up to its end */
+    int loop;            /* at its end it begins anew */
+    int start;           /* play at once; and end the run at the end, unless loop */
+    uint32_t clients;    /* with start: once so many clients are there; 0: at once */
+    double duration_s;   /* > 0: end the run after that time; with start: after that time of playing */
+    /* In place of a recording: what each link says, as many as cfg has links, and how. NULL: a recording. */
+    const struct talk *const *talk;
+    struct talk_options talk_options;
     const char *truth;              /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings while it is played, from the player's thread */
 };

@@ -68,6 +68,7 @@ void replay_take_emitter(struct replay *r, const struct native_emitter *e)
 
 void replay_take_anchor(struct replay *r, const struct native_anchor *anchor)
 {
+    r->anchor = *anchor;
     r->cmd.settings.station = r->cmd.defaults.station = anchor->station;
     r->cmd.limits.n_stations = anchor->station;
 }
@@ -101,10 +102,10 @@ static void carry_out(struct replay *r, enum command_effect effect)
     if (r->wants_start) r->options.clients = 0; /* a client that commands the start does not wait for others */
 }
 
-void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
+/* With the lock held. */
+static void do_command(struct replay *r, uint32_t session, const char *line, uint64_t released,
+                       struct command_result *out)
 {
-    struct replay *r = self;
-    pthread_mutex_lock(&r->lock);
     r->cmd.state = visible_state(r, released);
     r->cmd.t_ns = (int64_t)released * r->tick_ns;
     r->cmd.frames_done = r->frames_done;
@@ -113,6 +114,22 @@ void replay_command(void *self, uint32_t session, const char *line, uint64_t rel
     r->desk.now_ns = r->cmd.t_ns;
     command_execute(&r->cmd, session, line, out);
     if (out->error == 0) carry_out(r, out->effect);
+}
+
+void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    do_command(r, session, line, released, out);
+    pthread_mutex_unlock(&r->lock);
+}
+
+void replay_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    do_command(r, session, line, released, out);
+    if (out->took_control) r->cmd.control = 0;
     pthread_mutex_unlock(&r->lock);
 }
 

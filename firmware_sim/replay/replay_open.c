@@ -2,6 +2,7 @@
 /* Opening: reads the description of the head from the recording, before anything is played. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/native_encode.h"
@@ -44,6 +45,25 @@ static int read_front(struct replay *r, struct sh_err *err)
     return recording_rewind(&r->recording, err);
 }
 
+/* Finds the first frame with a time of day within the first seconds; heads send telemetry each second. */
+static int read_clock(struct replay *r, struct sh_err *err)
+{
+    enum { LONG_ENOUGH_NS = 2000000000 };
+    struct recording_frame frame;
+    struct native_telemetry t;
+    struct native_header header;
+    int got;
+    while ((got = recording_next(&r->recording, &frame, err)) == 1 &&
+           (double)frame.t_ns - (double)r->first_ns <= LONG_ENOUGH_NS) {
+        native_read_header(frame.bytes, &header);
+        if (header.type != NATIVE_TELEMETRY) continue;
+        if (native_decode_telemetry(frame.bytes + NATIVE_HEADER_LEN, header.length, &t) != SH_OK) continue;
+        if (t.utc_ns > 0) r->utc0_ns = (int64_t)((uint64_t)t.utc_ns - (uint64_t)header.t_ns);
+        break;
+    }
+    return got < 0 ? got : recording_rewind(&r->recording, err);
+}
+
 /* Copies "MAKER,MODEL,SERIAL,REST" into the fields of the configuration that links show to hosts. */
 static void take_identity(struct config *cfg, const char *idn)
 {
@@ -80,18 +100,6 @@ static void fill_config(struct replay *r, const struct native_descriptor *d)
     cfg->output.colour = (d->content & NATIVE_HAS_COLOURS) != 0 ? COLOUR_SOLID : COLOUR_NONE;
 }
 
-static int check_links(const struct config *cfg, struct sh_err *err)
-{
-    for (uint32_t i = 0; i < cfg->n_links; i++) {
-        const struct protocol_ops *protocol = protocol_ops_get((enum protocol_id)cfg->link[i].protocol);
-        if (protocol == NULL || protocol->passes_native) continue;
-        return sh_fail(err, SH_EINPUT,
-                       "%s: links[%u].protocol %s: a recording has the native protocol; allowed is only native",
-                       cfg->file, i, protocol->name);
-    }
-    return SH_OK;
-}
-
 static int check_faults(const struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->faults.n; i++) {
@@ -102,13 +110,37 @@ static int check_faults(const struct config *cfg, struct sh_err *err)
     return SH_OK;
 }
 
+/* The firmware that its profile has: protocols say it, and a stream doesn't. */
+static void take_firmware(struct config *cfg)
+{
+    struct config_profile *profile = calloc(1, sizeof *profile);
+    struct sh_err err;
+    if (profile != NULL && config_load_profile(cfg->profile.name, cfg->file, profile, &err) == SH_OK &&
+        strcmp(profile->model, cfg->profile.model) == 0)
+        snprintf(cfg->profile.firmware, sizeof cfg->profile.firmware, "%s", profile->firmware);
+    free(profile);
+}
+
+static int is_device(const struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].protocol != PROTOCOL_NATIVE) return 1;
+    return 0;
+}
+
 int replay_open_recording(struct replay *r, struct sh_err *err)
 {
     struct native_descriptor d;
     struct native_emitter e;
     struct native_anchor a;
-    int rc = check_links(r->cfg, err);
-    if (rc == SH_OK) rc = check_faults(r->cfg, err);
+    int rc = check_faults(r->cfg, err);
+    r->is_device = is_device(r->cfg);
+    r->utc0_ns = INT64_MIN;
+    if (r->options.talk != NULL) {
+        replay_open_commands(r);
+        r->cmd.idn = r->idn;
+        return rc;
+    }
     if (rc == SH_OK) rc = recording_open(&r->recording, r->options.path, err);
     if (rc == SH_OK) rc = read_front(r, err);
     if (rc != SH_OK) return rc;
@@ -117,13 +149,18 @@ int replay_open_recording(struct replay *r, struct sh_err *err)
         return sh_fail(err, SH_EFORMAT, "%s: its descriptor can't be read", r->options.path);
     replay_open_commands(r);
     replay_take_descriptor(r, &d);
-    if (front->len[1] != 0 &&
-        native_decode_emitter(front->bytes[1] + NATIVE_HEADER_LEN, front->len[1] - NATIVE_HEADER_LEN, &e) == SH_OK)
-        replay_take_emitter(r, &e);
+    const uint8_t *emitter = front->bytes[1] + NATIVE_HEADER_LEN;
+    const int has_emitter =
+        front->len[1] != 0 && native_decode_emitter(emitter, front->len[1] - NATIVE_HEADER_LEN, &e) == SH_OK;
+    if (has_emitter) replay_take_emitter(r, &e);
     if (front->len[2] != 0 &&
         native_decode_anchor(front->bytes[2] + NATIVE_HEADER_LEN, front->len[2] - NATIVE_HEADER_LEN, &a) == SH_OK)
         replay_take_anchor(r, &a);
+    if (r->is_device && (rc = read_clock(r, err)) != SH_OK) return rc;
+    rc = replay_check_links(r, &d, has_emitter ? &e : NULL, emitter, err);
+    if (rc != SH_OK) return rc;
     fill_config(r, &d);
+    if (r->is_device) take_firmware(r->cfg);
     snprintf(r->idn, sizeof r->idn, "%s", d.idn);
     r->cmd.idn = r->idn;
     return SH_OK;

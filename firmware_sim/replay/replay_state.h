@@ -22,6 +22,7 @@ struct replay {
     struct replay_options options;
     int64_t tick_ns;
     char idn[96];
+    int is_device; /* a link has another protocol than the native one */
     struct device_counters counters;
     struct fault_board *faults;
     struct fault_desk desk;
@@ -43,6 +44,10 @@ struct replay {
     } change[REPLAY_CHANGES];
     uint32_t n_changes;
     struct sh_err failure; /* code 0: none */
+    /* Time of day at device time 0 of the run, ns since 1970. The first time that it is played sets it so that frames
+     * have the time that they were recorded with; it then goes on. INT64_MIN: the recording has none. */
+    int64_t utc0_ns;
+    struct native_anchor anchor; /* the last one */
 
     /* of the player's thread; until that begins, of the thread that opens */
     uint64_t n_ticks,
@@ -54,6 +59,7 @@ struct replay {
     uint64_t start_tick; /* the tick at which it began, or at which counting began anew */
     int64_t base;        /* the tick of the recording at start_tick */
     int64_t last;        /* tick of the recording of the frame sent last */
+    int64_t shift_ns;    /* of the frames being sent: the run's device time less theirs */
     uint32_t seq_shift;  /* added to sequence numbers */
     int has_seq;         /* a frame was sent since power-up; last_seq is its number as it was sent */
     uint32_t last_seq;
@@ -75,6 +81,7 @@ void replay_take_anchor(struct replay *replay, const struct native_anchor *ancho
 void replay_open_commands(struct replay *replay);
 /* As struct loop_source_ops has them. */
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
+void replay_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 void replay_overlong(void *self, uint32_t session, struct command_result *out);
 void replay_session_opened(void *self, uint32_t session, const char *who);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
@@ -82,6 +89,16 @@ void replay_report(void *self, int number, const char *text);
 
 /* replay_notes.c: a frame goes out with a tick. With the lock held; counts into r->tick. */
 void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);
+
+/* replay_device.c: a recording as a device of another protocol than the native one. */
+/* Whether the protocols of all links can be the recorded head. e NULL: it has no emitter frame. beams: its payload. */
+int replay_check_links(struct replay *replay, const struct native_descriptor *d, const struct native_emitter *e,
+                       const uint8_t *beams, struct sh_err *err);
+/* As struct loop_source_ops has them. */
+int64_t replay_utc_ns(void *self, int64_t t_ns);
+int64_t replay_next_fix_ns(void *self, int64_t t_ns);
+int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
+enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns);
 
 /* replay_open.c: reads up to the first anchor, and fills in what links need. */
 int replay_open_recording(struct replay *replay, struct sh_err *err);

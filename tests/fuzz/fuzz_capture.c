@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* This fuzzes captures and recordings that are replayed: .pcapng by its reader, in pieces, and then as a recording,
- * frame by frame with its times. The input is a byte (how it is cut, which ending), then the file. The reader must give
+ * frame by frame with its times; captures also as what answers, whose client says again what its clients said. The input is a byte (how it is cut, which ending), then the file. The reader must give
  * the same packets in pieces as at once, and must refuse in one line. */
 #include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/pcapng.h"
+#include "drivers/protocol/protocol.h"
+#include "firmware_sim/replay/capture.h"
 #include "firmware_sim/replay/recording.h"
 #include "tests/fuzz/rig.h"
 #include "tests/fuzz/seal.h"
@@ -62,6 +64,69 @@ static void replay(const char *path)
     recording_close(&recording);
 }
 
+static int take_unit(void *ctx, const void *unit, size_t len)
+{
+    *(uint64_t *)ctx += len != 0 ? ((const uint8_t *)unit)[0] + ((const uint8_t *)unit)[len - 1] : 0u;
+    fuzz_must(len <= TALK_MAX_MESSAGE, "a unit is no longer than the protocol says");
+    return 0;
+}
+
+static void count(void *ctx, enum protocol_count what, uint64_t n)
+{
+    *(uint64_t *)ctx += (uint64_t)what + n;
+}
+
+static void end(void *ctx)
+{
+    ++*(uint64_t *)ctx;
+}
+
+static void tell(void *ctx, const char *text)
+{
+    *(uint64_t *)ctx += strlen(text);
+}
+
+static void say_again(const struct talk *talk, int loop)
+{
+    uint64_t sum = 0;
+    const struct talk_options options = {.unknown = TALK_ERROR, .loop = loop};
+    const struct protocol_spec spec = {
+        .host = {.ctx = &sum, .send = take_unit, .count = count, .hang_up = end, .tell_once = tell},
+        .talk = talk,
+        .talk_options = &options};
+    const struct protocol_ops *ops = protocol_ops_get(PROTOCOL_CAPTURE);
+    void *protocol;
+    struct sh_err err;
+    int64_t t_ns = 0;
+    if (ops->create(&spec, &protocol, &err) != SH_OK) return;
+    ops->open(protocol, 0);
+    for (uint32_t i = 0; i < talk->n_requests && i < 100; i++) {
+        const struct talk_request *r = &talk->request[i];
+        for (uint32_t at = 0; at < r->len; at += 64)
+            ops->input(protocol, talk->bytes + r->at + at, r->len - at < 64 ? r->len - at : 64);
+        ops->input(protocol, (const uint8_t *)"?\n", 2 * (i % 2));
+        ops->time(protocol, t_ns += 3000000);
+        sum += (uint64_t)ops->owes(protocol);
+    }
+    for (int i = 0; i < 100 && ops->next_ns(protocol) != INT64_MAX; i++)
+        ops->time(protocol, ops->next_ns(protocol));
+    ops->destroy(protocol);
+}
+
+static void answer(const char *path, int loop)
+{
+    struct replay_capture *capture;
+    struct sh_err err = {0};
+    capture_is(path);
+    if (capture_load(path, &capture, &err) != SH_OK) {
+        fuzz_must_be_line(&err);
+        return;
+    }
+    for (uint32_t i = 0; i < capture_n(capture); i++)
+        say_again(&capture_place(capture, i)->talk, loop);
+    capture_free(capture);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static uint8_t bytes[MAX_INPUT];
@@ -75,6 +140,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         fuzz_must(whole.packets == cut.packets && whole.bytes == cut.bytes && whole.rc == cut.rc,
                   "pieces change nothing");
     }
-    replay(fuzz_file((how & 2) == 0 ? ".pcapng" : ".shs", bytes, in.n));
+    const char *path = fuzz_file((how & 2) == 0 ? ".pcapng" : ".shs", bytes, in.n);
+    replay(path);
+    answer(path, how >> 7);
     return 0;
 }

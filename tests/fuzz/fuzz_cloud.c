@@ -51,6 +51,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         else
             fuzz_must_be_line(&err);
         cloud_free(&cloud);
+        if (cloud_read_positions(path, &fuzz_report, &cloud, &err) == SH_OK)
+            check_cloud(&cloud);
+        else
+            fuzz_must_be_line(&err);
+        cloud_free(&cloud);
     }
     struct viewed viewed;
     if (viewed_load(&viewed, path, &fuzz_report, &err) == SH_OK)

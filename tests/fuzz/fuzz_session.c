@@ -206,7 +206,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int64_t t_ns = 0;
     uint32_t line = 0;
     if (size > 8192) return 0;
-    open_session((enum protocol_id)(PROTOCOL_NMEA + which % (PROTOCOL_N - PROTOCOL_NMEA)), how);
+    open_session((enum protocol_id)(PROTOCOL_NMEA + which % (PROTOCOL_CAPTURE - PROTOCOL_NMEA)), how);
     if (rig.protocol == NULL) return 0;
     if ((which & 128) == 0 && rig.ops->frame != NULL) protocol_rig_describe(&rig, 0);
     for (int i = 0; i < MAX_RECORDS && in.n > 0 && !rig.hung_up; i++)

@@ -184,7 +184,8 @@ const struct bad bad[] = {
     {"output:", "loop:\n  tick_hz: 300\noutput:", 17, "loop.tick_hz", "a divisor of 1e9"},
     {"output:", "loop:\n  tick_hz: 312.5\noutput:", 17, "loop.tick_hz", "a divisor of 1e9"},
     {"output:", "loop:\n  tick_hz: 50\noutput:", 17, "loop.tick_hz", "from 100 to 10000"},
-    {"type: tcp", "type: pty", 15, "links[0].port", "a pty link has no such key; allowed type, path"},
+    {"type: tcp", "type: pty", 15, "links[0].port", "a pty link has no such key; allowed type, path, baud"},
+    {"type: tcp", "type: tcp\n    baud: 9600", 15, "links[0].baud", "a tcp link has no such key"},
     {"type: tcp", "type: null", 15, "links[0].port", "a null link has no such key"},
     {"port: 0", "path: /tmp/x", 15, "links[0].path", "a tcp link has no such key; allowed type, address, port"},
     /* the time and the receiver */

@@ -33,7 +33,7 @@ static void each_kind_has_its_name_and_place(void **state)
         places[fault_place_of((enum fault_kind)kind)]++;
     }
     assert_null(fault_names[FAULT_N_KINDS]);
-    assert_int_equal(places[FAULT_AT_FRAME], 16); /* as config/fault_rows.h has them */
+    assert_int_equal(places[FAULT_AT_FRAME], 17); /* as config/fault_rows.h has them */
     assert_int_equal(places[FAULT_AT_REPLY], 4);
     assert_int_equal(places[FAULT_AT_CONNECTION], 3);
 }

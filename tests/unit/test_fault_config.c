@@ -129,6 +129,8 @@ static void wrong_ones_are_refused_with_what_is_allowed(void **state)
         {"{kind: drop, of: points}", "faults[0].of: "},
         {"{kind: drop, link: 2}", "faults[0].link: there is no link 2; allowed 0 to 1"},
         {"{kind: drop, link: 9}", "faults[0].link: "},
+        {"{kind: cable}", "cable needs for_ms"},
+        {"{kind: unplug, for_ms: 1, reset: on}", "unplug has no such key; allowed for_ms"},
         {"{kind: drop, at: 3, every: 2}",
          "faults[0].at: is a single number; allowed only without from, until and every"},
         {"{kind: drop, at: 3, from: 2}", "faults[0].at: is a single number"},

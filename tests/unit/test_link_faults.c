@@ -48,7 +48,7 @@ static void test_table(void **state)
 {
     (void)state;
     const uint32_t ends = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE),
-                   unplug = LINK_FAULT_BIT(LINK_FAULT_UNPLUG);
+                   unplug = LINK_FAULT_BIT(LINK_FAULT_UNPLUG), cable = LINK_FAULT_BIT(LINK_FAULT_CABLE);
     const struct {
         enum link_type type;
         uint32_t faults;
@@ -56,9 +56,9 @@ static void test_table(void **state)
                 {LINK_FILE, 0},
                 {LINK_FD, 0},
                 {LINK_PTY, ends | unplug},
-                {LINK_TCP, ends | unplug},
-                {LINK_WEB, ends | unplug},
-                {LINK_UDP, unplug}};
+                {LINK_TCP, ends | unplug | cable},
+                {LINK_WEB, ends | unplug | cable},
+                {LINK_UDP, unplug | cable}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const struct link_spec spec = {.type = rows[i].type};
         assert_int_equal(link_faults(&spec), rows[i].faults);

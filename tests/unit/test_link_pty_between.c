@@ -12,11 +12,20 @@ static int visitor = -1;             /* a client's descriptor */
 static void (*when_unwatched)(void); /* called once, after the watch is taken away */
 static void (*between_looks)(void);  /* called once, after poll has looked at all descriptors but the last */
 
+static int comes_early; /* a client opens the terminal just before it is watched for the first time */
+
 static void call_once(void (**what)(void))
 {
     void (*now)(void) = *what;
     *what = NULL;
     if (now != NULL) now();
+}
+
+int inotify_add_watch(int fd, const char *path, uint32_t mask)
+{
+    if (comes_early) visitor = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    comes_early = 0;
+    return (int)syscall(SYS_inotify_add_watch, fd, path, mask);
 }
 
 int inotify_rm_watch(int fd, int watch)
@@ -126,12 +135,27 @@ static void test_came_unwatched_left_between_looks(void **state)
     bench_close(&bench);
 }
 
+/* The symlink is there before the watch: so may be a client that waits for it. */
+static void test_came_with_the_symlink(void **state)
+{
+    (void)state;
+    comes_early = 1;
+    bench = bench_open(&plain);
+    assert_int_equal(comes_early, 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    exchange(&bench, 0, visitor);
+    leave();
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_written_and_gone_unwatched),
         cmocka_unit_test(test_next_after_written_and_gone),
         cmocka_unit_test(test_came_unwatched_left_between_looks),
+        cmocka_unit_test(test_came_with_the_symlink),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,6 +67,7 @@ static const struct output {
     {COVERAGE, "--output", "--output=@o.ply", "o.ply"},
     {COVERAGE, "--output", "--output=@o.gltf", "o.bin"},
     {SOAK, "--json", "--json=@o", "o"},
+    {SOAK, "--junit", "--client=true --junit=@o", "o"},
     {SOAK, "--truth", "--truth=@o", "o"},
     {SOAK, "links[0].path", "--set=links[0].type=file --set=links[0].path=@o", "o"},
     {CHECK, "--scene-csv", "--scene-csv=@o", "o"},
@@ -120,6 +121,9 @@ static const struct {
      "path.csv", "o-11.poses.csv", "--output", "platform.file"},
     {"map @cloud.ply --perspective --output=@o.png", "cloud.ply", "o.png", "--output", "the operand"},
     {"map @c.yaml --perspective --cloud=@cloud.ply --output=@o.png", "cloud.ply", "o.png", "--output", "--cloud"},
+    {"soak @c.yaml --client=true --client-file=@path.csv --json=@o", "path.csv", "o", "--json", "--client-file"},
+    {"soak @c.yaml --client=true --client-folder=@ --scenario=@loss.yaml", "loss.yaml", "loss.log", "--client-folder",
+     "--scenario"},
     {"batch @c.yaml --output=@ --format=obj --set=scene.meshes[0].file=@0001_station-1.obj", "room.obj",
      "0001_station-1.obj", "--output", "an input"},
 };

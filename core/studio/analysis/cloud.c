@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* A cloud's memory, and which reader a file gets. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/studio/analysis/cloud_readers.h"
 #include "core/infile.h"
+#include "core/text.h"
 
 static int reserve_one(void *array, size_t n, size_t size)
 {
@@ -39,6 +41,32 @@ int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *er
     return SH_OK;
 }
 
+void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_report *report)
+{
+    const double worth_a_word_m = 1e-4;
+    double largest = 0;
+    for (size_t i = 0; i < cloud->n; i++)
+        for (int k = 0; k < 3; k++)
+            largest = fmax(largest, fabs(cloud->xyz_m[i][k]));
+    if (cloud->epsg == 4979) largest *= 111320.0; /* degrees */
+    cloud->count_m = fmax(cloud->count_m, largest * 1.2e-7);
+    if (largest * 6e-8 > worth_a_word_m)
+        sh_warn(report, "%s: stored in single precision, with errors up to %.2g m", path, largest * 6e-8);
+}
+
+bool cloud_is_position(const double p[3])
+{
+    const int n_nan = isnan(p[0]) + isnan(p[1]) + isnan(p[2]);
+    return n_nan == 3 || (isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]));
+}
+
+int cloud_check_position(const struct text *t, uint64_t line, const double p[3], struct sh_err *err)
+{
+    if (cloud_is_position(p)) return SH_OK;
+    return text_fail(t, line, SH_EINPUT, err,
+                     "(%.9g %.9g %.9g) is not a position; a shot without echo has nan three times", p[0], p[1], p[2]);
+}
+
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err)
 {
@@ -48,6 +76,17 @@ int cloud_read_columns(const char *path, unsigned columns, const struct sh_repor
                        "%s: not a PLY file and not a LAS file; allowed are point clouds of these two formats", path);
     int rc = infile_begins(path, "LASF") == 1 ? cloud_read_las(path, columns, report, out, err)
                                               : cloud_read_ply(path, columns, report, out, err);
+    if (rc != SH_OK) cloud_free(out);
+    return rc;
+}
+
+int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+{
+    if (infile_begins(path, "ply") == 1 || infile_begins(path, "LASF") == 1)
+        return cloud_read_columns(path, 0, report, out, err);
+    const int is_pcd = infile_begins(path, "# .PCD") == 1 || infile_begins(path, "VERSION") == 1;
+    *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
+    const int rc = is_pcd ? cloud_read_pcd(path, report, out, err) : cloud_read_text(path, report, out, err);
     if (rc != SH_OK) cloud_free(out);
     return rc;
 }

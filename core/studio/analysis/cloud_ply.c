@@ -65,8 +65,7 @@ static int keep_point(void *reading, struct sh_err *err)
     struct cloud *c = g->cloud;
     size_t i = (size_t)g->r.row;
     const double *p = &g->r.scalar[PLY_X];
-    int n_nan = isnan(p[0]) + isnan(p[1]) + isnan(p[2]);
-    if (n_nan != 3 && !(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]))) {
+    if (!cloud_is_position(p)) {
         char what[112];
         snprintf(what, sizeof what, "(%.9g %.9g %.9g) is not a position; a shot without echo has nan three times", p[0],
                  p[1], p[2]);
@@ -87,19 +86,6 @@ static int keep_point(void *reading, struct sh_err *err)
     if (c->label != NULL) c->label[i] = (uint16_t)label;
     if (c->echo != NULL) c->echo[i] = (uint8_t)echo;
     return keep_columns(g, i, err);
-}
-
-static void note_single(const struct reading *g)
-{
-    const double worth_a_word_m = 1e-4;
-    double largest = 0;
-    for (size_t i = 0; i < g->cloud->n; i++)
-        for (int k = 0; k < 3; k++)
-            largest = fmax(largest, fabs(g->cloud->xyz_m[i][k]));
-    if (g->cloud->epsg == 4979) largest *= 111320.0; /* degrees */
-    g->cloud->count_m = fmax(g->cloud->count_m, largest * 1.2e-7);
-    if (largest * 6e-8 > worth_a_word_m)
-        sh_warn(g->report, "%s: stored in single precision, with errors up to %.2g m", g->r.t.path, largest * 6e-8);
 }
 
 /* Colours count where they are whole bytes: as floats they mean something else in every program. */
@@ -149,8 +135,9 @@ static int read_body(struct reading *g, struct sh_err *err)
         has_points |= h->element[i].kind == PLY_VERTEX;
     if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "it has no element vertex, so no points");
     int rc = ply_walk(&g->r, &user, err);
-    if (h->format == PLY_ASCII) g->cloud->count_m = 1e-6;
-    if (rc == SH_OK && g->r.is_single) note_single(g);
+    g->cloud->is_text = h->format == PLY_ASCII;
+    if (g->cloud->is_text) g->cloud->count_m = 1e-6;
+    if (rc == SH_OK && g->r.is_single) cloud_note_single(g->cloud, g->r.t.path, g->report);
     return rc;
 }
 

@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/analysis: the readers that cloud_read_columns chooses from. In: the path of a PLY or LAS file. Out:
- * its points in the file's coordinates, with station, label and echo where the file has them. */
+/* Private to core/studio/analysis: the readers that cloud.c chooses from. In: the path of a PLY, LAS, PCD or text file.
+ * Out: its points in the file's coordinates, with station, label and echo where the file has them. */
 #ifndef CORE_STUDIO_ANALYSIS_CLOUD_READERS_H
 #define CORE_STUDIO_ANALYSIS_CLOUD_READERS_H
 
+#include <stdbool.h>
+
 #include "core/studio/cloud.h"
+
+struct text;
 
 /* Beside enum cloud_column. */
 enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
@@ -12,10 +16,19 @@ enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
 /* Arrays for n points: positions, and those named in `has`. */
 int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
 
+/* Sets count_m to what single precision rounds to. Warns where that is coarse. */
+void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_report *report);
+/* Whether these are three finite numbers, or three times NaN: a shot without echo. */
+bool cloud_is_position(const double p[3]);
+/* Fails with the place in the file where they are not. line 0: the file has no lines. */
+int cloud_check_position(const struct text *t, uint64_t line, const double p[3], struct sh_err *err);
+
 /* As cloud_read_columns; on failure the caller frees out. */
 int cloud_read_las(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                    struct sh_err *err);
 int cloud_read_ply(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                    struct sh_err *err);
+int cloud_read_pcd(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+int cloud_read_text(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 
 #endif

@@ -33,6 +33,8 @@ static int check_head(const struct run_options *o)
                          : o->clients > 0         ? "--clients"
                          : o->links[0] != '\0'    ? "--link"
                          : o->config != NULL      ? "--config"
+                         : o->unknown != NULL     ? "--unknown"
+                         : o->device_port != 0    ? "--device-port"
                                                   : NULL;
     if (option == NULL) return APP_GO_ON;
     return app_usage(&app_run, "%s is for a recording, but %s is a configuration; allowed with FILE.shs, FILE.pcapng",
@@ -104,8 +106,8 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     const struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
     int rc = o->view ? run_add_view(cfg, err) : SH_OK;
     if (rc == SH_OK && cfg->n_links == 0)
-        rc = sh_fail(err, SH_EINPUT, "%s: links: none; a replay needs at least one of pty, tcp, usb, web, file, null",
-                     cfg->file);
+        rc = sh_fail(err, SH_EINPUT,
+                     "%s: links: none; a replay needs at least one of pty, tcp, udp, usb, web, file, null", cfg->file);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
         rc = sh_fail(err, SH_EINPUT, "--speed: allowed only with the pace realtime");
     app_warn_settings_file(cfg, "the recording has the settings");

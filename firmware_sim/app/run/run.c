@@ -7,6 +7,7 @@
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/app/surfaces.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/replay/capture.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "firmware_sim/site/rate.h"
 
@@ -201,10 +202,13 @@ static int run_run(int argc, char **argv)
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
-    const int is_recording = app_is_recording(o.in.operand[0]);
+    const char *path = o.in.operand[0];
+    const int is_capture = app_ends_in(path, ".pcap") || (app_ends_in(path, ".pcapng") && capture_is(path));
+    const int is_recording = is_capture || app_is_recording(path);
     status = run_check_options(&o, is_recording);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
+    if (is_capture) return run_capture(&o);
     return is_recording ? run_replay(&o) : app_with_config(&o.in, run_head, &o);
 }
 
@@ -254,6 +258,11 @@ static const struct app_option OPTIONS[] = {
     {APP_CALL, "link", "LINK", .apply = run_take_link,
      .help = "serve a recording on this link: pty, tcp, usb, web, file or null; or keys as in a configuration, such "
              "as 'type: tcp, port: 5025'; may be repeated (default: pty and tcp)"},
+    {APP_TEXT, "unknown", "WORD", .at = AT(unknown),
+     .help = "what a capture does with a request that is not in it: silence (default), error (the protocol's own, of CoLa "
+             "and SCIP), close"},
+    {APP_WHOLE, "device-port", "N", .min = 1, .max = 65535, .at = AT(device_port),
+     .help = "serve only this port of the device in a capture; with UDP, the port that it sent to"},
     {APP_TEXT, "config", "CONFIG", .at = AT(config), .file = APP_READS,
      .help = "for a recording, use links, loop and faults of this configuration; its scene is not loaded"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "print only errors and warnings"},
@@ -271,7 +280,11 @@ static const char NOTES[] =
     "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, with\n"
     "their recorded timing, from the first one on each time that a client commands SCAN:STARt. With --start they\n"
     "are served at once, and the run ends with them. Queries are answered from the recording's descriptor;\n"
-    "settings can't change. Faults on the wire and of links apply.\n";
+    "settings can't change. Faults on the wire and of links apply.\n"
+    "\n"
+    "So may a capture of any device's traffic, FILE.pcap or FILE.pcapng of tcpdump, Wireshark or record --raw. Each\n"
+    "port of the device then has a link: a TCP port of this machine, or datagrams to the port that it sent to. A\n"
+    "client's requests are answered by what the device answered to the same bytes.\n";
 
 const struct app_command app_run = {
     .name = "run",

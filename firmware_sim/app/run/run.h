@@ -18,6 +18,8 @@ struct run_options {
     const char *surfaces; /* --surfaces */
     long ready_fd;
     int quiet, no_hash, frames_given, view;
+    const char *unknown; /* --unknown */
+    long device_port;    /* 0: not given */
 };
 
 /* serve.c: from the start of the loop to its end; writes the statistics. stats is filled in any case. */
@@ -34,5 +36,8 @@ int run_take_link(void *values, const char *text);
 int run_check_options(const struct run_options *o, int is_recording);
 /* Serves a recording. Returns the exit status. */
 int run_replay(struct run_options *o);
+
+/* capture.c: serves a capture of another device's traffic. Returns the exit status. */
+int run_capture(struct run_options *o);
 
 #endif

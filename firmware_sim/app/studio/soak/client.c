@@ -50,11 +50,13 @@ static const char *why_not(const struct link_place *place, const struct link_spe
     return NULL;
 }
 
-/* Its packets begin anew then, and those of the link beside it don't. */
+/* Its packets begin anew then, or are missing, and those of the link beside it are not. */
 static int begins_anew(const struct soak *soak)
 {
-    for (uint32_t i = 0; i < soak->faults.n; i++)
-        if (soak->faults.fault[i].kind == FAULT_POWER_CYCLE || soak->faults.fault[i].kind == FAULT_UNPLUG) return 1;
+    for (uint32_t i = 0; i < soak->faults.n; i++) {
+        const enum fault_kind kind = soak->faults.fault[i].kind;
+        if (kind == FAULT_POWER_CYCLE || kind == FAULT_UNPLUG || kind == FAULT_CABLE) return 1;
+    }
     return 0;
 }
 
@@ -71,8 +73,9 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
     link->datagrams = soak->datagrams[i];
     link->not_soaked = only != 0 && only != i + 1 ? "not asked for (--link)"
                        : link->datagrams == NULL  ? why_not(place, &soak->cfg->link[i])
-                       : begins_anew(soak) ? "its packets restart with power or plug, so they can not be compared"
-                                           : NULL;
+                       : begins_anew(soak)
+                           ? "its packets restart with power, plug or cable, so they can not be compared"
+                           : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
     link->fact = soak_ledger_open();

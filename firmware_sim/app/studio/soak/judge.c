@@ -97,7 +97,7 @@ static void judge_reorder(struct soak_link *link, const struct soak_fact *f)
 
 static void judge_late(struct soak_link *link, const struct soak_fact *f)
 {
-    static const enum fault_kind kinds[] = {FAULT_DELAY, FAULT_JITTER, FAULT_STALL};
+    static const enum fault_kind kinds[] = {FAULT_DELAY, FAULT_JITTER, FAULT_STALL, FAULT_CABLE};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         struct soak_row *row = &link->row[kinds[i]];
         const uint64_t n = f->times[kinds[i]];

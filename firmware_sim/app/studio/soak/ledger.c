@@ -72,6 +72,7 @@ static void take_kind(struct soak_fact *fact, const struct fault_note *note)
     case FAULT_DELAY:
     case FAULT_JITTER:
     case FAULT_STALL:
+    case FAULT_CABLE:
         if (note->for_ms > fact->for_ms) fact->for_ms = note->for_ms;
         break;
     default:
@@ -107,6 +108,12 @@ static int was_just_seen(struct soak_link *link, enum fault_kind kind)
     return 1;
 }
 
+/* A cable that is pulled without a reset only holds up a connection; a terminal or a USB device goes with it. */
+static int is_pause(const struct soak_link *link, const struct fault_note *note)
+{
+    return note->kind == FAULT_CABLE && note->text[0] == '\0' && strcmp(link->type, "tcp") == 0;
+}
+
 static void hit_frame(struct soak_link *link, const struct fault_note *note)
 {
     struct soak_row *row = &link->row[row_of(note)];
@@ -116,7 +123,7 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
                                                     : "the library clears the halt: the bytes are the same");
         return;
     }
-    if (note->kind >= FAULT_DISCONNECT) {
+    if (note->kind >= FAULT_DISCONNECT && !is_pause(link, note)) {
         if (was_just_seen(link, note->kind)) return;
         if (link->n_acts < SOAK_MAX_ACTS)
             link->act[link->n_acts++] = (struct soak_act){note->kind, note->t_ns};

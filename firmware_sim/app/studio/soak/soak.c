@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. */
+/* scanhead soak: the head with faults on request, and our own clients; at the end a sheet of what each noticed. With
+ * --client it runs somebody else's instead (verdicts.h). */
 #include "drivers/link/link.h"
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/client.h"
@@ -9,12 +10,14 @@
 #include "firmware_sim/app/studio/soak/ledger.h"
 #include "firmware_sim/app/studio/soak/sheet.h"
 #include "firmware_sim/app/studio/soak/usb.h"
+#include "firmware_sim/app/studio/soak/verdicts.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/loop/loop.h"
 
 #include <poll.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/soak/soak.h"
@@ -27,7 +30,8 @@ struct soak_options {
     struct device_options device;
     double duration_s;
     long link;
-    const char *json;
+    double match_mm;
+    struct verdicts verdicts;
     int quiet;
 };
 
@@ -153,7 +157,7 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
 {
     soak_conclude(soak);
     soak_print(soak, stdout);
-    const int rc = o->json != NULL ? app_write_json(o->json, soak_put, soak, err) : SH_OK;
+    const int rc = o->verdicts.json != NULL ? app_write_json(o->verdicts.json, soak_put, soak, err) : SH_OK;
     if (rc != SH_OK || soak->n_failures == 0) return rc;
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
@@ -229,12 +233,62 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
+static int take_scenario(void *values, const char *text)
+{
+    struct soak_options *o = values;
+    if (o->verdicts.n == VERDICTS_MAX_SCENARIOS)
+        return app_usage(&app_soak, "--scenario %s: at most %d are allowed", text, VERDICTS_MAX_SCENARIOS);
+    o->verdicts.scenario[o->verdicts.n++] = o->in.scenario = text;
+    return APP_OK;
+}
+
+static int take_allowed(void *values, const char *text)
+{
+    struct soak_options *o = values;
+    for (int check = 0; check < VERDICT_N_CHECKS; check++) {
+        if (strcmp(text, verdict_names[check]) != 0) continue;
+        o->verdicts.options.allowed |= 1U << check;
+        return APP_OK;
+    }
+    return app_usage(&app_soak, "--allow %s: there is no such check; allowed are those of --help", text);
+}
+
+/* Some options go only with a client, and --truth goes only with one scenario. */
+static int check_options(const struct soak_options *o)
+{
+    const struct verdicts *v = &o->verdicts;
+    const int is_theirs = v->options.command != NULL;
+    const int has_texts = v->options.file != NULL || v->options.folder != NULL || v->junit != NULL;
+    const int has_numbers = v->options.limit_s > 0.0 || v->options.grace_s > 0.0 || o->match_mm >= 0.0;
+    if (!is_theirs && (has_texts || has_numbers || v->options.allowed != 0))
+        return app_usage(&app_soak, "--client-file, --client-folder, --client-grace, --reconnect-limit, --match-mm, "
+                                    "--allow and --junit need --client");
+    if (!is_theirs && v->n > 1) return app_usage(&app_soak, "several --scenario need --client");
+    if (v->n > 1 && o->device.truth != NULL)
+        return app_usage(&app_soak, "--truth is one file, and %u scenarios are given; allowed is one", v->n);
+    return APP_GO_ON;
+}
+
+static int run_theirs(struct soak_options *o)
+{
+    struct verdict_options *v = &o->verdicts.options;
+    v->truth = o->device.truth;
+    v->duration_s = o->duration_s;
+    v->match_m = 1e-3 * o->match_mm;
+    if (v->limit_s <= 0.0) v->limit_s = 10.0;
+    if (v->grace_s <= 0.0) v->grace_s = 5.0;
+    v->link = o->link != 0 ? (uint32_t)o->link : 1;
+    return verdicts_run(&o->verdicts, &o->in);
+}
+
 static int soak_run_command(int argc, char **argv)
 {
-    struct soak_options o = {.duration_s = 30.0};
-    const int status = app_parse(&app_soak, argc, argv, &o.in, &o);
+    struct soak_options o = {.duration_s = 30.0, .match_mm = -1.0};
+    int status = app_parse(&app_soak, argc, argv, &o.in, &o);
+    if (status == APP_GO_ON) status = check_options(&o);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
+    if (o.verdicts.options.command != NULL) return run_theirs(&o);
     return app_with_config(&o.in, soak_head, &o);
 }
 
@@ -242,13 +296,33 @@ static int soak_run_command(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
-     .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults"},
+    {APP_CALL, "scenario", "FILE", .apply = take_scenario, .file = APP_READS,
+     .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults. With "
+             "--client it may be repeated: each is run in turn"},
     {APP_NUMBER, "duration", "S", .min = 0.1, .max = 1e8, .at = AT(duration_s),
      .help = "inject faults for S seconds from the first points on (default 30), in the pace fast of device time"},
     {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
-     .help = "connect a client only to this link of the configuration"},
-    {APP_TEXT, "json", "FILE", .at = AT(json), .file = APP_WRITES,
+     .help = "connect a client only to this link of the configuration; with --client: the link that it gets (default 1)"},
+    {APP_TEXT, "client", "COMMAND", .at = AT(verdicts.options.command),
+     .help = "run this by sh -c in place of our own clients, and judge it; {endpoint}, {host}, {port}, {path} and {out} "
+             "are filled in"},
+    {APP_TEXT, "client-file", "FILE", .at = AT(verdicts.options.file), .file = APP_READS,
+     .help = "compare the points that the client leaves in this file (PLY, LAS, PCD, or text) with those of the head; - "
+             "is its standard output"},
+    {APP_TEXT, "client-folder", "DIR", .at = AT(verdicts.options.folder),
+     .help = "put logs and {out} there (default: a new folder in TMPDIR)"},
+    {APP_NUMBER, "reconnect-limit", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.limit_s),
+     .help = "the client has to connect within S seconds, and after a disturbance again (default 10)"},
+    {APP_NUMBER, "client-grace", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.grace_s),
+     .help = "the client has to end within S seconds of SIGTERM (default 5)"},
+    {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
+     .help = "coordinates of points agree within MM and what the file rounds to (default 0.01; scip and cola 2, velodyne "
+             "20)"},
+    {APP_CALL, "allow", "CHECK", .apply = take_allowed, .choices = verdict_names, .n_choices = VERDICT_N_CHECKS,
+     .help = "a finding of this check does not count; may be repeated"},
+    {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,
+     .help = "write the verdict on the client as JUnit XML, too"},
+    {APP_TEXT, "json", "FILE", .at = AT(verdicts.json), .file = APP_WRITES,
      .help = "write the results as JSON, too; - is standard output"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
@@ -259,6 +333,7 @@ static const struct app_option OPTIONS[] = {
 };
 /* clang-format on */
 
+#define CHECK_LINE(id, name, asks) "  " name ": " asks "\n"
 static const char NOTES[] =
     "The results have a row for each link and kind of fault: how often it was injected, how often the client\n"
     "noticed it at its place, frames that the client lost by it, and frames that it accepted although they differ\n"
@@ -266,7 +341,10 @@ static const char NOTES[] =
     "\n"
     "Exit status 0: each fault that can be noticed was noticed; frames were lost only by faults; all frames that\n"
     "were wrongly accepted have flipped bits with a corrected checksum; the head is healthy. 1: one of these is\n"
-    "not so.\n";
+    "not so.\n"
+    "\n"
+    "With --client the results are checks of that client, by what the head sees of it. Exit status 0: there are no\n"
+    "findings; 1: there are. The checks, with what each asks for:\n" VERDICT_CHECKS(CHECK_LINE);
 
 const struct app_command app_soak = {
     .name = "soak",

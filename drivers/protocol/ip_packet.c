@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: MIT */
+#include "drivers/protocol/ip_packet.h"
+
+#include <string.h>
+
+#include "core/bytes.h"
+
+/* Link types, from https://www.tcpdump.org/linktypes.html */
+enum {
+    LINK_NULL_BSD = 0,
+    LINK_ETHERNET = 1,
+    LINK_RAW_BSD = 12,
+    LINK_RAW = 101,
+    LINK_LOOP = 108,
+    LINK_SLL = 113,
+    LINK_IPV4 = 228,
+    LINK_IPV6 = 229,
+    LINK_SLL2 = 276,
+};
+enum { TYPE_IPV4 = 0x0800, TYPE_IPV6 = 0x86dd, TYPE_VLAN = 0x8100, TYPE_QINQ = 0x88a8 };
+enum { PROTOCOL_HOP = 0, PROTOCOL_TCP = 6, PROTOCOL_UDP = 17, PROTOCOL_FRAGMENT = 44, PROTOCOL_OPTIONS = 60 };
+enum { IPV4_LEN = 20, IPV6_LEN = 40, UDP_LEN = 8, TCP_LEN = 20 };
+
+struct rest {
+    const uint8_t *p;
+    size_t len;     /* that the capture has */
+    size_t claimed; /* that the packet has, by its headers */
+};
+
+/* Bytes before the IP packet; -1: no IP. */
+static int skip_ethernet(const uint8_t *data, size_t len)
+{
+    size_t at = 12;
+    while (len >= at + 4 && (be_get16(data + at) == TYPE_VLAN || be_get16(data + at) == TYPE_QINQ))
+        at += 4;
+    if (len < at + 2) return -1;
+    const uint16_t type = be_get16(data + at);
+    return type == TYPE_IPV4 || type == TYPE_IPV6 ? (int)at + 2 : -1;
+}
+
+/* Bytes before the IP packet; -1: it has none; -2: another link type. */
+static int skip_link(uint16_t link, const uint8_t *data, size_t len)
+{
+    switch (link) {
+    case LINK_ETHERNET:
+        return skip_ethernet(data, len);
+    case LINK_NULL_BSD:
+    case LINK_LOOP:
+        return 4;
+    case LINK_SLL:
+        return 16;
+    case LINK_SLL2:
+        return 20;
+    case LINK_RAW_BSD:
+    case LINK_RAW:
+    case LINK_IPV4:
+    case LINK_IPV6:
+        return 0;
+    default:
+        return -2;
+    }
+}
+
+static enum ip_packet_found read_ipv4(struct rest *r, struct ip_packet *out, unsigned *protocol)
+{
+    if (r->len < IPV4_LEN) return IP_PACKET_DAMAGED;
+    const size_t head = 4 * (size_t)(r->p[0] & 15);
+    size_t total = be_get16(r->p + 2);
+    if (total == 0) total = r->len; /* left to the network card, which cuts it into segments */
+    if (head < IPV4_LEN || total < head || r->len < head) return IP_PACKET_DAMAGED;
+    if ((be_get16(r->p + 6) & 0x3fff) != 0) return IP_PACKET_FRAGMENT;
+    *protocol = r->p[9];
+    memcpy(out->from.address, r->p + 12, 4);
+    memcpy(out->to.address, r->p + 16, 4);
+    r->p += head;
+    r->len -= head;
+    r->claimed = total - head;
+    return IP_PACKET_FOUND;
+}
+
+static enum ip_packet_found read_ipv6(struct rest *r, struct ip_packet *out, unsigned *protocol)
+{
+    if (r->len < IPV6_LEN) return IP_PACKET_DAMAGED;
+    r->claimed = be_get16(r->p + 4);
+    if (r->claimed == 0) r->claimed = r->len - IPV6_LEN;
+    *protocol = r->p[6];
+    out->from.is_v6 = out->to.is_v6 = 1;
+    memcpy(out->from.address, r->p + 8, 16);
+    memcpy(out->to.address, r->p + 24, 16);
+    r->p += IPV6_LEN;
+    r->len -= IPV6_LEN;
+    while (*protocol == PROTOCOL_HOP || *protocol == PROTOCOL_OPTIONS) {
+        const size_t head = r->len >= 8 ? 8 * ((size_t)r->p[1] + 1) : SIZE_MAX;
+        if (head > r->len || head > r->claimed) return IP_PACKET_DAMAGED;
+        *protocol = r->p[0];
+        r->p += head;
+        r->len -= head;
+        r->claimed -= head;
+    }
+    return *protocol == PROTOCOL_FRAGMENT ? IP_PACKET_FRAGMENT : IP_PACKET_FOUND;
+}
+
+static enum ip_packet_found read_transport(const struct rest *r, struct ip_packet *out)
+{
+    size_t head = UDP_LEN, claimed = r->claimed;
+    if (r->len < (out->is_tcp ? (size_t)TCP_LEN : (size_t)UDP_LEN)) return IP_PACKET_DAMAGED;
+    out->from.port = be_get16(r->p);
+    out->to.port = be_get16(r->p + 2);
+    if (out->is_tcp) {
+        head = 4 * (size_t)(r->p[12] >> 4);
+        out->seq = be_get32(r->p + 4);
+        out->flags = r->p[13];
+        if (head < TCP_LEN) return IP_PACKET_DAMAGED;
+    } else {
+        const size_t said = be_get16(r->p + 4);
+        if (said != 0 && said < claimed) claimed = said; /* a jumbogram says 0 */
+    }
+    if (head > claimed || head > r->len) return IP_PACKET_DAMAGED;
+    const size_t have = (r->len < claimed ? r->len : claimed) - head;
+    out->data = r->p + head;
+    out->len = (uint32_t)have;
+    out->missing = (uint32_t)(claimed - head - have);
+    return IP_PACKET_FOUND;
+}
+
+enum ip_packet_found ip_packet_read(uint16_t link, const uint8_t *data, size_t len, struct ip_packet *out)
+{
+    unsigned protocol = 0;
+    memset(out, 0, sizeof *out);
+    const int skip = skip_link(link, data, len);
+    if (skip == -2) return IP_PACKET_LINK;
+    if (skip < 0) return IP_PACKET_OTHER;
+    if (len <= (size_t)skip) return IP_PACKET_DAMAGED;
+    struct rest r = {data + skip, len - (size_t)skip, 0};
+    const int version = r.p[0] >> 4;
+    if (version != 4 && version != 6) return IP_PACKET_OTHER;
+    const enum ip_packet_found found = (version == 4 ? read_ipv4 : read_ipv6)(&r, out, &protocol);
+    if (found != IP_PACKET_FOUND) return found;
+    if (protocol != PROTOCOL_TCP && protocol != PROTOCOL_UDP) return IP_PACKET_OTHER;
+    out->is_tcp = protocol == PROTOCOL_TCP;
+    return read_transport(&r, out);
+}

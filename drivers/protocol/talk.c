@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: MIT */
+/* The protocol `capture`: a device says again what it said in a capture (talk.h).
+ *
+ * A request that comes again gets the next run that the capture has for it, and the last one once there is no further
+ * one. A run begins with its request: its messages have the delays that they had. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/protocol.h"
+#include "drivers/protocol/talk.h"
+
+enum { MAX_PLAYED = 64, NO_REQUEST = -1, LEAST_SPAN_NS = 1000000 };
+
+/* A run that is being sent. */
+struct played {
+    const struct talk_run *run; /* NULL: the place is free */
+    int request;                /* that it answers; NO_REQUEST: it is the connection's */
+    uint32_t next;
+    int64_t t0_ns;
+};
+
+struct capture_session {
+    struct protocol_host host;
+    const struct talk *talk;
+    struct talk_options options;
+    int64_t now_ns;
+    int is_begun, is_over;
+    struct played played[MAX_PLAYED];
+    size_t len; /* of what the client sent, and was not taken */
+    uint8_t in[TALK_MAX_REQUEST];
+    uint32_t times[]; /* of each request, so far */
+};
+
+static int talk_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+{
+    const size_t n = spec->talk != NULL ? spec->talk->n_requests : 0;
+    struct capture_session *s = calloc(1, sizeof *s + n * sizeof s->times[0]);
+    if (s == NULL || spec->talk == NULL) {
+        free(s);
+        return sh_fail(err, SH_ENOMEM, "protocol capture: no memory, or no capture");
+    }
+    s->host = spec->host;
+    s->talk = spec->talk;
+    s->options = *spec->talk_options;
+    *protocol = s;
+    return SH_OK;
+}
+
+/* ---- runs */
+
+static const struct talk_message *message_of(const struct capture_session *s, const struct played *p)
+{
+    return &s->talk->message[p->run->first + p->next];
+}
+
+static int64_t due_ns(const struct capture_session *s, const struct played *p)
+{
+    return p->t0_ns + message_of(s, p)->after_ns;
+}
+
+static void talk_begin(struct capture_session *s, int run, int request)
+{
+    const struct talk_run *r = &s->talk->run[run];
+    if (r->n == 0) return;
+    for (int i = 0; i < MAX_PLAYED; i++) {
+        if (s->played[i].run != NULL) continue;
+        s->played[i] = (struct played){r, request, 0, s->now_ns};
+        return;
+    }
+    s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, r->n);
+}
+
+/* A stream that begins again goes on as evenly as it was: after its last message, its mean period passes. Messages that
+ * came all at once have no period, and are not repeated. */
+static void talk_advance(const struct capture_session *s, struct played *p)
+{
+    const struct talk_run *run = p->run;
+    if (++p->next < run->n) return;
+    const uint32_t from = run->loop_from;
+    const struct talk_message *m = &s->talk->message[run->first];
+    const int repeats = s->options.loop && from < run->n - 1;
+    const int64_t span_ns = repeats ? m[run->n - 1].after_ns - m[from].after_ns : 0;
+    if (span_ns < LEAST_SPAN_NS) {
+        p->run = NULL;
+        return;
+    }
+    p->next = from;
+    p->t0_ns += span_ns + span_ns / (run->n - 1 - from);
+}
+
+static void talk_send(const struct capture_session *s, const struct talk_message *m)
+{
+    for (uint32_t at = 0, n; at < m->len; at += n) {
+        n = m->len - at < TALK_MAX_MESSAGE ? m->len - at : TALK_MAX_MESSAGE;
+        s->host.send(s->host.ctx, s->talk->bytes + m->at + at, n);
+    }
+}
+
+/* Sends what is due, in the order of time. The rest goes out with the next tick where it is very much. */
+static void send_due(struct capture_session *s)
+{
+    enum { MOST_AT_ONCE = 10000 };
+    for (int i = 0; i < MOST_AT_ONCE; i++) {
+        struct played *first = NULL;
+        for (int k = 0; k < MAX_PLAYED; k++) {
+            struct played *p = &s->played[k];
+            if (p->run != NULL && (first == NULL || due_ns(s, p) < due_ns(s, first))) first = p;
+        }
+        if (first == NULL || due_ns(s, first) > s->now_ns) return;
+        talk_send(s, message_of(s, first));
+        talk_advance(s, first);
+    }
+}
+
+/* ---- requests */
+
+static void stop_others(struct capture_session *s, const uint8_t *request, size_t len)
+{
+    const struct talk_kind *kind = s->talk->kind;
+    for (int i = 0; i < MAX_PLAYED; i++) {
+        struct played *p = &s->played[i];
+        if (p->run == NULL) continue;
+        const struct talk_request *began = p->request >= 0 ? &s->talk->request[p->request] : NULL;
+        const int stops =
+            kind->stops == NULL || (began != NULL && kind->stops(request, len, s->talk->bytes + began->at, began->len));
+        if (stops) p->run = NULL;
+    }
+}
+
+static int talk_find(const struct talk *t, const uint8_t *bytes, size_t len)
+{
+    for (uint32_t i = 0; i < t->n_requests; i++)
+        if (t->request[i].len == len && memcmp(t->bytes + t->request[i].at, bytes, len) == 0) return (int)i;
+    return NO_REQUEST;
+}
+
+static void take_known(struct capture_session *s, int request)
+{
+    const struct talk_request *r = &s->talk->request[request];
+    const uint32_t k = s->times[request] < r->n_runs - 1 ? s->times[request]++ : r->n_runs - 1;
+    stop_others(s, s->talk->bytes + r->at, r->len);
+    talk_begin(s, (int)(r->first_run + k), request);
+}
+
+static void take_unknown(struct capture_session *s, const uint8_t *bytes, size_t len)
+{
+    const struct talk_kind *kind = s->talk->kind;
+    uint8_t error[64];
+    char name[TALK_NAME_LEN], text[120];
+    talk_name(kind, bytes, len, name);
+    snprintf(text, sizeof text, "the capture has no such request: %s", name);
+    s->host.count(s->host.ctx, PROTOCOL_WRONG, 1);
+    if (s->host.tell_once != NULL) s->host.tell_once(s->host.ctx, text);
+    if (kind->stops != NULL) stop_others(s, bytes, len);
+    if (s->options.unknown == TALK_CLOSE) {
+        s->is_over = 1;
+        s->host.hang_up(s->host.ctx);
+    }
+    if (s->options.unknown == TALK_ERROR && kind->error != NULL)
+        s->host.send(s->host.ctx, error, kind->error(bytes, len, error));
+}
+
+/* Protocols without messages of their own: finds the longest request that the bytes begin with. Returns its length; 0
+ * where they may be the beginning of one. Bytes that begin none are one unknown request. */
+static size_t match_beginning(const struct capture_session *s)
+{
+    const struct talk *t = s->talk;
+    size_t best = 0;
+    int may_come = 0;
+    for (uint32_t i = 0; i < t->n_requests; i++) {
+        const size_t n = t->request[i].len, common = n < s->len ? n : s->len;
+        if (memcmp(t->bytes + t->request[i].at, s->in, common) != 0) continue;
+        if (n > s->len) may_come = 1;
+        if (n <= s->len && n > best) best = n;
+    }
+    return best != 0 ? best : may_come ? 0 : s->len;
+}
+
+static void take_requests(struct capture_session *s)
+{
+    while (s->len != 0 && !s->is_over) {
+        const size_t n =
+            s->talk->kind->request_len != NULL ? s->talk->kind->request_len(s->in, s->len) : match_beginning(s);
+        if (n == 0) break;
+        const int request = talk_find(s->talk, s->in, n);
+        if (request >= 0)
+            take_known(s, request);
+        else
+            take_unknown(s, s->in, n);
+        s->len -= n;
+        memmove(s->in, s->in + n, s->len);
+    }
+    if (s->is_over) s->len = 0;
+}
+
+/* ---- the protocol */
+
+static void open_at(void *protocol, int64_t t_ns)
+{
+    struct capture_session *s = protocol;
+    s->now_ns = t_ns;
+    if (s->is_begun) return;
+    s->is_begun = 1;
+    if (s->talk->connection_run != TALK_NO_RUN) talk_begin(s, s->talk->connection_run, NO_REQUEST);
+}
+
+/* Requests are taken with the next tick: all the pieces of one that came together are there by then. */
+static void input(void *protocol, const uint8_t *bytes, size_t len)
+{
+    struct capture_session *s = protocol;
+    if (s->len + len > sizeof s->in) {
+        s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->len);
+        s->len = 0;
+    }
+    memcpy(s->in + s->len, bytes, len);
+    s->len += len;
+}
+
+static void talk_time(void *protocol, int64_t t_ns)
+{
+    struct capture_session *s = protocol;
+    s->now_ns = t_ns;
+    take_requests(s);
+    if (!s->is_over) send_due(s);
+}
+
+static int64_t talk_next_ns(const void *protocol)
+{
+    const struct capture_session *s = protocol;
+    int64_t next_ns = s->len != 0 ? s->now_ns : INT64_MAX;
+    for (int i = 0; i < MAX_PLAYED; i++)
+        if (s->played[i].run != NULL && due_ns(s, &s->played[i]) < next_ns) next_ns = due_ns(s, &s->played[i]);
+    return next_ns;
+}
+
+static int owes(const void *protocol)
+{
+    const struct capture_session *s = protocol;
+    return !s->is_over && talk_next_ns(s) != INT64_MAX;
+}
+
+const struct protocol_ops protocol_capture = {
+    .name = "capture",
+    .emitters = 1u << 31, /* no head's */
+    .max_unit = TALK_MAX_MESSAGE,
+    .create = talk_create,
+    .destroy = free,
+    .open = open_at,
+    .time = talk_time,
+    .input = input,
+    .owes = owes,
+    .next_ns = talk_next_ns,
+};

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+#include "drivers/socket/silence.h"
+
+#include <linux/sockios.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <stddef.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
+#include "core/err.h"
+
+/* A peer confirms after 40 ms at most, if it reads. After 200 ms (TCP_RTO_MIN) the system begins to repeat. */
+enum { CONFIRM_MS = 200, MOST_HOPS = 255 };
+
+/* A socket of IPv6 may have a peer of IPv4, so both are set. */
+static int take_from(int fd, int least_ttl)
+{
+    const int by_v4 = setsockopt(fd, IPPROTO_IP, IP_MINTTL, &least_ttl, sizeof least_ttl);
+    const int by_v6 = setsockopt(fd, IPPROTO_IPV6, IPV6_MINHOPCOUNT, &least_ttl, sizeof least_ttl);
+    return by_v4 == 0 || by_v6 == 0 ? SH_OK : SH_ESTATE;
+}
+
+static int is_any_unconfirmed(const int *fds, int n)
+{
+    for (int i = 0; i < n; i++) {
+        int bytes = 0;
+        if (fds[i] >= 0 && ioctl(fds[i], SIOCOUTQ, &bytes) == 0 && bytes > 0) return 1;
+    }
+    return 0;
+}
+
+int sockets_silence(const int *fds, int n)
+{
+    const int off = 0;
+    for (int ms = 0; ms < CONFIRM_MS && is_any_unconfirmed(fds, n); ms++)
+        poll(NULL, 0, 1);
+    for (int i = 0; i < n; i++) {
+        if (fds[i] < 0) continue;
+        if (take_from(fds[i], MOST_HOPS) != SH_OK) {
+            sockets_speak(fds, i);
+            return SH_ESTATE;
+        }
+        setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &off, sizeof off);
+    }
+    return SH_OK;
+}
+
+void sockets_speak(const int *fds, int n)
+{
+    const int on = 1;
+    for (int i = 0; i < n; i++) {
+        if (fds[i] < 0) continue;
+        take_from(fds[i], 0);
+        setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+    }
+}

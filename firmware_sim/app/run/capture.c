@@ -1,0 +1,231 @@
+/* SPDX-License-Identifier: MIT */
+/* scanhead run FILE.pcap: serves a capture of a device's traffic. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/run/run.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/replay/capture.h"
+
+struct capture_run {
+    struct run_options *o;
+    struct replay_capture *capture;
+    const struct talk *talk[CONFIG_MAX_LINKS];
+    uint64_t taken; /* bit per place that a link serves */
+};
+
+/* ---- links */
+
+static int is_wanted(const struct run_options *o, const struct capture_place *place)
+{
+    return o->device_port == 0 || o->device_port == place->port;
+}
+
+/* A link for each port of the capture, in YAML. TCP ports are the system's choice, as that of the device may need a right. */
+static void default_links(const struct capture_run *run, char *text, size_t cap)
+{
+    size_t n = 0;
+    int n_links = 0;
+    for (uint32_t i = 0; i < capture_n(run->capture) && n_links < CONFIG_MAX_LINKS && n < cap; i++) {
+        const struct capture_place *place = capture_place(run->capture, i);
+        if (!is_wanted(run->o, place)) continue;
+        n += (size_t)snprintf(text + n, cap - n, "- {type: %s, port: %d, protocol: capture}\n",
+                              place->is_tcp ? "tcp" : "udp", place->is_tcp ? 0 : place->port);
+        n_links++;
+    }
+}
+
+/* Links of --link speak `capture`, unless they say otherwise. */
+static void given_links(const char *given, char *text, size_t cap)
+{
+    size_t n = 0;
+    while (*given != '\0' && n < cap) {
+        const size_t len = strcspn(given, "\n");
+        const int says = memmem(given, len, "protocol:", 9) != NULL;
+        n += (size_t)snprintf(text + n, cap - n, "%.*s%s\n", (int)len - 1, given, says ? "}" : ", protocol: capture}");
+        given += len + (given[len] == '\n');
+    }
+}
+
+/* "tcp 2112 (CoLa), udp 2368" */
+static void name_places(const struct capture_run *run, char *text, size_t cap)
+{
+    size_t n = 0;
+    text[0] = '\0';
+    for (uint32_t i = 0; i < capture_n(run->capture) && n < cap; i++) {
+        const struct capture_place *p = capture_place(run->capture, i);
+        n += (size_t)snprintf(text + n, cap - n, "%s%s %d of %s", i > 0 ? ", " : "", p->is_tcp ? "tcp" : "udp", p->port,
+                              p->device);
+    }
+}
+
+/* The place that a link serves: one with its port, else the first one that no link has. */
+static const struct capture_place *place_for(const struct capture_run *run, const struct link_spec *spec)
+{
+    const struct capture_place *found = NULL;
+    for (uint32_t i = 0; i < capture_n(run->capture); i++) {
+        const struct capture_place *place = capture_place(run->capture, i);
+        const int fits = place->is_tcp == (spec->type != LINK_UDP) && is_wanted(run->o, place);
+        if (!fits || (run->taken & UINT64_C(1) << i) != 0) continue;
+        if (place->port == spec->port) return place;
+        if (found == NULL) found = place;
+    }
+    return found;
+}
+
+static int join_links(struct capture_run *run, struct config *cfg, struct sh_err *err)
+{
+    char places[400];
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        struct link_spec *spec = &cfg->link[i];
+        const struct capture_place *place = place_for(run, spec);
+        if (spec->protocol != PROTOCOL_CAPTURE)
+            return sh_fail(err, SH_EINPUT, "%s: links[%u].protocol: %s is a capture; allowed is only capture",
+                           cfg->file, i, run->o->in.operand[0]);
+        name_places(run, places, sizeof places);
+        if (place == NULL)
+            return sh_fail(err, SH_EINPUT, "%s: links[%u]: no port of %s is left for it%s; it has %s", cfg->file, i,
+                           run->o->in.operand[0], run->o->device_port != 0 ? " with --device-port" : "", places);
+        run->taken |= UINT64_C(1) << (place - capture_place(run->capture, 0));
+        run->talk[i] = &place->talk;
+        if (spec->type != LINK_UDP || spec->source_port != 0) continue;
+        spec->source_port = place->source_port;
+        spec->usual_port = 1;
+    }
+    return SH_OK;
+}
+
+/* ---- messages */
+
+static void say_what_runs(const struct capture_run *run, const struct loop *loop)
+{
+    fprintf(stderr, "%s: answers from %s\n", app_program, run->o->in.operand[0]);
+    for (uint32_t i = 0; i < capture_n(run->capture); i++) {
+        const struct capture_place *p = capture_place(run->capture, i);
+        fprintf(stderr, "%s: %s port %d of %s: %s, %u different requests, %u messages\n", app_program,
+                p->is_tcp ? "tcp" : "udp", p->port, p->device, p->is_tcp ? p->talk.kind->name : "datagrams",
+                p->talk.n_requests, p->n_messages);
+    }
+    run_say_links(loop);
+}
+
+static void warn_of_capture(const struct capture_run *run)
+{
+    const char *file = run->o->in.operand[0];
+    struct capture_counts c;
+    for (uint32_t i = 0; i < capture_n(run->capture); i++) {
+        const struct capture_place *p = capture_place(run->capture, i);
+        if (is_wanted(run->o, p) && (run->taken & UINT64_C(1) << i) == 0)
+            sh_warn(&app_report_stderr, "%s: %s port %d of %s is not served: no link is left for it", file,
+                    p->is_tcp ? "tcp" : "udp", p->port, p->device);
+    }
+    capture_get_counts(run->capture, &c);
+    if (c.missing_bytes != 0)
+        sh_warn(&app_report_stderr, "%s: %llu bytes are missing in it; what follows them may be wrong", file,
+                (unsigned long long)c.missing_bytes);
+    if (c.fragments + c.damaged != 0)
+        sh_warn(&app_report_stderr, "%s: left out %llu fragments of datagrams, and %llu packets with damaged headers",
+                file, (unsigned long long)c.fragments, (unsigned long long)c.damaged);
+}
+
+/* ---- the run */
+
+static int serve(struct config *cfg, void *ctx, struct sh_err *err)
+{
+    struct capture_run *run = ctx;
+    struct run_options *o = run->o;
+    struct replay *replay = NULL;
+    struct loop *loop = NULL;
+    struct loop_stats stats;
+    const struct loop_options options = {.report = &app_report_stderr};
+    int rc = join_links(run, cfg, err);
+    if (rc == SH_OK && cfg->loop.pace != PACE_REALTIME)
+        rc = sh_fail(err, SH_EINPUT, "loop.pace: a capture has only times of its own; allowed is realtime");
+    const struct replay_options replayed = {
+        .path = o->in.operand[0],
+        .speed = 1.0,
+        .talk = run->talk,
+        .talk_options = run->o->replay.talk_options,
+        /* one second more, so that the last of it gets out */
+        .duration_s = o->device.duration_s > 0.0 ? o->device.duration_s
+                      : o->device.start          ? capture_duration_s(run->capture) + 1.0
+                                                 : 0.0,
+        .truth = o->device.truth,
+        .report = &app_report_stderr,
+    };
+    if (rc == SH_OK) rc = replay_open(cfg, &replayed, &replay, err);
+    const struct loop_source source = {&replay_source, replay};
+    if (rc == SH_OK) rc = loop_create_of(cfg, &source, &options, &loop, err);
+    if (rc == SH_OK) {
+        if (!o->quiet) say_what_runs(run, loop);
+        warn_of_capture(run);
+        rc = run_serve(o, loop, &stats, err);
+        run_warn_losses(&stats.counters);
+    }
+    if (rc == SH_OK) rc = loop_check_links(loop, err);
+    loop_free(loop);
+    replay_free(replay);
+    return rc;
+}
+
+static int check_options(struct run_options *o)
+{
+    static const char *const words[] = {[TALK_SILENCE] = "silence", [TALK_ERROR] = "error", [TALK_CLOSE] = "close"};
+    const char *option = o->replay.speed > 0.0    ? "--speed"
+                         : o->replay.from_s > 0.0 ? "--from"
+                         : o->replay.to_s > 0.0   ? "--to"
+                         : o->clients > 0         ? "--clients"
+                         : o->view                ? "--view"
+                         : o->config != NULL      ? "--config"
+                                                  : NULL;
+    if (option != NULL)
+        return app_usage(&app_run, "%s is for recordings of a head, but %s is a capture of packets; not allowed here",
+                         option, o->in.operand[0]);
+    o->replay.talk_options.loop = o->replay.loop;
+    if (o->unknown == NULL) return APP_GO_ON;
+    for (int i = 0; i <= TALK_CLOSE; i++)
+        if (strcmp(o->unknown, words[i]) == 0) {
+            o->replay.talk_options.unknown = (enum talk_unknown)i;
+            return APP_GO_ON;
+        }
+    return app_usage(&app_run, "--unknown '%.40s': allowed are silence, error, close", o->unknown);
+}
+
+/* The links of --link, or one for each port. */
+static int with_links(struct capture_run *run, struct sh_err *err)
+{
+    struct run_options *o = run->o;
+    char links[sizeof o->links + 1024], text[sizeof links + 16];
+    struct config_faults faults;
+    struct config *cfg = calloc(1, sizeof *cfg);
+    if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory"), app_fail(err);
+    links[0] = '\0';
+    if (o->links[0] != '\0')
+        given_links(o->links, links, sizeof links);
+    else
+        default_links(run, links, sizeof links);
+    snprintf(text, sizeof text, "links:%s%s", links[0] != '\0' ? "\n" : " []", links);
+    if (config_load_links(text, "--link", o->in.sets.set, o->in.sets.n, cfg, &faults) != SH_OK ||
+        (o->in.scenario != NULL && config_add_scenario(cfg, o->in.scenario, &faults) != SH_OK)) {
+        free(cfg);
+        return app_fail_config(&faults);
+    }
+    int rc = app_check_files(&o->in, cfg, err);
+    if (rc == SH_OK) rc = serve(cfg, run, err);
+    free(cfg);
+    return rc == SH_OK ? APP_OK : app_fail(err);
+}
+
+int run_capture(struct run_options *o)
+{
+    struct capture_run run = {.o = o};
+    struct sh_err err = {0};
+    int status = check_options(o);
+    if (status != APP_GO_ON) return status;
+    if (capture_load(o->in.operand[0], &run.capture, &err) != SH_OK) return app_fail(&err);
+    status = with_links(&run, &err);
+    capture_free(run.capture);
+    return status;
+}

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+/* soak --client: a verdict on a client for each scenario, one after the other. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_VERDICTS_H
+#define FIRMWARE_SIM_APP_STUDIO_SOAK_VERDICTS_H
+
+#include "firmware_sim/app/options.h"
+#include "firmware_sim/app/studio/verdict/verdict.h"
+
+enum { VERDICTS_MAX_SCENARIOS = 16 };
+
+struct verdicts {
+    struct verdict_options options;
+    const char *scenario[VERDICTS_MAX_SCENARIOS]; /* as the command line has them */
+    uint32_t n;                                   /* 0: one run, with the faults of the configuration alone */
+    const char *json, *junit;                     /* NULL: none */
+};
+
+/* Prints the sheets. Returns the exit status: APP_FAILED where there are findings. */
+int verdicts_run(struct verdicts *verdicts, struct app_input *in);
+
+#endif

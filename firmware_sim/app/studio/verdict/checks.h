@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* The checks of a verdict, from what was seen. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_CHECKS_H
+#define FIRMWARE_SIM_APP_STUDIO_VERDICT_CHECKS_H
+
+#include "firmware_sim/app/studio/verdict/client.h"
+#include "firmware_sim/app/studio/verdict/match.h"
+#include "firmware_sim/app/studio/verdict/verdict.h"
+#include "firmware_sim/app/studio/verdict/watch.h"
+
+struct checks {
+    const struct verdict_options *options;
+    struct watch *watch;
+    const struct client *client;
+    int has_sessions;           /* clients of the link connect to it; 0: it sends to whoever is there */
+    int is_open;                /* it has a session at the end, before the client was ended */
+    int scans, holds;           /* points came to the end; the client keeps a dead connection */
+    int64_t start_ns, ended_ns; /* of the client, and when its end was asked for */
+    int was_there;              /* it had not ended by itself until then */
+};
+
+void checks_judge(const struct checks *checks, struct verdict *verdict);
+/* Why its points were not compared; or the figures, with `unknown` as the first unknown point. */
+void checks_no_points(struct verdict *verdict, enum verdict_state state, const char *why);
+void checks_points(struct verdict *verdict, const struct match *match, const double unknown[3]);
+
+#endif

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: MIT */
+/* The client's process. In: a command for sh -c. Out: whether it runs, and how it ended. It and all that it starts are one
+ * process group. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
+#define FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
+
+#include <stdint.h>
+#include <sys/types.h>
+
+#include "core/err.h"
+
+struct client_words {
+    const char *endpoint; /* tcp:127.0.0.1:40123 or tty:/dev/pts/3 */
+    const char *out;      /* a file for points */
+};
+
+/* Puts the values in place of {endpoint}, {host}, {port}, {path} and {out}; other braces stay. Returns what free() takes;
+ * NULL: no memory. */
+char *client_fill(const char *text, const struct client_words *words);
+
+struct client {
+    int in_fd; /* its standard input, which stays open and has nothing: some clients end with it, or at a key */
+    pid_t pid; /* of the shell, and of the group; 0: none was started */
+    int64_t started_ns, ended_ns; /* ended_ns 0: some process of the group is there */
+    int status;                   /* the shell's, as waitpid has it */
+    int had_to_be_killed;
+};
+
+/* out: the file for standard output; NULL: it goes into the log, as standard error does. Both are emptied. */
+int client_start(struct client *client, const char *line, const char *log, const char *out, struct sh_err *err);
+/* 1: the whole group has ended. */
+int client_has_ended(struct client *client);
+/* SIGTERM, after grace_s SIGKILL. Due after each start. */
+void client_end(struct client *client, double grace_s);
+
+#endif

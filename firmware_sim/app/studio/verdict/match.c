@@ -1,0 +1,229 @@
+/* SPDX-License-Identifier: MIT */
+/* Which points of a client's the head had, and how often.
+ *
+ * A point of the client's may agree with several of the head's. These are then one group, and counts are compared by group.
+ * A client that has each point that it was sent once can't have more points in a group than were sent: each of its points
+ * agrees with the one that it comes from, so both are in the same group. So dense points give no false finding. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/studio/verdict/match.h"
+#include "firmware_sim/app/studio/verdict/match_index.h"
+
+enum { TRIED_POINTS = 2000, MAX_WAYS = 4 };
+
+/* ---- coordinate frames */
+
+/* Takes a point of the client's to the stream's frame. */
+struct way {
+    const char *frame;
+    int is_forward;        /* x forward, y left first becomes x right, y forward */
+    double turn[9], at[3]; /* then this rotation, row by row, and this place */
+};
+
+static const double UNTURNED[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+static void match_go(const struct way *way, const double from[3], double to[3])
+{
+    const double p[3] = {way->is_forward ? -from[1] : from[0], way->is_forward ? from[0] : from[1], from[2]};
+    for (int k = 0; k < 3; k++)
+        to[k] = way->turn[3 * k] * p[0] + way->turn[3 * k + 1] * p[1] + way->turn[3 * k + 2] * p[2] + way->at[k];
+}
+
+static struct way *add_way(struct way ways[MAX_WAYS], int *n, const char *frame, int is_forward)
+{
+    struct way *way = &ways[(*n)++];
+    *way = (struct way){.frame = frame, .is_forward = is_forward};
+    memcpy(way->turn, UNTURNED, sizeof way->turn);
+    return way;
+}
+
+/* The stream's own frame is one. A head that stands, in a scene without a CRS, adds its own, and that with x forward. */
+static int find_ways(const struct own_stream *stream, struct way ways[MAX_WAYS])
+{
+    const struct scanhead_info *info = &stream->info;
+    const int stands = !info->moving && !stream->is_moved;
+    int n = 0;
+    if (info->geo) {
+        add_way(ways, &n, info->crs == 0 ? "scene" : "the stream's CRS", 0);
+        for (int forward = 0; forward < 2 && info->crs == 0 && stands; forward++) {
+            struct way *way = add_way(ways, &n, forward ? "head, x forward" : "head", forward);
+            memcpy(way->turn, info->rotation, sizeof way->turn);
+            memcpy(way->at, info->station_m, sizeof way->at);
+        }
+        return n;
+    }
+    if (info->moving) {
+        add_way(ways, &n, "scene", 0);
+        return n;
+    }
+    add_way(ways, &n, "head", 0);
+    add_way(ways, &n, "head, x forward", 1);
+    if (!stands) return n;
+    struct way *way = add_way(ways, &n, "scene", 0); /* the inverse of head to scene */
+    for (int row = 0; row < 3; row++) {
+        for (int k = 0; k < 3; k++)
+            way->turn[3 * row + k] = info->rotation[3 * k + row];
+        for (int k = 0; k < 3; k++)
+            way->at[row] -= way->turn[3 * row + k] * info->station_m[k];
+    }
+    return n;
+}
+
+static int is_empty(const double p[3])
+{
+    return isnan(p[0]) || (fabs(p[0]) + fabs(p[1]) + fabs(p[2]) <= 0.0);
+}
+
+/* The way by which most points agree, of some from all over the cloud. */
+static const struct way *best_way(const struct match_index *index, const struct cloud *cloud, const struct way *ways,
+                                  int n_ways)
+{
+    const size_t step = cloud->n / TRIED_POINTS + 1;
+    const struct way *best = ways;
+    size_t most = 0;
+    for (int k = 0; k < n_ways; k++) {
+        size_t n = 0;
+        for (size_t i = 0; i < cloud->n; i += step) {
+            double p[3];
+            if (is_empty(cloud->xyz_m[i])) continue;
+            match_go(&ways[k], cloud->xyz_m[i], p);
+            n += match_index_near(index, p, NULL, NULL) != 0;
+        }
+        if (n <= most) continue;
+        most = n;
+        best = &ways[k];
+    }
+    return best;
+}
+
+/* ---- what was sent */
+
+static int compare_spoiled(const void *left, const void *right)
+{
+    const struct watch_spoiled *a = left, *b = right;
+    if (a->session != b->session) return a->session < b->session ? -1 : 1;
+    return a->seq != b->seq ? (a->seq < b->seq ? -1 : 1) : 0;
+}
+
+/* How many sessions were sent the frame. At their ends they have the benefit of the doubt, of two ticks. */
+static uint32_t count_sent(const struct watch *watch, int64_t tick_ns, const struct own_frame *frame)
+{
+    uint32_t n = 0;
+    for (size_t i = 0; i < watch->n_span; i++) {
+        const struct watch_span *span = &watch->span[i];
+        const struct watch_spoiled key = {span->session, frame->seq};
+        if (frame->t_ns < span->from_ns - 2 * tick_ns || frame->t_ns / 2 > span->to_ns / 2 + tick_ns) continue;
+        n += watch->n_spoiled == 0 ||
+             bsearch(&key, watch->spoiled, watch->n_spoiled, sizeof key, compare_spoiled) == NULL;
+    }
+    return n;
+}
+
+static int index_stream(const struct own_stream *stream, struct watch *watch, int64_t tick_ns,
+                        struct match_index *index, struct sh_err *err)
+{
+    size_t n = 0;
+    index->entry = malloc((stream->n + 1) * sizeof *index->entry);
+    if (index->entry == NULL) return sh_fail(err, SH_ENOMEM, "no memory to compare %zu points", stream->n);
+    if (watch->n_spoiled != 0) qsort(watch->spoiled, watch->n_spoiled, sizeof *watch->spoiled, compare_spoiled);
+    for (size_t f = 0; f < stream->n_frames; f++) {
+        const uint32_t sent = count_sent(watch, tick_ns, &stream->frame[f]);
+        for (; n < stream->frame[f].end; n++) {
+            memcpy(index->entry[n].p, stream->xyz_m[n], sizeof index->entry[n].p);
+            index->entry[n].sent = sent;
+        }
+    }
+    index->n = n;
+    match_index_make(index);
+    return SH_OK;
+}
+
+/* ---- counting */
+
+struct taker {
+    struct match_index *index;
+    size_t first; /* of the entries that the point at hand agrees with; SIZE_MAX: none so far */
+};
+
+static void match_take(void *ctx, size_t entry)
+{
+    struct taker *taker = ctx;
+    if (taker->first == SIZE_MAX)
+        taker->first = entry;
+    else
+        match_index_join(taker->index, taker->first, entry);
+}
+
+static void count_points(struct match_index *index, const struct cloud *cloud, const struct way *way, struct match *m)
+{
+    for (size_t i = 0; i < cloud->n; i++) {
+        struct taker taker = {index, SIZE_MAX};
+        double p[3];
+        if (is_empty(cloud->xyz_m[i])) {
+            m->empty++;
+            continue;
+        }
+        m->n++;
+        match_go(way, cloud->xyz_m[i], p);
+        match_index_near(index, p, match_take, &taker);
+        if (taker.first != SIZE_MAX)
+            index->entry[match_index_root(index, taker.first)].got++;
+        else if (m->unknown++ == 0)
+            m->first_unknown = i;
+    }
+    for (size_t i = 0; i < index->n; i++) {
+        const struct match_entry *e = &index->entry[i];
+        if (e->parent != i) continue;
+        m->sent += e->sent;
+        m->again += e->sent > 0 ? e->sent - 1 : 0;
+        if (e->got > e->sent) m->repeated += e->got - e->sent;
+    }
+}
+
+double match_unit_m(const struct cloud *cloud)
+{
+    const size_t step = cloud->n / TRIED_POINTS + 1;
+    int decimals = 0, digits = 0;
+    double largest = 0.0;
+    if (!cloud->is_text) return cloud->count_m;
+    for (size_t i = 0; i < cloud->n; i++)
+        for (int k = 0; k < 3; k++) {
+            const double v = fabs(cloud->xyz_m[i][k]);
+            char text[32];
+            if (isnan(v)) continue;
+            if (v > largest) largest = v;
+            if (i % step != 0) continue;
+            /* 15 digits are what a double keeps of a decimal number; without zeros at their end: D.DDDDe-02 */
+            snprintf(text, sizeof text, "%.14e", v);
+            char *mark = strchr(text, 'e'), *end = mark;
+            while (end[-1] == '0')
+                end--;
+            const int n = (int)(end - text) - 1, exponent = atoi(mark + 1);
+            if (n > digits) digits = n;
+            if (n - 1 - exponent > decimals) decimals = n - 1 - exponent;
+        }
+    /* A file has as many decimals for each coordinate, or as many digits. */
+    const int exponent = largest > 0.0 ? (int)floor(log10(largest)) : 0;
+    const int last = decimals < digits - 1 - exponent ? decimals : digits - 1 - exponent;
+    return pow(10.0, -last);
+}
+
+int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,
+                 double match_m, struct match *match, struct sh_err *err)
+{
+    struct match_index index = {0};
+    struct way ways[MAX_WAYS];
+    *match = (struct match){.unit_m = match_unit_m(cloud)};
+    match->within_m = index.within_m = match->unit_m + match_m;
+    const int rc = index_stream(stream, watch, tick_ns, &index, err);
+    if (rc == SH_OK) {
+        const struct way *way = best_way(&index, cloud, ways, find_ways(stream, ways));
+        match->frame = way->frame;
+        count_points(&index, cloud, way, match);
+    }
+    free(index.entry);
+    return rc;
+}

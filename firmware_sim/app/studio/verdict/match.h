@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT */
+/* A client's points beside those of the head. In: both, and which of the head's frames each session was sent. Out: how many
+ * of the client's no pulse ever had, and how many it has more often than the head sent them. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
+#define FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
+
+#include "core/studio/cloud.h"
+#include "firmware_sim/app/studio/verdict/own_stream.h"
+#include "firmware_sim/app/studio/verdict/watch.h"
+
+struct match {
+    size_t empty;            /* shots without echo: NaN three times, or 0 three times */
+    size_t n;                /* other points */
+    size_t unknown;          /* no pulse had them */
+    size_t repeated;         /* the client has them more often than they were sent */
+    size_t sent;             /* points of the head that some session was sent, once for each */
+    size_t again;            /* of sent, those that agree with another one: a repeated one may go unseen there */
+    size_t first_unknown;    /* index in the cloud */
+    const char *frame;       /* the coordinate frame in which they agree best */
+    double unit_m, within_m; /* what the file rounds to; how far a coordinate may differ */
+};
+
+/* match_m: beside what the file rounds to. tick_ns: sessions begin and end with ticks. */
+int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,
+                 double match_m, struct match *match, struct sh_err *err);
+
+/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, else
+ * count_m. */
+double match_unit_m(const struct cloud *cloud);
+
+#endif

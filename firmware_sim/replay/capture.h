@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT */
+/* A capture of a device's traffic in place of a head: what the device answered, and what it sent unasked.
+ *
+ * In: a file of tcpdump's, Wireshark's or `record --raw` (.pcap, .pcapng). Out: a talk (drivers/protocol/talk.h) for each
+ * port of a device in it. A TCP device is who was connected to, or sent more bytes where the capture begins later. Of
+ * two ends of UDP it is the one that sent more datagrams. TCP streams are put together as receivers do; what is missing in them is counted.
+ *
+ * One thread; constant once it is open. */
+#ifndef FIRMWARE_SIM_REPLAY_CAPTURE_H
+#define FIRMWARE_SIM_REPLAY_CAPTURE_H
+
+#include "core/err.h"
+#include "drivers/protocol/talk.h"
+
+enum { CAPTURE_MAX_TALKS = 64 };
+
+struct capture_place {
+    int is_tcp;
+    int port;        /* TCP: that the device listened on; UDP: that its datagrams went to */
+    int source_port; /* UDP: the device's */
+    char device[64]; /* its address */
+    struct talk talk;
+    uint32_t n_messages, n_connections;
+};
+
+struct capture_counts {
+    uint64_t packets, others; /* all; those that are neither TCP nor UDP */
+    uint64_t fragments, damaged;
+    uint64_t missing_bytes; /* of TCP streams and of packets that were cut off */
+};
+
+struct replay_capture;
+
+/* 1: the file is a capture of packets, not a recording of the native stream. 0: it isn't, or it can't be read. */
+int capture_is(const char *path);
+/* SH_EINPUT, SH_EFORMAT, SH_EIO with the path. */
+int capture_load(const char *path, struct replay_capture **out, struct sh_err *err);
+void capture_free(struct replay_capture *capture);
+uint32_t capture_n(const struct replay_capture *capture);
+const struct capture_place *capture_place(const struct replay_capture *capture, uint32_t i);
+void capture_get_counts(const struct replay_capture *capture, struct capture_counts *counts);
+/* Time from the first packet to the last. */
+double capture_duration_s(const struct replay_capture *capture);
+
+#endif

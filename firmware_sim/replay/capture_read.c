@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: MIT */
+/* The packets of a capture: the file's blocks in, flows out. */
+#include <stdio.h>
+#include <string.h>
+
+#include "core/grow.h"
+#include "core/infile.h"
+#include "drivers/protocol/pcap.h"
+#include "firmware_sim/replay/capture_inside.h"
+
+enum { FRONT_BYTES = 4096, MAX_FLOWS = 1000 };
+static const size_t MAX_FILE = (size_t)2 << 30;
+static const int64_t MAX_SPAN_NS = INT64_C(10000000000000000); /* sums of times then fit */
+
+int capture_is(const char *path)
+{
+    const char *why;
+    uint8_t bytes[FRONT_BYTES];
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    struct sh_err err;
+    FILE *file = infile_open(path, &why);
+    if (file == NULL) return 0;
+    const size_t n = fread(bytes, 1, sizeof bytes, file);
+    fclose(file);
+    if (n >= 4 && pcap_is(bytes)) return 1;
+    for (size_t at = 0, used; reader.n_interfaces == 0; at += used)
+        if (pcapng_read(&reader, bytes + at, n - at, &packet, &used, &err) <= 0) return 0;
+    return reader.interface[0].link != PCAPNG_USER0;
+}
+
+static int read_file(struct replay_capture *c, const char *path, struct sh_err *err)
+{
+    const char *why;
+    FILE *file = infile_open(path, &why);
+    size_t room = 0, n = 1;
+    if (file == NULL) return sh_fail(err, SH_EINPUT, "%s: cannot open: %s", path, why);
+    int rc = SH_OK;
+    while (n != 0 && rc == SH_OK) {
+        if (c->file_len > MAX_FILE)
+            rc = sh_fail(err, SH_EINPUT, "%s: longer than 2 GiB, which is allowed", path);
+        else if (!grow(&c->file, &room, c->file_len + (1 << 20), 1))
+            rc = sh_fail(err, SH_ENOMEM, "%s: no memory for it", path);
+        else
+            c->file_len += n = fread(c->file + c->file_len, 1, room - c->file_len, file);
+    }
+    if (rc == SH_OK && ferror(file)) rc = sh_fail(err, SH_EIO, "%s: cannot read it", path);
+    fclose(file);
+    return rc;
+}
+
+/* ---- flows */
+
+static int same_end(const struct ethernet_end *a, const struct ethernet_end *b)
+{
+    return a->is_v6 == b->is_v6 && a->port == b->port && memcmp(a->address, b->address, sizeof a->address) == 0;
+}
+
+/* The flow of a packet and the side that sent it; NULL: it begins one. A connection may have the ends of an older one. */
+static struct capture_flow *find_flow(struct replay_capture *c, const struct ip_packet *p, uint8_t *side)
+{
+    const int begins = p->is_tcp && (p->flags & (TCP_SYN | TCP_ACK)) == TCP_SYN;
+    for (size_t i = c->n_flows; i-- > 0;) {
+        struct capture_flow *f = &c->flow[i];
+        if (f->is_tcp != p->is_tcp) continue;
+        const int forth = same_end(&f->end[0], &p->from) && same_end(&f->end[1], &p->to);
+        const int back = same_end(&f->end[1], &p->from) && same_end(&f->end[0], &p->to);
+        if (!forth && !back) continue;
+        if (begins && (f->is_closed || f->n_sent[0] + f->n_sent[1] != 0)) return NULL;
+        *side = !forth;
+        return f;
+    }
+    return NULL;
+}
+
+static struct capture_flow *add_flow(struct replay_capture *c, const struct ip_packet *p, int64_t t_ns)
+{
+    if (c->n_flows == MAX_FLOWS || !grow(&c->flow, &c->flow_room, c->n_flows + 1, sizeof *c->flow)) return NULL;
+    struct capture_flow *f = &c->flow[c->n_flows++];
+    *f = (struct capture_flow){.is_tcp = p->is_tcp, .end = {p->from, p->to}, .t0_ns = t_ns};
+    return f;
+}
+
+static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64_t t_ns, struct sh_err *err)
+{
+    uint8_t side = 0;
+    struct capture_flow *f = find_flow(c, p, &side);
+    if (f == NULL) f = add_flow(c, p, t_ns);
+    if (f == NULL)
+        return sh_fail(err, SH_EINPUT, "more than %d connections, which are allowed, or no memory for them",
+                       (int)MAX_FLOWS);
+    if (p->is_tcp && (p->flags & TCP_SYN) != 0) {
+        f->device = (p->flags & TCP_ACK) != 0 ? side : !side;
+        f->has_begin = 1;
+    }
+    if (p->is_tcp && (p->flags & (TCP_FIN | TCP_RST)) != 0) f->is_closed = 1;
+    c->counts.missing_bytes += p->missing;
+    if (p->len == 0 && (p->flags & TCP_SYN) == 0) return SH_OK;
+    f->n_sent[side] += p->len != 0;
+    f->bytes_sent[side] += p->len;
+    if (!grow(&f->segment, &f->room, f->n + 1, sizeof *f->segment)) return sh_fail(err, SH_ENOMEM, "no memory");
+    f->segment[f->n++] = (struct capture_segment){t_ns, p->data, p->len, p->seq, (uint8_t)p->flags, side};
+    return SH_OK;
+}
+
+static int take_packet(struct replay_capture *c, const struct pcapng_packet *packet, struct sh_err *err)
+{
+    struct ip_packet p;
+    const int64_t t_ns = packet->has_time && packet->t_ns > c->last_ns ? packet->t_ns : c->last_ns;
+    if (c->counts.packets++ == 0) c->first_ns = t_ns;
+    if (t_ns - c->first_ns > MAX_SPAN_NS)
+        return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",
+                       (unsigned long long)c->counts.packets, 1e-9 * (double)(t_ns - c->first_ns),
+                       1e-9 * (double)MAX_SPAN_NS);
+    c->last_ns = t_ns; /* the order of the file goes before its times */
+    switch (ip_packet_read(packet->link, packet->data, packet->len, &p)) {
+    case IP_PACKET_FOUND:
+        return add_packet(c, &p, t_ns, err);
+    case IP_PACKET_FRAGMENT:
+        c->counts.fragments++;
+        return SH_OK;
+    case IP_PACKET_DAMAGED:
+        c->counts.damaged++;
+        return SH_OK;
+    case IP_PACKET_LINK:
+        return sh_fail(err, SH_EINPUT,
+                       "packets of link type %u; allowed are Ethernet (1), raw IP (101, 228, 229), Linux cooked (113, "
+                       "276) and loopback (0, 108)",
+                       packet->link);
+    case IP_PACKET_OTHER:
+        c->counts.others++;
+    }
+    return SH_OK;
+}
+
+int capture_read_flows(struct replay_capture *c, const char *path, struct sh_err *err)
+{
+    struct pcapng_reader ng = {0};
+    struct pcap_reader classic = {0};
+    struct pcapng_packet packet;
+    struct sh_err why = {0};
+    int rc = read_file(c, path, err);
+    if (rc != SH_OK) return rc;
+    const int is_classic = c->file_len >= 4 && pcap_is(c->file);
+    size_t at = 0, used;
+    int item = PCAPNG_OTHER;
+    while (at < c->file_len && item > 0 && rc == SH_OK) {
+        item = is_classic ? pcap_read(&classic, c->file + at, c->file_len - at, &packet, &used, &why)
+                          : pcapng_read(&ng, c->file + at, c->file_len - at, &packet, &used, &why);
+        at += used;
+        if (item == PCAPNG_PACKET) rc = take_packet(c, &packet, &why);
+    }
+    if (item < 0 || rc != SH_OK) return sh_fail(err, item < 0 ? item : rc, "%s: %s", path, why.text);
+    if (at < c->file_len)
+        return sh_fail(err, SH_EFORMAT, "%s: at byte %zu: the file ends within a packet; allowed are whole files", path,
+                       at);
+    return SH_OK;
+}

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: MIT */
+/* A recording as a device of another protocol than the native one: whether it can be that device, its time of day and
+ * the fixes of its receiver. */
+#include <math.h>
+#include <string.h>
+
+#include "core/utc.h"
+#include "drivers/protocol/protocol.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/replay/replay_state.h"
+
+/* ---- which device it can be */
+
+/* What the stream must have beside its emitter. NULL: it has it. Amplitudes are not asked for: without them protocols
+ * take reflectances. */
+static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
+                         const struct native_emitter *e)
+{
+    const int first = e != NULL && e->echoes == NATIVE_ECHOES_FIRST, stands = (r->anchor.moving & NATIVE_MOVING) == 0;
+    if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && d->layout != NATIVE_POLAR)
+        return "has positions instead of ranges (layout geo); required is layout polar";
+    if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && first)
+        return "has first echoes alone; required is all, last or strongest";
+    if ((ops->needs & PROTOCOL_NEEDS_TIME) != 0 && r->utc0_ns == INT64_MIN)
+        return "has no time of day; required is one of a head with time.epoch";
+    if ((ops->needs & PROTOCOL_NEEDS_PLACE) != 0 && (!stands || r->anchor.lat_deg == 0.0))
+        return "has no place on the Earth where it stands; required is a station with one";
+    return NULL;
+}
+
+static int check_emitter(const struct protocol_ops *ops, const struct native_descriptor *d,
+                         const struct native_emitter *e, const uint8_t *beams, struct sh_err *err)
+{
+    static const char *const kinds[] = {[NATIVE_EMIT_LINE] = "line",
+                                        [NATIVE_EMIT_PLANAR] = "planar",
+                                        [NATIVE_EMIT_BEAMS] = "beams",
+                                        [NATIVE_EMIT_SPHERE] = "sphere",
+                                        [NATIVE_EMIT_DIRECTIONS] = "directions"};
+    const uint32_t kind = e != NULL ? e->kind : (uint32_t)NATIVE_EMIT_LINE;
+    if (ops->emitters != 0 && (ops->emitters & 1u << kind) == 0)
+        return sh_fail(err, SH_EINPUT, "emitter %s; allowed is %s", kinds[kind],
+                       kinds[(ops->emitters & 1u << NATIVE_EMIT_PLANAR) != 0 ? NATIVE_EMIT_PLANAR : NATIVE_EMIT_BEAMS]);
+    if (kind == NATIVE_EMIT_BEAMS && ops->n_beams != 0 && e->n_beams != ops->n_beams)
+        return sh_fail(err, SH_EINPUT, "%u rings; allowed are %u", e->n_beams, ops->n_beams);
+    return ops->check_head != NULL && e != NULL ? ops->check_head(d, e, beams, err) : SH_OK;
+}
+
+int replay_check_links(struct replay *r, const struct native_descriptor *d, const struct native_emitter *e,
+                       const uint8_t *beams, struct sh_err *err)
+{
+    const struct config *cfg = r->cfg;
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)cfg->link[i].protocol);
+        struct sh_err why;
+        if (ops == NULL || ops->passes_native) continue;
+        if (cfg->link[i].protocol == PROTOCOL_CAPTURE)
+            return sh_fail(err, SH_EINPUT,
+                           "%s: links[%u].protocol capture: %s is a recording, no capture; allowed are "
+                           "the other protocols",
+                           cfg->file, i, r->options.path);
+        const char *lack = lacks(r, ops, d, e);
+        if (lack != NULL)
+            return sh_fail(err, SH_EINPUT, "%s: links[%u].protocol %s: %s %s", cfg->file, i, ops->name, r->options.path,
+                           lack);
+        if (check_emitter(ops, d, e, beams, &why) != SH_OK)
+            return sh_fail(err, SH_EINPUT,
+                           "%s: links[%u].protocol %s: the device can't be the head of %s, which has %s", cfg->file, i,
+                           ops->name, r->options.path, why.text);
+        if (r->options.speed != 1.0)
+            return sh_fail(err, SH_EINPUT,
+                           "%s: links[%u].protocol %s: its times are those of the device; allowed is --speed 1",
+                           cfg->file, i, ops->name);
+    }
+    return SH_OK;
+}
+
+/* ---- time of day */
+
+/* A recording may have any number there; dates end in 2199 (core/utc.h). */
+int64_t replay_utc_ns(void *self, int64_t t_ns)
+{
+    static const int64_t LAST_NS = INT64_C(7258118400) * UTC_SECOND_NS;
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    const int is_known = r->utc0_ns != INT64_MIN;
+    const int64_t utc_ns = (int64_t)((uint64_t)r->utc0_ns + (uint64_t)t_ns);
+    pthread_mutex_unlock(&r->lock);
+    return is_known && utc_ns > 0 && utc_ns < LAST_NS ? utc_ns : INT64_MIN;
+}
+
+enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
+{
+    const int64_t utc_ns = replay_utc_ns(self, t_ns);
+    *hour_ns = (utc_ns != INT64_MIN ? utc_ns : t_ns) % (3600 * UTC_SECOND_NS);
+    return utc_ns != INT64_MIN ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
+}
+
+/* A receiver of one fix a second, at full seconds. */
+int64_t replay_next_fix_ns(void *self, int64_t t_ns)
+{
+    const int64_t utc_ns = replay_utc_ns(self, t_ns);
+    if (utc_ns == INT64_MIN) return INT64_MAX;
+    const int64_t since_ns = utc_ns % UTC_SECOND_NS;
+    return since_ns == 0 ? t_ns : t_ns + UTC_SECOND_NS - since_ns;
+}
+
+/* The station's place; none where the head moves, since the stream has its way in the scene alone. */
+int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
+{
+    struct replay *r = self;
+    struct utc_time utc;
+    const int64_t utc_ns = replay_utc_ns(r, t_ns);
+    if (utc_ns == INT64_MIN) return 0;
+    const struct utc_table *table = utc_table_builtin();
+    utc_from_tai(table, utc_tai_from_posix(table, utc_ns - utc_ns % UTC_SECOND_NS), &utc);
+    pthread_mutex_lock(&r->lock);
+    const struct native_anchor a = r->anchor;
+    pthread_mutex_unlock(&r->lock);
+    const int found = a.lat_deg != 0.0 && (a.moving & NATIVE_MOVING) == 0;
+    *fix = (struct nmea_fix){.talker = {'G', 'N'},
+                             .year = utc.year,
+                             .month = utc.month,
+                             .day = utc.day,
+                             .hour = utc.hour,
+                             .minute = utc.minute,
+                             .second = utc.second,
+                             .quality = found,
+                             .satellites = 12,
+                             .hdop = 0.7,
+                             .lat_deg = a.lat_deg,
+                             .lon_deg = a.lon_deg,
+                             .altitude_m = a.height_m,
+                             .course_deg = NAN};
+    return 1;
+}

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: MIT */
+/* The process of somebody else's client: placeholders of its command, its end, and what it leaves running. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/studio/verdict/client.h"
+
+static char folder[] = "/tmp/scanhead-client-XXXXXX";
+static char log_path[64];
+
+static int make(void **state)
+{
+    (void)state;
+    if (mkdtemp(folder) == NULL) return 1;
+    snprintf(log_path, sizeof log_path, "%s/log", folder);
+    return 0;
+}
+
+static int drop(void **state)
+{
+    (void)state;
+    unlink(log_path);
+    return rmdir(folder);
+}
+
+static void test_placeholders(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *endpoint, *text, *filled;
+    } cases[] = {
+        {"tcp:127.0.0.1:40123", "c {endpoint} {host} {port}", "c tcp:127.0.0.1:40123 127.0.0.1 40123"},
+        {"tcp:[::1]:5", "{host}/{port}/{path}.", "::1/5/."},
+        {"udp:127.0.0.1:2368", "{port}{port}", "23682368"},
+        {"tty:/dev/pts/3", "{path} {host}{port} {endpoint}", "/dev/pts/3  tty:/dev/pts/3"},
+        {"tcp:h:1", "awk '{print}' {out}.ply {} {ports", "awk '{print}' /o.ply {} {ports"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct client_words words = {cases[i].endpoint, "/o"};
+        char *filled = client_fill(cases[i].text, &words);
+        assert_string_equal(filled, cases[i].filled);
+        free(filled);
+    }
+}
+
+static void begin(struct client *client, const char *line)
+{
+    struct sh_err err;
+    if (client_start(client, line, log_path, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static void test_ends(void **state)
+{
+    (void)state;
+    struct client client;
+    begin(&client, "exit 3"); /* by itself */
+    while (!client_has_ended(&client))
+        usleep(1000);
+    client_end(&client, 0.0);
+    assert_true(WIFEXITED(client.status) && WEXITSTATUS(client.status) == 3 && !client.had_to_be_killed);
+    begin(&client, "exec sleep 600");
+    assert_false(client_has_ended(&client));
+    client_end(&client, 60.0);
+    assert_true(client_has_ended(&client) && !client.had_to_be_killed);
+    assert_true(WIFSIGNALED(client.status) && WTERMSIG(client.status) == SIGTERM);
+}
+
+/* Waits until the log begins with this line. */
+static void wait_for(const char *line)
+{
+    char text[16] = "";
+    while (strcmp(text, line) != 0) {
+        FILE *file = fopen(log_path, "r");
+        assert_non_null(file);
+        if (fgets(text, sizeof text, file) == NULL) text[0] = '\0';
+        fclose(file);
+    }
+}
+
+/* It is in the group that the shell leaves behind, and does not end at SIGTERM. The whole group is waited for, and killed.
+ * It says when it has set that up: a signal before that would end it. */
+static void test_what_the_shell_leaves(void **state)
+{
+    (void)state;
+    struct client client;
+    begin(&client, "(trap '' TERM; echo set; while :; do sleep 600; done) & exit 0");
+    wait_for("set\n");
+    assert_false(client_has_ended(&client));
+    client_end(&client, 0.2);
+    assert_true(client.had_to_be_killed && client_has_ended(&client));
+    assert_int_equal(kill(-client.pid, 0), -1);
+}
+
+/* Some programs end with their input, or at a key. This one would end by itself, with status 5. */
+static void test_its_input_stays_open(void **state)
+{
+    (void)state;
+    struct client client;
+    begin(&client, "echo open; cat; exit 5");
+    wait_for("open\n");
+    client_end(&client, 60.0);
+    assert_true(WIFSIGNALED(client.status));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_placeholders),
+        cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_what_the_shell_leaves),
+        cmocka_unit_test(test_its_input_stays_open),
+    };
+    return cmocka_run_group_tests(tests, make, drop);
+}

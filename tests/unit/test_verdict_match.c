@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: MIT */
+/* A client's points beside those of the head: unknown ones, repeated ones, coordinate frames, rounding. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/studio/verdict/match.h"
+
+enum { N = 600, PER_FRAME = 10, TICK_NS = 1000000 };
+
+/* The head: 60 frames of 10 points, one each millisecond. Point i is somewhere of its own. */
+static double xyz[N][3];
+static struct own_frame frames[N / PER_FRAME];
+static struct own_stream stream;
+static struct watch watch;
+static struct watch_span span[4];
+
+static void begin(void)
+{
+    for (int i = 0; i < N; i++)
+        for (int k = 0; k < 3; k++)
+            xyz[i][k] = 0.001 * ((i * (7919 + 104729 * k)) % 20011) - 10.0;
+    for (int f = 0; f < N / PER_FRAME; f++)
+        frames[f] = (struct own_frame){(uint32_t)f, (int64_t)f * TICK_NS, (size_t)(f + 1) * PER_FRAME};
+    memset(&stream, 0, sizeof stream);
+    stream.frame = frames;
+    stream.n_frames = N / PER_FRAME;
+    stream.xyz_m = xyz;
+    stream.n = N;
+    stream.info.geo = 1;
+    const double turn[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1}, at[3] = {3.0, -2.0, 1.5};
+    memcpy(stream.info.rotation, turn, sizeof turn);
+    memcpy(stream.info.station_m, at, sizeof at);
+    memset(&watch, 0, sizeof watch);
+    span[0] = (struct watch_span){1, 0, INT64_MAX};
+    watch.span = span;
+    watch.n_span = 1;
+}
+
+static struct match try(const struct cloud *cloud, double match_m)
+{
+    struct match match;
+    struct sh_err err;
+    assert_int_equal(match_points(&stream, &watch, TICK_NS, cloud, match_m, &match, &err), SH_OK);
+    return match;
+}
+
+/* The client's own: points `from` to `to`. */
+static double theirs[2 * N][3];
+static struct cloud cloud_of(int from, int to)
+{
+    memcpy(theirs, xyz + from, (size_t)(to - from) * sizeof xyz[0]);
+    return (struct cloud){.n = (size_t)(to - from), .xyz_m = theirs};
+}
+
+static void test_a_right_client(void **state)
+{
+    (void)state;
+    begin();
+    const struct cloud cloud = cloud_of(0, N);
+    const struct match m = try(&cloud, 1e-5);
+    assert_int_equal(m.n, N);
+    assert_int_equal(m.unknown + m.repeated + m.again + m.empty, 0);
+    assert_int_equal(m.sent, N);
+    assert_string_equal(m.frame, "scene");
+}
+
+static void test_unknown_and_empty(void **state)
+{
+    (void)state;
+    begin();
+    const struct cloud cloud = cloud_of(0, N);
+    theirs[7][2] += 0.0001;
+    theirs[300][0] = NAN;
+    memset(theirs[301], 0, sizeof theirs[301]);
+    const struct match m = try(&cloud, 1e-5);
+    assert_int_equal(m.unknown, 1);
+    assert_int_equal(m.first_unknown, 7);
+    assert_int_equal(m.empty, 2);
+    assert_int_equal(m.n, N - 2);
+    assert_int_equal(try(&cloud, 1.1e-4).unknown, 0);
+}
+
+static void test_repeated(void **state)
+{
+    (void)state;
+    begin();
+    struct cloud cloud = cloud_of(0, N);
+    memcpy(theirs + N, xyz + 50, PER_FRAME * sizeof xyz[0]);
+    cloud.n += PER_FRAME;
+    assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
+    /* Two sessions were sent everything: a client of two connections may have it twice. */
+    span[1] = (struct watch_span){2, 0, INT64_MAX};
+    watch.n_span = 2;
+    assert_int_equal(try(&cloud, 1e-5).repeated, 0);
+    /* The second was sent nothing of that frame, which is number 5: more than two ticks after its end. */
+    span[1].to_ns = 2 * TICK_NS;
+    assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
+    /* A fault took that frame away from it. */
+    span[1].to_ns = INT64_MAX;
+    struct watch_spoiled spoiled[] = {{2, 30}, {2, 5}, {1, 9}};
+    watch.spoiled = spoiled;
+    watch.n_spoiled = 3;
+    assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
+}
+
+/* Where points are so dense that a client's agrees with several, no right client has a finding, whatever the order. */
+static void test_dense_points(void **state)
+{
+    (void)state;
+    begin();
+    for (int i = 0; i < N; i++) {
+        xyz[i][0] = 1e-4 * i;
+        xyz[i][1] = xyz[i][2] = 0.5;
+    }
+    struct cloud cloud = cloud_of(0, N);
+    for (int i = 0; i < N; i++) /* rounded to millimetres: ten of them are one */
+        theirs[N - 1 - i][0] = 1e-3 * floor(xyz[i][0] / 1e-3 + 0.5);
+    for (int i = 0; i < N; i++)
+        theirs[i][1] = theirs[i][2] = 0.5;
+    struct match m = try(&cloud, 5.1e-4);
+    assert_int_equal(m.unknown + m.repeated, 0);
+    memcpy(theirs + N, theirs, sizeof xyz); /* all of it twice */
+    cloud.n = 2 * N;
+    m = try(&cloud, 5.1e-4);
+    assert_int_equal(m.repeated, N);
+}
+
+/* Head to scene: p_scene = station + rotation p. The station turns x to y; ROS has x where the head has y. */
+static void test_frames(void **state)
+{
+    (void)state;
+    begin();
+    const struct cloud cloud = cloud_of(0, N);
+    for (int i = 0; i < N; i++) {
+        const double x = xyz[i][0] - 3.0, y = xyz[i][1] + 2.0;
+        theirs[i][0] = y;
+        theirs[i][1] = -x;
+        theirs[i][2] = xyz[i][2] - 1.5;
+    }
+    struct match m = try(&cloud, 1e-5);
+    assert_string_equal(m.frame, "head");
+    assert_int_equal(m.unknown, 0);
+    for (int i = 0; i < N; i++) { /* forward is y, left is -x */
+        const double x = theirs[i][0];
+        theirs[i][0] = theirs[i][1];
+        theirs[i][1] = -x;
+    }
+    m = try(&cloud, 1e-5);
+    assert_string_equal(m.frame, "head, x forward");
+    assert_int_equal(m.unknown, 0);
+    /* A polar stream is in the head's frame, and the client's points in the scene's. */
+    stream.info.geo = 0;
+    for (int i = 0; i < N; i++) {
+        theirs[i][0] = 3.0 - xyz[i][1];
+        theirs[i][1] = -2.0 + xyz[i][0];
+        theirs[i][2] = 1.5 + xyz[i][2];
+    }
+    m = try(&cloud, 1e-5);
+    assert_string_equal(m.frame, "scene");
+    assert_int_equal(m.unknown, 0);
+}
+
+static void test_rounding(void **state)
+{
+    (void)state;
+    static const struct {
+        double xyz[2][3], unit_m;
+    } texts[] = {
+        {{{1.234, 10.5, -100.257}, {0.001, 2.0, 3.0}}, 1e-3},     /* %.3f */
+        {{{1.23457, 12.3457, -123.457}, {0.123457, 2, 3}}, 1e-3}, /* %g has six digits */
+        {{{5.0, 6.0, 7.0}, {8.0, 9.0, 4.0}}, 1.0},
+        {{{0.0, 0.0, 0.0}, {NAN, NAN, NAN}}, 1.0},
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        double points[2][3];
+        memcpy(points, texts[i].xyz, sizeof points);
+        struct cloud cloud = {.n = 2, .xyz_m = points, .is_text = 1};
+        assert_true(fabs(match_unit_m(&cloud) - texts[i].unit_m) < 1e-12);
+        cloud.is_text = 0;
+        cloud.count_m = 2e-6;
+        assert_true(fabs(match_unit_m(&cloud) - 2e-6) <= 0.0);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_right_client), cmocka_unit_test(test_unknown_and_empty),
+        cmocka_unit_test(test_repeated),       cmocka_unit_test(test_dense_points),
+        cmocka_unit_test(test_frames),         cmocka_unit_test(test_rounding),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
