@@ -12,6 +12,7 @@ static const double KNOT_M_S = 1852.0 / 3600.0;
 struct sentence {
     char *dst;
     size_t cap, len;
+    uint8_t spoil; /* bits of the checksum that are wrong */
 };
 
 static void nmea_put(struct sentence *s, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
@@ -34,14 +35,14 @@ uint8_t nmea_checksum(const char *text, size_t len)
 
 static struct sentence nmea_begin(char *dst, size_t cap, const struct nmea_fix *fix, const char *type)
 {
-    struct sentence s = {dst, cap, 0};
+    struct sentence s = {dst, cap, 0, fix->is_spoilt ? 0xff : 0};
     nmea_put(&s, "$%.2s%s", fix->talker, type);
     return s;
 }
 
 static size_t nmea_end(struct sentence *s)
 {
-    unsigned sum = s->len < s->cap ? nmea_checksum(s->dst + 1, s->len - 1) : 0;
+    unsigned sum = s->len < s->cap ? nmea_checksum(s->dst + 1, s->len - 1) ^ s->spoil : 0;
     nmea_put(s, "*%02X\r\n", sum);
     return s->len < s->cap ? s->len : 0;
 }

@@ -24,6 +24,7 @@ struct nmea_fix {
     double altitude_m;         /* above the geoid */
     double geoid_separation_m; /* geoid above the ellipsoid; ellipsoidal height = altitude + separation */
     int quality;               /* of GGA: 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float */
+    int is_spoilt;             /* each bit of the checksums is wrong */
     int satellites;
     double hdop;
     double speed_m_s, course_deg; /* over ground; course NaN: at rest */

@@ -7,7 +7,7 @@
 struct receiver {
     struct protocol_host host;
     int64_t from_ns; /* fixes before it were sent, or came before the client */
-    int64_t next_ns; /* the next one; INT64_MIN: to be asked for */
+    int64_t next_ns; /* the next one, as far as it is known; INT64_MIN: to be asked for */
 };
 
 static int nmea_protocol_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
@@ -39,10 +39,10 @@ static void nmea_protocol_say(struct receiver *self, int64_t t_ns)
 static void pass(void *protocol, int64_t t_ns)
 {
     struct receiver *self = protocol;
-    if (self->next_ns == INT64_MIN) self->next_ns = self->host.next_fix_ns(self->host.ctx, self->from_ns);
-    while (self->next_ns < t_ns) {
+    if (self->next_ns >= t_ns) return;
+    while ((self->next_ns = self->host.next_fix_ns(self->host.ctx, self->from_ns)) < t_ns) {
         nmea_protocol_say(self, self->next_ns);
-        self->next_ns = self->host.next_fix_ns(self->host.ctx, self->next_ns + 1);
+        self->from_ns = self->next_ns + 1;
     }
 }
 

@@ -80,11 +80,13 @@ struct protocol_host {
     /* Ends the session once what was sent has gone out. A pty or a USB device has no way to end it: there nothing
      * happens. */
     void (*hang_up)(void *ctx);
-    /* Device time of the receiver's first fix at or after t_ns; INT64_MAX: it knows no time. */
+    /* Device time at which the receiver's first fix at or after t_ns is known; INT64_MAX: it has none. Where that lies
+     * ahead, a later answer may be later. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
-    /* State of the pulses per second at a device time. *set: by then the time of day was set; else the head counts from
-     * power-up. May be NULL: locked where UTC is known. */
-    enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int *set);
+    /* State of the receiver's pulses per second at a device time, and the head's time since the top of the hour then,
+     * as far as pulses and sentences have set it; else since power-up. May be NULL: locked and UTC, where that is
+     * known. */
+    enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
     /* Keeps this protocol's settings without power, in place of those from before: lines of printable ASCII with their
      * '\n', at most PROTOCOL_STORED bytes with the NUL; "": none. From then on each new session gets them (spec.stored).
      * 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps none. Settings

@@ -44,20 +44,23 @@ struct velodyne {
 
 uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns)
 {
-    const int64_t hour_ns = 3600000000000;
-    int set = 1;
-    if (host->pps != NULL) host->pps(host->ctx, t_ns, &set);
-    int64_t utc_ns = set ? host->utc_ns(host->ctx, t_ns) : INT64_MIN;
-    int64_t in_hour = (utc_ns == INT64_MIN ? t_ns : utc_ns) % hour_ns;
-    if (in_hour < 0) in_hour += hour_ns;
-    return (uint32_t)(in_hour / 1000);
+    const int64_t whole_ns = 3600000000000;
+    int64_t hour_ns;
+    if (host->pps != NULL) {
+        host->pps(host->ctx, t_ns, &hour_ns);
+    } else {
+        const int64_t utc_ns = host->utc_ns(host->ctx, t_ns);
+        hour_ns = (utc_ns == INT64_MIN ? t_ns : utc_ns) % whole_ns;
+        if (hour_ns < 0) hour_ns += whole_ns;
+    }
+    return (uint32_t)(hour_ns / 1000);
 }
 
 enum protocol_pps velodyne_pps(const struct protocol_host *host, int64_t t_ns)
 {
-    int set;
-    if (host->utc_ns(host->ctx, t_ns) == INT64_MIN) return PROTOCOL_PPS_ABSENT;
-    return host->pps != NULL ? host->pps(host->ctx, t_ns, &set) : PROTOCOL_PPS_LOCKED;
+    int64_t hour_ns;
+    if (host->pps != NULL) return host->pps(host->ctx, t_ns, &hour_ns);
+    return host->utc_ns(host->ctx, t_ns) == INT64_MIN ? PROTOCOL_PPS_ABSENT : PROTOCOL_PPS_LOCKED;
 }
 
 uint8_t velodyne_reflectivity(int refl_cdb)

@@ -25,8 +25,8 @@ enum {
 
 enum velodyne_return_mode { VELODYNE_STRONGEST = 0x37, VELODYNE_LAST = 0x38, VELODYNE_DUAL = 0x39 };
 
-/* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999. The hour is that of UTC.
- * Where UTC is not known, or was not set by then, it is that of the time since power-up. */
+/* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999: the head's counter, which
+ * begins at power-up, and which the receiver's pulses and sentences set (protocol_host). */
 uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns);
 
 /* State of the pulses per second at a device time; absent where UTC is not known. */

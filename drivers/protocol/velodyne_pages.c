@@ -77,15 +77,17 @@ static void put_status(struct page *p)
     velodyne_pages_put(p, "{\"gps\":{\"pps_state\":\"%s\",\"position\":", words[velodyne_pps(&p->spec->host, p->t_ns)]);
     put_position(p);
     velodyne_pages_put(
-        p, "},\"motor\":{\"state\":\"%s\",\"rpm\":%u,\"lock\":\"Off\",\"phase\":0},\"laser\":{\"state\":\"%s\"}}",
-        on_off(p->state.motor_on), p->state.motor_on ? p->state.rpm : 0, on_off(p->state.laser_on));
+        p, "},\"motor\":{\"state\":\"%s\",\"rpm\":%u,\"lock\":\"%s\",\"phase\":%u},\"laser\":{\"state\":\"%s\"}}",
+        on_off(p->state.motor_on), p->state.motor_on ? p->state.rpm : 0, on_off(p->state.is_locked), p->state.edge_cdeg,
+        on_off(p->state.laser_on));
 }
 
 static void put_settings(struct page *p)
 {
     velodyne_pages_put(p, "{\"laser\":\"%s\",\"returns\":\"%s\",\"rpm\":%u,\"fov\":{\"start\":0,\"end\":359},",
                        on_off(p->state.laser_on), p->state.returns, p->state.rpm);
-    velodyne_pages_put(p, "\"phaselock\":{\"enabled\":\"Off\",\"offset\":0,\"offsetInput\":0},\"host\":{\"addr\":");
+    velodyne_pages_put(p, "\"phaselock\":{\"enabled\":\"%s\",\"offset\":%u,\"offsetInput\":%g},\"host\":{\"addr\":",
+                       on_off(p->state.phase_lock), p->state.offset_cdeg, 0.01 * p->state.offset_cdeg);
     put_string(p, velodyne_host_address(p->spec));
     velodyne_pages_put(p, ",\"dport\":%d,\"tport\":%d},", velodyne_host_port(p->spec), VELODYNE_POSITION_PORT);
     velodyne_pages_put(

@@ -156,19 +156,37 @@ static int set_network(const struct posted *p, const char *value, int apply)
 static int set_phase_lock(const struct posted *p, const char *value, int apply)
 {
     int on;
-    (void)apply;
     if (!read_switch(value, &on)) return refuse(p, 400, "enabled: allowed are on and off");
-    return on ? refuse(p, 409, "enabled: allowed is off; this head has no phase lock") : 200;
+    return apply ? command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF") : 200;
 }
 
-/* Without a phase lock it has no effect; but what the device doesn't take is refused. */
-static int set_phase(const struct posted *p, const char *value, int apply)
+/* A decimal from 0 to below a limit: 1, or 0. */
+static int read_decimal(const char *s, double limit, double *out)
 {
     char *end;
+    if (s[0] < '0' || s[0] > '9' || strspn(s, "0123456789.") != strlen(s)) return 0;
+    *out = strtod(s, &end);
+    return *end == '\0' && *out < limit;
+}
+
+/* The device's page multiplies its field offsetInput by 100, so that the product may have many decimals, and sends
+ * both. */
+static int set_phase(const struct posted *p, const char *value, int apply)
+{
+    char line[40];
+    double cdeg;
+    if (!read_decimal(value, 36000.0, &cdeg)) return refuse(p, 400, "offset: allowed are 0 to 35999, in 0.01 degree");
+    const long whole = (long)(cdeg + 0.5) % 36000;
+    snprintf(line, sizeof line, "HEAD:PHASE %ld.%02ld", whole / 100, whole % 100);
+    return apply ? command(p, line) : 200;
+}
+
+/* Only offset counts; but what the device doesn't take is refused. */
+static int check_phase_input(const struct posted *p, const char *value, int apply)
+{
+    double deg;
     (void)apply;
-    const double offset = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : -1.0;
-    if (offset >= 0.0 && offset < 36000.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 200;
-    return refuse(p, 400, "offset: 0 to 35999, in 0.01 degree; offsetInput: in degrees");
+    return read_decimal(value, 360.0, &deg) ? 200 : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
 }
 
 /* A head without a place for settings takes it, too: clients expect that a device does. */
@@ -185,6 +203,8 @@ static int reset(const struct posted *p, const char *value, int apply)
     if (!apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
+    if (status == 200) status = command(p, "HEAD:PHASE DEF");
+    if (status == 200) status = command(p, "HEAD:PHASE:LOCK DEF");
     if (status == 200 && !is_scanning(p->spec)) status = command(p, "SCAN:START");
     return status;
 }
@@ -207,7 +227,7 @@ static const struct setting {
     {"/cgi/setting/net", "dhcp", set_network},
     {"/cgi/setting/phaselock", "enabled", set_phase_lock},
     {"/cgi/setting/phaselock", "offset", set_phase},
-    {"/cgi/setting/phaselock", "offsetInput", set_phase},
+    {"/cgi/setting/phaselock", "offsetInput", check_phase_input},
     {"/cgi/save", "data", save},
     {"/cgi/reset", "data", reset},
 };
@@ -294,6 +314,24 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     return status;
 }
 
+static uint32_t read_cdeg(const char *reply)
+{
+    return (uint32_t)(strtod(reply, NULL) * 100.0 + 0.5) % 36000u;
+}
+
+static void read_phase(const struct protocol_spec *spec, struct velodyne_state *out)
+{
+    char reply[32];
+    ask(spec, "HEAD:PHASE:LOCK?", reply, sizeof reply);
+    out->phase_lock = strcmp(reply, "ON") == 0;
+    ask(spec, "HEAD:PHASE?", reply, sizeof reply);
+    out->offset_cdeg = read_cdeg(reply);
+    ask(spec, "HEAD:PHASE:EDGE?", reply, sizeof reply);
+    out->is_locked = strncmp(reply, "LOCKED,", 7) == 0;
+    const char *comma = strchr(reply, ',');
+    out->edge_cdeg = comma != NULL ? read_cdeg(comma + 1) : 0;
+}
+
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out)
 {
     char reply[32];
@@ -301,6 +339,7 @@ void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state
     ask(spec, "HEAD:LINES?", reply, sizeof reply);
     out->rpm = (uint32_t)(strtod(reply, NULL) * 60.0 + 0.5);
     ask(spec, "SCAN:ECHOES?", reply, sizeof reply);
+    read_phase(spec, out);
     out->returns = "";
     for (size_t i = 0; i < sizeof returns / sizeof returns[0]; i++)
         if (strlen(reply) >= 3 && strncasecmp(reply, returns[i].word, strlen(reply)) == 0)

@@ -22,7 +22,10 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
 struct velodyne_state {
     int motor_on, laser_on; /* it turns; it measures */
     uint32_t rpm;
-    const char *returns; /* "Strongest", "Last", "Dual"; "" for the head's other selection */
+    const char *returns;             /* "Strongest", "Last", "Dual"; "" for the head's other selection */
+    int phase_lock;                  /* it is asked for */
+    int is_locked;                   /* at the last pulse per second the rotor was where the lock wants it */
+    uint32_t offset_cdeg, edge_cdeg; /* azimuth at a pulse, 0.01 degree: asked for; at the last one, 0 without any */
 };
 /* Asks the head for its present state. */
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out);

@@ -6,6 +6,7 @@
  *             SYSTem:CONTrol?  SYSTem:CONTrol:RELease
  *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:STORe
  *             HEAD:RANGe:MIN  HEAD:RANGe:MAX  HEAD:NOISe  HEAD:NOISe:ANGLe  HEAD:NOISe:SIGMa  HEAD:NOISe:BALL
+ *             HEAD:PHASe  HEAD:PHASe:LOCK  HEAD:PHASe:EDGE?
  *   scan      SCAN:STARt  SCAN:STOP  SCAN:COUNt?  SCAN:FRAMes  SCAN:ECHoes
  *             SCAN:LINE:STARt  SCAN:LINE:STOP  SCAN:PAN:STARt  SCAN:PAN:STOP
  *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
@@ -119,6 +120,12 @@ struct command_peers {
     char name[COMMAND_PEERS][COMMAND_PEER_LEN];
 };
 
+/* The phase of a rotor by the last pulse per second. */
+struct command_phase {
+    int is_known, is_held; /* a pulse has come since it turns; it was within 0.01 degree of the lock's azimuth */
+    int64_t edge_udeg;     /* its azimuth then */
+};
+
 /* Settings that a recording does not say. */
 #define COMMAND_NOT_RECORDED     INT64_MIN
 #define COMMAND_NOT_RECORDED_U32 UINT32_MAX
@@ -128,6 +135,7 @@ struct command_device {
     const char *idn;
     const char *plan; /* the methods in use, in one line; NULL: not known */
     struct head_limits limits;
+    struct command_phase phase;
     /* Whether a scan can be planned with these settings, whose values are within the limits. Returns 0, or -1 and why
      * not. NULL: all can. */
     int (*can_plan)(void *owner, const struct head_settings *settings, char *why, size_t len);

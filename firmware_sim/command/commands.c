@@ -30,7 +30,7 @@ static const struct command_unit unit_m = {"m", 9, "M, MM or KM", {{"M", 0}, {"M
 static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
 
 enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES, RANGE_MIN, RANGE_MAX,
-       NOISE, ANGLE, SIGMA, BALL, STEP, STEP_LINE, STEP_PAN };
+       NOISE, ANGLE, SIGMA, BALL, PHASE, PHASE_LOCK, STEP, STEP_LINE, STEP_PAN };
 
 /* In the order of enum beam_select. */
 static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
@@ -66,6 +66,8 @@ static const struct command_setting settings[] = {
     [ANGLE] = {SETTING(angle_noise), 1, 1, CONSTANT(0), PROFILE(angle_most), NO_OTHER, switch_words, NULL},
     [SIGMA] = {SETTING(sigma_nm), 0, 1, PROFILE(sigma_min_nm), CONSTANT(10 * NM_PER_M), NO_OTHER, NULL, NULL},
     [BALL] = {SETTING(ball_nm), 0, 1, CONSTANT(0), PROFILE(ball_max_nm), NO_OTHER, NULL, NULL},
+    [PHASE] = {SETTING(phase_udeg), 0, 0, CONSTANT(0), CONSTANT(TURN_UDEG - 1), NO_OTHER, NULL, NULL},
+    [PHASE_LOCK] = {SETTING(phase_lock), 1, 0, CONSTANT(0), PROFILE(phase_lock_most), NO_OTHER, switch_words, NULL},
     [STEP] = {0, 0, 0, CONSTANT(1), CONSTANT(TURN_NDEG), NO_OTHER, NULL, &command_step_both},
     [STEP_LINE] = {0, 0, 0, CONSTANT(1), CONSTANT(TURN_NDEG), NO_OTHER, NULL, &command_step_line},
     [STEP_PAN] = {0, 0, 0, CONSTANT(0), CONSTANT(TURN_NDEG), NO_OTHER, NULL, &command_step_pan},
@@ -129,6 +131,15 @@ static int query_control_who(struct command_call *call)
 static int query_state(struct command_call *call)
 {
     return command_reply(call, "%s", head_state_name(call->dev->state));
+}
+
+/* Whether the lock holds it, and its azimuth at the last pulse per second; no such pulse since it turns is no error. */
+static int query_phase_edge(struct command_call *call)
+{
+    const struct command_phase *phase = &call->dev->phase;
+    if (!phase->is_known) return command_reply(call, "NONE");
+    return command_reply(call, "%s,%lld.%06lld", phase->is_held ? "LOCKED" : "FREE",
+                         (long long)(phase->edge_udeg / 1000000), (long long)(phase->edge_udeg % 1000000));
 }
 
 static int query_count(struct command_call *call)
@@ -303,6 +314,9 @@ const struct command_row command_rows[] = {
     VALUE("HEAD:NOISe:ANGLe", unit_count, ANGLE),
     VALUE("HEAD:NOISe:SIGMa", unit_m, SIGMA),
     VALUE("HEAD:NOISe:BALL", unit_m, BALL),
+    VALUE("HEAD:PHASe", unit_deg, PHASE),
+    VALUE("HEAD:PHASe:LOCK", unit_count, PHASE_LOCK),
+    QUERY("HEAD:PHASe:EDGE", query_phase_edge),
     VALUE("SCAN:STEP", unit_fine_deg, STEP),
     VALUE("SCAN:STEP:LINE", unit_fine_deg, STEP_LINE),
     VALUE("SCAN:STEP:PAN", unit_fine_deg, STEP_PAN),

@@ -55,6 +55,8 @@ struct head_settings {
     uint32_t echoes;                         /* which echoes of a pulse are sent: enum beam_select */
     uint32_t noise;                          /* of ranges: enum config_range_noise */
     uint32_t angle_noise;                    /* 0: none */
+    uint32_t phase_lock;                     /* 1: the rotor's phase is held to the pulses per second */
+    int64_t phase_udeg;                      /* its azimuth at a pulse */
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
     int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
     int64_t step_udeg;                       /* of a sphere, as it was set; of a planar head with geometries; else 0 */
@@ -95,6 +97,7 @@ struct head_limits {
     int64_t range_min_nm, range_max_nm;
     int64_t near_most_nm, far_least_nm; /* largest range_min, smallest range_max: each pulse rate keeps some range */
     uint32_t noise_most, angle_most;    /* the largest number of a kind of range noise, of angle noise */
+    uint32_t phase_lock_most;           /* 1: it has a rotor whose phase can be held */
     int64_t sigma_min_nm, ball_max_nm;
 };
 

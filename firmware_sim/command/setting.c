@@ -304,6 +304,13 @@ static void say_because(const struct command_call *call, int no_width, char *tex
                  in_unit(call, read_other(call)).text);
 }
 
+static const char *what_word_needs(const struct command_call *call)
+{
+    if (is_setting(call, offsetof(struct head_settings, noise))) return "signal.model: on";
+    if (is_setting(call, offsetof(struct head_settings, phase_lock))) return "a head profile with emitter: beams";
+    return "mirror_sigma_deg or pan_sigma_deg of the head profile";
+}
+
 /* Checks against the other setting; the range of the profile was checked before. */
 static int check_other(struct command_call *call, int64_t value)
 {
@@ -314,9 +321,7 @@ static int check_other(struct command_call *call, int64_t value)
     if (value >= min && value <= max && !no_width) return 0;
     if (call->row->setting->words != NULL)
         return command_fail(call, CMD_E_SETTINGS, "%s %s needs %s", call->row->header, call->row->setting->words[value],
-                            is_setting(call, offsetof(struct head_settings, noise))
-                                ? "signal.model: on"
-                                : "mirror_sigma_deg or pan_sigma_deg of the head profile");
+                            what_word_needs(call));
     say_because(call, no_width, with, sizeof with);
     return refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
 }

@@ -41,6 +41,9 @@ struct config_gnss {
     uint32_t satellites;
     double hdop, accuracy_m, geoid_separation_m;
     double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
+    int pps, nmea;         /* its pulses and its sentences reach the head */
+    double nmea_late_ms;
+    int cold; /* neither has reached the head before power-up */
 };
 
 enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL };
@@ -72,7 +75,8 @@ struct config_head {
     struct head_settings settings;
     char serial[32], name[32];
     char settings_file[CONFIG_PATH_LEN];
-    int start; /* scan when booted; only the command run uses it */
+    int start;        /* scan when booted; only the command run uses it */
+    double motor_ppm; /* beams: the error of the rotor's speed where nothing holds its phase */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
     /* of a sphere (core/emitter.h); also copied into the profile's emitter */

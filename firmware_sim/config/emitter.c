@@ -214,14 +214,30 @@ static void refuse_sphere_settings(struct cfg_reader *rd, const struct config *c
                          i == 0 ? ", or a planar one with geometries" : "");
 }
 
+/* Other heads have no rotor that runs free of their pulses. */
+static void refuse_rotor_settings(struct cfg_reader *rd, const struct config *cfg)
+{
+    static const char *const of_rotor[] = {"head.phase_lock", "head.phase_deg", "head.motor_ppm"};
+    for (size_t i = 0; i < CFG_LEN(of_rotor); i++)
+        if (cfg_is_given(rd, of_rotor[i], 0))
+            cfg_fail_key(rd, of_rotor[i], 0, "head profile %s has emitter: %s; allowed only with emitter: beams",
+                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
+}
+
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct head_settings *s = &cfg->head.settings;
     const enum emitter_kind kind = cfg->profile.emitter.kind;
     if (cfg_has_profile(rd) && kind == EMITTER_SPHERE) set_sphere_settings(rd, cfg);
     if (cfg_has_profile(rd) && kind != EMITTER_SPHERE) refuse_sphere_settings(rd, cfg);
+    if (cfg_has_profile(rd) && kind != EMITTER_BEAMS) refuse_rotor_settings(rd, cfg);
     if (cfg_has_profile(rd) && cfg->profile.arrangement.n_geometries > 0) cfg_choose_geometry(rd, cfg);
     if (!cfg_has_profile(rd) || kind == EMITTER_LINE) return;
+    if (s->phase_lock && CFG_SOUND(rd, 0, "head.lines_hz", "head.phase_lock") && s->lines_uhz % 1000000 != 0)
+        cfg_fail_key(rd, "head.phase_lock", 0,
+                     "on, but head.lines_hz is %.15g, which is at another azimuth each second; allowed with whole "
+                     "turns per second",
+                     from_micro(s->lines_uhz));
     check_instrument(rd, cfg);
     if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)
         cfg_fail_key(rd, "head.ambiguity", 0,

@@ -52,7 +52,8 @@
              "measured data are changed; in native frames the payload. Without reseal a datagram (udp) is not sent: "
              "its reader's system would drop it."},
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
-     .help = "Duration; jitter: the largest one. On the wire it is time of the clock, in the head device time."},
+     .help = "Duration; jitter: the largest one. On the wire it is time of the clock, in the head device time. "
+             "pps_jitter: how late every second pulse is, up to 400; nmea_late: how late sentences are, up to 5000."},
     {FAULT(reset), CFG_BOOL, .def = "off",
      .help = "cable: connections are reset once it is plugged in again; else they go on."},
     {FAULT(factor), CFG_REAL, NULL, "0.5", 0.01, 2, .help = "mirror_slow: the mirror's speed is multiplied by it."},

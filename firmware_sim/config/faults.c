@@ -84,6 +84,8 @@ static const struct {
     [FAULT_WINDOW_SOILED] = {"loss_db", 0, 0},
     [FAULT_CLOCK_JUMP] = {"jump_s", 0, 0},
     [FAULT_CLOCK_DRIFT] = {"ppm", 0, 0},
+    [FAULT_PPS_JITTER] = {"for_ms", 0, 1},
+    [FAULT_NMEA_LATE] = {"for_ms", 0, 1},
     [FAULT_PTP_LOST] = {"ppm", 0, 0},
     [FAULT_PTP_NO_SYNC] = {"ppm", 0, 0},
     [FAULT_PTP_FAULTY] = {"ppm", 0, 0},
@@ -122,15 +124,25 @@ static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
     }
 }
 
+/* The longest for_ms of a kind, as text: a late pulse must come before the next one. */
+static const char *find_most_ms(enum fault_kind kind)
+{
+    return kind == FAULT_PPS_JITTER ? "400" : kind == FAULT_NMEA_LATE ? "5000" : "1e8";
+}
+
 static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t i)
 {
     const char *name = fault_names[f->kind];
+    const char *most_ms = find_most_ms(f->kind);
     if (kinds[f->kind].n_max > 0.0 && (double)f->n > kinds[f->kind].n_max)
         cfg_fail_key(rd, "faults[].n", i, "%u is too many for %s; allowed up to %.0f", f->n, name,
                      kinds[f->kind].n_max);
     if (kinds[f->kind].needs_ms && f->for_ms <= 0.0 && CFG_SOUND(rd, i, "faults[].for_ms"))
         cfg_fail_key(rd, cfg_is_given(rd, "faults[].for_ms", i) ? "faults[].for_ms" : "faults[].kind", i,
-                     "%s needs for_ms; allowed above 0 to 1e8 ms", name);
+                     "%s needs for_ms; allowed above 0 to %s ms", name, most_ms);
+    if (f->for_ms > strtod(most_ms, NULL))
+        cfg_fail_key(rd, "faults[].for_ms", i, "%.10g is too long for %s; allowed above 0 to %s ms", f->for_ms, name,
+                     most_ms);
     if (f->at != 0 && (cfg_is_given(rd, "faults[].from", i) || cfg_is_given(rd, "faults[].until", i) ||
                        cfg_is_given(rd, "faults[].every", i)))
         cfg_fail_key(rd, "faults[].at", i, "is a single number; allowed only without from, until and every");
@@ -168,7 +180,7 @@ static int needs_ptp(enum fault_kind kind)
 static int needs_time(enum fault_kind kind)
 {
     return kind == FAULT_CLOCK_JUMP || kind == FAULT_CLOCK_DRIFT || kind == FAULT_CLOCK_STOP ||
-           kind == FAULT_PPS_LOST || kind == FAULT_LEAP_SECOND;
+           kind == FAULT_LEAP_SECOND || (kind >= FAULT_PPS_LOST && kind <= FAULT_NMEA_CHECKSUM);
 }
 
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)

@@ -88,6 +88,14 @@ static const struct cfg_key config_keys[] = {
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
 
+    {"head.phase_lock", SETTING(phase_lock), CFG_ENUM, .def = "off",
+     WORDS([0] = "off", [1] = "on"),
+     .help = "beams: holds the rotor's phase, so that it is at phase_deg at each pulse per second while these are locked. "
+             "It needs a whole number of turns per second (lines_hz)."},
+    {"head.phase_deg", SETTING(phase_udeg), CFG_MICRO, "deg", "0", 0, 359.999999,
+     .help = "Azimuth of the rotor at a pulse per second, with phase_lock: on."},
+    {KEY(head.motor_ppm), CFG_REAL, "ppm", "0", -10000, 10000,
+     .help = "beams: how much too fast the rotor turns while nothing holds its phase."},
     {KEY(head.ambiguity), CFG_ENUM, .def = "none",
      WORDS([DETECT_AMBIGUITY_NONE] = "none", [DETECT_FOLDED] = "folded", [DETECT_RESOLVED] = "resolved"),
      .help = "Echoes from beyond c / (2 prr_hz), which return after the next pulse. none: they have their true range; "
@@ -305,6 +313,15 @@ static const struct cfg_key config_keys[] = {
              "up."},
     {KEY(gnss.geoid_separation_m), CFG_REAL, "m", "0", -120, 120,
      .help = "Height of the geoid above the ellipsoid: altitude in GGA is the ellipsoidal height minus this."},
+    {KEY(gnss.pps), CFG_BOOL, .def = "on",
+     .help = "Its pulses per second reach the head. off: none ever does; the fault pps_lost has a begin and an end."},
+    {KEY(gnss.nmea), CFG_BOOL, .def = "on",
+     .help = "It sends sentences. off: none ever; the fault nmea_lost has a begin and an end."},
+    {KEY(gnss.nmea_late_ms), CFG_REAL, "ms", "0", 0, 5000,
+     .help = "How long after its second a sentence arrives, also at the head."},
+    {KEY(gnss.cold), CFG_BOOL, .def = "off",
+     .help = "on: the run begins with a head that has had no pulse and no sentence, and a VLP-16 counts from power-up; "
+             "off: it was synchronised before. After a power cycle it always begins cold."},
 
 #include "firmware_sim/config/fault_rows.h"
 };

@@ -104,15 +104,21 @@ static void slow_down(const struct device_beam *beam, const struct site *site, s
         spec->lines_uhz = spec->prr_uhz;
 }
 
+static int64_t free_uhz(const struct device_beam *beam, int64_t lines_uhz)
+{
+    return beam->free_ppm != 0.0 ? llround(1e-6 * beam->free_ppm * (double)lines_uhz) : 0;
+}
+
 void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec)
 {
     site_fill_spec(site, beam->settings, spec);
     beam->scan->prr_uhz = spec->prr_uhz;
     beam->scan->lines_uhz = spec->lines_uhz;
+    spec->lines_uhz = beam->held_uhz != 0 ? beam->held_uhz : spec->lines_uhz + free_uhz(beam, spec->lines_uhz);
     slow_down(beam, site, spec);
 }
 
-static void set_rates(struct device_beam *beam, uint64_t pulse)
+void device_set_rates(struct device_beam *beam, uint64_t pulse)
 {
     struct schedule_segment *seg = &beam->scan->segment;
     struct schedule_spec spec;
@@ -178,7 +184,7 @@ static void begin_or_end(struct device_beam *beam, uint64_t pulse, int64_t t_ns)
         f->begin_ns = t_ns;
         if (f->strikes) f->turn = find_turn(beam, pulse, t_ns);
     }
-    set_rates(beam, pulse);
+    device_set_rates(beam, pulse);
     add_up(beam);
     for (uint32_t i = 0; i < beam->n; i++)
         if (turned[i]) note(beam, &beam->fault[i], pulse, t_ns);

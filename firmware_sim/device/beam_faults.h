@@ -18,6 +18,8 @@ struct device_beam {
     struct fault_board *board;
     const struct head_settings *settings;
     int64_t tick_ns;
+    int64_t held_uhz; /* the rotor's speed while its phase is held (phase_lock.c); 0: it runs free */
+    double free_ppm;  /* the error of its speed then */
     uint32_t version; /* of the board's list that `fault` was taken from */
     uint32_t n;
     struct device_beam_fault {
@@ -32,6 +34,8 @@ struct device_beam {
 
 /* The schedule of a site's head with the present settings, slowed by faults of its mirror. Sets the scan's rates. */
 void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec);
+/* Takes over the present rates from a pulse of the scan on. */
+void device_set_rates(struct device_beam *beam, uint64_t pulse);
 /* Begins and ends the faults that do so at the scan's next pulse, if that fires before until_ns of the scan. The
  * segment has the new rates from there on; each change is noted on the board. Sets the next edge. */
 void device_turn_beam(struct device_beam *beam, int64_t until_ns);

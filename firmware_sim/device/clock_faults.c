@@ -59,24 +59,39 @@ void device_run_clock_faults(struct head_faults *faults, struct head_clock *cloc
     }
 }
 
-int device_has_no_pps(const struct head_faults *faults, int64_t t_ns)
+static int has_moment(const struct head_fault *f, enum fault_kind kind, int64_t t_ns)
 {
-    int lost = 0;
-    for (uint32_t i = 0; i < faults->n; i++)
-        lost |= faults->fault[i].fault.kind == FAULT_PPS_LOST && t_ns >= faults->fault[i].from_ns &&
-                t_ns < faults->fault[i].until_ns;
-    return lost;
+    return f->fault.kind == kind && f->active && t_ns >= f->from_ns && t_ns < f->until_ns;
 }
 
-int device_loses_pps(struct head_faults *faults, int64_t edge_ns)
+int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns)
 {
-    struct head_fault *f = NULL;
-    int lost = 0;
-    if (fault_board_version(faults->board) == 0) return 0;
-    while ((f = head_faults_next(faults, FAULT_PPS_LOST, f)) != NULL) {
-        if (edge_ns < f->from_ns || edge_ns >= f->until_ns) continue;
-        f->n++;
-        lost = 1;
+    for (uint32_t i = 0; i < faults->n; i++)
+        if (has_moment(&faults->fault[i], kind, t_ns)) return 1;
+    return 0;
+}
+
+int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns)
+{
+    double sum_ms = 0.0;
+    for (uint32_t i = 0; i < faults->n; i++)
+        if (has_moment(&faults->fault[i], FAULT_NMEA_LATE, t_ns)) sum_ms += faults->fault[i].fault.for_ms;
+    return llround(1e6 * sum_ms);
+}
+
+int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns)
+{
+    double sum_ms = 0.0;
+    for (uint32_t i = 0; i < faults->n; i++) {
+        const struct head_fault *f = &faults->fault[i];
+        if (!has_moment(f, FAULT_PPS_JITTER, edge_ns)) continue;
+        if ((edge_ns - f->from_ns) / UTC_SECOND_NS % 2 == 0) sum_ms += f->fault.for_ms;
     }
-    return lost;
+    return llround(1e6 * sum_ms);
+}
+
+void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns)
+{
+    for (uint32_t i = 0; i < faults->n; i++)
+        if (has_moment(&faults->fault[i], kind, t_ns)) faults->fault[i].n++;
 }

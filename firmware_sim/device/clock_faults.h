@@ -13,9 +13,13 @@ struct head_clock;
 /* Begins and ends those of a tick. */
 void device_run_clock_faults(struct head_faults *faults, struct head_clock *clock, struct device_events *events,
                              uint64_t tick);
-/* Whether pulses are lost at a device time. */
-int device_has_no_pps(const struct head_faults *faults, int64_t t_ns);
-/* Whether a fault suppresses the PPS event of a full second. */
-int device_loses_pps(struct head_faults *faults, int64_t edge_ns);
+/* For kinds that strike at pulses and sentences, after a step of the tick: whether one has this device time; counts the
+ * pulse or sentence for the note of their end. */
+int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
+void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
+
+/* How late all of them together make a sentence; a pulse: of each fault the first one, the third and so on are late. */
+int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns);
+int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns);
 
 #endif

@@ -115,8 +115,11 @@ static int open_faults(struct device *device, struct sh_err *err)
                                .events = &device->events,
                                .journal = device->journal.out};
     ptp_init(&device->ptp, &device->site->cfg->time.ptp, device->site->cfg->noise.seed);
-    device->beam = (struct device_beam){
-        .scan = &device->scan, .board = device->faults, .settings = &device->cmd.settings, .tick_ns = device->tick_ns};
+    device->beam = (struct device_beam){.scan = &device->scan,
+                                        .board = device->faults,
+                                        .settings = &device->cmd.settings,
+                                        .tick_ns = device->tick_ns,
+                                        .free_ppm = device->site->cfg->head.motor_ppm};
     device->desk = (struct fault_desk){.cfg = device->site->cfg, .board = device->faults};
     device->cmd.faults = &fault_desk_commands;
     device->cmd.faults_owner = &device->desk;
@@ -280,6 +283,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_say_held(&device->events, tick, device->over);
         device_say_lost_lines(&device->overrun, tick);
         device_say_pps(device, tick);
+        device_follow_receiver(device, tick);
     }
     const int repeated = device_is_repeated(device, tick);
     if (repeated) device_say_time(device, tick); /* a reader that joins gets the time before the first point */

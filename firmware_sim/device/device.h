@@ -203,12 +203,12 @@ int device_power_up(struct device *device, int64_t now_ns, const char **warning,
 
 /* UTC by the head's clock at a device time, ns since 1970; INT64_MIN: not known. */
 int64_t device_utc_ns(struct device *device, int64_t t_ns);
-/* The GNSS receiver (gnss.h). device_next_fix_ns: device time of its first fix at or after t_ns; INT64_MAX: it has
- * none. The other gives its last fix at or before t_ns, at the head's place then. 0: there is none. */
-int64_t device_next_fix_ns(const struct device *device, int64_t t_ns);
+/* The GNSS receiver (receiver_line.h). device_next_fix_ns: when its first sentence at or after t_ns arrives; INT64_MAX:
+ * none does. The other gives the last one that had arrived at t_ns, at the head's place then. 0: there is none. */
+int64_t device_next_fix_ns(struct device *device, int64_t t_ns);
 int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
-/* The pulses per second at a device time that was claimed (pps.h). */
-enum protocol_pps device_pps(struct device *device, int64_t t_ns, int *set);
+/* The pulses per second, and the time since the top of the hour, at a device time that was claimed (pps.h). */
+enum protocol_pps device_pps(struct device *device, int64_t t_ns, int64_t *hour_ns);
 
 /* The tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
 uint64_t device_rests_from(struct device *device);

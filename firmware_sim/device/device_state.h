@@ -15,6 +15,7 @@
 #include "firmware_sim/device/head_faults.h"
 #include "firmware_sim/device/overrun.h"
 #include "firmware_sim/device/pps.h"
+#include "firmware_sim/device/receiver_line.h"
 #include "firmware_sim/device/ptp.h"
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/device/variant.h"
@@ -78,7 +79,17 @@ struct device {
     struct gnss gnss;
     struct pps pps;
     struct ptp ptp;
-    char plan[160]; /* site_plan_text */
+    struct device_late_pulse {
+        int waits; /* a pulse of the head's clock, or of the receiver, comes later than its second */
+        int64_t t_ns, tai_s;
+    } late_own, late_received;
+    struct device_edge {
+        int waits; /* a pulse has come; the rotor's speed after it is chosen with the scan's next pulse */
+        int64_t t_ns;
+    } edge;
+    struct receiver_line line;
+    uint64_t line_taken; /* sentences that pps has */
+    char plan[160];      /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
@@ -162,11 +173,19 @@ int device_end_boot(struct device *device, uint64_t tick);
 /* Whether power has gone since `released`, or will go before an answer could come, and is not back. */
 int device_is_dead(const struct device *device, uint64_t released);
 
+/* phase_lock.c: the rotor's phase, held to the receiver's pulses. */
+/* A pulse comes in the tick at hand. */
+void device_hold_phase(struct device *device, int64_t edge_ns);
+/* A tick begins: chooses the rotor's speed after a pulse; without locked pulses it runs free. */
+void device_check_phase(struct device *device, int64_t t_ns);
+
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */
 int64_t device_gps_ns(const struct device *device, int64_t t_ns);
 /* Adds an event for the full second that begins in the tick, if one does. */
 void device_say_pps(struct device *device, uint64_t tick);
+/* Takes the receiver's pulses and sentences of the tick. */
+void device_follow_receiver(struct device *device, uint64_t tick);
 void device_say_time(struct device *device, uint64_t tick);
 /* Lets the PTP follower, if there is one, take part in a tick. */
 void device_follow_ptp(struct device *device, uint64_t tick);

@@ -1,10 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/* The state of the pulses per second that the head's clock follows.
+/* The head as a follower of a receiver's pulses and sentences: the state of the pulses, and the counter of time since
+ * the top of the hour that data and position packets carry (VLP-16 User Manual, appendix G).
  *
- * In: each full second that has a pulse, in order of time. Out: at a device time, whether pulses come (absent: none for
- * more than a second), whether they agree with the clock, and whether the time of day was ever set. A pulse agrees when
- * the time since the one before is the seconds that the clock counted, to PPS_TOLERANCE_NS a second. One that does not is
- * an error. Pulses without a gap lock the clock after PPS_TO_LOCK of them.
+ * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: both
+ * at a device time.
+ *
+ * Pulses: absent where none came for more than a second. A pulse agrees when the head's clock has counted whole seconds
+ * since the one before, to PPS_TOLERANCE_NS a second; one that doesn't is an error. After PPS_TO_LOCK pulses that agreed,
+ * one a second, they are locked.
+ *
+ *     power comes -> counts from 0 -> locked pulse: its part of a second becomes 0 -> sentence: its minutes and seconds
+ *                    by the head's own clock                                          are taken over
+ *
+ * While pulses aren't locked neither is used, and the counter goes on by the head's clock. Without sentences its seconds
+ * go on as they were.
  * The last PPS_KEPT changes are kept, since sessions ask for past times. Pure; the owner has the lock. */
 #ifndef FIRMWARE_SIM_DEVICE_PPS_H
 #define FIRMWARE_SIM_DEVICE_PPS_H
@@ -15,12 +24,17 @@
 
 enum { PPS_KEPT = 64, PPS_TO_LOCK = 2, PPS_TOLERANCE_NS = 1000000 /* 1000 ppm: more than any oscillator is off */ };
 
+/* A moment: device time, and what the head's clock shows then. */
+struct pps_moment {
+    int64_t t_ns, head_ns;
+};
+
 struct pps_state {
-    int64_t from_ns; /* device time */
-    int64_t tai_s;   /* of the pulse that came then; INT64_MIN: power came, and none has come yet */
+    struct pps_moment from, pulse; /* of this change; of the last pulse before or at it */
+    int has_pulse;                 /* one has come since power-up */
     enum protocol_pps state;
-    int run; /* pulses that agreed, without a gap */
-    int set; /* the time of day was set */
+    int run;         /* pulses that agreed, without a gap */
+    int64_t hour_ns; /* of the counter at `from` */
 };
 
 struct pps {
@@ -28,10 +42,12 @@ struct pps {
     struct pps_state kept[PPS_KEPT];
 };
 
-/* Power comes. lost: no pulses come then, so that the time of day is not set before one does. Else a battery has kept
- * it. */
-void pps_power_up(struct pps *pps, int64_t t_ns, int lost);
-void pps_take(struct pps *pps, int64_t edge_ns, int64_t tai_s);
-enum protocol_pps pps_at(const struct pps *pps, int64_t t_ns, int *set);
+/* Power comes, and the counter begins with hour_ns. pulses: they are there, so that the state is synchronising. */
+void pps_power_up(struct pps *pps, struct pps_moment at, int64_t hour_ns, int pulses);
+void pps_take(struct pps *pps, struct pps_moment edge);
+/* A sentence came that names this second of the hour, 0..3600. */
+void pps_take_sentence(struct pps *pps, struct pps_moment at, int64_t second);
+/* The state at `at`, and the counter then, 0..3599999999999. Before power-up: absent, and 0. */
+enum protocol_pps pps_at(const struct pps *pps, struct pps_moment at, int64_t *hour_ns);
 
 #endif

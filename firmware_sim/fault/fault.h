@@ -57,6 +57,11 @@ enum fault_kind {
     FAULT_CLOCK_DRIFT,   /* gains ppm */
     FAULT_CLOCK_STOP,
     FAULT_PPS_LOST,
+    FAULT_PPS_JITTER,      /* the first pulse and every second one after it are late by for_ms */
+    FAULT_NMEA_LOST,       /* the receiver sends no sentence */
+    FAULT_NMEA_LATE,       /* by for_ms */
+    FAULT_NMEA_VOID,       /* it has no fix */
+    FAULT_NMEA_CHECKSUM,   /* its sentences have wrong checksums */
     FAULT_PTP_LOST,        /* nothing comes from the master; the clock gains ppm meanwhile */
     FAULT_PTP_NO_SYNC,     /* the same, but its Announce messages come */
     FAULT_PTP_FAULTY,      /* the port is faulty; the clock gains ppm meanwhile */

@@ -42,7 +42,7 @@ static int64_t utc_ns(void *self, int64_t t_ns)
     return device_utc_ns(self, t_ns);
 }
 
-static int64_t next_fix_ns(const void *self, int64_t t_ns)
+static int64_t next_fix_ns(void *self, int64_t t_ns)
 {
     return device_next_fix_ns(self, t_ns);
 }
@@ -67,9 +67,9 @@ static uint32_t power_ons(void *self)
     return device_power_ons(self);
 }
 
-static enum protocol_pps pps(void *self, int64_t t_ns, int *set)
+static enum protocol_pps pps(void *self, int64_t t_ns, int64_t *hour_ns)
 {
-    return device_pps(self, t_ns, set);
+    return device_pps(self, t_ns, hour_ns);
 }
 
 static uint32_t near_wrap(void *self)

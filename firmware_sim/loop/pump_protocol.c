@@ -68,10 +68,10 @@ static int64_t host_next_fix_ns(void *ctx, int64_t t_ns)
     return s->pump->links->source->ops->next_fix_ns(s->pump->links->source->self, t_ns);
 }
 
-static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int *set)
+static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int64_t *hour_ns)
 {
     const struct session *s = ctx;
-    return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, set);
+    return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, hour_ns);
 }
 
 static int host_store(void *ctx, const char *lines)

@@ -26,11 +26,11 @@ struct loop_source_ops {
     /* ---- sessions of other protocols than the native one. NULL: there are none. */
     void (*command_once)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
     int64_t (*utc_ns)(void *self, int64_t t_ns);
-    int64_t (*next_fix_ns)(const void *self, int64_t t_ns);
+    int64_t (*next_fix_ns)(void *self, int64_t t_ns);
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
     int64_t (*power_ns)(void *self);
     uint32_t (*power_ons)(void *self);
-    enum protocol_pps (*pps)(void *self, int64_t t_ns, int *set);
+    enum protocol_pps (*pps)(void *self, int64_t t_ns, int64_t *hour_ns);
     uint32_t (*near_wrap)(void *self);
     int (*store)(void *self, const char *name, const char *text);
     int (*stored)(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);

@@ -87,6 +87,8 @@ void replay_open_commands(struct replay *r)
                                            .echoes = COMMAND_NOT_RECORDED_U32,
                                            .noise = COMMAND_NOT_RECORDED_U32,
                                            .angle_noise = COMMAND_NOT_RECORDED_U32,
+                                           .phase_lock = COMMAND_NOT_RECORDED_U32,
+                                           .phase_udeg = COMMAND_NOT_RECORDED,
                                            .sigma_nm = COMMAND_NOT_RECORDED,
                                            .ball_nm = COMMAND_NOT_RECORDED};
     cmd->limits.n_stations = 1;

@@ -88,16 +88,17 @@ int64_t replay_utc_ns(void *self, int64_t t_ns)
     return is_known && utc_ns > 0 && utc_ns < LAST_NS ? utc_ns : INT64_MIN;
 }
 
-enum protocol_pps replay_pps(void *self, int64_t t_ns, int *set)
+enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
 {
-    *set = replay_utc_ns(self, t_ns) != INT64_MIN;
-    return *set ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
+    const int64_t utc_ns = replay_utc_ns(self, t_ns);
+    *hour_ns = (utc_ns != INT64_MIN ? utc_ns : t_ns) % (3600 * UTC_SECOND_NS);
+    return utc_ns != INT64_MIN ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
 }
 
 /* A receiver of one fix a second, at full seconds. */
-int64_t replay_next_fix_ns(const void *self, int64_t t_ns)
+int64_t replay_next_fix_ns(void *self, int64_t t_ns)
 {
-    const int64_t utc_ns = replay_utc_ns((void *)(uintptr_t)self, t_ns);
+    const int64_t utc_ns = replay_utc_ns(self, t_ns);
     if (utc_ns == INT64_MIN) return INT64_MAX;
     const int64_t since_ns = utc_ns % UTC_SECOND_NS;
     return since_ns == 0 ? t_ns : t_ns + UTC_SECOND_NS - since_ns;

@@ -96,9 +96,9 @@ int replay_check_links(struct replay *replay, const struct native_descriptor *d,
                        const uint8_t *beams, struct sh_err *err);
 /* As struct loop_source_ops has them. */
 int64_t replay_utc_ns(void *self, int64_t t_ns);
-int64_t replay_next_fix_ns(const void *self, int64_t t_ns);
+int64_t replay_next_fix_ns(void *self, int64_t t_ns);
 int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
-enum protocol_pps replay_pps(void *self, int64_t t_ns, int *set);
+enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns);
 
 /* replay_open.c: reads up to the first anchor, and fills in what links need. */
 int replay_open_recording(struct replay *replay, struct sh_err *err);

@@ -76,12 +76,12 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
     return (t_ns + second_ns - 1) / second_ns * second_ns;
 }
 
-static enum protocol_pps pps(void *ctx, int64_t t_ns, int *set)
+static enum protocol_pps pps(void *ctx, int64_t t_ns, int64_t *hour_ns)
 {
     const struct protocol_rig *rig = ctx;
-    (void)t_ns;
-    *set = !rig->pps_unset;
-    return rig->pps;
+    const int is_set = rig->utc0_ns != INT64_MIN && !rig->pps_unset;
+    *hour_ns = ((is_set ? rig->utc0_ns : 0) + t_ns) % 3600000000000;
+    return rig->utc0_ns == INT64_MIN ? PROTOCOL_PPS_ABSENT : rig->pps;
 }
 
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)

@@ -142,6 +142,13 @@ static void settings_that_do_not_fit_are_refused(void **state)
         {"sphere", "  step_deg: 0.01\n  lines_hz: 278\n",
          "278 is outside the limits of head profile sphere; allowed 1 to"},
         {"velodyne-vlp16", "  prr_hz: 300000\n", ":3: head.prr_hz: 300000 is outside"},
+        {"velodyne-vlp16", "  lines_hz: 9.5\n  phase_lock: on\n",
+         ":4: head.phase_lock: on, but head.lines_hz is 9.5, which is at another azimuth each second; allowed with whole"},
+        {"velodyne-vlp16", "  phase_deg: 360\n",
+         "head.phase_deg: \"360\" is out of range; allowed 0 to 359.999999 deg"},
+        {"hokuyo-urg-04lx", "  phase_lock: on\n",
+         ":3: head.phase_lock: head profile hokuyo-urg-04lx has emitter: planar; allowed only with emitter: beams"},
+        {"hokuyo-urg-04lx", "  motor_ppm: 1\n", ":3: head.motor_ppm: head profile hokuyo-urg-04lx has emitter: planar"},
         {"velodyne-vlp16", "  ambiguity: folded\n", ":3: head.ambiguity: the pulses of head profile velodyne-vlp16"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {

@@ -98,8 +98,12 @@ static void test_settings(void **state)
         {"/cgi/setting/host", "dport=2369", 409, NULL},
         {"/cgi/setting/host", "tport=0", 400, NULL},
         {"/cgi/setting/net", "dhcp=on", 409, NULL},
-        {"/cgi/setting/phaselock", "enabled=off&offset=0&offsetInput=0.0", 200, NULL},
-        {"/cgi/setting/phaselock", "enabled=on&offset=0", 409, NULL},
+        {"/cgi/setting/phaselock", "enabled=off&offsetInput=0.0", 200, "HEAD:PHASE:LOCK OFF"},
+        {"/cgi/setting/phaselock", "enabled=on&offsetInput=90", 200, "HEAD:PHASE:LOCK ON"},
+        {"/cgi/setting/phaselock", "offset=18005&offsetInput=180.05", 200, "HEAD:PHASE 180.05"},
+        {"/cgi/setting/phaselock", "offset=110.00000000000001&offsetInput=1.1", 200, "HEAD:PHASE 1.10"}, /* 100 * 1.1 */
+        {"/cgi/setting/phaselock", "enabled=1", 400, NULL},
+        {"/cgi/setting/phaselock", "offset=0&offsetInput=360", 400, NULL},
         {"/cgi/setting/phaselock", "offset=36000", 400, NULL},
         {"/cgi/setting/phaselock", "offset=nan", 400, NULL},
         {"/cgi/save", "data=submit", 200, NULL},
@@ -184,11 +188,13 @@ static void test_reset(void **state)
     assert_int_equal(http_status(), 200);
     assert_string_equal(http_rig.line[0], "HEAD:LINES DEF");
     assert_string_equal(http_rig.line[1], "SCAN:ECHOES DEF");
-    assert_string_equal(http_rig.line[2], "HEAD:STATE?");
-    assert_int_equal(http_rig.n_lines, 3);
+    assert_string_equal(http_rig.line[2], "HEAD:PHASE DEF");
+    assert_string_equal(http_rig.line[3], "HEAD:PHASE:LOCK DEF");
+    assert_string_equal(http_rig.line[4], "HEAD:STATE?");
+    assert_int_equal(http_rig.n_lines, 5);
     http_replies[0].reply = "idle";
     http_post("/cgi/reset", "data=reset_system");
-    assert_string_equal(http_rig.line[3], "SCAN:START");
+    assert_string_equal(http_rig.line[5], "SCAN:START");
 }
 
 /* The head's refusal is passed on with its words, and the rest of the form is not carried out. */
@@ -242,6 +248,13 @@ static void test_documents(void **state)
                         "\"host\":{\"addr\":\"255.255.255.255\",\"dport\":2368,\"tport\":8308},"
                         "\"net\":{\"addr\":\"\",\"mask\":\"\",\"gateway\":\"\",\"dhcp\":\"Off\","
                         "\"mac_addr\":\"02-00-00-00-00-00\"}}");
+    http_replies[3] = (struct protocol_rig_reply){"HEAD:PHASE:LOCK?", "ON", 0};
+    http_replies[4] = (struct protocol_rig_reply){"HEAD:PHASE:EDGE?", "LOCKED,90.004999", 0};
+    http_replies[5] = (struct protocol_rig_reply){"HEAD:PHASE?", "90.01", 0};
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
+    http_get("/cgi/status.json");
+    assert_non_null(strstr(http_body(), "\"rpm\":600,\"lock\":\"On\",\"phase\":9000}"));
     http_replies[2].reply = "ALL";
     http_replies[1].reply = "10.166667";
     http_get("/cgi/settings.json");

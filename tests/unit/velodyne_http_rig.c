@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 struct protocol_rig http_rig;
-struct protocol_rig_reply http_replies[6];
+struct protocol_rig_reply http_replies[7];
 
 int http_setup(void **state)
 {

@@ -13,8 +13,8 @@
     "Content-Type: text/plain; charset=us-ascii" END "X-Content-Type-Options: nosniff" END "Content-Length: 0" END END
 
 extern struct protocol_rig http_rig;
-/* The head's answers: state, rate, echoes; the fourth is a test's own. It scans at 10 Hz, with strongest echoes. */
-extern struct protocol_rig_reply http_replies[6];
+/* The head's answers: state, rate, echoes; the others are a test's own. It scans at 10 Hz, with strongest echoes. */
+extern struct protocol_rig_reply http_replies[7];
 
 int http_setup(void **state);
 int http_teardown(void **state);

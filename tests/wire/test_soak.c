@@ -5,7 +5,7 @@
  * The heads run beside each other and mostly wait. Their ticks may be late, so that a busy machine costs no pulses. */
 #include "tests/wire/room.h"
 
-enum { N_SCENARIOS = 8 };
+enum { N_SCENARIOS = 10 };
 
 static const struct {
     const char *name;
@@ -21,6 +21,7 @@ static const struct {
     {"dying-motor", {"mirror_wobble", "mirror_slow", "mirror_stuck", "pan_slip", "laser_off"}},
     {"pulled-cable", {"cable"}},
     {"clock-step", {"clock_jump", "pps_lost", "clock_drift", "clock_stop"}},
+    {"gnss-outage", {"pps_jitter", "nmea_late", "nmea_void", "nmea_checksum", "nmea_lost"}},
     {"ptp-holdover", {"ptp_jitter", "ptp_faulty"}},
 };
 

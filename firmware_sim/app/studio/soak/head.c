@@ -28,6 +28,11 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
         return "amplitudes fall: a client has no others to compare with";
     case FAULT_COUNTERS_HIGH:
         return "counters continue after their wrap";
+    case FAULT_NMEA_LOST:
+    case FAULT_NMEA_LATE:
+    case FAULT_NMEA_VOID:
+    case FAULT_NMEA_CHECKSUM:
+        return "only the receiver's sentences and a VLP-16's packets show it";
     case FAULT_PTP_ASYMMETRY:
         return "a follower can't see it; only another clock does";
     case FAULT_PTP_JITTER:
@@ -66,6 +71,12 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     if (note->fault >= 1 && note->fault <= link->soak->faults.n) m->what = link->soak->faults.fault[note->fault - 1];
 }
 
+static void hide_moment(struct soak_link *link, uint32_t i, const char *why)
+{
+    soak_hide(&link->row[link->moment[i].kind], 1, why);
+    link->moment[i] = link->moment[--link->n_moments];
+}
+
 void soak_heard_head(struct soak_link *link, const struct fault_note *note)
 {
     link->ask.others++;
@@ -73,9 +84,11 @@ void soak_heard_head(struct soak_link *link, const struct fault_note *note)
         add_moment(link, note);
         return;
     }
-    for (uint32_t i = 0; i < link->n_moments; i++)
-        if (link->moment[i].fault == note->fault && link->moment[i].to_ns == INT64_MAX)
-            link->moment[i].to_ns = note->t_ns;
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        if (link->moment[i].fault != note->fault || link->moment[i].to_ns != INT64_MAX) continue;
+        link->moment[i].to_ns = note->t_ns;
+        if (note->kind == FAULT_PPS_JITTER && note->n == 0) hide_moment(link, i, "no pulse was in it");
+    }
 }
 
 /* ---- what the client saw */
@@ -84,12 +97,6 @@ static void see(struct soak_link *link, struct soak_moment *m)
 {
     link->row[m->kind].noticed++;
     *m = link->moment[--link->n_moments];
-}
-
-static void hide_moment(struct soak_link *link, uint32_t i, const char *why)
-{
-    soak_hide(&link->row[link->moment[i].kind], 1, why);
-    link->moment[i] = link->moment[--link->n_moments];
 }
 
 /* All of a kind that were at work within a time. */
@@ -191,6 +198,18 @@ static void hide_pps(struct soak_link *link, int64_t first_ns)
             hide_moment(link, i, "it was before the client had a frame");
 }
 
+/* A pulse that is as late against the one before it as the fault says, or early by that. */
+static void see_jitter(struct soak_link *link, int64_t at_ns, int64_t gps_s)
+{
+    const struct soak_times *t = &link->times;
+    const double off_s = fabs(1e-9 * (double)(at_ns - t->pps_ns) - (double)(gps_s - t->pps_gps_s));
+    for (uint32_t i = link->n_moments; i-- > 0;) {
+        struct soak_moment *m = &link->moment[i];
+        const double late_s = 1e-3 * m->for_ms;
+        if (m->kind == FAULT_PPS_JITTER && m->from_ns <= at_ns && fabs(off_s - late_s) < 0.25 * late_s) see(link, m);
+    }
+}
+
 static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
 {
     struct soak_times *t = &link->times;
@@ -199,8 +218,10 @@ static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
     miss_pps(link, at_ns);
     if (!t->have_pps) hide_pps(link, t->pps_ns);
     if (t->have_pps && leap_s != t->leap_s) see_kind(link, FAULT_LEAP_SECOND, INT64_MIN, at_ns);
+    if (t->have_pps) see_jitter(link, at_ns, (int64_t)frame->event_value[2]);
     t->have_pps = 1;
     t->pps_ns = at_ns;
+    t->pps_gps_s = (int64_t)frame->event_value[2];
     t->leap_s = leap_s;
 }
 

@@ -27,6 +27,7 @@ struct soak_times {
     int64_t at_ns, gps_ns; /* device time, GPS time */
     int have_pps;
     int64_t pps_ns, leap_s; /* device time of the last PPS; GPS time less UTC then */
+    int64_t pps_gps_s;      /* its second */
 };
 
 /* The caller of the first three has the link's lock. */

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: MIT */
+/* The phase lock of a rotor: at each pulse per second it looks at one azimuth.
+ *
+ *     at a pulse         the speed until the next one is chosen so that the azimuth will be right then
+ *     pulses not locked  the rotor runs free: at the speed that is set, with the error of its motor
+ *
+ * Speeds are whole micro-hertz, so an error of half of one is left after a second: 0.00018 degree. The wire has steps of
+ * 0.01. The rotor needs at most half a turn, so one second is enough for any phase. */
+#include <math.h>
+
+#include "firmware_sim/config/profile.h"
+#include "firmware_sim/device/device_state.h"
+
+static const double TURN_UDEG = 360e6, SECOND_NS = 1e9;
+static const int64_t HERTZ_UHZ = 1000000, HELD_UDEG = 10000 /* a step of the wire */;
+
+/* Turns in -1/2..1/2. */
+static double wrap(double turn)
+{
+    return turn - round(turn);
+}
+
+/* Of the rotor's present sweep, at a time since the scan's start near pulse k. */
+static double turn_at(const struct schedule_segment *seg, uint64_t k, int64_t t_ns)
+{
+    const double since_s = (double)(t_ns - schedule_time_ns(seg, k)) / SECOND_NS;
+    return schedule_sweep_turn(seg, k) + 1e-6 * (double)seg->spec.lines_uhz * since_s;
+}
+
+static int is_on(const struct device *device)
+{
+    const struct device_scan *scan = &device->scan;
+    return device->cmd.settings.phase_lock != 0 && scan->on && scan->lines_uhz % HERTZ_UHZ == 0;
+}
+
+static void set_speed(struct device *device, int64_t held_uhz)
+{
+    device->beam.held_uhz = held_uhz;
+    if (device->scan.on) device_set_rates(&device->beam, device->scan.pulse_next);
+}
+
+/* Notes where the rotor was at the pulse. */
+static void note_edge(struct device *device, double turn)
+{
+    struct command_phase *phase = &device->cmd.phase;
+    const int64_t phase_udeg = device->cmd.settings.phase_udeg;
+    phase->edge_udeg = llround((turn - floor(turn)) * TURN_UDEG) % (int64_t)TURN_UDEG;
+    phase->is_known = 1;
+    phase->is_held = device->beam.held_uhz != 0 &&
+                     fabs(wrap(turn - (double)phase_udeg / TURN_UDEG)) * TURN_UDEG <= (double)HELD_UDEG;
+}
+
+/* Chooses the speed from the scan's next pulse on, which is the first one after the edge. */
+static void hold(struct device *device, int64_t edge_ns)
+{
+    const struct device_scan *scan = &device->scan;
+    const struct schedule_segment *seg = &scan->segment;
+    const int64_t most_uhz = site_profile(device->site)->lines_max_uhz;
+    const double left_s = 1.0 + (double)(edge_ns - schedule_time_ns(seg, scan->pulse_next)) / SECOND_NS;
+    const double free_turn = schedule_sweep_turn(seg, scan->pulse_next) + 1e-6 * (double)scan->lines_uhz * left_s;
+    double missing = wrap((double)device->cmd.settings.phase_udeg / TURN_UDEG - free_turn);
+    if (missing > 0.0 && scan->lines_uhz + llround(1e6 * missing / left_s) > most_uhz) missing -= 1.0;
+    set_speed(device, scan->lines_uhz + llround(1e6 * missing / left_s));
+}
+
+static int is_locked(const struct device *device, int64_t t_ns)
+{
+    int64_t hour_ns;
+    const struct pps_moment at = {t_ns, head_clock_ns(&device->clock, t_ns)};
+    return pps_at(&device->pps, at, &hour_ns) == PROTOCOL_PPS_LOCKED;
+}
+
+void device_hold_phase(struct device *device, int64_t edge_ns)
+{
+    device->edge = (struct device_edge){1, edge_ns};
+}
+
+/* The tick of the edge has its pulses at the speed that was planned for it. */
+static void take_edge(struct device *device)
+{
+    const struct device_scan *scan = &device->scan;
+    const int64_t edge_ns = device->edge.t_ns - (int64_t)scan->tick0 * device->tick_ns;
+    if (schedule_time_ns(&scan->segment, scan->pulse_next) < edge_ns) return;
+    device->edge.waits = 0;
+    note_edge(device, turn_at(&scan->segment, scan->pulse_next, edge_ns));
+    if (is_on(device) && is_locked(device, device->edge.t_ns)) hold(device, edge_ns);
+}
+
+void device_check_phase(struct device *device, int64_t t_ns)
+{
+    const int turns = device->scan.on && site_profile(device->site)->emitter.kind == EMITTER_BEAMS;
+    if (!turns) device->edge.waits = device->cmd.phase.is_known = device->cmd.phase.is_held = 0;
+    if (device->edge.waits && device->scan.pulse_next < device->scan.segment.end_pulse) take_edge(device);
+    if (device->beam.held_uhz == 0 || (is_on(device) && is_locked(device, t_ns))) return;
+    device->cmd.phase.is_held = 0;
+    set_speed(device, 0);
+}
