@@ -30,8 +30,7 @@ struct cola_settings {
     uint8_t filter; /* FREchoFilter: enum cola_filter */
     uint32_t scale; /* LMDscandatascalefactor; 0: the geometry's */
     char location[COLA_MAX_NAME];
-    int64_t clock_ns; /* what the scanner's clock is ahead of the head's; 0: not set */
-    uint8_t framing;  /* EIHstCola, as it was written */
+    uint8_t framing; /* EIHstCola, as it was written */
 };
 enum cola_filter { COLA_FILTER_FIRST = 0, COLA_FILTER_ALL = 1, COLA_FILTER_LAST = 2 };
 
@@ -131,12 +130,18 @@ cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results;
 /* The event LIDoutputstate. */
 void cola_send_outputs(struct cola *self);
 
-/* cola_device.c: identity, states, log-in and clock. */
+/* cola_time.c: the clock, and the time server that sets it. */
 
 /* Time of day of the scanner's clock at a device time, ns since 1970. */
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
 /* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
+cola_handler cola_set_clock, cola_read_time_role, cola_write_time_role, cola_read_time_interface,
+    cola_write_time_interface, cola_read_time_address, cola_write_time_address, cola_read_time_zone,
+    cola_write_time_zone, cola_read_time_update, cola_write_time_update, cola_read_time_limit, cola_read_time_delay;
+
+/* cola_device.c: identity, states and log-in. */
+
 enum cola_head_state {
     COLA_HEAD_UNKNOWN = -1,
     COLA_HEAD_OFF,
@@ -152,8 +157,8 @@ enum cola_head_state cola_ask_state(struct cola *self);
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
     cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination,
-    cola_read_framing, cola_write_framing, cola_log_in, cola_log_out, cola_get_level, cola_check_password,
-    cola_set_clock, cola_start, cola_stop, cola_load_defaults, cola_keep, cola_reboot;
+    cola_read_framing, cola_write_framing, cola_log_in, cola_log_out, cola_get_level, cola_check_password, cola_start,
+    cola_stop, cola_load_defaults, cola_keep, cola_reboot;
 
 /* cola_commands.c: one request, and its answer. */
 void cola_carry_out(struct cola *self, const struct cola_request *request);

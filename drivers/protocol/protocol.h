@@ -84,6 +84,9 @@ struct protocol_host {
     /* State of the pulses per second at a device time. *set: by then the time of day was set; else the head counts from
      * power-up. May be NULL: locked where UTC is known. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int *set);
+    /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has set
+     * it, it is UTC, or the time since power-up. */
+    int64_t (*date_ns)(void *ctx, int64_t t_ns);
 };
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };

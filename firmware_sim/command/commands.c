@@ -8,6 +8,7 @@
 #include "firmware_sim/command/setting.h"
 #include "firmware_sim/command/site_pose.h"
 #include "firmware_sim/command/step.h"
+#include "firmware_sim/command/time_server.h"
 
 #include <string.h>
 
@@ -303,6 +304,9 @@ const struct command_row command_rows[] = {
     QUERY("TIME:UTC", query_utc),
     QUERY("TIME:GPS", query_gps),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
+    /* Open to all, as HEAD:REBoot is. */
+    {"TIME:SHIFt", command_shift_query, command_shift_change, &unit_ns, NULL, 1, 0, 0, 0, 0},
+    {"TIME:SERVer", command_server_query, command_server_change, &command_unit_server, NULL, 1, 0, 1, 0, 0},
     {.header = NULL},
 };
 /* clang-format on */

@@ -42,6 +42,15 @@ struct config_gnss {
     double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
 };
 
+/* The time server that a SICK scanner asks (scanner_clock.h). */
+struct config_ntp {
+    enum config_ntp_role { NTP_ROLE_NONE, NTP_ROLE_CLIENT, NTP_ROLE_SERVER } role;
+    char address[16]; /* numeric, IPv4 */
+    uint32_t port, update_s;
+    double zone_h, max_offset_s;
+    int anywhere; /* clients may choose a server outside of this machine */
+};
+
 enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL };
 
 /* Ball-shaped noise; detect_ball. */
@@ -182,6 +191,7 @@ struct config {
     struct config_loop loop;
     struct config_time time;
     struct config_gnss gnss;
+    struct config_ntp ntp;
     struct fault_list faults;
 };
 

@@ -267,6 +267,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(gnss.geoid_separation_m), CFG_REAL, "m", "0", -120, 120,
      .help = "Height of the geoid above the ellipsoid: altitude in GGA is the ellipsoidal height minus this."},
 
+#include "firmware_sim/config/ntp_rows.h"
 #include "firmware_sim/config/fault_rows.h"
 };
 /* clang-format on */

@@ -46,6 +46,10 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     case COMMAND_RELEASE:
         device_push_event(&device->events, NATIVE_EV_CONTROL, 0, 0, 0, "released");
         break;
+    case COMMAND_SERVER:
+        device_say_time_server(device);
+        break;
+    case COMMAND_CLOCK:
     case COMMAND_STEP:
     case COMMAND_FAULTS:
     case COMMAND_NONE:

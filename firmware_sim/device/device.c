@@ -140,6 +140,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (rc == SH_OK) rc = check_live(device, err);
     if (rc == SH_OK) rc = head_clock_create(&site->cfg->time, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
+    device_init_time_server(device);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc == SH_OK) rc = open_faults(device, err);
     if (rc != SH_OK) {
@@ -156,6 +157,11 @@ int device_create(const struct site *site, const struct device_options *options,
 int device_replay_ends(const struct device *device)
 {
     return device->journal.ends;
+}
+
+int device_replays(const struct device *device)
+{
+    return device->options.replay != NULL;
 }
 
 int device_close_journal(struct device *device, struct sh_err *err)

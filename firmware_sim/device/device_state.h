@@ -16,6 +16,7 @@
 #include "firmware_sim/device/overrun.h"
 #include "firmware_sim/device/pps.h"
 #include "firmware_sim/device/scan_state.h"
+#include "firmware_sim/device/scanner_clock.h"
 #include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
 
@@ -75,7 +76,9 @@ struct device {
     struct head_clock clock;
     struct gnss gnss;
     struct pps pps;
-    char plan[160]; /* site_plan_text */
+    struct scanner_clock date, date_before; /* since the last power-up, and before it */
+    int server_fd;                          /* device_watch_time_server */
+    char plan[160];                         /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
@@ -150,6 +153,14 @@ void device_run_power(struct device *device, uint64_t tick, struct device_work *
 int device_end_boot(struct device *device, uint64_t tick);
 /* Whether power has gone since `released`, or will go before an answer could come, and is not back. */
 int device_is_dead(const struct device *device, uint64_t released);
+
+/* scanner_clock.c */
+/* The settings of power-up, from the configuration. */
+void device_init_time_server(struct device *device);
+/* Power comes at a device time: the scanner's clock and its time server are as at power-up. */
+void device_start_date(struct device *device, int64_t t_ns);
+/* Its time server, or whether it may be asked, has changed. */
+void device_say_time_server(const struct device *device);
 
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */

@@ -72,6 +72,12 @@ static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int *set)
     return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, set);
 }
 
+static int64_t host_date_ns(void *ctx, int64_t t_ns)
+{
+    const struct session *s = ctx;
+    return s->pump->links->source->ops->date_ns(s->pump->links->source->self, t_ns);
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -120,7 +126,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
-                 host_pps},
+                 host_pps, host_date_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
         .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),

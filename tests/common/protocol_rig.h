@@ -32,6 +32,7 @@ struct protocol_rig {
         int error;
     } * replies;
     int64_t utc0_ns;       /* UTC of device time 0; INT64_MIN at first: not known */
+    int64_t shift_ns;      /* TIME:SHIFt of the device's own clock, which begins with utc0_ns, or at power-up */
     enum protocol_pps pps; /* of all times; locked at first */
     int pps_unset;         /* the time of day was never set */
     struct nmea_fix fix;   /* of all times; quality 0 at first: there is none */
