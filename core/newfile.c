@@ -167,6 +167,14 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
     return rc;
 }
 
+/* Does the name still belong to what was opened? Another writer may have renamed it before we had the lock. */
+static int is_named(const char *name, int fd)
+{
+    struct stat open_st, named;
+    return fstat(fd, &open_st) == 0 && lstat(name, &named) == 0 && open_st.st_dev == named.st_dev &&
+           open_st.st_ino == named.st_ino;
+}
+
 int newfile_append(const char *path, int *out, struct sh_err *err)
 {
     struct stat st;
@@ -177,6 +185,8 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
     if (fstat(fd, &st) != 0) rc = newfile_fail(path, "be opened for writing", err);
     if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
     if (rc == SH_OK) rc = lock(path, fd, SH_ESTATE, err);
+    if (rc == SH_OK && !is_named(path, fd))
+        rc = sh_fail(err, SH_ESTATE, "%s: another process has just written it anew", path);
     if (rc != SH_OK)
         close(fd);
     else
@@ -216,18 +226,10 @@ static int open_part(const char *part, int *fd, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-/* Does part still name what was opened? Another writer may have renamed it before we had the lock. */
-static int is_named(const char *part, int fd)
+/* newfile_part, for a path that may be replaced. */
+static int lock_part(const char *part, int *out, struct sh_err *err)
 {
-    struct stat open_st, named;
-    return fstat(fd, &open_st) == 0 && lstat(part, &named) == 0 && open_st.st_dev == named.st_dev &&
-           open_st.st_ino == named.st_ino;
-}
-
-int newfile_part(const char *path, const char *part, int *out, struct sh_err *err)
-{
-    int rc = check_target(path, err), fd;
-    if (rc == SH_OK) rc = check_unlocked(path, err);
+    int rc = SH_OK, fd;
     for (int i = 0; rc == SH_OK && i < TRIES; i++) {
         rc = open_part(part, &fd, err);
         if (rc == 0) continue;
@@ -243,6 +245,13 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         close(fd);
     }
     return rc != SH_OK ? rc : sh_fail(err, SH_EIO, "%s: appears and disappears; another program writes it", part);
+}
+
+int newfile_part(const char *path, const char *part, int *out, struct sh_err *err)
+{
+    int rc = check_target(path, err);
+    if (rc == SH_OK) rc = check_unlocked(path, err);
+    return rc == SH_OK ? lock_part(part, out, err) : rc;
 }
 
 int newfile_left(const char *part, int *out, struct sh_err *err)
@@ -375,17 +384,13 @@ void newfile_drop(const char *part, int fd)
     close(fd);
 }
 
-/* fd is taken in any case. */
-static int write_part(const char *path, const char *part, int fd, newfile_put *put, const void *source,
-                      struct sh_err *err)
+static int write_part(const char *path, int fd, newfile_put *put, const void *source, struct sh_err *err)
 {
     struct sh_err why = {0};
     FILE *file = fdopen(dup(fd), "wb");
     int rc = file != NULL ? put(source, file, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
     if (file != NULL && fclose(file) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
-    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
-    newfile_drop(part, fd);
-    return sh_fail(err, rc, "%s: cannot be written: %.300s", path, why.text);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: cannot be written: %.300s", path, why.text);
 }
 
 int newfile_write(const char *path, newfile_put *put, const void *source, struct sh_err *err)
@@ -394,8 +399,33 @@ int newfile_write(const char *path, newfile_put *put, const void *source, struct
     int fd;
     if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
     int rc = newfile_part(path, part, &fd, err);
-    if (rc == SH_OK && put == NULL) newfile_drop(part, fd);
-    if (rc == SH_OK && put != NULL) rc = write_part(path, part, fd, put, source, err);
+    const int is_open = rc == SH_OK;
+    if (rc == SH_OK && put != NULL) rc = write_part(path, fd, put, source, err);
+    if (rc == SH_OK && put != NULL)
+        rc = newfile_keep(path, part, fd, err);
+    else if (is_open)
+        newfile_drop(part, fd);
+    free(part);
+    return rc;
+}
+
+/* The new file is locked before it gets the name, so there is no moment in which another process could have it. */
+int newfile_replace(const char *path, int *locked, newfile_put *put, const void *source, struct sh_err *err)
+{
+    char *part;
+    int fd = -1;
+    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
+    int rc = check_target(path, err);
+    if (rc == SH_OK) rc = lock_part(part, &fd, err);
+    if (rc == SH_OK) rc = write_part(path, fd, put, source, err);
+    if (rc == SH_OK) rc = newfile_sync(part, fd, err);
+    if (rc == SH_OK && rename(part, path) != 0) rc = fail_rename(path, part, err);
+    if (rc == SH_OK) {
+        close_renamed(path, *locked);
+        *locked = fd;
+    } else if (fd >= 0) {
+        newfile_drop(part, fd);
+    }
     free(part);
     return rc;
 }

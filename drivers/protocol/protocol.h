@@ -87,7 +87,14 @@ struct protocol_host {
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has set
      * it, it is UTC, or the time since power-up. */
     int64_t (*date_ns)(void *ctx, int64_t t_ns);
+    /* Keeps this protocol's settings without power, in place of those from before: lines of printable ASCII with their
+     * '\n', at most PROTOCOL_STORED bytes with the NUL; "": none. From then on each new session gets them (spec.stored).
+     * 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps none. Settings
+     * of the head itself, which native commands set, are kept by the command HEAD:STORe. */
+    int (*store)(void *ctx, const char *lines);
 };
+
+enum { PROTOCOL_STORED = 2048 };
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
 
@@ -114,6 +121,8 @@ struct protocol_spec {
     int64_t power_ns;   /* device time of the last power-up, from which the device's counters count */
     uint32_t power_ons; /* how often power has come, by power cycles and reboots, with the first time */
     uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
+    int keeps;          /* 1: store() and HEAD:STORe work; else the device forgets all settings without power */
+    const char *stored; /* what store() has kept; "": nothing. NULL: as "". Valid during create */
     int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];

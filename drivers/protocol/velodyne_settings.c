@@ -171,10 +171,11 @@ static int set_phase(const struct posted *p, const char *value, int apply)
     return refuse(p, 400, "offset: 0 to 35999, in 0.01 degree; offsetInput: in degrees");
 }
 
+/* A head without a place for settings takes it, too: clients expect that a device does. */
 static int save(const struct posted *p, const char *value, int apply)
 {
-    (void)apply;
-    return strcmp(value, "submit") == 0 ? 200 : refuse(p, 400, "data: submit");
+    if (strcmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
+    return apply && p->spec->keeps ? command(p, "HEAD:STORE") : 200;
 }
 
 /* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
@@ -94,6 +95,14 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
     if (rc == SH_OK) rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
+}
+
+void app_warn_settings_file(const struct config *cfg, const char *why)
+{
+    struct stat st;
+    const char *path = cfg->head.settings_file;
+    if (path[0] != '\0' && stat(path, &st) == 0 && st.st_size > 0)
+        sh_warn(&app_report_stderr, "head.settings_file %s: is not used: %s", path, why);
 }
 
 static const char *warned_of; /* NULL: the work is one */

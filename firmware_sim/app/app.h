@@ -44,6 +44,9 @@ int app_fail_config(const struct config_faults *faults);
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
+/* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
+void app_warn_settings_file(const struct config *cfg, const char *why);
+
 /* To be called before any file is opened. Checks that the command writes no file twice, and none that it reads. Files
  * are those of the command line, those of cfg (NULL: there is none), with its links where the command opens them, and
  * what meshes name. app_with_config calls it; commands without a configuration call it themselves. */

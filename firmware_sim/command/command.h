@@ -4,8 +4,8 @@
  *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?  HELP:SETtings?
  *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:LOST?  SYSTem:VERSion?  SYSTem:PLAN?
  *             SYSTem:CONTrol?  SYSTem:CONTrol:RELease
- *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:RANGe:MIN  HEAD:RANGe:MAX
- *             HEAD:NOISe  HEAD:NOISe:ANGLe  HEAD:NOISe:SIGMa  HEAD:NOISe:BALL
+ *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:STORe
+ *             HEAD:RANGe:MIN  HEAD:RANGe:MAX  HEAD:NOISe  HEAD:NOISe:ANGLe  HEAD:NOISe:SIGMa  HEAD:NOISe:BALL
  *   scan      SCAN:STARt  SCAN:STOP  SCAN:COUNt?  SCAN:FRAMes  SCAN:ECHoes
  *             SCAN:LINE:STARt  SCAN:LINE:STOP  SCAN:PAN:STARt  SCAN:PAN:STOP
  *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
@@ -163,10 +163,11 @@ struct command_device {
     uint64_t lost_journal_lines, lost_truth_lines; /* lines that these files lack */
     int64_t t_ns;                                  /* device time */
     char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
-    struct command_time_server server, server_default; /* the latter is that of power-up */
-    int asks_server;                                   /* 1: TIME:SERVer may be CLIENT: there is somebody who asks */
+    struct command_time_server server, server_default, server_configured; /* now; at power-up; of the configuration */
+    int asks_server; /* 1: TIME:SERVer may be CLIENT: there is somebody who asks */
     struct command_time_answers answers;
     int64_t shift_ns;                      /* what the scanner's clock is ahead of that of power-up (scanner_clock.h) */
+    int keeps;                             /* 1: the head can keep settings without power */
     int step_allowed;                      /* 1 when the pace is `step` */
     int pose_allowed;                      /* 1 when the platform is live: a step may carry a pose */
     double pose_centre_m[3], pose_reach_m; /* the pose must be within pose_reach_m of the centre; scene frame */
@@ -185,6 +186,7 @@ enum command_effect {
     COMMAND_STOP,
     COMMAND_RESET,   /* settings are the defaults again; state event RESET accepted */
     COMMAND_REBOOT,  /* power goes for a moment; state event POWER_OFF accepted */
+    COMMAND_STORE,   /* settings are now those of power-up, and are to be kept */
     COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
     COMMAND_MOVE,    /* move a station; the reply is that of success */
     COMMAND_TAKE,    /* control, and nothing else */

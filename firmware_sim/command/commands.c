@@ -231,6 +231,22 @@ static int act_reboot(struct command_call *call)
     return act_event(call, COMMAND_REBOOT);
 }
 
+/* The power-up values; the device writes them to its file. Station and frames are no such settings (stored.h). */
+static int act_store(struct command_call *call)
+{
+    struct command_device *dev = call->dev;
+    if (!dev->keeps)
+        return command_fail(call, CMD_E_SETTINGS, "%s needs head.settings_file in the configuration",
+                            call->row->header);
+    const uint32_t station = dev->defaults.station, frames = dev->defaults.frames;
+    dev->defaults = dev->settings;
+    dev->defaults.station = station;
+    dev->defaults.frames = frames;
+    dev->server_default = dev->server;
+    call->out->effect = COMMAND_STORE;
+    return command_reply(call, "OK");
+}
+
 static int act_step(struct command_call *call)
 {
     int64_t step_ns;
@@ -273,6 +289,7 @@ const struct command_row command_rows[] = {
     QUERY("HEAD:STATe", query_state),
     /* Open to all, as a head's plug is: clients of its maker's protocol know nothing of control. */
     {"HEAD:REBoot", NULL, act_reboot, NULL, NULL, 1, 0, 0, 0, HEAD_EV_POWER_OFF + 1},
+    ACTION("HEAD:STORe", act_store, 0),
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
     VALUE("HEAD:RANGe:MIN", unit_m, RANGE_MIN),
     VALUE("HEAD:RANGe:MAX", unit_m, RANGE_MAX),

@@ -79,6 +79,7 @@ struct config_instrument {
 struct config_head {
     struct head_settings settings;
     char serial[32], name[32];
+    char settings_file[CONFIG_PATH_LEN];
     int start; /* scan when booted; only the command run uses it */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;

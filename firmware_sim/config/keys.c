@@ -95,6 +95,10 @@ static const struct cfg_key config_keys[] = {
      .help = "resolved: number of zones of c / (2 prr_hz) that the head can resolve; it detects nothing beyond them."},
     {KEY(head.name), CFG_TEXT, .def = "", .example = "north-gate", .flags = CFG_ASCII,
      .help = "The user's name of the head, for protocols that can ask for it (cola: LocationName)."},
+    {KEY(head.settings_file), CFG_PATH, .def = "", .flags = CFG_WRITTEN, .example = "settings.txt",
+     .help = "File for settings that clients store, so that they survive a power cycle and a new start: HEAD:STORe, "
+             "and the store commands of other protocols. They are then the settings of power-up, in place of those "
+             "here. Without it nothing is stored. `scanhead run` alone reads and writes it."},
     {KEY(head.start), CFG_BOOL, .def = "off",
      .help = "on: `scanhead run` scans at once when the head has booted, as with --start."},
 

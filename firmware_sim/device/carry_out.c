@@ -43,6 +43,9 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     case COMMAND_REBOOT:
         device->power.reboots = 1;
         break;
+    case COMMAND_STORE:
+        device_keep_settings(device);
+        break;
     case COMMAND_RELEASE:
         device_push_event(&device->events, NATIVE_EV_CONTROL, 0, 0, 0, "released");
         break;
@@ -97,6 +100,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
+    cmd->keeps = session == 0 || device->settings != NULL; /* a replayed journal stores nothing */
     cmd->lost_journal_lines = atomic_load(&device->counters.lost_journal_lines);
     cmd->lost_truth_lines = atomic_load(&device->counters.lost_truth_lines);
     device_set_time_texts(device);
@@ -114,6 +118,12 @@ static void do_command(struct device *device, uint32_t session, const char *line
     else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP && out->effect != COMMAND_MOVE)
         journal_write(device->journal.out, device->next_tick, cmd->t_ns, session, line);
     if (out->error == 0) carry_out(device, out->effect, released);
+}
+
+void device_carry_out_line(struct device *device, const char *line)
+{
+    struct command_result result;
+    do_command(device, 0, line, device->next_tick, 0, &result);
 }
 
 void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,

@@ -143,6 +143,7 @@ int device_create(const struct site *site, const struct device_options *options,
     device_init_time_server(device);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc == SH_OK) rc = open_faults(device, err);
+    if (rc == SH_OK) rc = device_restore(device, err);
     if (rc != SH_OK) {
         device_free(device);
         return rc;

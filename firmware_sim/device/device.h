@@ -20,6 +20,7 @@
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/device/journal.h"
+#include "firmware_sim/device/settings_file.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/site/site.h"
 
@@ -101,6 +102,7 @@ struct device_options {
     double scan_s;  /* > 0: end each scan after this time, to the pulse */
     const char *journal;            /* NULL: none */
     const char *replay;             /* NULL: none */
+    struct settings_file *settings; /* what clients have stored; the caller's; NULL: nothing is stored */
     const char *truth;              /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings of a station's new place, from the thread that plans it; NULL: none */
 };
@@ -188,6 +190,10 @@ void device_get_station(struct device *device, uint32_t station, struct device_s
 const struct site *device_hold_site(struct device *device, struct device_version **version);
 void device_give_back(struct device_version *version);
 const struct site *device_site_of(const struct device_version *version);
+
+/* What a protocol's sessions have stored (settings_file.h). Both return 1 where the head keeps nothing, 0 else. */
+int device_store(struct device *device, const char *name, const char *text);
+int device_stored(const struct device *device, const char *name, char text[SETTINGS_FILE_TEXT]);
 
 /* Adds an error to the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);

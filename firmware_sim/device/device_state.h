@@ -71,6 +71,7 @@ struct device {
     const struct site *site; /* as of now */
     struct device_moves moves;
     struct device_options options;
+    struct settings_file *settings; /* NULL: none, or what it had is just being restored */
     struct device_counters counters;
     struct command_device cmd;
     struct head_clock clock;
@@ -125,6 +126,14 @@ void device_describe(struct device *device, struct device_work *work);
 /* Carries out commands of the replayed journal that are due at the tick. Returns 1 when one of them moves a station:
  * that has to be planned and finished before the others. */
 int device_run_replay(struct device *device, uint64_t tick);
+
+void device_carry_out_line(struct device *device, const char *line);
+
+/* stored.c */
+/* HEAD:STORe: the settings are now those of power-up. */
+void device_keep_settings(struct device *device);
+/* Before the first power-up: carries out what the file has, as commands of the device itself, which the journal gets. */
+int device_restore(struct device *device, struct sh_err *err);
 
 /* moves.c */
 /* A move was commanded. The thread that commanded it, or one of its own, has to plan it (device_plan_move). */

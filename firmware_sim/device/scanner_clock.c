@@ -16,9 +16,10 @@ void device_init_time_server(struct device *device)
 {
     const struct config_ntp *ntp = &device->site->cfg->ntp;
     struct command_device *cmd = &device->cmd;
-    cmd->server_default = (struct command_time_server){
+    cmd->server_configured = (struct command_time_server){
         .role = (uint32_t)ntp->role, .update_s = ntp->update_s, .zone_h = (int32_t)ntp->zone_h};
-    inet_pton(AF_INET, ntp->address, cmd->server_default.address);
+    inet_pton(AF_INET, ntp->address, cmd->server_configured.address);
+    cmd->server = cmd->server_default = cmd->server_configured;
     device->server_fd = -1;
 }
 
@@ -52,7 +53,7 @@ int64_t device_date_ns(struct device *device, int64_t t_ns)
 static int may_be_asked(const struct device *device, const uint8_t address[4])
 {
     return address[0] == LOOPBACK || device->site->cfg->ntp.anywhere ||
-           memcmp(address, device->cmd.server_default.address, 4) == 0;
+           memcmp(address, device->cmd.server_configured.address, 4) == 0;
 }
 
 void device_get_time_server(struct device *device, struct device_time_server *out)

@@ -84,6 +84,16 @@ static uint32_t near_wrap(void *self)
     return device_near_wrap(self);
 }
 
+static int store(void *self, const char *name, const char *text)
+{
+    return device_store(self, name, text);
+}
+
+static int stored(const void *self, const char *name, char text[SETTINGS_FILE_TEXT])
+{
+    return device_stored(self, name, text);
+}
+
 static int64_t tick_ns(const void *self)
 {
     return device_tick_ns(self);
@@ -136,6 +146,8 @@ const struct loop_source_ops loop_device_source = {
     .power_ons = power_ons,
     .pps = pps,
     .near_wrap = near_wrap,
+    .store = store,
+    .stored = stored,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,

@@ -78,6 +78,13 @@ static int64_t host_date_ns(void *ctx, int64_t t_ns)
     return s->pump->links->source->ops->date_ns(s->pump->links->source->self, t_ns);
 }
 
+static int host_store(void *ctx, const char *lines)
+{
+    const struct session *s = ctx;
+    const struct loop_source *source = s->pump->links->source;
+    return source->ops->store == NULL || source->ops->store(source->self, s->pump->protocol->name, lines);
+}
+
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 {
     struct session *s = ctx;
@@ -121,17 +128,23 @@ static void greet(struct pump *pump, struct session *s)
     give_frames(pump->protocol, s, frames, len);
 }
 
+_Static_assert((int)PROTOCOL_STORED == (int)SETTINGS_FILE_TEXT, "what a protocol stores fits");
+
 static int pump_protocol_create(struct pump *pump, struct session *s)
 {
+    const struct loop_source *source = pump->links->source;
+    char stored[SETTINGS_FILE_TEXT] = "";
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns,
-                 host_pps, host_date_ns},
+                 host_pps, host_date_ns, host_store},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
-        .power_ns = pump->links->source->ops->power_ns(pump->links->source->self),
-        .power_ons = pump->links->source->ops->power_ons(pump->links->source->self),
-        .near_wrap = pump->links->source->ops->near_wrap(pump->links->source->self),
+        .power_ns = source->ops->power_ns(source->self),
+        .power_ons = source->ops->power_ons(source->self),
+        .near_wrap = source->ops->near_wrap(source->self),
+        .keeps = source->ops->stored != NULL && source->ops->stored(source->self, pump->protocol->name, stored) == 0,
+        .stored = stored,
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
     };

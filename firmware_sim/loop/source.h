@@ -33,6 +33,8 @@ struct loop_source_ops {
     uint32_t (*power_ons)(void *self);
     enum protocol_pps (*pps)(void *self, int64_t t_ns, int *set);
     uint32_t (*near_wrap)(void *self);
+    int (*store)(void *self, const char *name, const char *text);
+    int (*stored)(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
 
     /* ---- the run */
     int64_t (*tick_ns)(const void *self);

@@ -374,6 +374,59 @@ static int tear_down(void **state)
     return rmdir(dir);
 }
 
+static int put_two(const void *source, FILE *file, struct sh_err *why)
+{
+    (void)source;
+    (void)why;
+    fputs("two", file);
+    return SH_OK;
+}
+
+static int put_fails(const void *source, FILE *file, struct sh_err *why)
+{
+    (void)source;
+    fputs("th", file);
+    return sh_fail(why, SH_EIO, "no more");
+}
+
+static int first_fd;
+
+static void begin_append(void)
+{
+    int fd;
+    expect_error(newfile_append(path, &fd, &err), SH_ESTATE, path, "is being written by process");
+}
+
+static void replace_first(void)
+{
+    assert_int_equal(newfile_replace(path, &first_fd, put_two, NULL, &err), 0);
+}
+
+/* A locked file is written anew, and has no moment without its lock: neither for a second writer that begins just
+ * before the rename, nor for one that has opened the old file by then. */
+static void test_replace_keeps_the_lock(void **state)
+{
+    (void)state;
+    int fd;
+    assert_int_equal(newfile_append(path, &first_fd, &err), 0);
+    before_rename = begin_append;
+    assert_int_equal(newfile_replace(path, &first_fd, put_two, NULL, &err), 0);
+    assert_null(before_rename);
+    expect_text(path, "two");
+    expect_missing(part);
+    expect_error(newfile_append(path, &fd, &err), SH_ESTATE, path, "is being written by process");
+    before_lock = replace_first;
+    expect_error(newfile_append(path, &fd, &err), SH_ESTATE, path, "has just written it anew");
+    assert_int_equal(newfile_replace(path, &first_fd, put_fails, NULL, &err), SH_EIO);
+    assert_non_null(strstr(err.text, "cannot be written: no more"));
+    expect_text(path, "two");
+    expect_missing(part);
+    close(first_fd);
+    assert_int_equal(newfile_append(path, &fd, &err), 0);
+    close(fd);
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -388,6 +441,7 @@ int main(void)
         cmocka_unit_test(test_one_writer_in_place),
         cmocka_unit_test(test_begun_in_place_meanwhile),
         cmocka_unit_test(test_append),
+        cmocka_unit_test(test_replace_keeps_the_lock),
         cmocka_unit_test(test_rights),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -117,6 +117,23 @@ static void test_settings(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
+/* Where the head keeps settings, /cgi/save has it do so; a head that another session controls can't. */
+static void test_save(void **state)
+{
+    (void)state;
+    http_rig.spec.keeps = 1;
+    http_renew();
+    http_post("/cgi/save", "data=submit");
+    assert_int_equal(http_status(), 200);
+    http_assert_command("HEAD:STORE");
+    http_post("/cgi/save", "data=x");
+    assert_int_equal(http_status(), 400);
+    http_assert_command(NULL);
+    http_replies[3] = (struct protocol_rig_reply){"HEAD:STORE", "ERR -203,\"Command protected\"", -203};
+    http_post("/cgi/save", "data=submit");
+    assert_int_equal(http_status(), 409);
+}
+
 /* A client that sends nothing, or half a request, is cut off 30 s after the last whole request, as others wait. */
 static void test_idle_clients(void **state)
 {
@@ -251,11 +268,17 @@ static void test_names_are_escaped(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_curl),         TEST(test_mrpt),
-        TEST(test_urllib),       TEST(test_settings),
-        TEST(test_idle_clients), TEST(test_head_at_rest),
-        TEST(test_reset),        TEST(test_refused_by_the_head),
-        TEST(test_documents),    TEST(test_names_are_escaped),
+        TEST(test_curl),
+        TEST(test_mrpt),
+        TEST(test_urllib),
+        TEST(test_settings),
+        TEST(test_save),
+        TEST(test_idle_clients),
+        TEST(test_head_at_rest),
+        TEST(test_reset),
+        TEST(test_refused_by_the_head),
+        TEST(test_documents),
+        TEST(test_names_are_escaped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,6 +52,7 @@ static const struct output {
     {RUN, "--truth", "--truth=@o", "o"},
     {RUN, "--surfaces", "--surfaces=@o", "o"},
     {RUN, "links[0].path", "--set=links[0].type=file --set=links[0].path=@o", "o"},
+    {RUN, "head.settings_file", "--set=head.settings_file=@o", "o"},
     {RECORD, "--output", "--output=@o.ply", "o.ply"},
     {RECORD, "--output", "--output=@o.obj", "o.mtl"},
     {RECORD, "--output", "--output=@o.obj", "o.png"},
@@ -308,7 +309,9 @@ static void test_two_heads_one_file(void **state)
     snprintf(says, sizeof says, "is being written by process %ld (scanhead); choose another file name",
              (long)first.pid);
     static const char *const lines[] = {"run @f.yaml --start --frames=1", "run @c.yaml --start --frames=1 --journal=@o",
-                                        "run @c.yaml --start --frames=1 --truth=@o", "soak @f.yaml --duration=1"};
+                                        "run @c.yaml --start --frames=1 --truth=@o",
+                                        "run @c.yaml --start --frames=1 --set=head.settings_file=@o",
+                                        "soak @f.yaml --duration=1"};
     struct stat st, later;
     assert_int_equal(stat(wire_path(wire, "o"), &st), 0);
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)

@@ -108,6 +108,7 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
                      cfg->file);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
         rc = sh_fail(err, SH_EINPUT, "--speed: allowed only with the pace realtime");
+    app_warn_settings_file(cfg, "the recording has the settings");
     o->replay.path = o->in.operand[0];
     if (!(o->replay.speed > 0.0)) o->replay.speed = 1.0;
     o->replay.start = o->device.start;

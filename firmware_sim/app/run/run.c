@@ -27,6 +27,18 @@ static void say_sights(const struct site *site)
             build_s, mib);
 }
 
+/* A user who wonders why the head is not as configured finds the reason here. */
+static void say_stored(const struct config *cfg, struct settings_file *settings)
+{
+    char text[SETTINGS_FILE_TEXT] = "";
+    if (settings != NULL) settings_file_get(settings, "head", text);
+    if (text[0] == '\0') return;
+    text[strlen(text) - 1] = '\0';
+    for (char *end; (end = strchr(text, '\n')) != NULL;)
+        *end = ';';
+    fprintf(stderr, "%s: stored in %s: %s\n", app_program, cfg->head.settings_file, text);
+}
+
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
 {
     struct bvh_info info;
@@ -112,6 +124,25 @@ static int open_watch(const struct config *cfg, const struct site *site, struct 
     return page->start(*watch, err);
 }
 
+/* A replayed journal has what was stored, as its first commands. It must not depend on a file that changes. */
+static int open_settings(struct run_options *o, const struct config *cfg, struct sh_err *err)
+{
+    if (o->device.replay != NULL)
+        app_warn_settings_file(cfg, "the journal that is replayed has the settings");
+    else if (cfg->head.settings_file[0] != '\0')
+        return settings_file_open(cfg->head.settings_file, cfg->profile.name, &app_report_stderr, &o->device.settings,
+                                  err);
+    return SH_OK;
+}
+
+/* Its failure is the run's, unless that has one already. */
+static int close_settings(struct settings_file *settings, int rc, struct sh_err *err)
+{
+    struct sh_err why;
+    const int file_rc = settings_file_close(settings, &why);
+    return rc == SH_OK && file_rc != SH_OK ? sh_fail(err, file_rc, "%s", why.text) : rc;
+}
+
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct run_options *o = ctx;
@@ -137,17 +168,20 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
      * --start. */
     if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
+    if (rc == SH_OK) rc = open_settings(o, cfg, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
     if (rc == SH_OK) rc = open_watch(cfg, site, device, &options, &watch, err);
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
     if (rc == SH_OK) {
         if (!o->quiet) say_what_runs(cfg, site, loop);
+        if (!o->quiet) say_stored(cfg, o->device.settings);
         warn_of_replay(o, device);
         rc = serve(o, loop, device, err);
     }
     loop_free(loop);
     if (watch != NULL) page->close(watch);
     device_free(device);
+    rc = close_settings(o->device.settings, rc, err);
     site_free(site);
     return rc;
 }

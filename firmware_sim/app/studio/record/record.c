@@ -182,6 +182,7 @@ static int check_colours(const struct record_line *r)
 
 static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
 {
+    app_warn_settings_file(cfg, "a recording off line has the settings of the configuration");
     return record_job_off_line(ctx, cfg, err);
 }
 

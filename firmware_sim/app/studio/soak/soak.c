@@ -209,6 +209,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "loop.pace: step, but no client grants time; allowed realtime and fast");
     if (o->link > (long)cfg->n_links)
         return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
+    app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     be_patient(cfg);

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+/* The settings that a head keeps without power, as commands. */
+#ifndef FIRMWARE_SIM_COMMAND_STORED_H
+#define FIRMWARE_SIM_COMMAND_STORED_H
+
+#include <stddef.h>
+
+#include "firmware_sim/command/command.h"
+
+/* Writes a line for each setting whose value is not that of the configuration: "HEAD:LINes 10\n". Left out are the
+ * station, which says where the head stands, the frames of a scan, and steps that follow from the rates. Returns 0; or
+ * -1: cap is too small. */
+int command_stored_text(struct command_device *dev, const struct head_settings *configured, char *text, size_t cap);
+
+/* Carries out such lines in an order in which none is refused, since a setting's limits depend on others. set: does one
+ * of them. A line whose value is set already is left out. Returns 0; or -1: a line is refused, and why has it with the
+ * reason. */
+int command_stored_apply(struct command_device *dev, const char *text, void (*set)(void *ctx, const char *line),
+                         void *ctx, char *why, size_t len);
+
+#endif

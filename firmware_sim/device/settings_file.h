@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* Settings that a device keeps without power, in a file: those that a client's store command has stored.
+ *
+ * In: text under a name (a protocol's, or "head"), as lines of printable ASCII. Out: the same text, at once and after a
+ * new start. The file (head.settings_file) is a text, too:
+ *
+ *   scanhead settings 1
+ *   profile NAME                  of the head whose settings these are
+ *   NAME LINE                     any number of them; the lines of a name are in their order
+ *   end
+ *
+ * A thread writes it, as a new file that takes the place of the old one, so it is always whole. No caller waits for a
+ * disk. The file is locked as long as it is open here. */
+#ifndef FIRMWARE_SIM_DEVICE_SETTINGS_FILE_H
+#define FIRMWARE_SIM_DEVICE_SETTINGS_FILE_H
+
+#include <stddef.h>
+
+#include "core/err.h"
+
+struct settings_file;
+
+/* Reads the file, or makes an empty one. path and profile must outlive it. SH_EINPUT: the file is no such file, broken,
+ * of another head profile, or another process has it. report takes a failure to write; NULL: nobody does. */
+int settings_file_open(const char *path, const char *profile, const struct sh_report *report,
+                       struct settings_file **out, struct sh_err *err);
+
+/* Replaces what is stored under a name: whole lines with their '\n'; empty: nothing is stored there any more.
+ * SH_EINPUT: a character is not printable ASCII, an empty line, a missing end, or too long for the file; nothing
+ * changes. Any thread; never waits for the file. */
+int settings_file_put(struct settings_file *file, const char *name, const char *text);
+
+enum { SETTINGS_FILE_TEXT = 2048 }; /* of all that is stored under a name, with the NUL */
+
+/* Copies what is stored under a name; "" where nothing is. Any thread. */
+void settings_file_get(struct settings_file *file, const char *name, char text[SETTINGS_FILE_TEXT]);
+
+const char *settings_file_path(const struct settings_file *file);
+
+/* Writes what is not written yet, and frees. Returns the error of the last write, where it failed. NULL is allowed. */
+int settings_file_close(struct settings_file *file, struct sh_err *err);
+
+#endif

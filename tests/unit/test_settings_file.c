@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: MIT */
+/* The file of stored settings. Its bytes are those of the picture in settings_file.h, written out here. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "firmware_sim/device/settings_file.h"
+
+static char dir[] = "/tmp/test_settings_XXXXXX", path[64], part[64], inner[64];
+static struct sh_err err;
+
+static void write_text(const char *text)
+{
+    FILE *out = fopen(path, "w");
+    assert_non_null(out);
+    fputs(text, out);
+    assert_int_equal(fclose(out), 0);
+}
+
+static void expect_text(const char *want)
+{
+    char text[4096] = "";
+    FILE *in = fopen(path, "r");
+    assert_non_null(in);
+    text[fread(text, 1, sizeof text - 1, in)] = '\0';
+    fclose(in);
+    assert_string_equal(text, want);
+}
+
+static struct settings_file *open_file(void)
+{
+    struct settings_file *file;
+    if (settings_file_open(path, "puck", NULL, &file, &err) != SH_OK) fail_msg("%s", err.text);
+    return file;
+}
+
+static void close_file(struct settings_file *file)
+{
+    if (settings_file_close(file, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static void expect_stored(struct settings_file *file, const char *name, const char *want)
+{
+    char text[SETTINGS_FILE_TEXT];
+    settings_file_get(file, name, text);
+    assert_string_equal(text, want);
+}
+
+static void begin(void)
+{
+    unlink(path);
+}
+
+static void what_is_stored_is_there_again(void **state)
+{
+    (void)state;
+    begin();
+    struct settings_file *file = open_file();
+    expect_stored(file, "head", "");
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 15\nSCAN:ECHoes LAST\n"), SH_OK);
+    assert_int_equal(settings_file_put(file, "cola", "name=north gate\n"), SH_OK);
+    expect_stored(file, "head", "HEAD:LINes 15\nSCAN:ECHoes LAST\n");
+    close_file(file);
+    expect_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\nhead SCAN:ECHoes LAST\ncola name=north gate\n"
+                "end\n");
+    assert_int_equal(access(part, F_OK), -1);
+    file = open_file();
+    expect_stored(file, "head", "HEAD:LINes 15\nSCAN:ECHoes LAST\n");
+    expect_stored(file, "cola", "name=north gate\n");
+    assert_int_equal(settings_file_put(file, "head", ""), SH_OK);
+    close_file(file);
+    expect_text("scanhead settings 1\nprofile puck\ncola name=north gate\nend\n");
+}
+
+/* A head that stores nothing leaves the file's bytes and its inode. */
+static void nothing_new_is_not_written(void **state)
+{
+    (void)state;
+    struct stat before, after;
+    begin();
+    write_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\nend\n");
+    assert_int_equal(stat(path, &before), 0);
+    struct settings_file *file = open_file();
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 15\n"), SH_OK);
+    close_file(file);
+    assert_int_equal(stat(path, &after), 0);
+    assert_true(before.st_ino == after.st_ino);
+}
+
+static void wrong_text_is_refused(void **state)
+{
+    (void)state;
+    static char long_line[600], many[SETTINGS_FILE_TEXT + 2];
+    memset(long_line, 'x', sizeof long_line - 2);
+    long_line[sizeof long_line - 2] = '\n';
+    for (size_t i = 0; i < SETTINGS_FILE_TEXT; i += 2)
+        memcpy(many + i, "x\n", 2);
+    const char *const wrong[] = {"no end", "\n", "a\n\nb\n", "caf\xc3\xa9\n", "a\tb\n", long_line, many};
+    begin();
+    struct settings_file *file = open_file();
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+        assert_int_equal(settings_file_put(file, "head", wrong[i]), SH_EINPUT);
+    expect_stored(file, "head", "");
+    close_file(file);
+}
+
+static const struct {
+    const char *text, *says[2];
+} bad[] = {
+    {"ply\n", {"is no file of stored settings: the first line must be 'scanhead settings 1'", "name another file"}},
+    {"scanhead settings 2\nprofile puck\nend\n", {"must be 'scanhead settings 1'", ""}},
+    {"scanhead settings 1\n", {":2: the last line 'end' is missing", "remove the file"}},
+    {"scanhead settings 1\nprofile other\nend\n", {"of a head of profile other, this is puck", "name another file"}},
+    {"scanhead settings 1\nend\n", {":2: there must be 'profile NAME'", ""}},
+    {"scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\n", {":4: the last line 'end' is missing", ""}},
+    {"scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\nend", {":4: allowed are lines of 1 to 510", ""}},
+    {"scanhead settings 1\nprofile puck\nhead\nend\n", {":3: there must be a name, a blank and a setting", ""}},
+    {"scanhead settings 1\nprofile puck\n\nend\n", {":3: allowed are lines of 1 to 510 printable", ""}},
+    {"scanhead settings 1\nprofile puck\nhead a\x01\nend\n", {":3: allowed are lines", ""}},
+    {"scanhead settings 1\nprofile puck\nend\nhead a\n", {":4: nothing may follow 'end'", ""}},
+    {"scanhead settings 1\nprofile puck\na-name-of-more-than-31-characters x\nend\n",
+     {":3: too many names", "31 bytes"}},
+};
+
+static void a_broken_or_foreign_file_is_refused_and_stays(void **state)
+{
+    (void)state;
+    struct settings_file *file;
+    begin();
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        write_text(bad[i].text);
+        const int rc = settings_file_open(path, "puck", NULL, &file, &err);
+        if (rc != SH_EINPUT || strstr(err.text, path) == NULL || strstr(err.text, bad[i].says[0]) == NULL ||
+            strstr(err.text, bad[i].says[1]) == NULL)
+            fail_msg("%zu: %d, %s", i, rc, rc == SH_OK ? "" : err.text);
+        expect_text(bad[i].text);
+    }
+}
+
+/* Also after the file was written anew, which gives it another inode. */
+static void two_heads_have_no_file_in_common(void **state)
+{
+    (void)state;
+    struct settings_file *second, *file;
+    begin();
+    file = open_file();
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(settings_file_open(path, "puck", NULL, &second, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, "is being written by"));
+        if (i == 1) break;
+        struct stat before, after;
+        assert_int_equal(stat(path, &before), 0);
+        assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 15\n"), SH_OK);
+        do /* until the thread has written it; the limit of the program ends a wait for ever */
+            assert_int_equal(stat(path, &after), 0);
+        while (before.st_ino == after.st_ino);
+    }
+    close_file(file);
+    close_file(open_file());
+}
+
+/* A killed head has left part of a new file: the old one counts, and the next head takes the part over. */
+static void a_killed_writer_leaves_the_old_file(void **state)
+{
+    (void)state;
+    begin();
+    write_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\nend\n");
+    FILE *left = fopen(part, "w");
+    assert_non_null(left);
+    fputs("scanhead sett", left);
+    fclose(left);
+    struct settings_file *file = open_file();
+    expect_stored(file, "head", "HEAD:LINes 15\n");
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 5\n"), SH_OK);
+    close_file(file);
+    expect_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 5\nend\n");
+}
+
+static char warning[600];
+
+static void keep_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    snprintf(warning, sizeof warning, "%s", text);
+}
+
+/* A folder in the place of the new file: its writer says so at once, and at the end. The settings themselves stay. */
+static void a_failure_to_write_is_said(void **state)
+{
+    (void)state;
+    const struct sh_report report = {.warn = keep_warning};
+    struct settings_file *file;
+    begin();
+    assert_int_equal(mkdir(part, 0700), 0);
+    assert_int_equal(settings_file_open(path, "puck", &report, &file, &err), SH_OK);
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 5\n"), SH_OK);
+    expect_stored(file, "head", "HEAD:LINes 5\n");
+    assert_int_not_equal(settings_file_close(file, &err), SH_OK);
+    assert_non_null(strstr(err.text, part));
+    assert_non_null(strstr(warning, "the settings stored last would be lost without power"));
+    expect_text("");
+    assert_int_equal(rmdir(part), 0);
+}
+
+static void links_and_folders_are_refused(void **state)
+{
+    (void)state;
+    struct settings_file *file;
+    begin();
+    assert_int_equal(symlink(inner, path), 0);
+    assert_int_equal(settings_file_open(path, "puck", NULL, &file, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "symbolic link"));
+    begin();
+    assert_int_equal(settings_file_open(dir, "puck", NULL, &file, &err), SH_EINPUT);
+}
+
+static int make_dir(void **state)
+{
+    (void)state;
+    if (mkdtemp(dir) == NULL) return -1;
+    snprintf(path, sizeof path, "%s/set", dir);
+    snprintf(part, sizeof part, "%s/set.part", dir);
+    snprintf(inner, sizeof inner, "%s/inner", dir);
+    return 0;
+}
+
+static int remove_dir(void **state)
+{
+    (void)state;
+    unlink(path);
+    unlink(part);
+    return rmdir(dir);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_stored_is_there_again),
+        cmocka_unit_test(nothing_new_is_not_written),
+        cmocka_unit_test(wrong_text_is_refused),
+        cmocka_unit_test(a_broken_or_foreign_file_is_refused_and_stays),
+        cmocka_unit_test(two_heads_have_no_file_in_common),
+        cmocka_unit_test(a_killed_writer_leaves_the_old_file),
+        cmocka_unit_test(a_failure_to_write_is_said),
+        cmocka_unit_test(links_and_folders_are_refused),
+    };
+    return cmocka_run_group_tests(tests, make_dir, remove_dir);
+}
