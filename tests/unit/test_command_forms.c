@@ -76,6 +76,7 @@ static const struct {
     {"TIME:UTC", "TIME:UTC", 1, 0, ""},
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
+    {"HEAD:STORE", "HEAD:STOR", 0, 1, ""},
     {"TIME:SHIFT", "TIME:SHIF", 1, 1, " 5"},
     {"TIME:SERVER", "TIME:SERV", 1, 1, " NONE,127.0.0.1,5,0,ETH"},
     {"FAULT:ADD", "FAUL:ADD", 0, 1, " {kind: drop}"},
@@ -87,7 +88,7 @@ static const struct {
 static struct command_device device_for(const char *header)
 {
     struct command_device dev = command_test_device();
-    dev.step_allowed = 1;
+    dev.step_allowed = dev.keeps = 1;
     if (strcmp(header, "SCAN:STOP") == 0) dev.state = HEAD_SCANNING;
     return dev;
 }
