@@ -107,7 +107,9 @@ static void ask(struct time_client *c, int64_t now_ns)
     ntp_write_request(packet, c->t1_ns);
     (void)!send(c->fd, packet, sizeof packet, 0); /* one that is lost is missed as an answer */
     c->give_up_ns = now_ns + SECOND_NS;
-    c->ask_ns = now_ns + (c->server.set.update_s * SECOND_NS << c->halvings);
+    const int64_t period_ns = c->server.set.update_s * SECOND_NS << c->halvings;
+    c->ask_ns += period_ns;
+    if (c->ask_ns <= now_ns) c->ask_ns = now_ns + period_ns; /* the machine stood still */
 }
 
 static void give_up(struct time_client *c)
