@@ -83,6 +83,7 @@ static const struct {
     [FAULT_CLOCK_JUMP] = {"jump_s", 0, 0},
     [FAULT_CLOCK_DRIFT] = {"ppm", 0, 0},
     [FAULT_COUNTERS_HIGH] = {"n", 1e9, 0},
+    [FAULT_NTP_STEP] = {"jump_s", 0, 0},
 };
 
 /* Whether a list of words has the word. */

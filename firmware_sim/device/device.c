@@ -202,7 +202,8 @@ static void run_faults(struct device *device, uint64_t tick, struct device_work 
                                         .pulse0 = device->scan.pulse_next,
                                         .n_pulses =
                                             1}; /* from the tick on that begins with the fault's pulse or later */
-    if (head_faults_step(&device->head_faults, HEAD_FAULTS_CLOCK | HEAD_FAULT(FAULT_POWER_CYCLE), &at))
+    static const uint64_t kinds = HEAD_FAULTS_CLOCK | HEAD_FAULTS_SERVER | HEAD_FAULT(FAULT_POWER_CYCLE);
+    if (head_faults_step(&device->head_faults, kinds, &at))
         device_run_clock_faults(&device->head_faults, &device->clock, &device->events, tick);
     device_run_power(device, tick, work);
 }

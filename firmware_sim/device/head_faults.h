@@ -23,6 +23,10 @@
 #define HEAD_FAULTS_CLOCK                                                                          \
     (HEAD_FAULT(FAULT_CLOCK_JUMP) | HEAD_FAULT(FAULT_CLOCK_DRIFT) | HEAD_FAULT(FAULT_CLOCK_STOP) | \
      HEAD_FAULT(FAULT_PPS_LOST) | HEAD_FAULT(FAULT_LEAP_SECOND))
+/* They strike at answers of a time server. */
+#define HEAD_FAULTS_SERVER                                                                      \
+    (HEAD_FAULT(FAULT_NTP_SILENT) | HEAD_FAULT(FAULT_NTP_KISS) | HEAD_FAULT(FAULT_NTP_UNSYNC) | \
+     HEAD_FAULT(FAULT_NTP_STEP))
 #define HEAD_FAULTS_ONCE (HEAD_FAULT(FAULT_POWER_CYCLE) | HEAD_FAULT(FAULT_CLOCK_JUMP) | HEAD_FAULT(FAULT_LEAP_SECOND))
 #define HEAD_FAULTS_BEAM                                                                                \
     (HEAD_FAULT(FAULT_MIRROR_SLOW) | HEAD_FAULT(FAULT_MIRROR_STUCK) | HEAD_FAULT(FAULT_MIRROR_WOBBLE) | \

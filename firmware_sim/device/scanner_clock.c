@@ -87,6 +87,29 @@ void device_say_time_server(const struct device *device)
     if (device->server_fd >= 0) eventfd_write(device->server_fd, 1);
 }
 
+int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packet[NTP_LEN])
+{
+    static const struct {
+        enum fault_kind kind;
+        enum ntp_change change;
+    } changes[] = {{FAULT_NTP_STEP, NTP_STEP}, {FAULT_NTP_UNSYNC, NTP_UNSYNCHRONISE}, {FAULT_NTP_KISS, NTP_DENY}};
+    struct head_faults *faults = &device->head_faults;
+    struct head_fault *f = NULL;
+    int is_silent = 0;
+    pthread_mutex_lock(&device->lock);
+    for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++)
+        while ((f = head_faults_at(faults, changes[i].kind, t_ns, f)) != NULL) {
+            ntp_change_answer(packet, changes[i].change, llround(1e9 * f->fault.jump_s));
+            f->n++;
+        }
+    while ((f = head_faults_at(faults, FAULT_NTP_SILENT, t_ns, f)) != NULL) {
+        is_silent = 1;
+        f->n++;
+    }
+    pthread_mutex_unlock(&device->lock);
+    return is_silent;
+}
+
 void device_shift_date(struct device *device, int64_t by_ns, uint64_t released)
 {
     struct command_result result;

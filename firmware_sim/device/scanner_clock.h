@@ -11,6 +11,7 @@
 
 #include <stdint.h>
 
+#include "drivers/protocol/ntp.h"
 #include "firmware_sim/command/command.h"
 
 struct device;
@@ -37,6 +38,8 @@ struct device_time_server {
 void device_get_time_server(struct device *device, struct device_time_server *out);
 /* An eventfd that is written whenever that may have changed; -1: none. */
 void device_watch_time_server(struct device *device, int fd);
+/* Applies injected faults to a server's answer that comes at a device time. 1: it is as if it had not come. */
+int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packet[NTP_LEN]);
 /* Sets the clock forward, as a command of the device itself. */
 void device_shift_date(struct device *device, int64_t by_ns, uint64_t released);
 /* Replaces what TIME:SERVer? STATe replies. report: error 107 and an event; NULL: nothing is to be reported. */

@@ -5,7 +5,7 @@
  * The heads run beside each other and mostly wait. Their ticks may be late, so that a busy machine costs no pulses. */
 #include "tests/wire/room.h"
 
-enum { N_SCENARIOS = 7 };
+enum { N_SCENARIOS = 8 };
 
 static const struct {
     const char *name;
@@ -20,6 +20,7 @@ static const struct {
     {"slow-boot", {"slow_boot", "self_test", "refuse", "late_reply", "no_reply"}},
     {"dying-motor", {"mirror_wobble", "mirror_slow", "mirror_stuck", "pan_slip", "laser_off"}},
     {"clock-step", {"clock_jump", "pps_lost", "clock_drift", "clock_stop"}},
+    {"time-server", {"ntp_step"}},
 };
 
 /* Some 1300 frames a second. */

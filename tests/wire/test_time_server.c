@@ -238,11 +238,64 @@ static void wrong_servers(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* Adds a fault, and waits until the command has taken effect: 100 ms of the head's time. */
+static void inject(struct scanhead *sh, const char *fault)
+{
+    char line[80];
+    snprintf(line, sizeof line, "FAUL:ADD %s", fault);
+    client_ask(sh, line);
+    const int64_t from_ns = client_time_ns(sh);
+    while (client_time_ns(sh) < from_ns + 100000000)
+        continue;
+}
+
+/* The same by injected faults, which a client adds and takes out: the server itself answers rightly. */
+static void injected_faults(void **state)
+{
+    static const struct {
+        const char *fault, *state;
+    } cases[] = {{"{kind: ntp_unsync}", "UNSYNCHRONISED"},
+                 {"{kind: ntp_kiss}", "KISS"},
+                 {"{kind: ntp_silent}", "SILENT"},
+                 {"{kind: ntp_step, jump_s: -18001}", "OFFSET"}};
+    struct wire *wire = *state;
+    struct server server;
+    int64_t start_us, date_us, start0_us, date0_us;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    server_wait(&server);
+    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
+    until_state(sh, "SET");
+    read_times(&start0_us, &date0_us);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        inject(sh, cases[i].fault);
+        const double t1_s = ask_again(&server);
+        server_answer(&server, t1_s, 0, 1, "TEST");
+        until_state(sh, cases[i].state);
+        client_tell(sh, "FAUL:CLE ALL");
+    }
+    read_times(&start_us, &date_us);
+    assert_true(llabs(date_us - date0_us - (start_us - start0_us)) <= 2);
+    inject(sh, "{kind: ntp_step, jump_s: 100}"); /* this one is believed */
+    server_answer(&server, ask_again(&server), 0, 1, "TEST");
+    until_state(sh, "SET");
+    read_times(&start_us, &date_us);
+    const int64_t step_us = date_us - date0_us - (start_us - start0_us);
+    assert_true(step_us <= 100 * SECOND_US + 2 && step_us > 99 * SECOND_US); /* less half of the delay, below 1 s */
+    close(scanner.fd);
+    close(server.fd);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(scans_have_the_servers_time, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_servers, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(injected_faults, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("time server", tests, NULL, NULL);
 }

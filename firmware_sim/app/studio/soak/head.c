@@ -27,6 +27,11 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
         return "amplitudes fall: a client has no others to compare with";
     case FAULT_COUNTERS_HIGH:
         return "counters continue after their wrap";
+    case FAULT_NTP_SILENT:
+    case FAULT_NTP_KISS:
+    case FAULT_NTP_UNSYNC:
+    case FAULT_NTP_STEP:
+        return "only the dates of a SICK scanner's scans show it";
     case FAULT_MIRROR_SLOW:
     case FAULT_MIRROR_STUCK:
     case FAULT_MIRROR_WOBBLE:
