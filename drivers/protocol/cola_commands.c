@@ -195,7 +195,8 @@ static void reboot(struct cola *self)
 {
     char reply[512];
     const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
-    cola_power_up(self);
+    struct sh_err err; /* it was taken before */
+    cola_power_up(self, &err);
     if (refused) self->host.hang_up(self->host.ctx);
 }
 

@@ -115,26 +115,6 @@ enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, s
     return cola_args_end(args);
 }
 
-/* ---- which form streamed telegrams have */
-
-enum cola_error cola_read_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    cola_put_u(out, 1, self->set.framing);
-    return cola_args_end(args);
-}
-
-enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    const uint32_t form = cola_arg_u(args, 1);
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error != COLA_OK) return error;
-    if (form > COLA_B) return COLA_INVALID_DATA;
-    self->set.framing = (uint8_t)form;
-    self->stream_form = (enum cola_form)form;
-    return COLA_OK;
-}
-
 /* ---- log-in */
 
 static int password_fits(uint32_t level, uint32_t hash)
@@ -209,14 +189,7 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
     return COLA_OK;
 }
 
-/* ---- keeping and forgetting */
-
-enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    (void)self;
-    cola_put_u(out, 1, 1);
-    return cola_args_end(args);
-}
+/* ---- forgetting */
 
 enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, struct cola_out *out)
 {

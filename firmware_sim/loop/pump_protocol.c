@@ -130,7 +130,7 @@ static void greet(struct pump *pump, struct session *s)
 
 _Static_assert((int)PROTOCOL_STORED == (int)SETTINGS_FILE_TEXT, "what a protocol stores fits");
 
-static int pump_protocol_create(struct pump *pump, struct session *s)
+static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_err *err)
 {
     const struct loop_source *source = pump->links->source;
     char stored[SETTINGS_FILE_TEXT] = "";
@@ -145,21 +145,23 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
         .near_wrap = source->ops->near_wrap(source->self),
         .keeps = source->ops->stored != NULL && source->ops->stored(source->self, pump->protocol->name, stored) == 0,
         .stored = stored,
+        .dialect = pump->dialect,
+        .shared = &pump->shared,
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
     };
-    struct sh_err err;
     snprintf(spec.address, sizeof spec.address, "%s", pump->links->data_address);
     s->pump = pump;
     s->hang_up = 0;
-    if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;
+    if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK)
+        return sh_fail(err, SH_ENOMEM, "no memory for a session");
     unit_queue_clear(&s->units);
-    return pump->protocol->create(&spec, &s->protocol, &err);
+    return pump->protocol->create(&spec, &s->protocol, err);
 }
 
-int session_open_protocol(struct pump *pump, struct session *s)
+int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err)
 {
-    const int rc = pump_protocol_create(pump, s);
+    const int rc = pump_protocol_create(pump, s, err);
     if (rc == SH_OK) greet(pump, s);
     return rc;
 }
@@ -167,7 +169,8 @@ int session_open_protocol(struct pump *pump, struct session *s)
 int session_restart_protocol(struct pump *pump, struct session *s)
 {
     session_close_protocol(pump, s);
-    const int rc = pump_protocol_create(pump, s);
+    struct sh_err err; /* a file or null link has none to tell */
+    const int rc = pump_protocol_create(pump, s, &err);
     if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     return rc;
 }

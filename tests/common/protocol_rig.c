@@ -93,6 +93,13 @@ static enum protocol_pps pps(void *ctx, int64_t t_ns, int *set)
     return rig->pps;
 }
 
+static int store(void *ctx, const char *lines)
+{
+    struct protocol_rig *rig = ctx;
+    snprintf(rig->stored, sizeof rig->stored, "%s", lines);
+    return !rig->spec.keeps;
+}
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;
@@ -110,12 +117,12 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.serial, sizeof rig->identity.serial, "17210001");
     snprintf(rig->identity.firmware, sizeof rig->identity.firmware, "1.2.3");
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
-    rig->spec =
-        (struct protocol_spec){.identity = &rig->identity,
-                               .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns},
-                               .session = 1,
-                               .fixes_hz = 1,
-                               .power_ons = 1};
+    rig->spec = (struct protocol_spec){
+        .identity = &rig->identity,
+        .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns, store},
+        .session = 1,
+        .fixes_hz = 1,
+        .power_ons = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
     if (rig->ops->open != NULL) rig->ops->open(rig->protocol, 0);
 }
