@@ -59,7 +59,8 @@ enum ntp_kind ntp_read_answer(const uint8_t *packet, size_t len, int64_t t1_ns, 
     }
     const int64_t t2_ns = get_time(packet + RECEIVE), t3_ns = get_time(packet + TRANSMIT);
     out->delay_ns = (t4_ns - t1_ns) - (t3_ns - t2_ns);
-    out->offset_ns = ((t2_ns - t1_ns) + (t3_ns - t4_ns)) / 2;
+    const int64_t there_ns = t2_ns - t1_ns, back_ns = t3_ns - t4_ns;
+    out->offset_ns = there_ns / 2 + back_ns / 2 + (there_ns % 2 + back_ns % 2) / 2; /* their sum may have no room */
     return is_synchronised(packet) && t3_ns >= t2_ns && out->delay_ns >= 0 ? NTP_GOOD : NTP_UNSYNCHRONISED;
 }
 

@@ -11,7 +11,7 @@
  *
  *   offset = ((T2 - T1) + (T3 - T4)) / 2      delay = (T4 - T1) - (T3 - T2)
  *
- * Times in memory are ns since 1970. Pure. */
+ * Times in memory are ns since 1970, T1 and T4 within 1820 to 2170. Pure. */
 #ifndef DRIVERS_PROTOCOL_NTP_H
 #define DRIVERS_PROTOCOL_NTP_H
 

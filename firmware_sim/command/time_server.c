@@ -27,7 +27,7 @@ int command_shift_query(struct command_call *call)
 
 int command_shift_change(struct command_call *call)
 {
-    const int64_t most_ns = INT64_C(8000000000000000000); /* 253 years: a date between 1970 and 2199 is nearer */
+    const int64_t most_ns = INT64_C(4600000000000000000); /* 145 years; ntp.h has room for twice as much */
     int64_t shift_ns;
     if (call->dev->recorded != NULL) return fail_recorded(call);
     if (command_value_in_range(call, -most_ns, most_ns, &shift_ns) != 0) return -1;

@@ -16,5 +16,6 @@
     {KEY(ntp.max_offset_s), CFG_REAL, "s", "18000", 0.001, 1e9,
      .help = "TSCTCmaxoffset: once the clock is set, an answer that is farther from it is refused."},
     {KEY(ntp.anywhere), CFG_BOOL, .def = "off",
-     .help = "on: a client may choose any server. off: only the one of ntp.address, or one on this machine, is asked."},
-/* clang-format on */
+     .help = "on: a client may choose any server. off: only the one of ntp.address, or one on this machine, is "
+             "asked."},
+    /* clang-format on */

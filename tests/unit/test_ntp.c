@@ -122,6 +122,28 @@ static void kisses_are_read(void **state)
     assert_string_equal(a.kiss, "A?\"?");
 }
 
+/* Clocks at the ends of what the header allows, and any bytes: the sanitizers look for overflows. */
+static void any_bytes_do_no_harm(void **state)
+{
+    (void)state;
+    static const int64_t clocks_ns[] = {INT64_C(-4600000000000000000), -1, 0, INT64_C(6300000000000000000)};
+    uint32_t random = 1;
+    for (int i = 0; i < 20000; i++) {
+        const int64_t t1_ns = clocks_ns[i % 4];
+        uint8_t packet[NTP_LEN];
+        struct ntp_answer a;
+        answer(packet, t1_ns, 0, 0);
+        for (int k = 0; k < NTP_LEN; k++) {
+            random = random * 1664525 + 1013904223;
+            if (k < 24 ? k > 1 && random >> 31 : k > 31) packet[k] = (uint8_t)(random >> 24);
+        }
+        const enum ntp_kind kind = ntp_read_answer(packet, NTP_LEN, t1_ns, t1_ns + SECOND_NS, &a);
+        assert_true(kind == NTP_GOOD || kind == NTP_UNSYNCHRONISED);
+        ntp_change_answer(packet, NTP_STEP, i % 2 ? INT64_C(1000000000000000) : INT64_C(-1000000000000000));
+        if (kind == NTP_GOOD) assert_true(a.delay_ns >= 0 && a.delay_ns <= SECOND_NS);
+    }
+}
+
 /* Injected faults: what a reader makes of the changed answer. */
 static void answers_are_changed(void **state)
 {
@@ -145,7 +167,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_request_has_its_time), cmocka_unit_test(offset_and_delay),
         cmocka_unit_test(wrong_answers),          cmocka_unit_test(kisses_are_read),
-        cmocka_unit_test(answers_are_changed),
+        cmocka_unit_test(answers_are_changed),    cmocka_unit_test(any_bytes_do_no_harm),
     };
     return cmocka_run_group_tests_name("ntp", tests, NULL, NULL);
 }

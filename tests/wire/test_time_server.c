@@ -191,6 +191,9 @@ static void wrong_servers(void **state)
     cola_client_expect(&scanner, "sWN TSCTCtimezone D", "sWA TSCTCtimezone"); /* an hour ahead */
     cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
     server_wait(&server);
+    server.request[47] ^= 1; /* an answer to another request is passed over */
+    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
+    server.request[47] ^= 1;
     server_answer(&server, SERVER_S + SECONDS_1900, 3, 1, "TEST");
     until_state(sh, "UNSYNCHRONISED");
     client_until_soon(sh, SCANHEAD_EV_ERROR, &frame);
@@ -226,6 +229,8 @@ static void wrong_servers(void **state)
     assert_int_equal(good, 2);
     assert_int_equal(refused, 3);
     assert_int_equal(none, 1);
+    cola_client_expect(&scanner, "sWN TSCTCSrvAddr C0 0 2 1", "sWA TSCTCSrvAddr"); /* 192.0.2.1: not this machine */
+    until_state(sh, "REFUSED");
     cola_client_expect(&scanner, "sMN mSCreboot", "sAN mSCreboot");
     assert_null(cola_client_next(&scanner));
     close(scanner.fd);
