@@ -221,6 +221,7 @@ static int act_reset(struct command_call *call)
 {
     if (act_event(call, COMMAND_RESET) != 0) return -1;
     call->dev->settings = call->dev->defaults;
+    call->dev->server = call->dev->server_default;
     return 0;
 }
 

@@ -39,6 +39,7 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
         break;
     case COMMAND_RESET:
         stop(device, HEAD_EV_RESET, released);
+        device_say_time_server(device);
         break;
     case COMMAND_REBOOT:
         device->power.reboots = 1;

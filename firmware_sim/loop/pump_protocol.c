@@ -75,7 +75,10 @@ static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int *set)
 static int64_t host_date_ns(void *ctx, int64_t t_ns)
 {
     const struct session *s = ctx;
-    return s->pump->links->source->ops->date_ns(s->pump->links->source->self, t_ns);
+    const struct loop_source *source = s->pump->links->source;
+    if (source->ops->date_ns != NULL) return source->ops->date_ns(source->self, t_ns);
+    const int64_t utc_ns = source->ops->utc_ns(source->self, t_ns);
+    return utc_ns != INT64_MIN ? utc_ns : t_ns - source->ops->power_ns(source->self);
 }
 
 static int host_store(void *ctx, const char *lines)
