@@ -45,7 +45,7 @@ static void time_client_say(struct time_client *c, const char *state, const char
 {
     char report[128];
     const uint8_t *a = c->server.set.address;
-    const int is_new = c->answers.state != state;
+    const int is_new = c->answers.state == NULL || strcmp(c->answers.state, state) != 0;
     c->answers.state = state;
     if (text != NULL) snprintf(report, sizeof report, "%u.%u.%u.%u: %s", a[0], a[1], a[2], a[3], text);
     device_put_time_answers(c->device, &c->answers, is_new && text != NULL ? report : NULL);

@@ -99,7 +99,7 @@ static void who_is_asked(void **state)
 static void the_server_is_stored(void **state)
 {
     (void)state;
-    char path[96];
+    static char path[96]; /* outlives a test that fails */
     struct sh_err err;
     struct settings_file *file;
     struct device_options options = {0};

@@ -223,10 +223,15 @@ static void wrong_servers(void **state)
     const int64_t step_us = date_us - date0_us - (start_us - start0_us);
     assert_true(step_us <= 17999 * SECOND_US + 2 &&
                 step_us > 17998 * SECOND_US); /* less half of the delay, below 1 s */
+    cola_client_expect(&scanner, "sWN TSCRole 0", "sWA TSCRole");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    t1_s = server_wait(&server); /* the limit is for a clock that this role has set */
+    server_answer(&server, t1_s + 20000.0, 0, 1, "TEST");
+    until_state(sh, "SET");
     ask_again(&server);
     unsigned good, refused, none;
     assert_int_equal(sscanf(until_state(sh, "SILENT"), "SILENT,%*d,%*d,%*d,%u,%u,%u", &good, &refused, &none), 3);
-    assert_int_equal(good, 2);
+    assert_int_equal(good, 3);
     assert_int_equal(refused, 3);
     assert_int_equal(none, 1);
     cola_client_expect(&scanner, "sWN TSCTCSrvAddr C0 0 2 1", "sWA TSCTCSrvAddr"); /* 192.0.2.1: not this machine */
@@ -240,6 +245,26 @@ static void wrong_servers(void **state)
     close(scanner.fd);
     close(server.fd);
     scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* RATE: from then on it asks half as often. T1 of the requests tells their times by the scanner's own clock, which no
+ * answer sets. A request is late by what its thread waits for the processor. */
+static void a_kiss_slows_it_down(void **state)
+{
+    struct wire *wire = *state;
+    struct server server;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    cola_client_expect(&scanner, "sWN TSCTCupdatetime 1", "sWA TSCTCupdatetime");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    const double first_s = server_wait(&server);
+    server_answer(&server, first_s, 0, 0, "RATE");
+    const double late_s = server_wait(&server) - first_s - 2.0;
+    assert_true(late_s > -0.5 &&
+                late_s < 1e-3 * SOON_MS); /* below 0 where the first one was late; -1 without the kiss */
+    close(scanner.fd);
+    close(server.fd);
     head_end(&head, SIGTERM);
 }
 
@@ -300,6 +325,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(scans_have_the_servers_time, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_servers, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_kiss_slows_it_down, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(injected_faults, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("time server", tests, NULL, NULL);
