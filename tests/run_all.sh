@@ -57,7 +57,7 @@ if [ -z "$part" ]; then
     set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh
 fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
-if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh tests/check_scanheadd.sh tests/check_package.sh; fi # a browser beside them
+if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh tests/check_lockstep.sh tests/check_scanheadd.sh tests/check_package.sh; fi # a browser beside them
 
 # apart NAME...: prints those programs of the wanted folders, and those of unit with sanitizers.
 apart() {

@@ -103,6 +103,14 @@ static int64_t scan_end_ns(const struct device *device)
     return end_ns < path_end_ns ? end_ns : path_end_ns;
 }
 
+/* Another simulator that steps a live platform gets all pulses of a grant within it. Elsewhere an incomplete packet waits
+ * for the next tick: the stream is the same at any pace. */
+static int is_lock_step(const struct device *device)
+{
+    const struct config *cfg = device->site->cfg;
+    return cfg->loop.pace == PACE_STEP && cfg->platform.kind == PLATFORM_LIVE;
+}
+
 /* Claims the pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
  * over. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
@@ -136,7 +144,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
         due = most;
         ends = 0;
     }
-    uint64_t end = stop || ends || due == edge ? due : schedule_cut(seg, due);
+    uint64_t end = stop || ends || due == edge || is_lock_step(device) ? due : schedule_cut(seg, due);
     int done = due >= seg->end_pulse && !stop;
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;

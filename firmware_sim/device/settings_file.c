@@ -14,7 +14,8 @@
 
 static const char title[] = "scanhead settings 1", of_profile[] = "profile ", end_line[] = "end";
 
-enum { MAX_NAMES = 8, NAME_LEN = 32, LINE_LEN = 512 };
+/* A line of the file has a name, a blank, a setting, and its end. */
+enum { MAX_NAMES = 8, NAME_LEN = 32, MAX_SETTING = 478, LINE_LEN = NAME_LEN + MAX_SETTING + 2 };
 
 /* All that is stored. */
 struct image {
@@ -70,7 +71,7 @@ static int are_lines(const char *text)
 {
     for (size_t n; *text != '\0'; text += n + 1) {
         n = strcspn(text, "\n");
-        if (text[n] == '\0' || n + NAME_LEN >= LINE_LEN || !is_printable(text, n)) return 0;
+        if (text[n] == '\0' || n > MAX_SETTING || !is_printable(text, n)) return 0;
     }
     return 1;
 }
@@ -102,6 +103,8 @@ static int take_line(struct settings_file *file, unsigned line_no, char *line, s
         return fail_at(file, line_no, err, "too many names, or too long a name; allowed are %d of up to %d bytes",
                        MAX_NAMES, NAME_LEN - 1);
     const size_t len = strlen(text), more = strlen(blank + 1);
+    if (more > MAX_SETTING)
+        return fail_at(file, line_no, err, "too long a setting; allowed are %d characters", MAX_SETTING);
     if (len + more + 2 > SETTINGS_FILE_TEXT)
         return fail_at(file, line_no, err, "too much under one name; allowed are %d bytes", SETTINGS_FILE_TEXT - 1);
     memcpy(text + len, blank + 1, more);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* This fuzzes journals and the manifests of campaigns. The input is the file. A journal that is read must be sorted by
- * tick, and must give the same commands when it is written anew. */
+/* This fuzzes journals, the manifests of campaigns, and stored settings. The input is the file. A journal that is read
+ * must be sorted by tick, and must give the same commands when it is written anew. Settings that are read must be the
+ * same after they are written anew. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,7 @@
 
 #include "firmware_sim/app/studio/batch/manifest.h"
 #include "firmware_sim/device/journal.h"
+#include "firmware_sim/device/settings_file.h"
 #include "tests/fuzz/rig.h"
 
 static void check_again(const struct journal_entry *entry, size_t n)
@@ -50,6 +52,32 @@ static void read_entry(const uint8_t *data, size_t size)
     free(line);
 }
 
+/* 0: it is no such file. add: a name for one more setting; NULL: none. */
+static int take_settings(const char *path, const char *add, char text[SETTINGS_FILE_TEXT])
+{
+    struct sh_err err = {0};
+    struct settings_file *file;
+    if (settings_file_open(path, "puck", NULL, &file, &err) != SH_OK) {
+        fuzz_must_be_line(&err);
+        return 0;
+    }
+    settings_file_get(file, "head", text);
+    fuzz_must(settings_file_put(file, "head", text) == SH_OK, "what was read can be stored");
+    if (add != NULL) settings_file_put(file, add, "a 1\n"); /* there may be no room for it */
+    fuzz_must(settings_file_close(file, &err) == SH_OK, "and written");
+    return 1;
+}
+
+static void read_settings(const uint8_t *data, size_t size)
+{
+    static const char begin[] = "scanhead";
+    char before[SETTINGS_FILE_TEXT], after[SETTINGS_FILE_TEXT];
+    if (size < sizeof begin || memcmp(data, begin, sizeof begin - 1) != 0) return; /* the disk takes its time */
+    const char *path = fuzz_disk_file("settings", data, size);
+    if (!take_settings(path, "cola", before)) return;
+    fuzz_must(take_settings(path, NULL, after) && strcmp(before, after) == 0, "what was written can be read");
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct sh_err err = {0};
@@ -57,6 +85,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     size_t n = 0;
     if (size > 8192) return 0;
     read_entry(data, size);
+    read_settings(data, size);
     if (journal_read(fuzz_file(".journal", data, size), &entry, &n, &err) != SH_OK) {
         fuzz_must_be_line(&err);
         fuzz_must(entry == NULL, "there are no entries after a failure");

@@ -176,9 +176,33 @@ static void a_fix_is_where_the_head_was(void **state)
     unlink(path);
 }
 
+/* In lock-step a tick has all pulses that fire within it: none waits for its packet to be whole. At other paces, and
+ * without a live platform, some do, and the stream is the same at any pace. */
+static void a_tick_of_lock_step_has_all_its_pulses(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"head.prr_hz=123456.789", "head.frames=0", "platform.kind=live",
+                                       "loop.pace=step"};
+    for (int n_sets = 2; n_sets <= 4; n_sets++) {
+        struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, n_sets);
+        int left = 0;
+        rig_go_to(rig, 300);
+        for (int i = 0; i < 200; i++) {
+            assert_true(rig_claim(rig) && rig->work.scanning);
+            const int64_t end_ns = (int64_t)rig->next * 1000000 - rig->work.scan_t0_ns;
+            const uint64_t due = schedule_pulse_at(&rig->work.segment, end_ns);
+            assert_true(due - rig->work.pulse_end < SCHEDULE_PACKET);
+            left += due != rig->work.pulse_end;
+        }
+        assert_true(n_sets == 4 ? left == 0 : left > 100);
+        rig_close(rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_tick_of_lock_step_has_all_its_pulses),
         cmocka_unit_test(a_pose_far_ahead_keeps_no_other_out),
         cmocka_unit_test(a_platform_stands_where_the_scan_ended),
         cmocka_unit_test(a_path_ends_with_its_last_pose),
