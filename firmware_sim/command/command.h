@@ -191,9 +191,9 @@ enum command_effect {
     COMMAND_MOVE,    /* move a station; the reply is that of success */
     COMMAND_TAKE,    /* control, and nothing else */
     COMMAND_FAULTS,  /* faults were added or taken out */
-    COMMAND_RELEASE, /* control was given back */
     COMMAND_CLOCK,   /* the scanner's clock was set */
     COMMAND_SERVER,  /* its time server has changed */
+    COMMAND_RELEASE, /* control was given back */
 };
 
 struct command_result {
