@@ -237,7 +237,8 @@ static int act_store(struct command_call *call)
 {
     struct command_device *dev = call->dev;
     if (!dev->keeps)
-        return command_fail(call, CMD_E_SETTINGS, "%s needs head.settings_file in the configuration",
+        return command_fail(call, CMD_E_SETTINGS,
+                            "%s needs head.settings_file in the configuration, and no journal that is replayed",
                             call->row->header);
     const uint32_t station = dev->defaults.station, frames = dev->defaults.frames;
     dev->defaults = dev->settings;

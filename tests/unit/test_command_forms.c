@@ -50,6 +50,7 @@ static const struct {
     {"HEAD:PAN", "HEAD:PAN", 1, 1, " 9"},
     {"HEAD:STATE", "HEAD:STAT", 1, 0, ""},
     {"HEAD:REBOOT", "HEAD:REB", 0, 1, ""},
+    {"HEAD:STORE", "HEAD:STOR", 0, 1, ""},
     {"HEAD:STATION", "HEAD:STATION", 1, 1, " 2"},
     {"HEAD:RANGE:MIN", "HEAD:RANG:MIN", 1, 1, " 2"},
     {"HEAD:RANGE:MAX", "HEAD:RANG:MAX", 1, 1, " 20"},

@@ -93,7 +93,7 @@ static void one(struct command_device *dev, const char *line)
 static void begin(struct command_device *dev, uint64_t seed)
 {
     *dev = command_test_device();
-    dev->step_allowed = 1;
+    dev->step_allowed = dev->keeps = 1;
     memset(&seen, 0, sizeof seen);
     rng = seed;
 }
@@ -139,6 +139,7 @@ static const char *const valid[] = {
     "HEAD:PAN 18 DEG/S",
     "HEAD:STAT?",
     "HEAD:REBOOT",
+    "HEAD:STORE",
     "HEAD:STATION 2",
     "HEAD:RANG:MIN 1.5",
     "HEAD:RANG:MIN MAX",

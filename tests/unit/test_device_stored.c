@@ -188,6 +188,29 @@ static void a_replayed_journal_needs_no_file(void **state)
     free(again);
 }
 
+/* Before the first scan the descriptor has the settings of power-up, also where a command has just made these. */
+static void readers_before_a_scan_are_told_them(void **state)
+{
+    (void)state;
+    unlink(settings_path);
+    struct settings_file *file = open_settings();
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 40\n"), SH_OK);
+    for (int replay = 0; replay < 2; replay++) {
+        struct device_options options = {.journal = journal_path};
+        if (replay) options = (struct device_options){.replay = journal_path};
+        if (!replay) options.settings = file;
+        struct rig *rig = rig_open(&options, NULL, 0);
+        rig_go_to(rig, 1001); /* it is repeated each second */
+        assert_true(rig->work.describe && rig->work.descriptor.lines_uhz == 40000000);
+        if (!replay) rig_tell(rig, "HEAD:LINES 70", 1000);
+        if (!replay) rig_tell(rig, "HEAD:STORE", 1000);
+        rig_go_to(rig, 2001);
+        assert_true(rig->work.describe && rig->work.descriptor.lines_uhz == 70000000);
+        rig_close(rig);
+    }
+    close_settings(file);
+}
+
 static int make_all(void **state)
 {
     const int rc = make_folder(state);
@@ -209,6 +232,7 @@ int main(void)
         cmocka_unit_test(limits_that_depend_on_each_other_are_no_matter),
         cmocka_unit_test(what_the_head_does_not_take_is_refused),
         cmocka_unit_test(a_replayed_journal_needs_no_file),
+        cmocka_unit_test(readers_before_a_scan_are_told_them),
     };
     return cmocka_run_group_tests(tests, make_all, remove_all);
 }

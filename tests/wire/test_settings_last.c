@@ -142,12 +142,45 @@ static void a_replay_needs_no_file(void **state)
     assert_string_equal(once, again);
 }
 
+/* What a recording off line gives depends on the configuration alone. */
+static void a_recording_off_line_says_that_it_has_none(void **state)
+{
+    struct wire *wire = *state;
+    char set[400], file[400], without[65], with[65];
+    const struct room_config config = {
+        .profile = "velodyne-vlp16", .prr_hz = 289351.851852, .lines_hz = 20, .frames = 1, .links = "links: []\n"};
+    room_write(wire);
+    room_config_write(wire, &config);
+    snprintf(set, sizeof set, "head.settings_file=%s", wire_path(wire, "set"));
+    snprintf(file, sizeof file, "%s", wire_path(wire, "x.shs"));
+    for (int i = 0; i < 2; i++) {
+        const char *const args[] = {"record",
+                                    wire_path(wire, "config.yaml"),
+                                    "-o",
+                                    file,
+                                    "--quiet",
+                                    "--stats",
+                                    wire_path(wire, "stats.json"),
+                                    i == 0 ? NULL : "--set",
+                                    set,
+                                    NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        stats_hash(wire, i == 0 ? without : with);
+        char *err = wire_read(wire_path(wire, "err"), NULL);
+        assert_int_equal(strstr(err, "set: is not used: a recording off line has the settings") != NULL, i);
+        free(err);
+        wire_write_text(wire, "set", "scanhead settings 1\nprofile velodyne-vlp16\nhead HEAD:LINes 5\nend\n");
+    }
+    assert_string_equal(with, without);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(what_a_client_saves_is_there_again, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_killed_head_has_them_too, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_replay_needs_no_file, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_recording_off_line_says_that_it_has_none, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
