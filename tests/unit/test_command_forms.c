@@ -77,7 +77,6 @@ static const struct {
     {"TIME:UTC", "TIME:UTC", 1, 0, ""},
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
-    {"HEAD:STORE", "HEAD:STOR", 0, 1, ""},
     {"TIME:SHIFT", "TIME:SHIF", 1, 1, " 5"},
     {"TIME:SERVER", "TIME:SERV", 1, 1, " NONE,127.0.0.1,5,0,ETH"},
     {"FAULT:ADD", "FAUL:ADD", 0, 1, " {kind: drop}"},
