@@ -94,6 +94,31 @@ static void without_a_file_nothing_is_stored(void **state)
     rig_close(rig);
 }
 
+/* A protocol's own settings are there for its next session, and the head's stay beside them. */
+static void a_protocol_has_its_own(void **state)
+{
+    (void)state;
+    char text[SETTINGS_FILE_TEXT];
+    unlink(settings_path);
+    struct settings_file *file = open_settings();
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 40\n"), SH_OK);
+    struct rig *rig = rig_open(&(struct device_options){.settings = file}, NULL, 0);
+    assert_int_equal(device_stored(rig->device, "cola", text), 0);
+    assert_string_equal(text, "");
+    assert_int_equal(device_store(rig->device, "cola", "name=gate\n"), 0);
+    assert_int_equal(device_store(rig->device, "cola", "no end"), 1);
+    assert_int_equal(device_stored(rig->device, "cola", text), 0);
+    assert_string_equal(text, "name=gate\n");
+    rig_close(rig);
+    close_settings(file);
+    file = open_settings();
+    settings_file_get(file, "head", text);
+    assert_string_equal(text, "HEAD:LINes 40\n");
+    settings_file_get(file, "cola", text);
+    assert_string_equal(text, "name=gate\n");
+    close_settings(file);
+}
+
 /* In the file's order each of them is beyond what the others allow: 60 to 50 degrees is no line, and 150 lines a
  * second need more than 140 pulses. */
 static void limits_that_depend_on_each_other_are_no_matter(void **state)
@@ -229,6 +254,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_stored_is_that_of_power_up),
         cmocka_unit_test(without_a_file_nothing_is_stored),
+        cmocka_unit_test(a_protocol_has_its_own),
         cmocka_unit_test(limits_that_depend_on_each_other_are_no_matter),
         cmocka_unit_test(what_the_head_does_not_take_is_refused),
         cmocka_unit_test(a_replayed_journal_needs_no_file),
