@@ -44,6 +44,12 @@ void colour_reflectance(double db, uint8_t rgb[3]);
 /* A hue for each number, a golden section of the circle apart: however many there are, neighbours differ. */
 void colour_number(uint32_t number, uint8_t rgb[3]);
 
+/* As 0xrrggbb. */
+static inline uint32_t colour_packed(const uint8_t rgb[3])
+{
+    return (uint32_t)rgb[0] << 16 | (uint32_t)rgb[1] << 8 | rgb[2];
+}
+
 /* Linear light of 0 to 1 as sRGB has it, and back, IEC 61966-2-1. Values beyond that range stay beyond
  * it. */
 double colour_srgb_encode(double linear);

@@ -168,6 +168,13 @@ bool text_is_word(struct text_span span, const char *word)
     return span.n == strlen(word) && strncasecmp(span.p, word, span.n) == 0;
 }
 
+bool text_is_one_of(const char *text, const char *const *list)
+{
+    for (; *list != NULL; list++)
+        if (strcmp(text, *list) == 0) return true;
+    return false;
+}
+
 bool text_integer(struct text *t, int64_t *value)
 {
     const char *p = t->p;

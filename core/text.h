@@ -22,6 +22,9 @@ bool text_is(struct text_span span, const char *text);
 /* The same word, whatever its case? */
 bool text_is_word(struct text_span span, const char *word);
 
+/* Whether the list has the text. NULL ends the list. */
+bool text_is_one_of(const char *text, const char *const *list);
+
 struct text {
     const char *path; /* the caller's */
     char *data;       /* the whole file, with a NUL after it */

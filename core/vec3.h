@@ -68,6 +68,15 @@ static inline void vec3_bound(double min[3], double max[3], const double a[3])
     }
 }
 
+/* Whether one of a triangle's corners is the origin. A ray from a corner begins on the surface, and hits it nowhere else.
+ * Whatever its direction, the sides of two edges are 0, and the range of the plane is rounding. */
+static inline int vec3_is_any_zero(double corner[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        if (corner[i][0] == 0.0 && corner[i][1] == 0.0 && corner[i][2] == 0.0) return 1;
+    return 0;
+}
+
 /* Vectors as arrays, one per axis; the arrays stay the caller's. */
 struct vec3_in {
     const double *x, *y, *z;

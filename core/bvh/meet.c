@@ -186,15 +186,6 @@ static double held_range(double v[3][3], const double dir[3], double range_m)
     return range_m < lo || isnan(range_m) ? lo : range_m > hi ? hi : range_m;
 }
 
-/* A ray from a corner begins on the surface, and hits it nowhere else. Whatever its direction, the sides of two
- * edges are 0, and the plane's range is rounding. */
-static int begins_at_corner(double v[3][3])
-{
-    for (int i = 0; i < 3; i++)
-        if (v[i][0] == 0.0 && v[i][1] == 0.0 && v[i][2] == 0.0) return 1;
-    return 0;
-}
-
 /* Notes a triangle that the ray misses by no more than double precision resolves at its edges. Of several, the
  * nearest counts; of equally near ones, that with the lowest number. */
 static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
@@ -224,7 +215,7 @@ static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const s
         side[i] = edge_side(v[i], v[(i + 1) % 3], dir);
     query->decided++;
     const int met = is_inside(side);
-    if (is_edge_on(v, side) || begins_at_corner(v) || (!met && !is_near_miss(v, side, dir))) return;
+    if (is_edge_on(v, side) || vec3_is_any_zero(v) || (!met && !is_near_miss(v, side, dir))) return;
     const double along = vec3_dot(plane->n, dir);
     double range_m = (plane->d - vec3_dot(plane->n, o)) / along;
     if (!(along * along > FLAT * FLAT * vec3_dot(plane->n, plane->n))) range_m = held_range(v, dir, range_m);

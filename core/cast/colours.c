@@ -8,11 +8,6 @@
 #include "core/cast/echoes.h"
 #include "core/colour.h"
 
-static uint32_t packed(const uint8_t rgb[3])
-{
-    return (uint32_t)rgb[0] << 16 | (uint32_t)rgb[1] << 8 | rgb[2];
-}
-
 /* Frame scalar of a moving head when a pulse of the chunk fires; straight between two knots. */
 static double frame_at(const struct chunk *k, uint32_t pulse)
 {
@@ -68,13 +63,13 @@ static uint32_t colour_of(const struct coloured *c, uint32_t i, uint32_t pulse)
     default:
         break;
     }
-    return packed(rgb);
+    return colour_packed(rgb);
 }
 
 static void set_colour(const struct coloured *c, uint32_t i, uint32_t pulse)
 {
     if (isnan(c->list->range_m[i]))
-        c->list->colour[i] = packed(colour_grey);
+        c->list->colour[i] = colour_packed(colour_grey);
     else if (!c->k->texels)
         c->list->colour[i] = colour_of(c, i, pulse);
 }

@@ -101,14 +101,6 @@ static void set_strip(const struct sight *sight, struct build_candidate *c, doub
     }
 }
 
-/* Whether the triangle has a corner at the station: rays begin on it, and hit it nowhere else. */
-static int is_at_corner(double v[3][3])
-{
-    for (int i = 0; i < 3; i++)
-        if (v[i][0] == 0.0 && v[i][1] == 0.0 && v[i][2] == 0.0) return 1;
-    return 0;
-}
-
 /* The figures in prcs. False where no ray meets the triangle: it has no area, or a corner is at the station. */
 static int find_figures(const struct sight *sight, uint32_t triangle, struct build_candidate *c)
 {
@@ -116,7 +108,7 @@ static int find_figures(const struct sight *sight, uint32_t triangle, struct bui
     c->triangle = triangle;
     c->record = BUILD_NO_RECORD;
     sight_corners(sight, triangle, v);
-    if (is_at_corner(v) || !set_plane(sight, c)) return 0;
+    if (vec3_is_any_zero(v) || !set_plane(sight, c)) return 0;
     vec3_cross(v[1], v[2], n);
     const double volume = vec3_dot(v[0], n), sign = volume < 0.0 ? -1.0 : 1.0;
     double doubt = SIGHT_VOLUME_DOUBT * vec3_length(v[0]) * vec3_length(v[1]) * vec3_length(v[2]);

@@ -45,6 +45,15 @@ void picture_text(struct picture *picture, const double at[2], enum picture_anch
                   const struct picture_type *type, const uint8_t rgb[3], const char *text);
 double picture_text_width(const struct picture_type *type, const char *text);
 
+/* A rectangle on it, its right and lower borders not included. */
+struct picture_box {
+    double left, top, right, bottom;
+};
+static inline int picture_box_overlaps(const struct picture_box *a, const struct picture_box *b)
+{
+    return a->left < b->right && b->left < a->right && a->top < b->bottom && b->top < a->bottom;
+}
+
 /* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
 void picture_lab(double l, double a, double b, uint8_t rgb[3]);
 

@@ -15,11 +15,6 @@ struct surface_image {
     uint8_t rgb[][3];
 };
 
-static uint32_t packed(const uint8_t rgb[3])
-{
-    return (uint32_t)rgb[0] << 16 | (uint32_t)rgb[1] << 8 | rgb[2];
-}
-
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err)
 {
     *colours = (struct surface_colours){.n = n};
@@ -47,7 +42,7 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
     memcpy(rgb, colour_grey, sizeof rgb);
     for (int i = 0; i < 3 && named->has_colour; i++)
         rgb[i] = (uint8_t)lrint(255.0 * fmin(1.0, fmax(0.0, (double)named->colour[i])));
-    colours->own[label] = packed(rgb);
+    colours->own[label] = colour_packed(rgb);
     colours->by_vertex[label] = named->vertex_colours != SCENE_COLOURS_NONE;
 }
 
@@ -85,8 +80,8 @@ int surface_colours_texture(struct surface_colours *colours, uint32_t label, con
 uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2], const uint8_t rgb[3])
 {
     label = surface_of_label(label);
-    if (label >= colours->n) return packed(colour_grey);
+    if (label >= colours->n) return colour_packed(colour_grey);
     const struct surface_image *image = uv != NULL ? colours->image[label] : NULL;
     const int64_t at = image != NULL ? texture_at(&image->frame, uv) : -1;
-    return at >= 0 ? packed(image->rgb[at]) : rgb != NULL ? packed(rgb) : colours->own[label];
+    return at >= 0 ? colour_packed(image->rgb[at]) : rgb != NULL ? colour_packed(rgb) : colours->own[label];
 }

@@ -131,6 +131,8 @@ enum scanhead_event_code {
     SCANHEAD_EV_PPS = 10,  /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
     SCANHEAD_EV_TIME = 11, /* before each repeated descriptor: 0, device time (ns), its GPS time (ns) */
     SCANHEAD_EV_SITE = 12, /* a station was moved (SITE:POSE): its number, warnings of the head about its place */
+    SCANHEAD_EV_PTP = 13,  /* port or servo of the PTP follower changed: port + 256 * servo, device time (ns),
+                            * grandmaster; the numbers are in drivers/protocol/EVENTS.md */
 };
 
 struct scanhead_frame {

@@ -78,7 +78,7 @@ static ssize_t fd_write(void *link, int session, const void *buf, size_t len)
 {
     struct fd_link *self = link;
     if (session != 0 || self->ended) return SH_ECLOSED;
-    return fd_done(self, socket_write(self->fd, buf, len));
+    return fd_done(self, socket_write_heard(self->fd, buf, len));
 }
 
 static void fd_end(void *link, int session)

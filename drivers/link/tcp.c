@@ -236,7 +236,7 @@ static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
 {
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return SH_ECLOSED;
-    return moved(link, self, socket_write(self->fd, buf, len));
+    return moved(link, self, socket_write_heard(self->fd, buf, len));
 }
 
 /* Sends what was written, then the end of the stream, and does not wait for the client's own end. */

@@ -107,8 +107,13 @@ static const struct field telemetry[] = {
     TELE(errors_queued, FIELD_32), TELE(reader_lost_frames, FIELD_64),
     TELE(utc_ns, FIELD_64),        TELE(scan_fired, FIELD_64),
     TELE(scan_cast, FIELD_64),     TELE(scan_lost, FIELD_64),
-    TELE(lost_lines, FIELD_64),
+    TELE(lost_lines, FIELD_64),    TELE(ptp_port, FIELD_32),
+    TELE(ptp_servo, FIELD_32),     TELE(ptp_offset_ns, FIELD_64),
+    TELE(ptp_delay_ns, FIELD_64),  TELE(ptp_grandmaster, FIELD_64),
+    TELE(ptp_class, FIELD_32),     TELE(ptp_accuracy, FIELD_32),
+    TELE(ptp_flags, FIELD_32),     TELE(ptp_reserved, FIELD_32),
 };
+enum { N_PTP_FIELDS = 9 };
 
 #define EVENT(member, kind) ROW(native_event, member, kind)
 static const struct field event[] = {
@@ -132,9 +137,11 @@ const struct field_table fields_points = TABLE(points, native_points, NATIVE_POI
 const struct field_table fields_attributes =
     TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);
 const struct field_table fields_line_end = TABLE(line_end, line_end, 68, NATIVE_LINE_END);
-const struct field_table fields_telemetry = {telemetry, sizeof telemetry / sizeof telemetry[0] - 1, 96,
+const struct field_table fields_telemetry = {telemetry, sizeof telemetry / sizeof telemetry[0] - N_PTP_FIELDS - 1, 96,
                                              sizeof(struct native_telemetry), NATIVE_TELEMETRY};
-const struct field_table fields_telemetry_lines = TABLE(telemetry, native_telemetry, 104, NATIVE_TELEMETRY);
+const struct field_table fields_telemetry_lines = {telemetry, sizeof telemetry / sizeof telemetry[0] - N_PTP_FIELDS,
+                                                   104, sizeof(struct native_telemetry), NATIVE_TELEMETRY};
+const struct field_table fields_telemetry_ptp = TABLE(telemetry, native_telemetry, 152, NATIVE_TELEMETRY);
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 

@@ -220,6 +220,18 @@ struct native_pose {
     uint32_t flags, reserved;
 };
 
+/* A head that follows a PTP master. Port states have the numbers of IEEE 1588 and the names of linuxptp. */
+enum native_ptp_port {
+    NATIVE_PTP_NONE = 0, /* the head follows no master */
+    NATIVE_PTP_INITIALIZING = 1,
+    NATIVE_PTP_FAULTY = 2,
+    NATIVE_PTP_LISTENING = 4,
+    NATIVE_PTP_UNCALIBRATED = 8,
+    NATIVE_PTP_SLAVE = 9,
+};
+enum native_ptp_servo { NATIVE_PTP_UNLOCKED = 0, NATIVE_PTP_JUMP = 1, NATIVE_PTP_LOCKED = 2 }; /* s0, s1, s2 */
+enum { NATIVE_PTP_UTC_VALID = 1 };                                                             /* of ptp_flags */
+
 struct native_telemetry {
     uint32_t state; /* enum head_state, in its order */
     uint32_t scan;
@@ -228,7 +240,13 @@ struct native_telemetry {
     uint64_t reader_lost_frames;               /* of the reader who gets this frame; 0 in the common stream */
     int64_t utc_ns;                            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
     uint64_t scan_fired, scan_cast, scan_lost; /* pulses of that scan up to here */
-    uint64_t lost_lines;                       /* missing in the head's files; sent only where it is not 0 */
+    uint64_t lost_lines;                       /* missing in the head's files; sent where it is not 0, and with PTP */
+    /* sent where ptp_port is not 0: */
+    uint32_t ptp_port, ptp_servo; /* enum native_ptp_port, native_ptp_servo */
+    int64_t ptp_offset_ns;        /* of the head's clock from the master, as last measured */
+    int64_t ptp_delay_ns;         /* mean of the two ways */
+    uint64_t ptp_grandmaster;     /* its identity, as EUI-64; 0: none */
+    uint32_t ptp_class, ptp_accuracy, ptp_flags, ptp_reserved; /* of the grandmaster, as IEEE 1588 lists them */
 };
 
 enum native_event_code {
@@ -249,6 +267,8 @@ enum native_event_code {
                             time, ns */
     NATIVE_EV_SITE = 12, /* a station was moved; a: its number, b: warnings that its place gave rise to; the text is its
                             name */
+    NATIVE_EV_PTP = 13,  /* port or servo of the PTP follower changed; a: port + 256 * servo, b: device time, ns, c: the
+                            grandmaster, 0: none; the text is that of a line of ptp4l */
 };
 struct native_event {
     uint32_t code, reserved;

@@ -89,8 +89,10 @@ int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *
 
 int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out)
 {
-    const int has_lines = len >= fields_telemetry_lines.wire_len;
-    return fields_decode(has_lines ? &fields_telemetry_lines : &fields_telemetry, payload, len, out);
+    const struct field_table *table = len >= fields_telemetry_ptp.wire_len     ? &fields_telemetry_ptp
+                                      : len >= fields_telemetry_lines.wire_len ? &fields_telemetry_lines
+                                                                               : &fields_telemetry;
+    return fields_decode(table, payload, len, out);
 }
 
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out)

@@ -70,7 +70,9 @@ size_t native_encode_emitter(uint8_t *dst, size_t cap, const struct native_emitt
 
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags)
 {
-    const struct field_table *table = t->lost_lines != 0 ? &fields_telemetry_lines : &fields_telemetry;
+    const struct field_table *table = t->ptp_port != NATIVE_PTP_NONE ? &fields_telemetry_ptp
+                                      : t->lost_lines != 0           ? &fields_telemetry_lines
+                                                                     : &fields_telemetry;
     return encode_fixed(dst, cap, table, t, t_ns, flags);
 }
 

@@ -141,20 +141,20 @@ ssize_t socket_read(int fd, void *buf, size_t len)
     return SH_ECLOSED;
 }
 
-/* Bytes stay readable after the peer has reset the connection, but no more can be written. */
-static int has_unread(int fd)
-{
-    char byte;
-    return recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK) > 0;
-}
-
 ssize_t socket_write(int fd, const void *buf, size_t len)
 {
     ssize_t n = send(fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL);
     if (n >= 0) return n;
     /* ENOBUFS and ENOMEM: the system is short of memory for now, the connection is sound. */
     if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS || errno == ENOMEM) return 0;
-    return has_unread(fd) ? 0 : SH_ECLOSED;
+    return SH_ECLOSED;
+}
+
+ssize_t socket_write_heard(int fd, const void *buf, size_t len)
+{
+    char byte;
+    const ssize_t n = socket_write(fd, buf, len);
+    return n < 0 && recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK) > 0 ? 0 : n;
 }
 
 /* On Linux connecting to AF_UNSPEC resets the connection. */

@@ -49,10 +49,12 @@ void socket_tune(int fd);
 void socket_tune_impatient(int fd);
 
 /* Connected sockets, never blocking and never raising SIGPIPE. Bytes moved; 0: none now; SH_ECLOSED: end of
- * stream, reset or any other failure. Where the peer has gone and what it sent is not read yet, socket_write returns 0
- * and poll says readable at once: the last request of a client that left is not lost. */
+ * stream, reset or any other failure. */
 ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
+/* As socket_write, but 0 as long as a peer that has gone has bytes here that are not read: the last request of a client
+ * that left is not lost. Only for callers that read whenever poll says so. */
+ssize_t socket_write_heard(int fd, const void *buf, size_t len);
 /* Breaks a connected TCP socket: its peer sees a reset, and loses what it has not taken. The descriptor stays. */
 void socket_break(int fd);
 /* Reads and throws away what has come, so that closing the socket does not reset the connection. A peer that sends

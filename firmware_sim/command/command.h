@@ -11,7 +11,7 @@
  *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
  *   site      SITE:POSE
  *   fault     FAULt:ADD  FAULt:CLEar  FAULt:LIST?  FAULt:INJected?
- *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:STEP  TIME:SHIFt  TIME:SERVer
+ *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:PTP?  TIME:STEP  TIME:SHIFt  TIME:SERVer
  *
  * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
  * is STATe. A query ends in '?'. Settings have both forms.
@@ -163,6 +163,7 @@ struct command_device {
     uint64_t lost_journal_lines, lost_truth_lines; /* lines that these files lack */
     int64_t t_ns;                                  /* device time */
     char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
+    char ptp[128];         /* its PTP follower then; empty: it has none */
     struct command_time_server server, server_default, server_configured; /* now; at power-up; of the configuration */
     int asks_server; /* 1: TIME:SERVer may be CLIENT: there is somebody who asks */
     struct command_time_answers answers;

@@ -142,24 +142,31 @@ static int query_time(struct command_call *call)
     return command_reply(call, "%lld", (long long)call->dev->t_ns);
 }
 
-/* An empty text: the head does not know the time. */
-static int reply_time_of_day(struct command_call *call, const char *text)
+/* An empty text: the head does not know it. */
+static int reply_time_of_day(struct command_call *call, const char *text, const char *needs)
 {
     if (text[0] == '\0')
         return command_fail(call, CMD_E_SETTINGS, "%s? %s", call->row->header,
                             call->dev->recorded != NULL ? "is not possible: the recording does not have this value"
-                                                        : "needs time.epoch in the configuration");
+                                                        : needs);
     return command_reply(call, "%s", text);
 }
 
+static const char NEEDS_EPOCH[] = "needs time.epoch in the configuration";
+
 static int query_utc(struct command_call *call)
 {
-    return reply_time_of_day(call, call->dev->utc);
+    return reply_time_of_day(call, call->dev->utc, NEEDS_EPOCH);
 }
 
 static int query_gps(struct command_call *call)
 {
-    return reply_time_of_day(call, call->dev->gps);
+    return reply_time_of_day(call, call->dev->gps, NEEDS_EPOCH);
+}
+
+static int query_ptp(struct command_call *call)
+{
+    return reply_time_of_day(call, call->dev->ptp, "needs time.ptp.follower: on in the configuration");
 }
 
 static int act_clear(struct command_call *call)
@@ -322,6 +329,7 @@ const struct command_row command_rows[] = {
     QUERY("TIME", query_time),
     QUERY("TIME:UTC", query_utc),
     QUERY("TIME:GPS", query_gps),
+    QUERY("TIME:PTP", query_ptp),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
     /* Open to all, as HEAD:REBoot is. */
     {"TIME:SHIFt", command_shift_query, command_shift_change, &unit_ns, NULL, 1, 0, 0, 0, 0},

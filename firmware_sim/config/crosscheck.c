@@ -239,6 +239,10 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
                      "%s, but the time is not known; required is time.epoch: utc, tai, or a time such as "
                      "2026-01-01T00:00:00Z",
                      cfg_word(rd, "links[].protocol", cfg->link[link].protocol));
+    else if (source == EPOCH_NONE && cfg->time.ptp.follower && CFG_SOUND(rd, 0, "time.epoch"))
+        cfg_fail_key(rd, "time.ptp.follower", 0,
+                     "is on, but the time is not known; required is time.epoch: utc, tai, or a time such as "
+                     "2026-01-01T00:00:00Z");
     if (1000 % cfg->gnss.rate_hz != 0 || cfg->gnss.rate_hz == 8)
         cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate of the receiver; allowed 1, 2, 4, 5, 10 or 20 Hz",
                      cfg->gnss.rate_hz);

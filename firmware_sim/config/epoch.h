@@ -8,10 +8,24 @@
 
 #include "core/utc.h"
 
+/* A follower of a PTP master (ptp.h). */
+struct config_ptp {
+    int follower;
+    uint64_t grandmaster; /* its identity, an EUI-64 */
+    uint32_t clock_class, clock_accuracy;
+    int utc_valid;
+    uint32_t announce_ms, sync_ms;
+    uint32_t path_delay_ns, jitter_ns;
+    double asymmetry_ns;
+    uint64_t first_step_threshold_ns, step_threshold_ns; /* 0: never */
+    double max_ppm;
+};
+
 /* Time of day (head_clock.h). */
 struct config_time {
     char epoch[40]; /* of power-up: none, utc, tai, or a date as 2026-01-01T00:00:00Z */
     double offset_s, drift_ppm, jump_s, jump_at_s;
+    struct config_ptp ptp;
 };
 
 enum epoch_source {

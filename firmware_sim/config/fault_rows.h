@@ -62,7 +62,15 @@
      .help = "window_soiled: loss of optical power, both ways together."},
     {FAULT(jump_s), CFG_REAL, "s", "1", -1e6, 1e6, .help = "clock_jump: how much the time of day goes forward; "
                                                            "ntp_step: how far the server is ahead; below 0: back."},
-    {FAULT(ppm), CFG_REAL, "ppm", "100", -1e5, 1e5, .help = "clock_drift: how fast the time of day gains."},
+    {FAULT(ppm), CFG_REAL, "ppm", "100", -1e5, 1e5,
+     .help = "clock_drift: how fast the time of day gains; ptp_lost, ptp_no_sync, ptp_faulty: the same, in holdover."},
+    {FAULT(ns), CFG_REAL, "ns", "1000", -1e15, 1e15,
+     .help = "ptp_grandmaster, ptp_step: how far the master's time is ahead of the true time; ptp_asymmetry: how much "
+             "longer the way from the master is than the mean of both ways; ptp_jitter: largest deviation of a "
+             "measurement to either side, up to 1e9."},
+    {FAULT(grandmaster), CFG_COUNT, NULL, "0x00b0aefffe000002", 1, 18446744073709551615.0, .flags = CFG_HEX,
+     .allowed = "0x1 to 0xffffffffffffffff", .help = "ptp_grandmaster: its identity, an EUI-64."},
+    {FAULT(clock_class), CFG_COUNT, NULL, "6", 0, 255, .help = "ptp_grandmaster: its clock class by IEEE 1588."},
 #undef FAULT
 #undef FAULT_MEMBER
 #undef FAULT_LIST_AT

@@ -50,7 +50,8 @@ static const struct {
 };
 
 /* Keys that say what a fault does. */
-static const char *const what[] = {"n", "byte", "reseal", "for_ms", "factor", "deg", "hz", "loss_db", "jump_s", "ppm"};
+static const char *const what[] = {"n",       "byte",   "reseal", "for_ms", "factor",      "deg",        "hz",
+                                   "loss_db", "jump_s", "ppm",    "ns",     "grandmaster", "clock_class"};
 
 /* The keys that a kind has, and its largest n. needs_ms: for_ms above 0 must be given. */
 static const struct {
@@ -82,6 +83,13 @@ static const struct {
     [FAULT_WINDOW_SOILED] = {"loss_db", 0, 0},
     [FAULT_CLOCK_JUMP] = {"jump_s", 0, 0},
     [FAULT_CLOCK_DRIFT] = {"ppm", 0, 0},
+    [FAULT_PTP_LOST] = {"ppm", 0, 0},
+    [FAULT_PTP_NO_SYNC] = {"ppm", 0, 0},
+    [FAULT_PTP_FAULTY] = {"ppm", 0, 0},
+    [FAULT_PTP_GRANDMASTER] = {"ns, grandmaster, clock_class", 0, 0},
+    [FAULT_PTP_STEP] = {"ns", 0, 0},
+    [FAULT_PTP_ASYMMETRY] = {"ns", 0, 0},
+    [FAULT_PTP_JITTER] = {"ns", 0, 0},
     [FAULT_COUNTERS_HIGH] = {"n", 1e9, 0},
     [FAULT_NTP_STEP] = {"jump_s", 0, 0},
 };
@@ -132,6 +140,8 @@ static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t 
     if (f->until_s > 0.0 && f->until_s <= f->from_s)
         cfg_fail_key(rd, "faults[].until_s", i, "is not after from_s, which is %.10g s; allowed is a later time",
                      f->from_s);
+    if (f->kind == FAULT_PTP_JITTER && (f->ns < 0.0 || f->ns > 1e9))
+        cfg_fail_key(rd, "faults[].ns", i, "%.10g is out of range for %s; allowed 0 to 1e9 ns", f->ns, name);
     if (f->until_pulse < f->from_pulse)
         cfg_fail_key(rd, "faults[].until_pulse", i,
                      "is before from_pulse, which is %llu; allowed is that number or more",
@@ -150,6 +160,11 @@ void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
     }
 }
 
+static int needs_ptp(enum fault_kind kind)
+{
+    return kind >= FAULT_PTP_LOST && kind <= FAULT_PTP_JITTER;
+}
+
 static int needs_time(enum fault_kind kind)
 {
     return kind == FAULT_CLOCK_JUMP || kind == FAULT_CLOCK_DRIFT || kind == FAULT_CLOCK_STOP ||
@@ -163,6 +178,9 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
         if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
         if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
             cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
+                         fault_names[f->kind]);
+        if (needs_ptp(f->kind) && !cfg->time.ptp.follower)
+            cfg_fail_key(rd, "faults[].kind", i, "%s needs a follower of PTP; allowed where time.ptp.follower is on",
                          fault_names[f->kind]);
         if (cfg->links_are_not_here) continue; /* checked with the scanner that has the links */
         if (f->link > cfg->n_links)

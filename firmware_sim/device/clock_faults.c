@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Injected faults of the head's time of day: jumps, gains, standstills, leap seconds, missing PPS. They hold from their
+/* Injected faults of the head's time of day: jumps, gains, standstills, leap seconds, missing PPS, a lost PTP master. They hold from their
  * exact nanosecond on, not from a tick on. */
 #include <math.h>
 #include <stdio.h>
@@ -7,6 +7,8 @@
 #include "firmware_sim/device/clock_faults.h"
 #include "firmware_sim/device/events.h"
 #include "firmware_sim/device/head_clock.h"
+
+static const uint64_t GAINS = HEAD_FAULT(FAULT_CLOCK_DRIFT) | HEAD_FAULTS_HOLDOVER;
 
 static void add_leap(struct head_clock *clock, struct device_events *events, const struct head_fault *f)
 {
@@ -25,7 +27,7 @@ static void add_leap(struct head_clock *clock, struct device_events *events, con
 static void change(struct head_clock *clock, const struct head_fault *f, int64_t t_ns, int sign)
 {
     struct head_clock_change change = {0};
-    if (f->fault.kind == FAULT_CLOCK_DRIFT) change.gain_ppt = sign * llround(1e6 * f->fault.ppm);
+    if ((HEAD_FAULT(f->fault.kind) & GAINS) != 0) change.gain_ppt = sign * llround(1e6 * f->fault.ppm);
     if (f->fault.kind == FAULT_CLOCK_STOP) change.stands = sign;
     if (f->fault.kind == FAULT_CLOCK_JUMP) change.jump_ns = llround(1e9 * f->fault.jump_s);
     head_clock_change(clock, t_ns, &change);
@@ -34,7 +36,7 @@ static void change(struct head_clock *clock, const struct head_fault *f, int64_t
 /* The tick ends at end_ns and takes tick_ns. */
 static void clock_faults_run(struct head_clock *clock, struct head_fault *f, int64_t end_ns, int64_t tick_ns)
 {
-    const int lasts = f->fault.kind == FAULT_CLOCK_DRIFT || f->fault.kind == FAULT_CLOCK_STOP;
+    const int lasts = (HEAD_FAULT(f->fault.kind) & (GAINS | HEAD_FAULT(FAULT_CLOCK_STOP))) != 0;
     if (f->begins && (lasts || f->fault.kind == FAULT_CLOCK_JUMP)) change(clock, f, f->begin_ns, 1);
     if (!lasts || f->undone) return;
     if (f->active && f->until_ns < end_ns) { /* within this tick */

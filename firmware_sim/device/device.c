@@ -110,6 +110,11 @@ static int open_faults(struct device *device, struct sh_err *err)
     if (rc != SH_OK) return rc;
     fault_board_listen(device->faults, write_note, device);
     head_faults_init(&device->head_faults, device->faults, device->tick_ns);
+    device->ptp = (struct ptp){.faults = &device->head_faults,
+                               .clock = &device->clock,
+                               .events = &device->events,
+                               .journal = device->journal.out};
+    ptp_init(&device->ptp, &device->site->cfg->time.ptp, device->site->cfg->noise.seed);
     device->beam = (struct device_beam){
         .scan = &device->scan, .board = device->faults, .settings = &device->cmd.settings, .tick_ns = device->tick_ns};
     device->desk = (struct fault_desk){.cfg = device->site->cfg, .board = device->faults};
@@ -223,9 +228,7 @@ static void fill_telemetry(const struct device *device, uint64_t tick, struct na
     t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
     t->errors_queued = device->cmd.queue.count;
     t->lost_lines = atomic_load(&c->lost_journal_lines) + atomic_load(&c->lost_truth_lines);
-    if (device->clock.source != EPOCH_NONE)
-        t->utc_ns =
-            utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
+    device_tell_time(device, (int64_t)tick * device->tick_ns, t);
 }
 
 static int ends_scan(const struct device_work *work)
@@ -277,6 +280,7 @@ int device_claim(struct device *device, struct device_work *work)
     run_faults(device, tick, work);
     device_use_site(&device->moves, work);
     device_run_timers(device, tick);
+    device_follow_ptp(device, tick);
     const int off = device->machine.state == HEAD_OFF;
     if (!off) {
         device_say_overrun(&device->overrun, device->scan.pulse_next, tick);

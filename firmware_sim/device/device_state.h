@@ -15,6 +15,7 @@
 #include "firmware_sim/device/head_faults.h"
 #include "firmware_sim/device/overrun.h"
 #include "firmware_sim/device/pps.h"
+#include "firmware_sim/device/ptp.h"
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/device/scanner_clock.h"
 #include "firmware_sim/device/variant.h"
@@ -77,6 +78,7 @@ struct device {
     struct head_clock clock;
     struct gnss gnss;
     struct pps pps;
+    struct ptp ptp;
     struct scanner_clock date, date_before; /* since the last power-up, and before it */
     int server_fd;                          /* device_watch_time_server */
     char plan[160];                         /* site_plan_text */
@@ -177,7 +179,11 @@ int64_t device_gps_ns(const struct device *device, int64_t t_ns);
 /* Adds an event for the full second that begins in the tick, if one does. */
 void device_say_pps(struct device *device, uint64_t tick);
 void device_say_time(struct device *device, uint64_t tick);
-/* Sets the answers to TIME:UTC? and TIME:GPS? at cmd.t_ns. */
+/* Lets the PTP follower, if there is one, take part in a tick. */
+void device_follow_ptp(struct device *device, uint64_t tick);
+/* Fills in what telemetry of a device time says of the time of day. */
+void device_tell_time(const struct device *device, int64_t t_ns, struct native_telemetry *t);
+/* Sets the answers to TIME:UTC?, TIME:GPS? and TIME:PTP? at cmd.t_ns. */
 void device_set_time_texts(struct device *device);
 
 #endif

@@ -20,9 +20,14 @@
 
 /* A set of kinds. */
 #define HEAD_FAULT(kind) (UINT64_C(1) << (kind))
+/* In holdover the clock gains ppm. */
+#define HEAD_FAULTS_HOLDOVER (HEAD_FAULT(FAULT_PTP_LOST) | HEAD_FAULT(FAULT_PTP_NO_SYNC) | HEAD_FAULT(FAULT_PTP_FAULTY))
+#define HEAD_FAULTS_PTP                                                                      \
+    (HEAD_FAULTS_HOLDOVER | HEAD_FAULT(FAULT_PTP_GRANDMASTER) | HEAD_FAULT(FAULT_PTP_STEP) | \
+     HEAD_FAULT(FAULT_PTP_ASYMMETRY) | HEAD_FAULT(FAULT_PTP_JITTER))
 #define HEAD_FAULTS_CLOCK                                                                          \
     (HEAD_FAULT(FAULT_CLOCK_JUMP) | HEAD_FAULT(FAULT_CLOCK_DRIFT) | HEAD_FAULT(FAULT_CLOCK_STOP) | \
-     HEAD_FAULT(FAULT_PPS_LOST) | HEAD_FAULT(FAULT_LEAP_SECOND))
+     HEAD_FAULT(FAULT_PPS_LOST) | HEAD_FAULT(FAULT_LEAP_SECOND) | HEAD_FAULTS_PTP)
 /* They strike at answers of a time server. */
 #define HEAD_FAULTS_SERVER                                                                      \
     (HEAD_FAULT(FAULT_NTP_SILENT) | HEAD_FAULT(FAULT_NTP_KISS) | HEAD_FAULT(FAULT_NTP_UNSYNC) | \

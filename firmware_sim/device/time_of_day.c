@@ -39,6 +39,29 @@ void device_say_pps(struct device *device, uint64_t tick)
                       (uint64_t)(utc_gps_ns(tai_ns) / UTC_SECOND_NS), text);
 }
 
+void device_follow_ptp(struct device *device, uint64_t tick)
+{
+    const int64_t t_ns = (int64_t)tick * device->tick_ns;
+    const enum head_state state = device->machine.state;
+    ptp_run(&device->ptp, t_ns, t_ns + device->tick_ns, state != HEAD_OFF && state != HEAD_BOOT);
+}
+
+void device_tell_time(const struct device *device, int64_t t_ns, struct native_telemetry *t)
+{
+    const struct head_clock *clock = &device->clock;
+    const struct ptp_status *ptp = ptp_at(&device->ptp, t_ns);
+    if (clock->source != EPOCH_NONE) t->utc_ns = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns));
+    if (ptp == NULL) return;
+    t->ptp_port = ptp->port;
+    t->ptp_servo = ptp->servo;
+    t->ptp_offset_ns = ptp->offset_ns;
+    t->ptp_delay_ns = ptp->delay_ns;
+    t->ptp_grandmaster = ptp->grandmaster;
+    t->ptp_class = ptp->clock_class;
+    t->ptp_accuracy = ptp->clock_accuracy;
+    t->ptp_flags = ptp->utc_valid ? NATIVE_PTP_UTC_VALID : 0;
+}
+
 void device_say_time(struct device *device, uint64_t tick)
 {
     int64_t t_ns = (int64_t)tick * device->tick_ns;
@@ -50,7 +73,9 @@ void device_set_time_texts(struct device *device)
 {
     struct command_device *cmd = &device->cmd;
     const struct head_clock *clock = &device->clock;
-    cmd->utc[0] = cmd->gps[0] = '\0';
+    const struct ptp_status *ptp = ptp_at(&device->ptp, cmd->t_ns);
+    cmd->utc[0] = cmd->gps[0] = cmd->ptp[0] = '\0';
+    if (ptp != NULL) ptp_text(ptp, cmd->ptp);
     if (clock->source == EPOCH_NONE) return;
     int64_t tai_ns = head_clock_ns(clock, cmd->t_ns);
     struct utc_time utc;

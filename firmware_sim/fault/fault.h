@@ -56,8 +56,15 @@ enum fault_kind {
     FAULT_CLOCK_DRIFT,   /* gains ppm */
     FAULT_CLOCK_STOP,
     FAULT_PPS_LOST,
-    FAULT_LEAP_SECOND,   /* at the end of the minute at hand; no table has it */
-    FAULT_COUNTERS_HIGH, /* counters begin n below their wrap at power-up */
+    FAULT_PTP_LOST,        /* nothing comes from the master; the clock gains ppm meanwhile */
+    FAULT_PTP_NO_SYNC,     /* the same, but its Announce messages come */
+    FAULT_PTP_FAULTY,      /* the port is faulty; the clock gains ppm meanwhile */
+    FAULT_PTP_GRANDMASTER, /* another one is better; its time is ahead by ns */
+    FAULT_PTP_STEP,        /* the master's time is ahead by ns */
+    FAULT_PTP_ASYMMETRY,   /* the way from the master is longer than the mean by ns */
+    FAULT_PTP_JITTER,      /* of each measurement, up to ns to either side */
+    FAULT_LEAP_SECOND,     /* at the end of the minute at hand; no table has it */
+    FAULT_COUNTERS_HIGH,   /* counters begin n below their wrap at power-up */
     /* what a SICK scanner's time server answers */
     FAULT_NTP_SILENT, /* nothing */
     FAULT_NTP_KISS,   /* DENY */
@@ -95,7 +102,9 @@ struct fault {
     int64_t byte; /* from 0; -1: any */
     int reseal;
     double for_ms;
-    double factor, deg, hz, loss_db, jump_s, ppm;
+    double factor, deg, hz, loss_db, jump_s, ppm, ns;
+    uint64_t grandmaster; /* its identity */
+    uint32_t clock_class;
 };
 
 struct fault_list {

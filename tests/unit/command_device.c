@@ -78,6 +78,7 @@ struct command_device command_test_device(void)
         .t_ns = INT64_C(1234567890123),
         .utc = "2026-01-01T00:20:34.567890123Z",
         .gps = "2399,346852.567890123",
+        .ptp = "SLAVE,s2,-12,850,00b0ae.fffe.000001,6,0x21,1",
     };
     dev.place = places;
     dev.first_place = first_places;

@@ -5,6 +5,7 @@ import {readFileSync} from 'node:fs';
 import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit} from '../../drivers/link/web/knobs.js';
+import {ptpText} from '../../drivers/link/web/figures.js';
 import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
@@ -126,6 +127,10 @@ test('events in words', () => {
   equal(eventWords({name: 'ERROR', number: -222, session: 9, held_back: 0, text: 'Data out of range'}), ['Session 9: -222 Data out of range', 'bad']);
   equal(eventWords({name: 'ERROR', number: 102, session: 0, held_back: 0, text: 'session 17, fd:3'}), ['Reader too slow (102): session 17, fd:3', 'bad']);
   equal(eventWords({name: 'PPS'}), null);
+  equal(eventWords({name: 'PTP', text: 'servo s0 to s1'}), ['PTP: servo s0 to s1', '']);
+  equal(eventWords({name: 'PTP', text: 'SLAVE to FAULTY on FAULT_DETECTED'}), ['PTP: SLAVE to FAULTY on FAULT_DETECTED', 'bad']);
+  equal(ptpText({ptp_port: 9, ptp_servo: 2, ptp_offset_ns: -1234n}), ', PTP SLAVE, s2, \u22121\u2009234 ns');
+  equal(ptpText({ptp_port: 0}), '');
   equal(eventWords({name: '', code: 99, text: 'new'}), ['Event 99: new', '']);
 });
 

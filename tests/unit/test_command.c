@@ -65,6 +65,7 @@ static void replies_of_queries(void **ctx)
     expect(&dev, "TIME?", "1234567890123");
     expect(&dev, "TIME:UTC?", "2026-01-01T00:20:34.567890123Z");
     expect(&dev, "TIME:GPS?", "2399,346852.567890123");
+    expect(&dev, "TIME:PTP?", "SLAVE,s2,-12,850,00b0ae.fffe.000001,6,0x21,1");
     dev.settings.line_start_udeg = -1;
     expect(&dev, "SCAN:LINE:STAR?", "-0.000001");
     dev.settings.line_start_udeg = -1500000;
@@ -190,9 +191,10 @@ static void a_head_without_the_time_says_so(void **ctx)
 {
     (void)ctx;
     struct command_device dev = command_test_device();
-    dev.utc[0] = dev.gps[0] = '\0';
+    dev.utc[0] = dev.gps[0] = dev.ptp[0] = '\0';
     expect_error(&dev, 1, "TIME:UTC?", CMD_E_SETTINGS);
     expect_error(&dev, 1, "TIME:GPS?", CMD_E_SETTINGS);
+    expect_error(&dev, 1, "TIME:PTP?", CMD_E_SETTINGS);
 }
 
 /* Station 2 has numbers that are hard to print (command_device.c). */

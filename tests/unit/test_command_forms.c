@@ -76,6 +76,7 @@ static const struct {
     {"TIME", "TIME", 1, 0, ""},
     {"TIME:UTC", "TIME:UTC", 1, 0, ""},
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
+    {"TIME:PTP", "TIME:PTP", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
     {"TIME:SHIFT", "TIME:SHIF", 1, 1, " 5"},
     {"TIME:SERVER", "TIME:SERV", 1, 1, " NONE,127.0.0.1,5,0,ETH"},

@@ -31,8 +31,10 @@ enum { N_KINDS = sizeof kinds / sizeof kinds[0] };
 
 static const struct {
     const char *key, *value;
-} what[] = {{"n", "5"},   {"byte", "30"}, {"reseal", "on"}, {"for_ms", "3"}, {"factor", "0.5"},
-            {"deg", "1"}, {"hz", "2"},    {"loss_db", "3"}, {"jump_s", "1"}, {"ppm", "5"}};
+} what[] = {{"n", "5"},          {"byte", "30"}, {"reseal", "on"}, {"for_ms", "3"},
+            {"factor", "0.5"},   {"deg", "1"},   {"hz", "2"},      {"loss_db", "3"},
+            {"jump_s", "1"},     {"ppm", "5"},   {"ns", "7"},      {"grandmaster", "0x123456fffe654321"},
+            {"clock_class", "7"}};
 enum { N_WHAT = sizeof what / sizeof what[0] };
 
 static struct fault fault;
@@ -159,6 +161,48 @@ static void wrong_ones_are_refused_with_what_is_allowed(void **state)
     }
 }
 
+/* Faults of a PTP follower. Their keys are those of device/README.md. */
+static void a_follower_has_its_own_faults(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"time.epoch=2026-01-01T00:00:00Z", "time.ptp.follower=on"};
+    static const struct {
+        const char *text, *says; /* NULL: it is taken */
+    } list[] = {
+        {"{kind: ptp_lost, ppm: -0.5}", NULL},
+        {"{kind: ptp_no_sync, ppm: 2}", NULL},
+        {"{kind: ptp_faulty, ppm: 0}", NULL},
+        {"{kind: ptp_step, ns: -1e15}", NULL},
+        {"{kind: ptp_asymmetry, ns: -1}", NULL},
+        {"{kind: ptp_jitter, ns: 1e9}", NULL},
+        {"{kind: ptp_grandmaster, ns: 5, grandmaster: 0xffffffffffffffff, clock_class: 255}", NULL},
+        {"{kind: ptp_lost, ns: 1}", "faults[0].ns: ptp_lost has no such key; allowed ppm"},
+        {"{kind: ptp_lost, every: 2}", "faults[0].every: ptp_lost has no such key"},
+        {"{kind: ptp_step, grandmaster: 0x1}", "allowed ns"},
+        {"{kind: ptp_jitter, ns: -1}", "faults[0].ns: -1 is out of range for ptp_jitter; allowed 0 to 1e9 ns"},
+        {"{kind: ptp_jitter, ns: 1.1e9}", "allowed 0 to 1e9 ns"},
+        {"{kind: ptp_step, ns: 1.1e15}", "faults[0].ns: "},
+        {"{kind: ptp_grandmaster, grandmaster: 1209}", "without 0x"},
+        {"{kind: ptp_grandmaster, grandmaster: 0x0}", "allowed 0x1 to 0xffffffffffffffff"},
+        {"{kind: ptp_grandmaster, grandmaster: 0x10000000000000000}", "out of range"},
+        {"{kind: ptp_grandmaster, clock_class: 256}", "faults[0].clock_class: "},
+    };
+    load_base();
+    assert_int_equal(load_sets(sets, 1), SH_OK);
+    assert_int_equal(read_fault("{kind: ptp_lost}"), SH_EINPUT);
+    assert_says("ptp_lost needs a follower of PTP; allowed where time.ptp.follower is on");
+    assert_int_equal(load_sets(&sets[1], 1), SH_EINPUT);
+    assert_says("time.ptp.follower: is on, but the time is not known");
+    assert_int_equal(load_sets(sets, 2), SH_OK);
+    for (size_t i = 0; i < sizeof list / sizeof list[0]; i++) {
+        const int code = read_fault(list[i].text);
+        if ((code == SH_OK) != (list[i].says == NULL)) fail_msg("%s: %s", list[i].text, err.text);
+        if (list[i].says != NULL) assert_says(list[i].says);
+    }
+    assert_int_equal(read_fault("{kind: ptp_grandmaster, grandmaster: 0xfedcba9876543210}"), SH_OK);
+    assert_true(fault.grandmaster == UINT64_C(0xfedcba9876543210) && fault.clock_class == 6 && fault.ns == 1000.0);
+}
+
 /* A command line is long enough for many keys, and no longer text is cut. */
 static void the_longest_fault_fits_a_command_line(void **state)
 {
@@ -220,6 +264,7 @@ int main(void)
         cmocka_unit_test(a_kind_has_its_keys_and_no_others),
         cmocka_unit_test(what_is_not_given_is_as_said),
         cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),
+        cmocka_unit_test(a_follower_has_its_own_faults),
         cmocka_unit_test(the_longest_fault_fits_a_command_line),
         cmocka_unit_test(faults_stand_in_the_configuration_and_in_scenarios),
     };

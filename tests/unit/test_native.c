@@ -139,7 +139,9 @@ static void test_line_end(void **state)
 static void test_telemetry(void **state)
 {
     (void)state;
-    struct native_telemetry t = {4, 2, UINT64_MAX, 1, 2, 3, 4, 5, 6, 7, INT64_MIN, 8, 9, 10, 0}, back;
+    struct native_telemetry t = {4, 2,  UINT64_MAX, 1, 2, 3, 4, 5, 6, 7, INT64_MIN, 8,
+                                 9, 10, 0,          0, 0, 0, 0, 0, 0, 0, 0,         0},
+                            back;
     size_t len = native_encode_telemetry(out, sizeof out, &t, -1, 0);
     check_frame(out, len, 5, 0, 96, -1);
     const uint8_t *p = out + 28;
@@ -166,6 +168,27 @@ static void test_telemetry(void **state)
     assert_int_equal(native_decode_telemetry(p, 103, &back), 0);
     assert_int_equal(back.lost_lines, 0);
     assert_int_equal(back.scan_lost, 10);
+    assert_int_equal(back.ptp_port, 0);
+}
+
+/* The offsets are those of EVENTS.md. */
+static void test_telemetry_of_a_follower(void **state)
+{
+    (void)state;
+    struct native_telemetry t = {.state = 2, .scan_lost = 10, .ptp_port = 9}, back;
+    t.ptp_servo = 2, t.ptp_offset_ns = -3, t.ptp_delay_ns = 4, t.ptp_grandmaster = UINT64_C(0xec4670fffe0a1b2c);
+    t.ptp_class = 6, t.ptp_accuracy = 0x21, t.ptp_flags = NATIVE_PTP_UTC_VALID;
+    const size_t len = native_encode_telemetry(out, sizeof out, &t, -1, 0);
+    check_frame(out, len, 5, 0, 152, -1);
+    const uint8_t *p = out + 28;
+    assert_true(wire(p, 96, 8) == 0 && wire(p, 104, 4) == 9 && wire(p, 108, 4) == 2);
+    assert_true(wire(p, 112, 8) == UINT64_MAX - 2 && wire(p, 120, 8) == 4);
+    assert_true(wire(p, 128, 8) == UINT64_C(0xec4670fffe0a1b2c));
+    assert_true(wire(p, 136, 4) == 6 && wire(p, 140, 4) == 0x21 && wire(p, 144, 4) == 1 && wire(p, 148, 4) == 0);
+    assert_int_equal(native_decode_telemetry(p, 152, &back), 0);
+    assert_memory_equal(&t, &back, sizeof t);
+    assert_int_equal(native_decode_telemetry(p, 151, &back), 0);
+    assert_true(back.ptp_port == 0 && back.ptp_offset_ns == 0 && back.scan_lost == 10);
 }
 
 static void test_event(void **state)
@@ -360,12 +383,12 @@ static void test_is_hashed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_descriptor), cmocka_unit_test(test_descriptor_refused),
-        cmocka_unit_test(test_anchor),     cmocka_unit_test(test_line_end),
-        cmocka_unit_test(test_telemetry),  cmocka_unit_test(test_event),
-        cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_surfaces_split),
-        cmocka_unit_test(test_emitter),    cmocka_unit_test(test_is_hashed),
-        cmocka_unit_test(test_poses),
+        cmocka_unit_test(test_descriptor),     cmocka_unit_test(test_descriptor_refused),
+        cmocka_unit_test(test_anchor),         cmocka_unit_test(test_line_end),
+        cmocka_unit_test(test_telemetry),      cmocka_unit_test(test_telemetry_of_a_follower),
+        cmocka_unit_test(test_event),          cmocka_unit_test(test_surfaces),
+        cmocka_unit_test(test_surfaces_split), cmocka_unit_test(test_emitter),
+        cmocka_unit_test(test_is_hashed),      cmocka_unit_test(test_poses),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The ring of slots, with all its threads at once. */
+#include "core/monotonic.h"
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"
 
@@ -13,18 +14,21 @@
 /* Two casters fill slots with contents that depend only on the tick's number. The pacing thread releases them, numbers
  * their frames, and gives up late ones where the test says so. It waits for two of the readers, as in the pace `fast`,
  * and not for the slow ones. One of these reads slots in place. Slots grow all the while. For one tick in seven caster
- * and pacing thread race: 8,600 times, so that an error in one of 2,900 races is seen in 95 of 100 runs. */
+ * and pacing thread race: 8,600 times, so that an error in one of 2,900 races is seen in 95 of 100 runs.
+ *
+ * Each wait is a sched_yield(), which takes milliseconds where other processes want both processors. So the run ends
+ * early once LONG_S have passed, but not before the slow readers have lost ticks. */
 enum { TICKS = SANITIZED ? 20000 : 40000 };
-enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES };
+enum { CASTERS = 2, READERS = 4, SLOW = 2, LOOKING = 3, MAX_BYTES = 3 * SLOT_BYTES, LONG_S = 20 };
 
 static struct {
     pthread_mutex_t claim_lock;
     uint64_t next_tick; /* under claim_lock */
     _Atomic uint64_t cursor[READERS];
-    _Atomic int done;
+    _Atomic uint64_t end;     /* ticks of this run */
     uint8_t head_lost[TICKS]; /* marked by the pacing thread, before the tick is released */
-    _Atomic uint64_t bad;
-    uint64_t got[READERS], too_old[READERS], lost_by_head[READERS];
+    _Atomic uint64_t bad, too_old[READERS];
+    uint64_t got[READERS], lost_by_head[READERS];
 } all;
 
 static uint32_t len_of(uint64_t tick)
@@ -51,7 +55,7 @@ static void *caster_main(void *arg)
         struct ring_slot *slot = NULL;
         uint64_t tick = TICKS;
         pthread_mutex_lock(&all.claim_lock);
-        if (all.next_tick >= TICKS) {
+        if (all.next_tick >= atomic_load(&all.end)) {
             pthread_mutex_unlock(&all.claim_lock);
             return NULL;
         }
@@ -64,7 +68,7 @@ static void *caster_main(void *arg)
             sched_yield();
             continue;
         }
-        while (is_raced(tick) && atomic_load(&ring.released) < tick)
+        while (is_raced(tick) && atomic_load(&ring.released) < tick && tick < atomic_load(&all.end))
             sched_yield();
         struct ring_tick made = {.bytes = bytes, .len = len_of(tick)};
         for (uint32_t i = 0; i < made.len; i++)
@@ -81,10 +85,22 @@ static int readers_have_room(uint64_t tick)
     return 1;
 }
 
+static int have_seen_all(void)
+{
+    for (int r = SLOW; r < READERS; r++)
+        if (atomic_load(&all.too_old[r]) == 0) return 0;
+    return 1;
+}
+
 static void *pacer_main(void *arg)
 {
     uint32_t *seq = arg;
-    for (uint64_t tick = 0; tick < TICKS;) {
+    const int64_t long_ns = monotonic_ns() + LONG_S * INT64_C(1000000000);
+    for (uint64_t tick = 0; tick < atomic_load(&all.end);) {
+        if (have_seen_all() && monotonic_ns() > long_ns) {
+            atomic_store(&all.end, tick);
+            return NULL;
+        }
         struct ring_slot *slot = ring_peek(&ring, tick);
         if (!readers_have_room(tick)) {
             sched_yield();
@@ -104,7 +120,6 @@ static void *pacer_main(void *arg)
             sched_yield();
         }
     }
-    atomic_store(&all.done, 1);
     return NULL;
 }
 
@@ -124,7 +139,7 @@ static void *reader_main(void *arg)
     uint8_t bytes[MAX_BYTES];
     struct ring_copy copy = {.buf = bytes, .cap = sizeof bytes};
     uint32_t next_seq = 0;
-    for (uint64_t tick = 0; tick < TICKS;) {
+    for (uint64_t tick = 0; tick < atomic_load(&all.end);) {
         const enum ring_read got =
             me == LOOKING ? ring_look(&ring, me, tick, &copy) : ring_read(&ring, me, tick, &copy);
         switch (got) {
@@ -135,7 +150,7 @@ static void *reader_main(void *arg)
             if (all.head_lost[tick])
                 all.lost_by_head[me]++;
             else
-                all.too_old[me]++;
+                atomic_fetch_add(&all.too_old[me], 1);
             break;
         case RING_READ:
             all.got[me]++;
@@ -160,6 +175,7 @@ static void no_tick_is_torn_with_all_threads_at_work(void **state)
     pthread_t caster[CASTERS], pacer, reader[READERS];
     uint32_t seq = 0;
     memset(&all, 0, sizeof all);
+    atomic_store(&all.end, TICKS);
     pthread_mutex_init(&all.claim_lock, NULL);
     for (int i = 0; i < READERS; i++)
         assert_int_equal(pthread_create(&reader[i], NULL, reader_main, (void *)(intptr_t)i), 0);
@@ -172,19 +188,20 @@ static void no_tick_is_torn_with_all_threads_at_work(void **state)
     for (int i = 0; i < READERS; i++)
         pthread_join(reader[i], NULL);
     pthread_mutex_destroy(&all.claim_lock);
+    const uint64_t ticks = atomic_load(&all.end);
     uint64_t head_lost = 0;
-    for (int i = 0; i < TICKS; i++)
+    for (uint64_t i = 0; i < ticks; i++)
         head_lost += all.head_lost[i];
-    print_message("# %u ticks, %u lost by the head; the slow readers got %u and %u\n", (unsigned)TICKS,
+    print_message("# %u ticks, %u lost by the head; the slow readers got %u and %u\n", (unsigned)ticks,
                   (unsigned)head_lost, (unsigned)all.got[SLOW], (unsigned)all.got[LOOKING]);
     assert_true(atomic_load(&all.bad) == 0);
     for (int i = 0; i < READERS; i++) {
-        assert_true(all.got[i] + all.too_old[i] + all.lost_by_head[i] == TICKS);
+        assert_true(all.got[i] + all.too_old[i] + all.lost_by_head[i] == ticks);
         assert_true(all.lost_by_head[i] == head_lost);
         if (i < SLOW) assert_true(all.too_old[i] == 0); /* they were waited for */
     }
     for (int i = SLOW; i < READERS; i++)
-        assert_true(all.got[i] > 0 && all.too_old[i] > 0);
+        assert_true(all.got[i] > 0 && atomic_load(&all.too_old[i]) > 0);
 }
 
 int main(void)

@@ -118,6 +118,15 @@ const char *const all_fields[] = {"_ws.expert.severity",
                                   S "telemetry.scan_fired",
                                   S "telemetry.scan_cast",
                                   S "telemetry.scan_lost",
+                                  S "telemetry.ptp_port",
+                                  S "telemetry.ptp_servo",
+                                  S "telemetry.ptp_offset_ns",
+                                  S "telemetry.ptp_delay_ns",
+                                  S "telemetry.ptp_grandmaster",
+                                  S "telemetry.ptp_class",
+                                  S "telemetry.ptp_accuracy",
+                                  S "telemetry.ptp_flags",
+                                  S "telemetry.ptp_reserved",
                                   S "event.code",
                                   S "event.a",
                                   S "event.b",
@@ -178,8 +187,7 @@ static void expect_header(const uint8_t *frame)
     expect_uint(S "type", h.type);
     expect_uint(S "version", h.version);
     expect_uint(S "flags", h.flags);
-    expect_uint(S "flags.repeat", h.flags & 1);
-    expect_uint(S "flags.local", h.flags >> 1 & 1);
+    expect_uint(S "flags.repeat", h.flags & 1), expect_uint(S "flags.local", h.flags >> 1 & 1);
     expect_uint(S "length", h.length);
     expect_uint(S "seq", h.seq);
     expect_uint(S "payload_crc", h.payload_crc);
@@ -307,6 +315,12 @@ static void expect_telemetry(const struct scanhead_frame *f)
     UINT("telemetry", lines), UINT("telemetry", lost_pulses), UINT("telemetry", late_blocks);
     UINT("telemetry", late_max_us), UINT("telemetry", errors_queued), UINT("telemetry", reader_lost_frames);
     UINT("telemetry", scan_fired), UINT("telemetry", scan_cast), UINT("telemetry", scan_lost);
+    if (v.ptp_port != NATIVE_PTP_NONE) {
+        UINT("telemetry", ptp_port), UINT("telemetry", ptp_servo), UINT("telemetry", ptp_grandmaster);
+        UINT("telemetry", ptp_class), UINT("telemetry", ptp_accuracy), UINT("telemetry", ptp_flags);
+        UINT("telemetry", ptp_reserved), expect_int(S "telemetry.ptp_offset_ns", v.ptp_offset_ns);
+        expect_int(S "telemetry.ptp_delay_ns", v.ptp_delay_ns);
+    }
     const char *text = take_text(S "telemetry.utc"), *rest = strptime(text, "%b %d, %Y %H:%M:%S", &utc);
     if (rest == NULL) rest = strptime(text, "%Y-%m-%dT%H:%M:%S", &utc); /* as later versions write it */
     assert_non_null(rest);

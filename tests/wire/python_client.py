@@ -422,7 +422,8 @@ def tables(folder, path):
             continue
         theirs = [v.split(b"\0")[0].decode() if isinstance(v, bytes) else v
                   for v in forms[frame.type].unpack_from(frame.payload)]
-        assert theirs == list(flat(frame.fields)), (frame.type, theirs, frame.fields)
+        ours = list(flat(frame.fields))[:len(theirs)]  # what is sent only at times is in tables of its own
+        assert theirs == ours, (frame.type, theirs, frame.fields)
         seen.append(frame.type)
     print(*seen)
 

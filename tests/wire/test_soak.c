@@ -5,7 +5,7 @@
  * The heads run beside each other and mostly wait. Their ticks may be late, so that a busy machine costs no pulses. */
 #include "tests/wire/room.h"
 
-enum { N_SCENARIOS = 8 };
+enum { N_SCENARIOS = 9 };
 
 static const struct {
     const char *name;
@@ -21,6 +21,7 @@ static const struct {
     {"dying-motor", {"mirror_wobble", "mirror_slow", "mirror_stuck", "pan_slip", "laser_off"}},
     {"clock-step", {"clock_jump", "pps_lost", "clock_drift", "clock_stop"}},
     {"time-server", {"ntp_step"}},
+    {"ptp-holdover", {"ptp_jitter", "ptp_faulty"}},
 };
 
 /* Some 1300 frames a second. */
@@ -31,7 +32,7 @@ static const struct room_config SLOW = {.prr_hz = 30000,
                                         .frames = 1,
                                         .links = LINK_YAML_BOTH,
                                         .more = "loop: {late_ms: 900, queue_ms: 2000}\n"
-                                                "time: {epoch: \"2026-01-01T00:00:00Z\"}\n"};
+                                                "time: {epoch: \"2026-01-01T00:00:00Z\", ptp: {follower: on}}\n"};
 
 static const char *path_of(const struct wire *wire, const char *name, const char *ending)
 {
@@ -116,6 +117,8 @@ static void check(struct wire *wire, const char *name, const char *const *must)
     const uint64_t resealed = count_lines(truth, "resealed", "", "?");
     assert_int_equal(total(json, "wrongly_accepted"), resealed);
     if (strcmp(name, "hostile-wire") == 0) assert_true(resealed != 0);
+    const char *faulty = strstr(json, "\"fault\": \"ptp_faulty\""); /* the client saw the port's event */
+    if (strcmp(name, "ptp-holdover") == 0) assert_int_equal(value_after(faulty, "noticed"), 1);
     assert_int_equal(total(json, "missed"), 0);
     free(json);
     free(truth);

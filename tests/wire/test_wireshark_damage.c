@@ -208,7 +208,7 @@ static const struct {
     {3, 36, 4, 5, 0, "5 points, and room for 4"},
     {3, 32, 4, 2, 0, "3 pulses begin, and n_pulses is 2"},
     {5, 0, 0, 0, -30, "66 bytes, allowed 96 and more"},
-    {6, 0, 4, 13, 0, "An event that version 1 does not have yet"},
+    {6, 0, 4, 99, 0, "An event that version 1 does not have yet"},
     {6, 32, 96, 'A', 0, "text: a text without NUL"}, /* up to the packet's end */
     {6, 0, 0, 0, 4, "Longer than version 1 has it"},
     {7, 4, 4, 3, 0, "shorter than its names"},

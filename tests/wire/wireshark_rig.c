@@ -13,7 +13,7 @@ static const struct {
 } recording[N_RECORDINGS] = {
     {"polar.shs", "output.attributes=on output.colour=height signal.model=on", 0},
     {"ride.shs", "output.attributes=off", 1},
-    {"utm.shs", "output.layout=geo output.crs=utm" AT_BERLIN, 0},
+    {"utm.shs", "output.layout=geo output.crs=utm time.epoch=2026-01-01T00:00:00Z time.ptp.follower=on" AT_BERLIN, 0},
     {"geodetic.shs", "output.layout=geo output.crs=geodetic" AT_BERLIN, 0},
 };
 const char *const stream_name[N_STREAMS] = {"polar.shs",   "ride.shs",   "utm.shs", "geodetic.shs",

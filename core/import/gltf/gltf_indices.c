@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/import/gltf/gltf_at.h"
+#include "core/text.h"
 
 enum { MAX_DEPTH = 12 };
 
@@ -50,13 +51,6 @@ struct search {
     const char *list;
 };
 
-static bool is_one_of(const char *text, const char *const *known)
-{
-    for (; *known != NULL; known++)
-        if (strcmp(text, *known) == 0) return true;
-    return false;
-}
-
 static void look_at(struct search *s, const json_t *value, const char *list, const char *at)
 {
     const double number = json_number_value(value);
@@ -94,8 +88,8 @@ static const char *list_of(const char *key, const char *within)
 
 static bool is_entered(const char *key, const char *within)
 {
-    if (strcmp(within, "extensions") != 0) return !is_one_of(key, passed_over);
-    return is_one_of(key, entered) || strncmp(key, "KHR_materials_", 14) == 0;
+    if (strcmp(within, "extensions") != 0) return !text_is_one_of(key, passed_over);
+    return text_is_one_of(key, entered) || strncmp(key, "KHR_materials_", 14) == 0;
 }
 
 static void walk(struct search *s, const json_t *value, const char *key, const char *at, int depth);

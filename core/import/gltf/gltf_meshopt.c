@@ -7,6 +7,8 @@
 
 #include <meshoptimizer.h>
 
+#include "core/text.h"
+
 /* meshoptimizer asserts the sizes that it gets, so they are checked before. */
 static bool sizes_fit(const struct gltf_packed *p)
 {
@@ -32,24 +34,17 @@ static int decode(const struct gltf_packed *p, void *out)
     return 0;
 }
 
-static bool is_one_of(const char *text, const char *const *known)
-{
-    for (; *known != NULL; known++)
-        if (strcmp(text, *known) == 0) return true;
-    return false;
-}
-
 static int check(struct scene_build *b, const struct gltf_packed *p, const char *at, struct sh_err *err)
 {
     static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES", NULL}, *const filters[] = {
                                                                                          "NONE", "OCTAHEDRAL",
                                                                                          "QUATERNION", "EXPONENTIAL",
                                                                                          NULL};
-    if (!is_one_of(p->mode, modes))
+    if (!text_is_one_of(p->mode, modes))
         return build_fail(b, SH_EINPUT, err,
                           "%s: meshopt's mode %.40s is not known; known are ATTRIBUTES, TRIANGLES, INDICES", at,
                           p->mode);
-    if (!is_one_of(p->filter, filters))
+    if (!text_is_one_of(p->filter, filters))
         return build_fail(b, SH_EINPUT, err,
                           "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL", at,
                           p->filter);

@@ -11,15 +11,6 @@ enum {
     ROOM_PX = 4, /* between a station's mark and its label */
 };
 
-struct box {
-    double left, top, right, bottom;
-};
-
-static int overlap(const struct box *a, const struct box *b)
-{
-    return a->left < b->right && b->left < a->right && a->top < b->bottom && b->top < a->bottom;
-}
-
 static void measure(const struct map_station *station, double size[2])
 {
     const double name = picture_text_width(&map_name_type, station->name);
@@ -32,7 +23,7 @@ static void measure(const struct map_station *station, double size[2])
 }
 
 /* To the right at first, then left, above, below, and between; farther rings go round in the same order. */
-static struct box box_at(const double at[2], const double size[2], int ring, int place)
+static struct picture_box box_at(const double at[2], const double size[2], int ring, int place)
 {
     static const double direction[PLACES][2] = {{1, 0},       {-1, 0},       {0, -1},     {0, 1},
                                                 {1, -1},      {-1, -1},      {1, 1},      {-1, 1},
@@ -40,28 +31,29 @@ static struct box box_at(const double at[2], const double size[2], int ring, int
     const double gap = MAP_STATION_PX + ROOM_PX + 26.0 * ring;
     const double x = at[0] + direction[place][0] * (gap + 0.5 * size[0]);
     const double y = at[1] + direction[place][1] * (gap + 0.5 * size[1]);
-    return (struct box){x - 0.5 * size[0], y - 0.5 * size[1], x + 0.5 * size[0], y + 0.5 * size[1]};
+    return (struct picture_box){x - 0.5 * size[0], y - 0.5 * size[1], x + 0.5 * size[0], y + 0.5 * size[1]};
 }
 
 /* Marks of stations are boxes, too; their ticks are not. */
-static int is_free(const struct map *map, const struct map_label *label, uint32_t n, const struct box *box)
+static int is_free(const struct map *map, const struct map_label *label, uint32_t n, const struct picture_box *box)
 {
     for (uint32_t i = 0; i < n; i++) {
-        const struct box other = {label[i].left, label[i].top, label[i].right, label[i].bottom};
-        if (label[i].placed && overlap(box, &other)) return 0;
+        const struct picture_box other = {label[i].left, label[i].top, label[i].right, label[i].bottom};
+        if (label[i].placed && picture_box_overlaps(box, &other)) return 0;
     }
     for (uint32_t i = 0; i < map->n_stations; i++) {
         double at[2];
         map_station_place(map, i, at);
-        const struct box mark = {at[0] - MAP_STATION_PX, at[1] - MAP_STATION_PX, at[0] + MAP_STATION_PX,
-                                 at[1] + MAP_STATION_PX};
-        if (overlap(box, &mark)) return 0;
+        const struct picture_box mark = {at[0] - MAP_STATION_PX, at[1] - MAP_STATION_PX, at[0] + MAP_STATION_PX,
+                                         at[1] + MAP_STATION_PX};
+        if (picture_box_overlaps(box, &mark)) return 0;
     }
     return 1;
 }
 
 /* Share of walls under the box, and a little for its own tick. */
-static double cost_of(const struct map *map, const struct map_layout *at, uint32_t station, const struct box *box)
+static double cost_of(const struct map *map, const struct map_layout *at, uint32_t station,
+                      const struct picture_box *box)
 {
     double sum = 0, n = 0, place[2];
     for (double y = box->top; y < box->bottom; y += 2)
@@ -74,8 +66,8 @@ static double cost_of(const struct map *map, const struct map_layout *at, uint32
     if (!isnan(heading_rad)) {
         map_station_place(map, station, place);
         const double x = place[0] + MAP_TICK_PX * sin(heading_rad), y = place[1] - MAP_TICK_PX * cos(heading_rad);
-        const struct box tip = {x - 3, y - 3, x + 3, y + 3};
-        if (overlap(box, &tip)) sum += 0.2 * n;
+        const struct picture_box tip = {x - 3, y - 3, x + 3, y + 3};
+        if (picture_box_overlaps(box, &tip)) sum += 0.2 * n;
     }
     return n > 0 ? sum / n : 0;
 }
@@ -89,7 +81,7 @@ static void place_label(const struct map *map, const struct map_layout *at, uint
         for (int k = 0; k < PLACES; k++) {
             const double rank = 0.02 * k + 0.5 * ring; /* the ring counts as half a box of wall */
             if (rank >= least) continue;
-            const struct box box = box_at(place, size, ring, k);
+            const struct picture_box box = box_at(place, size, ring, k);
             if (box.left < 2 || box.top < 2 || box.right > at->width - 2 || box.bottom > at->top + at->map_height)
                 continue;
             const double cost = rank + cost_of(map, at, i, &box);

@@ -24,16 +24,7 @@ void view_ramp(double part, uint8_t rgb[3])
     picture_lab(80 - 4 * t, chroma * cos(hue_rad), chroma * sin(hue_rad), rgb);
 }
 
-struct box {
-    double left, top, right, bottom;
-};
-
-static const struct box NO_BOX = {INFINITY, INFINITY, -INFINITY, -INFINITY};
-
-static int overlap(const struct box *a, const struct box *b)
-{
-    return a->left < b->right && b->left < a->right && a->top < b->bottom && b->top < a->bottom;
-}
+static const struct picture_box NO_BOX = {INFINITY, INFINITY, -INFINITY, -INFINITY};
 
 static int find_mark(const struct view *view, const struct picture *picture, const struct view_station *station,
                      double at[2])
@@ -56,16 +47,16 @@ static void draw_mark(struct picture *picture, const double at[2])
 
 /* Boxes that names must leave free: other names, and the marks of other stations. */
 struct taken {
-    struct box *name, *mark; /* [n_names], [n_marks]; a mark that is not in the image is an empty box */
+    struct picture_box *name, *mark; /* [n_names], [n_marks]; a mark that is not in the image is an empty box */
     uint32_t n_names, n_marks;
 };
 
-static int is_free(const struct taken *taken, const struct box *own, uint32_t own_mark)
+static int is_free(const struct taken *taken, const struct picture_box *own, uint32_t own_mark)
 {
     for (uint32_t i = 0; i < taken->n_names; i++)
-        if (overlap(own, &taken->name[i])) return 0;
+        if (picture_box_overlaps(own, &taken->name[i])) return 0;
     for (uint32_t i = 0; i < taken->n_marks; i++)
-        if (i != own_mark && overlap(own, &taken->mark[i])) return 0;
+        if (i != own_mark && picture_box_overlaps(own, &taken->mark[i])) return 0;
     return 1;
 }
 
@@ -75,7 +66,7 @@ static int draw_name(struct picture *picture, const double at[2], const char *na
     const double width = picture_text_width(&name_type, name);
     for (int left = 0; left < 2; left++) {
         const double x = at[0] + (left ? -14 - width : 14);
-        const struct box own = {x - 3, at[1] - 9, x + width + 3, at[1] + 8};
+        const struct picture_box own = {x - 3, at[1] - 9, x + width + 3, at[1] + 8};
         if (x < 4 || x + width > picture->width - 4 || !is_free(taken, &own, mark)) continue;
         picture_text(picture, (const double[2]){x, at[1] + 5}, PICTURE_LEFT, &name_type, ink, name);
         taken->name[taken->n_names++] = own;
@@ -87,7 +78,7 @@ static int draw_name(struct picture *picture, const double at[2], const char *na
 uint32_t view_draw_stations(const struct view *view, struct picture *picture, const struct view_station *station,
                             uint32_t n)
 {
-    struct box name[MAX_NAMES];
+    struct picture_box name[MAX_NAMES];
     struct taken taken = {name, malloc((n + 1) * sizeof *taken.mark), 0, n};
     uint32_t left_out = 0;
     double at[2];
@@ -95,7 +86,7 @@ uint32_t view_draw_stations(const struct view *view, struct picture *picture, co
         const int seen = find_mark(view, picture, &station[i], at);
         if (seen) draw_mark(picture, at);
         if (taken.mark != NULL)
-            taken.mark[i] = seen ? (struct box){at[0] - 8, at[1] - 9, at[0] + 8, at[1] + 5} : NO_BOX;
+            taken.mark[i] = seen ? (struct picture_box){at[0] - 8, at[1] - 9, at[0] + 8, at[1] + 5} : NO_BOX;
     }
     for (uint32_t i = 0; i < n; i++) {
         if (!find_mark(view, picture, &station[i], at)) continue;

@@ -40,7 +40,9 @@ except ImportError:  # everything works without, slower
  COLOURS) = range(1, 12)
 REPEAT, LOCAL = 1, 2  # flags of a frame
 (EV_STATE, EV_SCAN_START, EV_SCAN_END, EV_OVERRUN, EV_READER_LOST, EV_CONTROL, EV_ERROR, EV_SETTINGS,
- EV_POSE_LATE, EV_PPS, EV_TIME, EV_SITE) = range(1, 13)
+ EV_POSE_LATE, EV_PPS, EV_TIME, EV_SITE, EV_PTP) = range(1, 14)
+PTP_NONE, PTP_INITIALIZING, PTP_FAULTY, PTP_LISTENING, PTP_UNCALIBRATED, PTP_SLAVE = 0, 1, 2, 4, 8, 9  # ports
+PTP_UNLOCKED, PTP_JUMP, PTP_LOCKED = range(3)  # servos
 POLAR, GEO = 0, 1  # layouts
 EMIT_LINE, EMIT_PLANAR, EMIT_BEAMS, EMIT_SPHERE, EMIT_DIRECTIONS = range(5)
 CRS_LOCAL, CRS_ECEF, CRS_UTM, CRS_GEODETIC = range(4)
@@ -195,7 +197,9 @@ _LAYOUT = {
 }
 _MORE = {  # what payloads may have behind that, piece by piece
     DESCRIPTOR: [("<II", "content reserved")],
-    TELEMETRY: [("<3Q", "scan_fired scan_cast scan_lost"), ("<Q", "lost_lines")],
+    TELEMETRY: [("<3Q", "scan_fired scan_cast scan_lost"), ("<Q", "lost_lines"),
+                ("<IIqqQ4I", "ptp_port ptp_servo ptp_offset_ns ptp_delay_ns ptp_grandmaster ptp_class "
+                 "ptp_accuracy ptp_flags ptp_reserved")],
 }
 
 

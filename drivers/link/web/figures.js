@@ -11,7 +11,7 @@ const HEAD = [
   ['lost', 'Pulses lost by the head', 'Cast, but not computed in time'],
   ['late', 'Late blocks', 'Blocks that were sent late, and by how much at most'],
   ['queued', 'Errors in its queue', 'SYSTem:ERRor? reads and removes them, for all clients'],
-  ['time', 'Time', 'UTC as the head’s clock has it, or its time since power-up'],
+  ['time', 'Time', 'UTC as the head’s clock has it, or its time since power-up; its offset from a PTP master'],
 ];
 const PAGE = [
   ['received', 'Points a second', 'Received by this page'],
@@ -98,7 +98,7 @@ export class Figures {
       'lost': grouped(number(t.lost_pulses)),
       'late': late > 0 ? `${grouped(late)}, up to ${duration(number(t.late_max_us) / 1e6)}` : '0',
       'queued': grouped(number(t.errors_queued)),
-      'time': clockText(t.utc_ns, now.t_s),
+      'time': clockText(t.utc_ns, now.t_s) + ptpText(t),
     });
     mark('lost', number(t.lost_pulses) > 0);
     mark('queued', number(t.errors_queued) > 0);
@@ -156,6 +156,15 @@ function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}
   if (!points && !gone && !lost) return NONE;
   return [grouped(number(points)), gone > 0 && `${short(gone)} older ones are gone`,
     lost > 0 && `${grouped(lost)} frames not kept`].filter(Boolean).join(', ');
+}
+
+// By the number of the port's state (drivers/protocol/EVENTS.md).
+const PTP_PORTS = {1: 'INITIALIZING', 2: 'FAULTY', 4: 'LISTENING', 8: 'UNCALIBRATED', 9: 'SLAVE'};
+
+/** The port, the servo and the offset; empty where the head follows no master. */
+export function ptpText(t) {
+  if (!t.ptp_port) return '';
+  return `, PTP ${PTP_PORTS[t.ptp_port] ?? t.ptp_port}, s${t.ptp_servo}, ${grouped(number(t.ptp_offset_ns))} ns`;
 }
 
 function clockText(utc_ns, t_s) {

@@ -30,6 +30,7 @@ export function eventWords(e) {
     case 'SETTINGS': return [`Other settings from pulse ${grouped(ns(e.first_pulse))} on`, ''];
     case 'SITE': return [`Station ${e.a}${e.text ? ` (${e.text})` : ''} was moved`
       + (ns(e.b) > 0 ? `; ${grouped(ns(e.b))} warnings` : ''), ns(e.b) > 0 ? 'warn' : ''];
+    case 'PTP': return [`PTP: ${e.text}`, e.text.includes(' on FAULT_DETECTED') ? 'bad' : ''];
     case 'POSE_LATE': return [`No pose of the platform in time, for ${seconds(e.since_ns)}`, 'warn'];
     case 'PPS': case 'TIME': return null; // they come every second; the figures show the time
     default: return [`Event ${e.code}${e.text ? `: ${e.text}` : ''}`, ''];

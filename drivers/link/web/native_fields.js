@@ -72,6 +72,8 @@ const telemetry = layout(`state u32, scan u32, pulses u64, echoes u64, lines u64
   late_max_us u32, errors_queued u32, reader_lost_frames u64, utc_ns I64`);
 const scanCounts = layout('scan_fired u64, scan_cast u64, scan_lost u64');
 const lostLines = layout('lost_lines u64');
+const ptp = layout(`ptp_port u32, ptp_servo u32, ptp_offset_ns I64, ptp_delay_ns I64, ptp_grandmaster U64, ptp_class u32,
+  ptp_accuracy u32, ptp_flags u32, ptp_reserved u32`);
 const event = layout('code u32, reserved u32, a U64, b U64, c U64, text char[96]');
 const emitter = layout(`kind u32, n_beams u32, steps u32, first_step i32, last_step i32, front_step i32, turn i32,
   rings u32, sequence_ns_num u64, sequence_ns_den u64, first_ring_udeg i64, echoes u32, gaps u32`);
@@ -106,14 +108,16 @@ export function readAnchor(view) {
 
 export const readLineEnd = (view) => whole(lineEnd, view, 'a line end');
 
-/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is sent where it is not 0. */
+/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is sent where it is not 0.
+ * ptp_port is 0, and the rest of ptp is not there, where the head follows no PTP master. */
 export function readTelemetry(view) {
   const t = whole(telemetry, view, 'a telemetry');
   t.scan_fired = t.scan_cast = t.scan_lost = null;
   if (view.byteLength >= telemetry.bytes + scanCounts.bytes) take(scanCounts, view, telemetry.bytes, t);
-  t.lost_lines = 0;
+  t.lost_lines = t.ptp_port = 0;
   const at = telemetry.bytes + scanCounts.bytes;
   if (view.byteLength >= at + lostLines.bytes) take(lostLines, view, at, t);
+  if (view.byteLength >= at + lostLines.bytes + ptp.bytes) take(ptp, view, at + lostLines.bytes, t);
   return t;
 }
 
@@ -131,6 +135,7 @@ const EVENTS = {
   10: ['PPS', 'utc_s', 'at_ns', 'gps_s'],
   11: ['TIME', '', 'at_ns', 'gps_ns'],
   12: ['SITE', 'station', 'warnings'],
+  13: ['PTP', 'port_and_servo', 'at_ns'],
 };
 
 /** Besides code, a, b, c and text: `name`, and what a, b, c mean under names of their own. An unknown code has the

@@ -121,6 +121,7 @@ local KINDS = {
   u8 = {1, whole(ProtoField.uint8)},
   u32 = {4, whole(ProtoField.uint32)},
   i32 = {4, whole(ProtoField.int32)},
+  i64 = {8, whole(ProtoField.int64)},
   u64 = {8, whole(ProtoField.uint64)},
   hex = {4, function(abbr, title) return ProtoField.uint32(abbr, title, base.HEX) end},
   zero = {4, function(abbr, title) return ProtoField.uint32(abbr, title, base.HEX) end},
@@ -136,6 +137,7 @@ local KINDS = {
   end},
   utc = {8, function(abbr, title) return ProtoField.absolute_time(abbr, title, base.UTC) end,
          function(range) return time_of(range:le_int64()) end},
+  eui64 = {8, function(abbr, title) return ProtoField.uint64(abbr, title, base.HEX) end},
   text = {nil, ProtoField.string},
 }
 
@@ -157,6 +159,8 @@ local function rows_of(prefix, rows)
 end
 
 local YES_NO = {"yes", "no"}
+local PTP_PORTS = {[0] = "none", "INITIALIZING", "FAULTY", [4] = "LISTENING", [8] = "UNCALIBRATED", [9] = "SLAVE"}
+local PTP_SERVOS = {[0] = "s0, unlocked", "s1, jump", "s2, locked"}
 local ROWS = {
   [DESCRIPTOR] = rows_of("descriptor.", {
     {"idn", "text", "Identity", 96}, {"profile", "text", "Profile", 32},
@@ -208,9 +212,15 @@ local ROWS = {
     {"scan_fired", "u64", "Fired in the scan", "pulses"}, {"scan_cast", "u64", "Cast in the scan", "pulses"},
     {"scan_lost", "u64", "Lost by the head in the scan", "pulses"}}),
   lost_lines = rows_of("telemetry.", {{"lost_lines", "u64", "Lines that the head's files lack"}}),
+  ptp = rows_of("telemetry.", {
+    {"ptp_port", "u32", "PTP port", PTP_PORTS}, {"ptp_servo", "u32", "PTP servo", PTP_SERVOS},
+    {"ptp_offset_ns", "i64", "Offset from the master", "ns"}, {"ptp_delay_ns", "i64", "Mean path delay", "ns"},
+    {"ptp_grandmaster", "eui64", "Grandmaster"}, {"ptp_class", "u32", "Its clock class"},
+    {"ptp_accuracy", "hex", "Its clock accuracy", 256}, {"ptp_flags", "hex", "PTP flags", 2},
+    {"ptp_reserved", "zero", "Reserved"}}),
   [EVENT] = rows_of("event.", {
     {"code", "u32", "Event", {"STATE", "SCAN_START", "SCAN_END", "OVERRUN", "READER_LOST", "CONTROL", "ERROR",
-                              "SETTINGS", "POSE_LATE", "PPS", "TIME", "SITE"}},
+                              "SETTINGS", "POSE_LATE", "PPS", "TIME", "SITE", "PTP"}},
     {"reserved", "zero", "Reserved"}, {"a", "u64", "a"}, {"b", "u64", "b"}, {"c", "u64", "c"},
     {"text", "text", "Text", 96}}),
   [SURFACES] = rows_of("surfaces.", {{"first", "u32", "First label"}, {"count", "u32", "Surfaces"}}),
@@ -880,6 +890,7 @@ local function known_len(h, bytes, at)
   if h.type == EMITTER then return 64 + 12 * number_at(bytes, at + 4) end
   if h.type == SURFACES then return h.length end
   if h.type == DESCRIPTOR and h.length >= 280 then return 280 end
+  if h.type == TELEMETRY and h.length >= 104 then return h.length >= 152 and 152 or 104 end
   return math.min(ROWS[h.type].len, h.length)
 end
 
@@ -892,9 +903,10 @@ local EVENTS = {
   {"session with control"}, {"SCPI number", "session", "errors held back"}, {"first pulse with the new settings"},
   {"poses made up so far", nil, "since the last one"}, {"UTC, s since 1970", "device time of the edge", "GPS time, s"},
   {nil, "device time", "its GPS time"}, {"station", "warnings of its place"},
+  {"port + 256 * servo", "device time", "grandmaster"},
 }
 local IN_SECONDS = {[2] = {false, true, true}, [9] = {false, false, true}, [10] = {false, true, false},
-                    [11] = {false, true, true}}
+                    [11] = {false, true, true}, [13] = {false, true, false}}
 local TROUBLE = {[4] = "event_warning", [5] = "event_warning", [9] = "event_warning", [7] = "event_note",
                  [2] = "event_chat", [3] = "event_chat"}
 
@@ -931,6 +943,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
   if h.type == TELEMETRY and h.length >= 104 then put_rows(tree, ROWS.lost_lines, tvb, at + 96, 8) end
+  if h.type == TELEMETRY and h.length >= 152 then put_rows(tree, ROWS.ptp, tvb, at + 104, 48) end
   if m.wrong then
     tree:add_proto_expert_info(E.wrong, m.wrong)
     return

@@ -165,7 +165,7 @@ static enum cfg_number parse_hex(const char *digits, __int128 *out)
 {
     size_t n = strspn(digits, "0123456789abcdefABCDEF");
     if (n == 0 || digits[n] != '\0') return CFG_NOT_A_NUMBER;
-    if (n > 15) return CFG_TOO_LARGE;
+    if (n > 16) return CFG_TOO_LARGE;
     *out = (__int128)strtoull(digits, NULL, 16);
     return CFG_NUMBER_OK;
 }

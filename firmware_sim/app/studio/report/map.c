@@ -8,6 +8,7 @@
 #include "core/geoframe.h"
 #include "core/mat3.h"
 #include "core/studio/cloud_picture.h"
+#include "core/studio/picture.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/report/page.h"
 #include "firmware_sim/app/studio/report/report.h"
@@ -64,15 +65,6 @@ static void include_stations(const struct view *v, struct cloud_picture_spec *sp
     }
 }
 
-struct box {
-    double left, top, right, bottom;
-};
-
-static int overlap(const struct box *a, const struct box *b)
-{
-    return a->left < b->right && b->left < a->right && a->top < b->bottom && b->top < a->bottom;
-}
-
 static int letters(const char *text)
 {
     int n = 0;
@@ -82,17 +74,17 @@ static int letters(const char *text)
 }
 
 /* Right of the station, left of it, above or below: the first place within the map that is free of what is there. */
-static int place_label(const double at[2], double wide, double height, const struct box *taken, uint32_t n,
-                       struct box *out)
+static int place_label(const double at[2], double wide, double height, const struct picture_box *taken, uint32_t n,
+                       struct picture_box *out)
 {
     enum { LETTER_HEIGHT = 18, GAP = 12, PLACES = 4 };
     const double x[PLACES] = {at[0] + GAP, at[0] - GAP - wide, at[0] - 0.5 * wide, at[0] - 0.5 * wide};
     const double y[PLACES] = {at[1], at[1], at[1] - 20.0, at[1] + 18.0};
     for (int k = 0; k < PLACES; k++) {
-        *out = (struct box){x[k], y[k] - 0.5 * LETTER_HEIGHT, x[k] + wide, y[k] + 0.5 * LETTER_HEIGHT};
+        *out = (struct picture_box){x[k], y[k] - 0.5 * LETTER_HEIGHT, x[k] + wide, y[k] + 0.5 * LETTER_HEIGHT};
         int is_free = out->left >= 0.0 && out->right <= WIDTH && out->top >= 0.0 && out->bottom <= height;
         for (uint32_t i = 0; i < n && is_free; i++)
-            is_free = !overlap(out, &taken[i]);
+            is_free = !picture_box_overlaps(out, &taken[i]);
         if (is_free) return 1;
     }
     return 0;
@@ -120,16 +112,16 @@ static uint32_t put_stations(FILE *out, const struct view *v, const struct cloud
     const struct site *site = v->r->site;
     const uint32_t n = site->moving ? 0 : site->n_stations;
     const double height = scale * (p->max_m[1] - p->min_m[1]), letter = 8.5; /* bold, of 14 units */
-    struct box taken[2 * MOST_NAMES];
+    struct picture_box taken[2 * MOST_NAMES];
     uint32_t n_taken = 0, left_out = 0;
     char name[96];
     double at[2];
     for (uint32_t s = 0; s < n && n_taken < MOST_NAMES; s++) {
         station_at(v, p, scale, s, at);
-        taken[n_taken++] = (struct box){at[0] - 8.0, at[1] - 9.0, at[0] + 8.0, at[1] + 6.0};
+        taken[n_taken++] = (struct picture_box){at[0] - 8.0, at[1] - 9.0, at[0] + 8.0, at[1] + 6.0};
     }
     for (uint32_t s = 0; s < n; s++) {
-        struct box box;
+        struct picture_box box;
         station_at(v, p, scale, s, at);
         snprintf(name, sizeof name, "%" PRIu32 " %s", s + 1, site->station[s].station->name);
         put_mark(out, at, name);

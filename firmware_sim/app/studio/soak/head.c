@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "drivers/host/scanhead.h"
+#include "drivers/protocol/native.h"
 #include "firmware_sim/app/studio/soak/head.h"
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/app/studio/soak/row.h"
@@ -32,6 +33,12 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
     case FAULT_NTP_UNSYNC:
     case FAULT_NTP_STEP:
         return "only the dates of a SICK scanner's scans show it";
+    case FAULT_PTP_ASYMMETRY:
+        return "a follower can't see it; only another clock does";
+    case FAULT_PTP_JITTER:
+        return "the noise of the path looks the same";
+    case FAULT_PTP_NO_SYNC:
+        return "the follower's states remain; only its offset stands still";
     case FAULT_MIRROR_SLOW:
     case FAULT_MIRROR_STUCK:
     case FAULT_MIRROR_WOBBLE:
@@ -202,12 +209,50 @@ static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
     t->leap_s = leap_s;
 }
 
+/* ---- the PTP follower, by the states of its port and its offset */
+
+/* A master that is lost shows as the port listens, up to an Announce after it is back. */
+static int shows_ptp(const struct soak_link *link, const struct soak_moment *m, int64_t at_ns,
+                     const struct native_telemetry *t)
+{
+    const int64_t announce_ns = INT64_C(1000000) * link->soak->cfg->time.ptp.announce_ms;
+    const int is_near = m->from_ns <= at_ns && (m->to_ns > at_ns || at_ns - m->to_ns <= announce_ns);
+    switch (m->kind) {
+    case FAULT_PTP_LOST:
+        return is_near && t->ptp_port == NATIVE_PTP_LISTENING;
+    case FAULT_PTP_FAULTY:
+        return is_near && t->ptp_port == NATIVE_PTP_FAULTY;
+    case FAULT_PTP_GRANDMASTER:
+        return is_near && t->ptp_grandmaster == m->what.grandmaster;
+    case FAULT_PTP_STEP:
+        return is_near && fabs((double)t->ptp_offset_ns) >= 0.5 * fabs(m->what.ns);
+    default:
+        return 0;
+    }
+}
+
+static void take_ptp(struct soak_link *link, int64_t at_ns, const struct native_telemetry *t)
+{
+    for (uint32_t i = link->n_moments; i-- > 0;)
+        if (shows_ptp(link, &link->moment[i], at_ns, t)) see(link, &link->moment[i]);
+}
+
+static void head_take_telemetry(struct soak_link *link, const struct scanhead_frame *frame)
+{
+    struct native_telemetry t;
+    if (native_decode_telemetry(frame->payload, frame->payload_len, &t) == SH_OK) take_ptp(link, frame->t_ns, &t);
+}
+
 static void head_take_event(struct soak_link *link, const struct scanhead_frame *frame)
 {
     const int64_t a = (int64_t)frame->event_value[1], b = (int64_t)frame->event_value[2];
     if (frame->event == SCANHEAD_EV_STATE) take_state(link, frame);
     if (frame->event == SCANHEAD_EV_TIME || frame->event == SCANHEAD_EV_SCAN_START) take_time(link, a, b);
     if (frame->event == SCANHEAD_EV_TIME) miss_pps(link, a);
+    if (frame->event == SCANHEAD_EV_PTP)
+        take_ptp(link, a,
+                 &(struct native_telemetry){.ptp_port = (uint32_t)(frame->event_value[0] & 255),
+                                            .ptp_grandmaster = frame->event_value[2]});
     if (frame->event != SCANHEAD_EV_PPS) return;
     take_time(link, a, b * 1000000000);
     take_pps(link, frame);
@@ -288,18 +333,37 @@ void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame)
     pthread_mutex_lock(&link->lock);
     if (link->frames == 1) link->times.pps_ns = frame->t_ns;
     if (frame->type == SCANHEAD_EVENT) head_take_event(link, frame);
+    if (frame->type == SCANHEAD_TELEMETRY) head_take_telemetry(link, frame);
     if (frame->type == SCANHEAD_POINTS) head_take_points(link, frame);
     pthread_mutex_unlock(&link->lock);
 }
 
 /* ---- at the end */
 
+/* Why a fault may be over, or the run, before the client can notice it; NULL: it must be noticed. */
+static const char *why_unseen(const struct soak_link *link, enum fault_kind kind)
+{
+    switch (kind) {
+    case FAULT_LEAP_SECOND:
+        return "the minute was not over";
+    case FAULT_PTP_LOST:
+    case FAULT_PTP_FAULTY:
+    case FAULT_PTP_GRANDMASTER:
+    case FAULT_PTP_STEP:
+        return "the follower's state and offset showed nothing of it in that time";
+    case FAULT_SLOW_BOOT:
+        return link->soak->realtime ? NULL : "out of real time it may end before a client connects";
+    default:
+        return NULL;
+    }
+}
+
 int soak_is_head_seen(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
     uint32_t n = 0;
     for (uint32_t i = 0; i < link->n_moments; i++)
-        n += link->moment[i].kind != FAULT_LEAP_SECOND;
+        n += link->moment[i].kind == FAULT_SLOW_BOOT || why_unseen(link, link->moment[i].kind) == NULL;
     pthread_mutex_unlock(&link->lock);
     return n == 0;
 }
@@ -307,13 +371,12 @@ int soak_is_head_seen(struct soak_link *link)
 void soak_judge_head(struct soak_link *link)
 {
     for (uint32_t i = 0; i < link->n_moments; i++) {
-        const struct soak_moment *m = &link->moment[i];
-        if (m->kind == FAULT_LEAP_SECOND)
-            soak_hide(&link->row[m->kind], 1, "the minute was not over");
-        else if (m->kind == FAULT_SLOW_BOOT && !link->soak->realtime)
-            soak_hide(&link->row[m->kind], 1, "out of real time it may end before a client connects");
+        const enum fault_kind kind = link->moment[i].kind;
+        const char *why = why_unseen(link, kind);
+        if (why != NULL)
+            soak_hide(&link->row[kind], 1, why);
         else
-            link->row[m->kind].missed++;
+            link->row[kind].missed++;
     }
     link->n_moments = 0;
 }
