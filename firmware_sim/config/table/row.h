@@ -32,7 +32,7 @@ enum cfg_flags {
     CFG_NEEDED = 8,   /* has no default that suits most configurations: the example gives it a value */
 };
 
-enum { CFG_MAX_ROWS = 256, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96 };
+enum { CFG_MAX_ROWS = 320, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96 };
 
 struct cfg_key {
     const char *path;
