@@ -37,6 +37,7 @@ struct link_spec {
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int baud;           /* pty: of the head's UART; clients with another rate get, and send, other bytes. 0: any rate */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
+    int dialect;        /* of that protocol; 0: any. Nor at this */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
     int waits; /* enum link_waits; its owner sees to it */

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* SICK CoLa-A and CoLa-B (SOPAS): TiM5xx, TiM7xx, LMS1xx. COLA.md is its page. */
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "drivers/protocol/cola.h"
 
 enum { TRY_NS = 100000000, MOST_WAITING = 100, COLA_MIN_STEPS = 55 };
 
-void cola_power_up(struct cola *self)
+int cola_power_up(struct cola *self, struct sh_err *err)
 {
     cola_settings_reset(self);
     cola_ports_reset(self);
@@ -15,6 +16,7 @@ void cola_power_up(struct cola *self)
     self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
     self->n_waiting = self->since_sent = 0;
     self->telegrams = (uint16_t)(0U - self->near_wrap);
+    return cola_restore(self, err);
 }
 
 uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
@@ -32,10 +34,17 @@ static int cola_create(const struct protocol_spec *spec, void **protocol, struct
     self->power_ons = spec->power_ons;
     self->near_wrap = spec->near_wrap;
     self->model = cola_model_find(spec->identity->model);
+    self->keeps = spec->keeps && spec->host.store != NULL;
+    if (spec->stored != NULL) snprintf(self->stored, sizeof self->stored, "%s", spec->stored);
+    self->dialect = spec->dialect;
+    self->shared = spec->shared;
     planar_scan_init(&self->scan);
-    cola_power_up(self);
-    *protocol = self;
-    return SH_OK;
+    const int rc = cola_power_up(self, err);
+    if (rc != SH_OK)
+        free(self);
+    else
+        *protocol = self;
+    return rc;
 }
 
 static void open_at(void *protocol, int64_t t_ns)
@@ -70,6 +79,7 @@ static void deliver_scan(struct cola *self)
 void cola_deliver(struct cola *self)
 {
     if (!self->pending) return;
+    cola_follow_dialect(self);
     self->pending = self->wants_scan = 0;
     const unsigned news = self->watch.on ? cola_ports_scan(self) : 0;
     deliver_scan(self);
@@ -154,7 +164,9 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
         bytes += n;
         len -= n;
         for (int found; (found = cola_input_next(&self->input, &request, &lost)) != 0;)
-            if (found < 0)
+            if (!cola_understands(self, found < 0 ? COLA_A : request.form))
+                lost += found < 0 ? (uint64_t)COLA_MAX_REQUEST : request.len; /* as any other garbage */
+            else if (found < 0)
                 cola_refuse(self, COLA_A, COLA_TOO_LONG);
             else
                 cola_carry_out(self, &request);

@@ -31,8 +31,7 @@ struct cola_settings {
     uint8_t filter; /* FREchoFilter: enum cola_filter */
     uint32_t scale; /* LMDscandatascalefactor; 0: the geometry's */
     char location[COLA_MAX_NAME];
-    int64_t clock_ns; /* what the scanner's clock is ahead of the head's; 0: not set */
-    uint8_t framing;  /* EIHstCola, as it was written */
+    uint8_t framing; /* EIHstCola, as it was written or stored */
 };
 enum cola_filter { COLA_FILTER_FIRST = 0, COLA_FILTER_ALL = 1, COLA_FILTER_LAST = 2 };
 
@@ -41,6 +40,9 @@ struct cola {
     const struct protocol_identity *identity;
     const struct cola_model *model;
     struct cola_settings set;
+    char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
+    int keeps, dialect;           /* of the spec */
+    _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
     int started;             /* LMCstartmeas was called since */
@@ -93,8 +95,8 @@ typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, 
 void cola_deliver(struct cola *self);
 /* sRN LMDscandata: the last scan, or later the first one. */
 cola_handler cola_read_scan;
-/* Sets the session and its settings as at power-up. */
-void cola_power_up(struct cola *self);
+/* Sets the session and its settings as at power-up. SH_EINPUT: what is stored is wrong. */
+int cola_power_up(struct cola *self, struct sh_err *err);
 
 /* Device time as the scanner counts it: us, 32 bits. */
 uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
@@ -121,6 +123,24 @@ struct cola_beams {
 struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_head *head);
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
     cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
+
+/* Whether the model has these channels, and all values are allowed. */
+int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s);
+
+/* cola_stored.c */
+
+/* Takes over what is stored. */
+int cola_restore(struct cola *self, struct sh_err *err);
+cola_handler cola_keep;
+
+/* cola_dialect.c */
+
+/* EIHstCola as it is now: enum cola_form. */
+uint32_t cola_framing(const struct cola *self);
+int cola_understands(const struct cola *self, enum cola_form form);
+/* Another session may have changed it: streamed telegrams have its form. */
+void cola_follow_dialect(struct cola *self);
+cola_handler cola_read_framing, cola_write_framing;
 
 /* cola_geometry.c: line rate and step, which belong to the head, not to this session. */
 
@@ -156,12 +176,18 @@ void cola_ports_report(struct cola *self, unsigned news);
 /* Time has passed: inputs may have changed. */
 void cola_ports_time(struct cola *self);
 
-/* cola_device.c: identity, states, log-in and clock. */
+/* cola_time.c: the clock, and the time server that sets it. */
 
 /* Time of day of the scanner's clock at a device time, ns since 1970. */
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
 /* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
+cola_handler cola_set_clock, cola_read_time_role, cola_write_time_role, cola_read_time_interface,
+    cola_write_time_interface, cola_read_time_address, cola_write_time_address, cola_read_time_zone,
+    cola_write_time_zone, cola_read_time_update, cola_write_time_update, cola_read_time_limit, cola_read_time_delay;
+
+/* cola_device.c: identity, states and log-in. */
+
 enum cola_head_state {
     COLA_HEAD_UNKNOWN = -1,
     COLA_HEAD_OFF,
@@ -176,9 +202,8 @@ enum cola_head_state cola_ask_state(struct cola *self);
 /* Lets the head scan if it rests. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
-    cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination,
-    cola_read_framing, cola_write_framing, cola_log_in, cola_log_out, cola_get_level, cola_check_password,
-    cola_set_clock, cola_start, cola_stop, cola_load_defaults, cola_keep, cola_reboot;
+    cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination, cola_log_in,
+    cola_log_out, cola_get_level, cola_check_password, cola_start, cola_stop, cola_load_defaults, cola_reboot;
 
 /* cola_commands.c: one request, and its answer. */
 

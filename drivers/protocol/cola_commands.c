@@ -43,6 +43,18 @@ static const struct command {
     {"FieldSetSelectionMethod", 'W', COLA_CLIENT, cola_write_set_method},
     {"ActiveFieldSet", 'R', COLA_RUN, cola_read_set},
     {"ActiveFieldSet", 'W', COLA_CLIENT, cola_write_set},
+    {"TSCRole", 'R', COLA_RUN, cola_read_time_role},
+    {"TSCRole", 'W', COLA_CLIENT, cola_write_time_role},
+    {"TSCTCInterface", 'R', COLA_RUN, cola_read_time_interface},
+    {"TSCTCInterface", 'W', COLA_CLIENT, cola_write_time_interface},
+    {"TSCTCSrvAddr", 'R', COLA_RUN, cola_read_time_address},
+    {"TSCTCSrvAddr", 'W', COLA_CLIENT, cola_write_time_address},
+    {"TSCTCtimezone", 'R', COLA_RUN, cola_read_time_zone},
+    {"TSCTCtimezone", 'W', COLA_CLIENT, cola_write_time_zone},
+    {"TSCTCupdatetime", 'R', COLA_RUN, cola_read_time_update},
+    {"TSCTCupdatetime", 'W', COLA_CLIENT, cola_write_time_update},
+    {"TSCTCmaxoffset", 'R', COLA_RUN, cola_read_time_limit},
+    {"TSCTCdelay", 'R', COLA_RUN, cola_read_time_delay},
     {"SetAccessMode", 'M', COLA_RUN, cola_log_in},
     {"GetAccessMode", 'M', COLA_RUN, cola_get_level},
     {"CheckPassword", 'M', COLA_RUN, cola_check_password},
@@ -174,7 +186,8 @@ static void reboot(struct cola *self)
 {
     char reply[512];
     const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
-    cola_power_up(self);
+    struct sh_err err; /* it was taken before */
+    cola_power_up(self, &err);
     if (refused) self->host.hang_up(self->host.ctx);
 }
 

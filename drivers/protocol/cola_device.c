@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Identity, states, log-in and clock. */
+/* Identity, states and log-in. */
 #include <stdio.h>
 #include <string.h>
 
@@ -120,26 +120,6 @@ enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, s
     return cola_args_end(args);
 }
 
-/* ---- which form streamed telegrams have */
-
-enum cola_error cola_read_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    cola_put_u(out, 1, self->set.framing);
-    return cola_args_end(args);
-}
-
-enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    const uint32_t form = cola_arg_u(args, 1);
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error != COLA_OK) return error;
-    if (form > COLA_B) return COLA_INVALID_DATA;
-    self->set.framing = (uint8_t)form;
-    self->stream_form = (enum cola_form)form;
-    return COLA_OK;
-}
-
 /* ---- log-in */
 
 static int password_fits(uint32_t level, uint32_t hash)
@@ -214,51 +194,7 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
     return COLA_OK;
 }
 
-/* ---- clock */
-
-int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
-{
-    const int64_t utc_ns = self->host.utc_ns(self->host.ctx, t_ns);
-    return (utc_ns == INT64_MIN ? t_ns - self->power_ns : utc_ns) + self->set.clock_ns;
-}
-
-void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
-{
-    const struct cola_date d = cola_date_of(cola_clock_ns(self, t_ns));
-    cola_put_u(out, 2, d.year);
-    cola_put_u(out, 1, d.month);
-    cola_put_u(out, 1, d.day);
-    cola_put_u(out, 1, d.hour);
-    cola_put_u(out, 1, d.minute);
-    cola_put_u(out, 1, d.second);
-    cola_put_u(out, 4, d.us);
-}
-
-/* u16 year, 5 x u8, u32 us; u8 1: set */
-enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    struct cola_date d = {.year = cola_arg_u(args, 2)};
-    uint32_t *const parts[] = {&d.month, &d.day, &d.hour, &d.minute, &d.second};
-    int64_t ns;
-    for (int i = 0; i < 5; i++)
-        *parts[i] = cola_arg_u(args, 1);
-    d.us = cola_arg_u(args, 4);
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
-    const int is_date = cola_date_ns(&d, &ns);
-    if (is_date) self->set.clock_ns += ns - cola_clock_ns(self, self->now_ns);
-    cola_put_u(out, 1, (uint32_t)is_date);
-    return COLA_OK;
-}
-
-/* ---- keeping and forgetting */
-
-enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    (void)self;
-    cola_put_u(out, 1, 1);
-    return cola_args_end(args);
-}
+/* ---- forgetting */
 
 enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, struct cola_out *out)
 {

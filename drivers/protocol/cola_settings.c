@@ -73,6 +73,14 @@ enum cola_error cola_read_scan_data_cfg(struct cola *self, struct cola_args *arg
     return cola_args_end(args);
 }
 
+int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s)
+{
+    const uint8_t have = (uint8_t)((1u << self->model->echoes) - 1);
+    return s->channels[0] != 0 && (s->channels[0] & ~have) == 0 && s->channels[1] == 0 && s->unit == 0 &&
+           s->every != 0 && s->rssi <= 1 && s->rssi_16bit <= 1 && s->position <= 1 && s->name <= 1 && s->comment <= 1 &&
+           s->time <= 1;
+}
+
 enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct cola_settings s = self->set;
@@ -84,11 +92,7 @@ enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *ar
     s.every = (uint16_t)cola_arg_u(args, 2);
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    const uint8_t have = (uint8_t)((1u << self->model->echoes) - 1);
-    if (s.channels[0] == 0 || (s.channels[0] & ~have) != 0 || s.channels[1] != 0 || s.unit != 0 || s.every == 0)
-        return COLA_INVALID_DATA;
-    if (s.rssi > 1 || s.rssi_16bit > 1 || s.position > 1 || s.name > 1 || s.comment > 1 || s.time > 1)
-        return COLA_INVALID_DATA;
+    if (!cola_scan_data_fits(self, &s)) return COLA_INVALID_DATA;
     self->set = s;
     return COLA_OK;
 }

@@ -48,6 +48,13 @@ enum protocol_pps {
     PROTOCOL_PPS_ERROR, /* they come at other times than the clock's full seconds */
 };
 
+/* Which of its dialects a link speaks. */
+enum protocol_dialect {
+    PROTOCOL_DIALECT_ANY, /* all of them: an answer has that of its request */
+    PROTOCOL_COLA_A,
+    PROTOCOL_COLA_B,
+};
+
 /* Counts of a session, beside the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
@@ -87,6 +94,9 @@ struct protocol_host {
      * as far as pulses and sentences have set it; else since power-up. May be NULL: locked and UTC, where that is
      * known. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
+    /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has set
+     * it, it is UTC, or the time since power-up. */
+    int64_t (*date_ns)(void *ctx, int64_t t_ns);
     /* Keeps this protocol's settings without power, in place of those from before: lines of printable ASCII with their
      * '\n', at most PROTOCOL_STORED bytes with the NUL; "": none. From then on each new session gets them (spec.stored).
      * 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps none. Settings
@@ -125,14 +135,16 @@ struct talk_options;
 struct protocol_spec {
     const struct protocol_identity *identity;
     struct protocol_host host;
-    uint32_t session;   /* from 1, over all links */
-    uint32_t fixes_hz;  /* of the GNSS receiver */
-    int64_t power_ns;   /* device time of the last power-up, from which the device's counters count */
-    uint32_t power_ons; /* how often power has come, by power cycles and reboots, with the first time */
-    uint32_t near_wrap; /* counters begin so many below their wrap; 0: at 0 */
-    int keeps;          /* 1: store() and HEAD:STORe work; else the device forgets all settings without power */
-    const char *stored; /* what store() has kept; "": nothing. NULL: as "". Valid during create */
-    int waits;          /* 1: paces fast and step: device time says nothing of how long a client takes */
+    uint32_t session;         /* from 1, over all links */
+    uint32_t fixes_hz;        /* of the GNSS receiver */
+    int64_t power_ns;         /* device time of the last power-up, from which the device's counters count */
+    uint32_t power_ons;       /* how often power has come, by power cycles and reboots, with the first time */
+    uint32_t near_wrap;       /* counters begin so many below their wrap; 0: at 0 */
+    int keeps;                /* 1: store() and HEAD:STORe work; else the device forgets all settings without power */
+    const char *stored;       /* what store() has kept; "": nothing. NULL: as "". Valid during create */
+    int dialect;              /* enum protocol_dialect: the one of the link at first */
+    _Atomic uint32_t *shared; /* a word of the link that all of its sessions share; 0 at first. NULL: there is none */
+    int waits;                /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];
     int port;

@@ -8,6 +8,7 @@
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
+#include "firmware_sim/command/time_server.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -169,6 +170,7 @@ static int do_act(struct command_call *call)
     if (row->unit != NULL && call->param[0] == '\0')
         return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
                             row->unit == &command_unit_fault                      ? "fault or its number"
+                            : row->unit == &command_unit_server                   ? "role, address, s, h and interface"
                             : row->own                                            ? "station and its place"
                             : row->setting != NULL && row->setting->words != NULL ? "word"
                                                                                   : "number");

@@ -12,7 +12,7 @@
  *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
  *   site      SITE:POSE
  *   fault     FAULt:ADD  FAULt:CLEar  FAULt:LIST?  FAULt:INJected?
- *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:PTP?  TIME:STEP
+ *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:PTP?  TIME:STEP  TIME:SHIFt  TIME:SERVer
  *
  * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
  * is STATe. A query ends in '?'. Settings have both forms.
@@ -82,6 +82,7 @@ enum command_error {
     CMD_E_REFUSED = 104,     /* a client was turned away: all sessions taken */
     CMD_E_PARTIAL = 105,     /* a client went away in the middle of a command */
     CMD_E_LINES = 106,       /* lines of a file were dropped: it is too slow, or full */
+    CMD_E_TIME = 107,        /* the time server does not answer, or its answer is refused */
 };
 
 struct command_queue {
@@ -112,6 +113,23 @@ struct command_faults {
     int (*injected)(void *owner, uint32_t number, uint64_t *n);
     /* "1 drop, 2 flip"; empty: none. Faults without room are counted at the end: ", and 3 more". */
     void (*list)(void *owner, char *text, size_t len);
+};
+
+/* The time server that a SICK scanner asks. The words of TIME:SERVer are in the order of the numbers. */
+enum command_time_role { COMMAND_TIME_NONE, COMMAND_TIME_CLIENT, COMMAND_TIME_SERVER };
+struct command_time_server {
+    uint32_t role;      /* enum command_time_role */
+    uint32_t interface; /* 0: Ethernet; 1: CAN, where no server is asked */
+    uint8_t address[4];
+    uint32_t update_s; /* from request to request */
+    int32_t zone_h;    /* what local time is ahead of UTC */
+};
+/* What has come of it since power-up. */
+struct command_time_answers {
+    int64_t max_offset_ns;       /* the clock once set, an answer farther from it is refused */
+    int64_t offset_ns, delay_ns; /* of the last answer that set the clock */
+    uint64_t good, refused, none;
+    const char *state; /* one word; NULL: OFF */
 };
 
 /* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. [0] is unused. */
@@ -152,13 +170,17 @@ struct command_device {
     uint64_t frames_done;                          /* of the scan at hand or the last one */
     uint64_t lost_journal_lines, lost_truth_lines; /* lines that these files lack */
     int64_t t_ns;                                  /* device time */
-    char utc[40], gps[40];                   /* the same as time of day, by the clock of the head; empty: unknown */
-    char ptp[128];                           /* its PTP follower then; empty: it has none */
-    int keeps;                               /* 1: the head can keep settings without power */
-    int step_allowed;                        /* 1 when the pace is `step` */
-    int pose_allowed;                        /* 1 when the platform is live: a step may carry a pose */
-    double pose_centre_m[3], pose_reach_m;   /* the pose must be within pose_reach_m of the centre; scene frame */
-    const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
+    char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
+    char ptp[128];         /* its PTP follower then; empty: it has none */
+    struct command_time_server server, server_default, server_configured; /* now; at power-up; of the configuration */
+    int asks_server; /* 1: TIME:SERVer may be CLIENT: there is somebody who asks */
+    struct command_time_answers answers;
+    int64_t shift_ns;                      /* what the scanner's clock is ahead of that of power-up (scanner_clock.h) */
+    int keeps;                             /* 1: the head can keep settings without power */
+    int step_allowed;                      /* 1 when the pace is `step` */
+    int pose_allowed;                      /* 1 when the platform is live: a step may carry a pose */
+    double pose_centre_m[3], pose_reach_m; /* the pose must be within pose_reach_m of the centre; scene frame */
+    const struct command_place *place;     /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
     const char *recorded;                    /* a recording is replayed: why no setting changes; NULL: none is */
     int is_played;                           /* it is playing, whatever its head's state was: SCAN:STOP ends it */
@@ -178,6 +200,8 @@ enum command_effect {
     COMMAND_MOVE,    /* move a station; the reply is that of success */
     COMMAND_TAKE,    /* control, and nothing else */
     COMMAND_FAULTS,  /* faults were added or taken out */
+    COMMAND_CLOCK,   /* the scanner's clock was set */
+    COMMAND_SERVER,  /* its time server has changed */
     COMMAND_RELEASE, /* control was given back */
 };
 

@@ -8,6 +8,7 @@
 #include "firmware_sim/command/setting.h"
 #include "firmware_sim/command/site_pose.h"
 #include "firmware_sim/command/step.h"
+#include "firmware_sim/command/time_server.h"
 
 #include <string.h>
 
@@ -238,6 +239,7 @@ static int act_reset(struct command_call *call)
 {
     if (act_event(call, COMMAND_RESET) != 0) return -1;
     call->dev->settings = call->dev->defaults;
+    call->dev->server = call->dev->server_default;
     return 0;
 }
 
@@ -260,6 +262,7 @@ static int act_store(struct command_call *call)
     dev->defaults = dev->settings;
     dev->defaults.station = station;
     dev->defaults.frames = frames;
+    dev->server_default = dev->server;
     call->out->effect = COMMAND_STORE;
     return command_reply(call, "OK");
 }
@@ -342,6 +345,9 @@ const struct command_row command_rows[] = {
     QUERY("TIME:GPS", query_gps),
     QUERY("TIME:PTP", query_ptp),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
+    /* Open to all, as HEAD:REBoot is. */
+    {"TIME:SHIFt", command_shift_query, command_shift_change, &unit_ns, NULL, 1, 0, 0, 0, 0},
+    {"TIME:SERVer", command_server_query, command_server_change, &command_unit_server, NULL, 1, 0, 1, 0, 0},
     {.header = NULL},
 };
 /* clang-format on */

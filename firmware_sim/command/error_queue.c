@@ -28,6 +28,7 @@ static const struct {
     {CMD_E_REFUSED, "Client refused"},
     {CMD_E_PARTIAL, "Incomplete command"},
     {CMD_E_LINES, "Lines lost"},
+    {CMD_E_TIME, "Time server"},
 };
 
 const char *command_error_text(int number)

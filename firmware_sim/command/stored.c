@@ -9,10 +9,12 @@
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
 #include "firmware_sim/command/step.h"
+#include "firmware_sim/command/time_server.h"
 
-static int is_stored(const struct command_device *dev, const struct command_setting *setting)
+static int is_stored(const struct command_device *dev, const struct command_row *row)
 {
-    if (setting == NULL) return 0;
+    const struct command_setting *setting = row->setting;
+    if (setting == NULL) return row->act == command_server_change;
     if (setting->derived != NULL) return setting->derived == &command_step_both && dev->settings.step_udeg != 0;
     return setting->offset != offsetof(struct head_settings, station) &&
            setting->offset != offsetof(struct head_settings, frames);
@@ -30,14 +32,17 @@ static const char *ask(struct command_device *dev, const char *header, struct co
 int command_stored_text(struct command_device *dev, const struct head_settings *configured, char *text, size_t cap)
 {
     const struct head_settings now = dev->settings;
+    const struct command_time_server server = dev->server;
     struct command_result out, before;
     size_t n = 0;
     text[0] = '\0';
     for (const struct command_row *row = command_rows; row->header != NULL; row++) {
-        if (!is_stored(dev, row->setting)) continue;
+        if (!is_stored(dev, row)) continue;
         dev->settings = *configured;
+        dev->server = dev->server_configured;
         ask(dev, row->header, &before);
         dev->settings = now;
+        dev->server = server;
         if (strcmp(ask(dev, row->header, &out), before.reply) == 0) continue;
         n += (size_t)snprintf(text + n, cap - n, "%s %s\n", row->header, out.reply);
         if (n >= cap) return -1;
@@ -75,7 +80,7 @@ static int cut_lines(const struct command_device *dev, const char *text, struct 
         memcpy(line, text, n);
         line[n] = '\0';
         const struct command_row *row = row_of(line);
-        if (row == NULL || !is_stored(dev, row->setting)) {
+        if (row == NULL || !is_stored(dev, row)) {
             snprintf(why, len, "'%.80s' is no setting that this head stores", line);
             return -1;
         }

@@ -46,6 +46,15 @@ struct config_gnss {
     int cold; /* neither has reached the head before power-up */
 };
 
+/* The time server that a SICK scanner asks (scanner_clock.h). */
+struct config_ntp {
+    enum config_ntp_role { NTP_ROLE_NONE, NTP_ROLE_CLIENT, NTP_ROLE_SERVER } role;
+    char address[16]; /* numeric, IPv4 */
+    uint32_t port, update_s;
+    double zone_h, max_offset_s;
+    int anywhere; /* clients may choose a server outside of this machine */
+};
+
 enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL };
 
 /* Ball-shaped noise; detect_ball. */
@@ -192,6 +201,7 @@ struct config {
     struct config_loop loop;
     struct config_time time;
     struct config_gnss gnss;
+    struct config_ntp ntp;
     struct fault_list faults;
 };
 

@@ -5,6 +5,7 @@
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/check_ntp.h"
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
@@ -283,6 +284,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     check_sight(rd, cfg);
     cfg_check_loop(rd, cfg);
     check_time(rd, cfg);
+    cfg_check_ntp(rd, cfg);
     cfg_check_signal(rd, cfg);
     cfg_check_fields(rd, cfg);
     cfg_check_faults(rd, &cfg->faults);

@@ -63,8 +63,8 @@
     {FAULT(hz), CFG_REAL, "Hz", "10", 0.01, 1000, .help = "mirror_wobble: how often per second."},
     {FAULT(loss_db), CFG_REAL, "dB", "3", 0, 60,
      .help = "window_soiled: loss of optical power, both ways together."},
-    {FAULT(jump_s), CFG_REAL, "s", "1", -1e6, 1e6, .help = "clock_jump: how much the time of day goes forward; below "
-                                                           "0: back."},
+    {FAULT(jump_s), CFG_REAL, "s", "1", -1e6, 1e6, .help = "clock_jump: how much the time of day goes forward; "
+                                                           "ntp_step: how far the server is ahead; below 0: back."},
     {FAULT(ppm), CFG_REAL, "ppm", "100", -1e5, 1e5,
      .help = "clock_drift: how fast the time of day gains; ptp_lost, ptp_no_sync, ptp_faulty: the same, in holdover."},
     {FAULT(ns), CFG_REAL, "ns", "1000", -1e15, 1e15,

@@ -94,6 +94,7 @@ static const struct {
     [FAULT_PTP_ASYMMETRY] = {"ns", 0, 0},
     [FAULT_PTP_JITTER] = {"ns", 0, 0},
     [FAULT_COUNTERS_HIGH] = {"n", 1e9, 0},
+    [FAULT_NTP_STEP] = {"jump_s", 0, 0},
 };
 
 /* Whether a list of words has the word. */

@@ -169,6 +169,10 @@ static const struct cfg_key config_keys[] = {
      .help = "native: the head's own stream and commands; nmea: the GNSS receiver, which sends NMEA 0183 and takes no "
              "commands; scip: as a Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, "
              "velodyne-position: position packets, velodyne-http: settings, as a VLP-16."},
+    {LINK(dialect), CFG_ENUM, .def = "any",
+     WORDS([PROTOCOL_DIALECT_ANY] = "any", [PROTOCOL_COLA_A] = "cola-a", [PROTOCOL_COLA_B] = "cola-b"),
+     .help = "cola: any: each request is answered in its own dialect. cola-a, cola-b: the link understands that one "
+             "alone, until EIHstCola changes it."},
     {LINK(path), CFG_PATH, .def = "", .flags = CFG_WRITTEN, .example = "port",
      .of = CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_USB), .of_backend = CFG_KIND(USB_BACKEND_USBREDIR),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
@@ -323,6 +327,7 @@ static const struct cfg_key config_keys[] = {
      .help = "on: the run begins with a head that has had no pulse and no sentence, and a VLP-16 counts from power-up; "
              "off: it was synchronised before. After a power cycle it always begins cold."},
 
+#include "firmware_sim/config/ntp_rows.h"
 #include "firmware_sim/config/fault_rows.h"
 };
 /* clang-format on */

@@ -146,6 +146,9 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
                      cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
         return;
     }
+    if (link->dialect != PROTOCOL_DIALECT_ANY && link->protocol != PROTOCOL_COLA)
+        cfg_fail_key(rd, "links[].dialect", i, "%s, but the protocol is %s; allowed with protocol: cola, or any",
+                     cfg_word(rd, "links[].dialect", link->dialect), ops->name);
     set_source_port(rd, link, i);
     /* The real device turns a second client away. */
     if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;

@@ -40,6 +40,7 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
         break;
     case COMMAND_RESET:
         stop(device, HEAD_EV_RESET, released);
+        device_say_time_server(device);
         break;
     case COMMAND_REBOOT:
         device->power.reboots = 1;
@@ -50,6 +51,10 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     case COMMAND_RELEASE:
         device_push_event(&device->events, NATIVE_EV_CONTROL, 0, 0, 0, "released");
         break;
+    case COMMAND_SERVER:
+        device_say_time_server(device);
+        break;
+    case COMMAND_CLOCK:
     case COMMAND_STEP:
     case COMMAND_FAULTS:
     case COMMAND_NONE:

@@ -148,6 +148,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (rc == SH_OK) rc = check_live(device, err);
     if (rc == SH_OK) rc = head_clock_create(&site->cfg->time, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
+    device_init_time_server(device);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc == SH_OK) rc = open_faults(device, err);
     if (rc == SH_OK) rc = device_restore(device, err);
@@ -165,6 +166,11 @@ int device_create(const struct site *site, const struct device_options *options,
 int device_replay_ends(const struct device *device)
 {
     return device->journal.ends;
+}
+
+int device_replays(const struct device *device)
+{
+    return device->options.replay != NULL;
 }
 
 int device_close_journal(struct device *device, struct sh_err *err)
@@ -204,7 +210,8 @@ static void run_faults(struct device *device, uint64_t tick, struct device_work 
                                         .pulse0 = device->scan.pulse_next,
                                         .n_pulses =
                                             1}; /* from the tick on that begins with the fault's pulse or later */
-    if (head_faults_step(&device->head_faults, HEAD_FAULTS_CLOCK | HEAD_FAULT(FAULT_POWER_CYCLE), &at))
+    static const uint64_t kinds = HEAD_FAULTS_CLOCK | HEAD_FAULTS_SERVER | HEAD_FAULT(FAULT_POWER_CYCLE);
+    if (head_faults_step(&device->head_faults, kinds, &at))
         device_run_clock_faults(&device->head_faults, &device->clock, &device->events, tick);
     device_run_power(device, tick, work);
 }

@@ -113,6 +113,8 @@ int device_create(const struct site *site, const struct device_options *options,
 void device_free(struct device *device);
 /* 1: the replayed journal ends the run. 0: it has no end, or there is none. */
 int device_replay_ends(const struct device *device);
+/* 1: a journal is replayed. */
+int device_replays(const struct device *device);
 /* Ends and closes the journal and the file of the truth, if there are any. Returns the first error in writing them; the
  * lines that they lack are counted. A file that takes nothing for 2 s is given up. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);

@@ -18,6 +18,7 @@
 #include "firmware_sim/device/receiver_line.h"
 #include "firmware_sim/device/ptp.h"
 #include "firmware_sim/device/scan_state.h"
+#include "firmware_sim/device/scanner_clock.h"
 #include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
 
@@ -88,8 +89,10 @@ struct device {
         int64_t t_ns;
     } edge;
     struct receiver_line line;
-    uint64_t line_taken; /* sentences that pps has */
-    char plan[160];      /* site_plan_text */
+    uint64_t line_taken;                    /* sentences that pps has */
+    struct scanner_clock date, date_before; /* since the last power-up, and before it */
+    int server_fd;                          /* device_watch_time_server */
+    char plan[160];                         /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
@@ -178,6 +181,14 @@ int device_is_dead(const struct device *device, uint64_t released);
 void device_hold_phase(struct device *device, int64_t edge_ns);
 /* A tick begins: chooses the rotor's speed after a pulse; without locked pulses it runs free. */
 void device_check_phase(struct device *device, int64_t t_ns);
+
+/* scanner_clock.c */
+/* The settings of power-up, from the configuration. */
+void device_init_time_server(struct device *device);
+/* Power comes at a device time: the scanner's clock and its time server are as at power-up. */
+void device_start_date(struct device *device, int64_t t_ns);
+/* Its time server, or whether it may be asked, has changed. */
+void device_say_time_server(const struct device *device);
 
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */

@@ -51,6 +51,7 @@ void device_first_power(struct device *device)
     static const struct head_faults_tick first = {0};
     head_faults_step(&device->head_faults, 0, &first); /* only takes over the list */
     set_near_wrap(device, 0);
+    device_start_date(device, 0);
     device_transition(device, HEAD_EV_POWER_ON, 0);
 }
 
@@ -62,6 +63,7 @@ static void turn_on(struct device *device, uint64_t tick)
     cmd->frames_done = 0;
     memset(&cmd->queue, 0, sizeof cmd->queue);
     set_near_wrap(device, tick);
+    device_start_date(device, time_of(device, tick));
     device->power.again++;
     device->scan.variant = NULL;
     device_before_scans(device);

@@ -43,6 +43,7 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
         (struct device_state_change){tick, device->machine.state};
     device_push_event(&device->events, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
                       head_state_name(device->machine.state));
+    device_say_time_server(device);
     uint64_t from = tick > device->next_tick ? tick : device->next_tick;
     switch (device->machine.state) {
     case HEAD_BOOT:

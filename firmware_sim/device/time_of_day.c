@@ -10,6 +10,7 @@ int device_power_up(struct device *device, int64_t now_ns, const char **warning,
 {
     pthread_mutex_lock(&device->lock); /* a client may ask for the time already */
     int rc = head_clock_power_up(&device->clock, now_ns, err);
+    device->date.zero_ns = head_clock_ns(&device->clock, 0); /* the system's clock was not known before */
     pthread_mutex_unlock(&device->lock);
     *warning = device->clock.warning[0] != '\0' ? device->clock.warning : NULL;
     return rc;

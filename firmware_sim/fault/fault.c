@@ -55,6 +55,10 @@ const char *const fault_names[] = {
     [FAULT_PTP_JITTER] = "ptp_jitter",
     [FAULT_LEAP_SECOND] = "leap_second",
     [FAULT_COUNTERS_HIGH] = "counters_high",
+    [FAULT_NTP_SILENT] = "ntp_silent",
+    [FAULT_NTP_KISS] = "ntp_kiss",
+    [FAULT_NTP_UNSYNC] = "ntp_unsync",
+    [FAULT_NTP_STEP] = "ntp_step",
     [FAULT_N_KINDS] = NULL,
 };
 

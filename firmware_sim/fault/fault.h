@@ -71,6 +71,11 @@ enum fault_kind {
     FAULT_PTP_JITTER,      /* of each measurement, up to ns to either side */
     FAULT_LEAP_SECOND,     /* at the end of the minute at hand; no table has it */
     FAULT_COUNTERS_HIGH,   /* counters begin n below their wrap at power-up */
+    /* what a SICK scanner's time server answers */
+    FAULT_NTP_SILENT, /* nothing */
+    FAULT_NTP_KISS,   /* DENY */
+    FAULT_NTP_UNSYNC, /* that it is not synchronised */
+    FAULT_NTP_STEP,   /* a time that is ahead by jump_s */
     FAULT_N_KINDS
 };
 

@@ -2,6 +2,8 @@
 /* The head that computes, as a source of the loop. */
 #include "firmware_sim/loop/source.h"
 
+#include "firmware_sim/device/scanner_clock.h"
+
 static void command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
     device_command(self, session, line, released, out);
@@ -40,6 +42,11 @@ static void command_once(void *self, uint32_t session, const char *line, uint64_
 static int64_t utc_ns(void *self, int64_t t_ns)
 {
     return device_utc_ns(self, t_ns);
+}
+
+static int64_t date_ns(void *self, int64_t t_ns)
+{
+    return device_date_ns(self, t_ns);
 }
 
 static int64_t next_fix_ns(void *self, int64_t t_ns)
@@ -136,6 +143,7 @@ const struct loop_source_ops loop_device_source = {
     .faults = faults,
     .command_once = command_once,
     .utc_ns = utc_ns,
+    .date_ns = date_ns,
     .next_fix_ns = next_fix_ns,
     .fix = fix,
     .rests_from = rests_from,

@@ -190,6 +190,15 @@ static void lock_memory(const struct loop *loop)
             strerror(errno));
 }
 
+/* A SICK scanner, in real time. A journal that is replayed has what its time server's answers did. */
+static int asks_time(const struct loop *loop)
+{
+    int asks = loop->cfg->ntp.role == NTP_ROLE_CLIENT;
+    for (uint32_t i = 0; i < loop->cfg->n_links; i++)
+        asks |= loop->cfg->link[i].protocol == PROTOCOL_COLA;
+    return asks && loop->device != NULL && !loop->stream.waits && !device_replays(loop->device);
+}
+
 int loop_start(struct loop *loop, struct sh_err *err)
 {
     lock_memory(loop);
@@ -198,6 +207,8 @@ int loop_start(struct loop *loop, struct sh_err *err)
     if (rc == SH_OK) rc = links_start(&loop->links, err);
     if (rc == SH_OK) rc = pacer_start(loop, err);
     if (rc == SH_OK) rc = loop->device != NULL ? casters_start(loop, err) : player_start(loop, err);
+    if (rc == SH_OK && asks_time(loop))
+        rc = time_client_start(loop->device, &loop->stream, loop->pacer.pace.epoch_ns, &loop->client, err);
     if (rc == SH_OK && loop->device != NULL) loop->cost = cost_watch_start(loop);
     return rc;
 }
@@ -245,6 +256,8 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     player_join(loop);
     pacer_join(loop);
     mover_join(&loop->links.mover);
+    time_client_join(loop->client);
+    loop->client = NULL;
     links_join(&loop->links);
     pose_feed_close(loop->feed);
     loop->feed = NULL;

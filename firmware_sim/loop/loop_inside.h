@@ -12,6 +12,7 @@
 #include "firmware_sim/loop/player.h"
 #include "firmware_sim/loop/pose_feed.h"
 #include "firmware_sim/loop/stream.h"
+#include "firmware_sim/loop/time_client.h"
 #include "firmware_sim/loop/work.h"
 
 struct loop_caster {
@@ -57,6 +58,7 @@ struct loop {
     struct hasher *hasher;       /* NULL: none is wanted */
     struct cost_watch *cost;     /* NULL: nobody is to be warned */
     struct pose_feed *feed;      /* of a live platform in real time; NULL: none */
+    struct time_client *client;  /* of a time server; NULL: none is asked */
     _Atomic uint64_t final_tick; /* first tick after the run's end; UINT64_MAX while unknown */
     _Atomic int stopping;        /* give up waiting for anything */
 };

@@ -66,6 +66,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->is_clean = spec->type == LINK_FD || spec->clean;
     pump->can_unplug = (link_faults(spec) & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
+    pump->dialect = spec->dialect;
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
     struct link_spec with = *spec;
     with.web = links->web;

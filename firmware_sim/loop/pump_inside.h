@@ -72,7 +72,9 @@ struct pump {
     const struct link_ops *ops;
     struct faulty_link *link;
     const struct protocol_ops *protocol;
-    uint8_t *tick; /* frames of the tick at hand, for a protocol; NULL: it is native */
+    int dialect;             /* of the protocol */
+    _Atomic uint32_t shared; /* by its sessions: protocol_spec.shared */
+    uint8_t *tick;           /* frames of the tick at hand, for a protocol; NULL: it is native */
     int wake_fd;
     struct stream_listener *listener;
     uint32_t index;                  /* of the link, from 0 */
@@ -160,7 +162,7 @@ void pump_read_commands(struct pump *pump, struct session *s, int index);
 
 /* pump_protocol.c: a session of a protocol that is not native. It has everything before the tick at its cursor. */
 /* Returns 0 or a negative SH_E. */
-int session_open_protocol(struct pump *pump, struct session *s);
+int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err);
 void session_close_protocol(struct pump *pump, struct session *s);
 /* Closes it and opens it again at the cursor. */
 int session_restart_protocol(struct pump *pump, struct session *s);

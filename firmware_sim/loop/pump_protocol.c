@@ -74,6 +74,15 @@ static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int64_t *hour_ns)
     return s->pump->links->source->ops->pps(s->pump->links->source->self, t_ns, hour_ns);
 }
 
+static int64_t host_date_ns(void *ctx, int64_t t_ns)
+{
+    const struct session *s = ctx;
+    const struct loop_source *source = s->pump->links->source;
+    if (source->ops->date_ns != NULL) return source->ops->date_ns(source->self, t_ns);
+    const int64_t utc_ns = source->ops->utc_ns(source->self, t_ns);
+    return utc_ns != INT64_MIN ? utc_ns : t_ns - source->ops->power_ns(source->self);
+}
+
 static int host_store(void *ctx, const char *lines)
 {
     const struct session *s = ctx;
@@ -170,7 +179,7 @@ static void greet(struct pump *pump, struct session *s)
 
 _Static_assert((int)PROTOCOL_STORED == (int)SETTINGS_FILE_TEXT, "what a protocol stores fits");
 
-static int pump_protocol_create(struct pump *pump, struct session *s)
+static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_err *err)
 {
     const struct loop_source *source = pump->links->source;
     char stored[SETTINGS_FILE_TEXT] = "";
@@ -185,6 +194,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
                  .hang_up = host_hang_up,
                  .next_fix_ns = host_next_fix_ns,
                  .pps = host_pps,
+                 .date_ns = host_date_ns,
                  .store = host_store,
                  .window_loss_db = host_window_loss_db,
                  .tell_once = host_tell_once},
@@ -195,22 +205,24 @@ static int pump_protocol_create(struct pump *pump, struct session *s)
         .near_wrap = source->ops->near_wrap(source->self),
         .keeps = source->ops->stored != NULL && source->ops->stored(source->self, pump->protocol->name, stored) == 0,
         .stored = stored,
+        .dialect = pump->dialect,
+        .shared = &pump->shared,
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
     };
-    struct sh_err err;
     snprintf(spec.address, sizeof spec.address, "%s", pump->links->data_address);
     if (source->ops->talk != NULL) spec.talk = source->ops->talk(source->self, pump->index, &spec.talk_options);
     s->pump = pump;
     s->hang_up = 0;
-    if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;
+    if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK)
+        return sh_fail(err, SH_ENOMEM, "no memory for a session");
     unit_queue_clear(&s->units);
-    return pump->protocol->create(&spec, &s->protocol, &err);
+    return pump->protocol->create(&spec, &s->protocol, err);
 }
 
-int session_open_protocol(struct pump *pump, struct session *s)
+int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err)
 {
-    const int rc = pump_protocol_create(pump, s);
+    const int rc = pump_protocol_create(pump, s, err);
     if (rc == SH_OK) greet(pump, s);
     return rc;
 }
@@ -218,7 +230,8 @@ int session_open_protocol(struct pump *pump, struct session *s)
 int session_restart_protocol(struct pump *pump, struct session *s)
 {
     session_close_protocol(pump, s);
-    const int rc = pump_protocol_create(pump, s);
+    struct sh_err err; /* a file or null link has none to tell */
+    const int rc = pump_protocol_create(pump, s, &err);
     if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     return rc;
 }

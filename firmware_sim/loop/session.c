@@ -38,8 +38,9 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     s->shut = s->left = 0;
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address is shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);
-    if (native ? s->out == NULL : session_open_protocol(pump, s) != SH_OK) {
-        source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
+    struct sh_err err = {.text = "no memory for a session"};
+    if (native ? s->out == NULL : session_open_protocol(pump, s, &err) != SH_OK) {
+        source_report(pump->links->source, CMD_E_REFUSED, err.text);
         return;
     }
     s->open = 1;

@@ -27,6 +27,7 @@ struct loop_source_ops {
     void (*command_once)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
     int64_t (*utc_ns)(void *self, int64_t t_ns);
     int64_t (*next_fix_ns)(void *self, int64_t t_ns);
+    int64_t (*date_ns)(void *self, int64_t t_ns); /* NULL: UTC, or the time since power-up */
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
     int64_t (*power_ns)(void *self);
     uint32_t (*power_ons)(void *self);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/common/protocol_rig.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -35,6 +36,8 @@ static int answer(void *ctx, const char *line, char *reply, size_t cap)
     struct protocol_rig *rig = ctx;
     assert_true(rig->n_lines < RIG_LINES && cap >= 480);
     snprintf(rig->line[rig->n_lines++], sizeof rig->line[0], "%s", line);
+    if (sscanf(line, "TIME:SHIFt %" SCNd64, &rig->shift_ns) == 1) return snprintf(reply, cap, "OK"), 0;
+    if (strcmp(line, "TIME:SHIFt?") == 0) return snprintf(reply, cap, "%" PRId64, rig->shift_ns), 0;
     for (const struct protocol_rig_reply *r = rig->replies; r != NULL && r->prefix != NULL; r++)
         if (strncmp(line, r->prefix, strlen(r->prefix)) == 0) {
             snprintf(reply, cap, "%s", r->reply);
@@ -48,6 +51,12 @@ static int64_t utc_ns(void *ctx, int64_t t_ns)
 {
     const struct protocol_rig *rig = ctx;
     return rig->utc0_ns == INT64_MIN ? INT64_MIN : rig->utc0_ns + t_ns;
+}
+
+static int64_t date_ns(void *ctx, int64_t t_ns)
+{
+    const struct protocol_rig *rig = ctx;
+    return t_ns + (rig->utc0_ns == INT64_MIN ? -rig->spec.power_ns : rig->utc0_ns) + rig->shift_ns;
 }
 
 static int fix(void *ctx, int64_t t_ns, struct nmea_fix *out)
@@ -84,6 +93,13 @@ static enum protocol_pps pps(void *ctx, int64_t t_ns, int64_t *hour_ns)
     return rig->utc0_ns == INT64_MIN ? PROTOCOL_PPS_ABSENT : rig->pps;
 }
 
+static int store(void *ctx, const char *lines)
+{
+    struct protocol_rig *rig = ctx;
+    snprintf(rig->stored, sizeof rig->stored, "%s", lines);
+    return !rig->spec.keeps;
+}
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;
@@ -101,11 +117,12 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.serial, sizeof rig->identity.serial, "17210001");
     snprintf(rig->identity.firmware, sizeof rig->identity.firmware, "1.2.3");
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
-    rig->spec = (struct protocol_spec){.identity = &rig->identity,
-                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps},
-                                       .session = 1,
-                                       .fixes_hz = 1,
-                                       .power_ons = 1};
+    rig->spec = (struct protocol_spec){
+        .identity = &rig->identity,
+        .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns, store},
+        .session = 1,
+        .fixes_hz = 1,
+        .power_ons = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
     if (rig->ops->open != NULL) rig->ops->open(rig->protocol, 0);
 }

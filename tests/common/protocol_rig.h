@@ -31,10 +31,12 @@ struct protocol_rig {
         const char *prefix, *reply;
         int error;
     } * replies;
-    int64_t utc0_ns;       /* UTC of device time 0; INT64_MIN at first: not known */
-    enum protocol_pps pps; /* of all times; locked at first */
-    int pps_unset;         /* the time of day was never set */
-    struct nmea_fix fix;   /* of all times; quality 0 at first: there is none */
+    int64_t utc0_ns;              /* UTC of device time 0; INT64_MIN at first: not known */
+    int64_t shift_ns;             /* TIME:SHIFt of the device's own clock, which begins with utc0_ns, or at power-up */
+    enum protocol_pps pps;        /* of all times; locked at first */
+    int pps_unset;                /* the time of day was never set */
+    struct nmea_fix fix;          /* of all times; quality 0 at first: there is none */
+    char stored[PROTOCOL_STORED]; /* what it has stored; spec.keeps is 0 at first */
     /* the head */
     struct native_descriptor descriptor;
     struct native_emitter emitter;

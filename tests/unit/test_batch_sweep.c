@@ -14,7 +14,7 @@
 /* Returns the values of one --sweep, each in brackets; or the error, after a "!". */
 static const char *values(const char *text)
 {
-    static char all[1024];
+    static char all[1100]; /* an error and its mark */
     struct batch_sweeps sweeps = {.n = 0};
     struct sh_err err = {0};
     const int rc = batch_sweeps_add(&sweeps, text, &err);

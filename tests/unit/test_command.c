@@ -310,6 +310,52 @@ static void faults_are_added_listed_counted_and_cleared(void **ctx)
     expect_error(&dev, 1, "FAUL:CLE 1", CMD_E_SETTINGS);
 }
 
+/* TIME:SERVer and TIME:SHIFt. Both are open to sessions without control, as a scanner's clients have none. */
+static void a_time_server_is_set_and_read(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *line;
+        int number;
+    } wrong[] = {
+        {"TIME:SERV", CMD_E_MISSING},
+        {"TIME:SERV CLIENT", CMD_E_DATA_TYPE},
+        {"TIME:SERV CLIENT,127.0.0.1,600,0,ETH,1", CMD_E_DATA_TYPE},
+        {"TIME:SERV CLIENT,127.0.0.1.1,600,0,ETH", CMD_E_DATA_TYPE},
+        {"TIME:SERV CLIENT,localhost,600,0,ETH", CMD_E_DATA_TYPE},
+        {"TIME:SERV CLIENTS,127.0.0.1,600,0,ETH", CMD_E_RANGE},
+        {"TIME:SERV CLIENT,127.0.0.256,600,0,ETH", CMD_E_RANGE},
+        {"TIME:SERV CLIENT,127.0.0.1,0,0,ETH", CMD_E_RANGE},
+        {"TIME:SERV CLIENT,127.0.0.1,86401,0,ETH", CMD_E_RANGE},
+        {"TIME:SERV CLIENT,127.0.0.1,600,13,ETH", CMD_E_RANGE},
+        {"TIME:SERV CLIENT,127.0.0.1,600,0,USB", CMD_E_RANGE},
+        {"TIME:SERV CLIENT,127.0.0.1,600,0,ETH", CMD_E_SETTINGS}, /* nobody is there who asks */
+        {"TIME:SERV? ALL", CMD_E_NOT_ALLOWED},
+        {"TIME:SHIF 1e19", CMD_E_RANGE},
+        {"TIME:SHIF 0.5", CMD_E_RANGE},
+        {"TIME:SHIF", CMD_E_MISSING},
+    };
+    struct command_device dev = command_test_device();
+    dev.server.update_s = 600;
+    for (size_t i = 0; i < N_OF(wrong); i++)
+        expect_error(&dev, 1, wrong[i].line, wrong[i].number);
+    expect(&dev, "TIME:SERV?", "NONE,0.0.0.0,600,0,ETH");
+    expect(&dev, "TIME:SERV? STAT", "OFF,0,0,0,0,0,0");
+    dev.control = 2;
+    dev.asks_server = 1;
+    expect(&dev, "time:server client , 10.0.0.255, 86400, -12, can", "OK");
+    assert_true(result.changes && result.effect == COMMAND_SERVER && dev.control == 2);
+    expect(&dev, "TIME:SERV?", "CLIENT,10.0.0.255,86400,-12,CAN");
+    expect(&dev, "TIME:SHIF -1.5 S", "OK");
+    assert_true(result.changes && result.effect == COMMAND_CLOCK);
+    expect(&dev, "TIME:SHIF?", "-1500000000");
+    expect(&dev, "TIME:SHIF 4.6e18", "OK");
+    assert_true(dev.shift_ns == INT64_C(4600000000000000000));
+    dev.recorded = "a recording";
+    expect_error(&dev, 1, "TIME:SHIF 1", CMD_E_SETTINGS);
+    expect_error(&dev, 1, "TIME:SERV NONE,127.0.0.1,5,0,ETH", CMD_E_SETTINGS);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -321,6 +367,7 @@ int main(void)
         cmocka_unit_test(a_head_without_the_time_says_so),
         cmocka_unit_test(a_place_is_read_and_said),
         cmocka_unit_test(faults_are_added_listed_counted_and_cleared),
+        cmocka_unit_test(a_time_server_is_set_and_read),
     };
     return cmocka_run_group_tests_name("command", tests, NULL, NULL);
 }

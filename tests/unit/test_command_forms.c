@@ -81,6 +81,8 @@ static const struct {
     {"TIME:GPS", "TIME:GPS", 1, 0, ""},
     {"TIME:PTP", "TIME:PTP", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
+    {"TIME:SHIFT", "TIME:SHIF", 1, 1, " 5"},
+    {"TIME:SERVER", "TIME:SERV", 1, 1, " NONE,127.0.0.1,5,0,ETH"},
     {"FAULT:ADD", "FAUL:ADD", 0, 1, " {kind: drop}"},
     {"FAULT:CLEAR", "FAUL:CLE", 0, 1, " ALL"},
     {"FAULT:LIST", "FAUL:LIST", 1, 0, ""},

@@ -93,7 +93,7 @@ static void one(struct command_device *dev, const char *line)
 static void begin(struct command_device *dev, uint64_t seed)
 {
     *dev = command_test_device();
-    dev->step_allowed = dev->keeps = 1;
+    dev->step_allowed = dev->keeps = dev->asks_server = 1;
     memset(&seen, 0, sizeof seen);
     rng = seed;
 }
@@ -172,6 +172,9 @@ static const char *const valid[] = {
     "TIME?",
     "TIME:STEP 1000000",
     "TIME:STEP 1 S",
+    "TIME:SHIF -5 S",
+    "TIME:SERV CLIENT,127.0.0.1,600,-12,ETH",
+    "TIME:SERV? STAT",
     "FAUL:ADD {kind: drop}",
     "FAUL:CLE 1",
     "FAUL:INJ? 2",

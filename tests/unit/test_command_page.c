@@ -96,6 +96,11 @@ static int is_of_faults(const struct command_row *row)
     return strncmp(row->header, "FAULt", 5) == 0;
 }
 
+static int is_server(const struct command_row *row)
+{
+    return strcmp(row->header, "TIME:SERVer") == 0;
+}
+
 /* Writes a line of the row that is valid by itself. */
 static void fill_line(char line[256], const struct command_row *row, int query)
 {
@@ -103,6 +108,7 @@ static void fill_line(char line[256], const struct command_row *row, int query)
     snprintf(line, 256, "%.*s%s", (int)len, row->header,
              query               ? "?"
              : is_of_faults(row) ? (strstr(row->header, "ADD") != NULL ? " {kind: drop}" : " ALL")
+             : is_server(row)    ? " NONE,127.0.0.1,600,0,ETH"
              : row->own          ? " 1, DEF"
              : row->setting      ? " DEF"
              : row->unit         ? " 1"
@@ -144,14 +150,16 @@ static void columns(char text[256], const struct command_row *row)
     if (row->unit != NULL && row->unit->name[0] != 0) add(text, "%s (%s)", row->unit->name, row->unit->suffixes);
     add(text, " | ");
     if (row->own) {
-        add(text, is_of_faults(row) ? "see *Faults on request*" : "see *Moving a station*");
+        add(text, is_of_faults(row) ? "see *Faults on request*"
+                  : is_server(row)  ? "see *Time server*"
+                                    : "see *Moving a station*");
     } else if (row->setting != NULL) {
         add_range(text, row);
     } else if (row->unit != NULL) {
         struct command_device dev = command_test_device();
         struct command_result result;
         char line[256];
-        snprintf(line, sizeof line, "%s 0", row->header);
+        snprintf(line, sizeof line, "%s 1e19", row->header);
         command_execute(&dev, 1, line, &result);
         const char *allowed = strstr(result.reply, "allowed ");
         assert_non_null(allowed);

@@ -52,7 +52,7 @@ static void test_disk_full(void **state)
     small.rlim_max = old.rlim_max;
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
     int ply = record(out_path, (struct recorder_options){0}, 1, &err);
-    char ply_text[512];
+    char ply_text[sizeof err.text];
     snprintf(ply_text, sizeof ply_text, "%s", err.text);
     snprintf(path, sizeof path, "%s/full.shs", dir);
     snprintf(part, sizeof part, "%s.part", path);

@@ -5,7 +5,7 @@
  * The heads run beside each other and mostly wait. Their ticks may be late, so that a busy machine costs no pulses. */
 #include "tests/wire/room.h"
 
-enum { N_SCENARIOS = 10 };
+enum { N_SCENARIOS = 11 };
 
 static const struct {
     const char *name;
@@ -22,6 +22,7 @@ static const struct {
     {"pulled-cable", {"cable"}},
     {"clock-step", {"clock_jump", "pps_lost", "clock_drift", "clock_stop"}},
     {"gnss-outage", {"pps_jitter", "nmea_late", "nmea_void", "nmea_checksum", "nmea_lost"}},
+    {"time-server", {"ntp_step"}},
     {"ptp-holdover", {"ptp_jitter", "ptp_faulty"}},
 };
 

@@ -33,6 +33,11 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
     case FAULT_NMEA_VOID:
     case FAULT_NMEA_CHECKSUM:
         return "only the receiver's sentences and a VLP-16's packets show it";
+    case FAULT_NTP_SILENT:
+    case FAULT_NTP_KISS:
+    case FAULT_NTP_UNSYNC:
+    case FAULT_NTP_STEP:
+        return "only the dates of a SICK scanner's scans show it";
     case FAULT_PTP_ASYMMETRY:
         return "a follower can't see it; only another clock does";
     case FAULT_PTP_JITTER:

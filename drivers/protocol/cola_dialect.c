@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* CoLa-A or CoLa-B. Where the configuration chooses one (links[].dialect), the link answers in that one alone, until
+ * EIHstCola changes it, at once and for all sessions of the link. Else each request is answered in its own. */
+#include <stdatomic.h>
+
+#include "drivers/protocol/cola.h"
+
+/* The link's word has the form that EIHstCola has set since power came, and which time that was. */
+static uint32_t word_of(const struct cola *self, uint32_t form)
+{
+    return self->power_ons << 2 | (form + 1);
+}
+
+static int is_strict(const struct cola *self)
+{
+    return self->dialect != PROTOCOL_DIALECT_ANY && self->shared != NULL;
+}
+
+uint32_t cola_framing(const struct cola *self)
+{
+    if (!is_strict(self)) return self->set.framing;
+    const uint32_t word = atomic_load(self->shared);
+    if (word == word_of(self, COLA_A)) return COLA_A;
+    if (word == word_of(self, COLA_B)) return COLA_B;
+    return self->stored[0] != '\0' ? self->set.framing : self->dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
+}
+
+int cola_understands(const struct cola *self, enum cola_form form)
+{
+    return !is_strict(self) || cola_framing(self) == form;
+}
+
+void cola_follow_dialect(struct cola *self)
+{
+    if (is_strict(self)) self->stream_form = (enum cola_form)cola_framing(self);
+}
+
+enum cola_error cola_read_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_u(out, 1, cola_framing(self));
+    return cola_args_end(args);
+}
+
+/* The answer still has the form of its request. */
+enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const uint32_t form = cola_arg_u(args, 1);
+    const enum cola_error error = cola_args_end(args);
+    (void)out;
+    if (error != COLA_OK) return error;
+    if (form > COLA_B) return COLA_INVALID_DATA;
+    self->set.framing = (uint8_t)form;
+    self->stream_form = (enum cola_form)form;
+    if (is_strict(self)) atomic_store(self->shared, word_of(self, form));
+    return COLA_OK;
+}

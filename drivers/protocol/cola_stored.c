@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: MIT */
+/* mEEwriteall: settings of the session that last without power, a line each, as a request in CoLa-A writes them but with
+ * decimal numbers. Line rate, step and time server are the head's, and HEAD:STORe keeps them. */
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/cola.h"
+
+enum { MAX_REPLY = 512, CFG_NUMBERS = 12 };
+
+/* The numbers of LMDscandatacfg without the last one. */
+static void list_cfg(struct cola_settings *s, uint8_t *bytes[CFG_NUMBERS - 1])
+{
+    uint8_t *const list[CFG_NUMBERS - 1] = {&s->channels[0], &s->channels[1], &s->rssi,       &s->rssi_16bit,
+                                            &s->unit,        &s->encoder[0],  &s->encoder[1], &s->position,
+                                            &s->name,        &s->comment,     &s->time};
+    memcpy(bytes, list, sizeof list);
+}
+
+static void put_lines(const struct cola *self, char *text, size_t cap)
+{
+    struct cola_settings s = self->set;
+    uint8_t *bytes[CFG_NUMBERS - 1];
+    size_t n = (size_t)snprintf(text, cap, "LMDscandatacfg");
+    list_cfg(&s, bytes);
+    for (int i = 0; i < CFG_NUMBERS - 1; i++)
+        n += (size_t)snprintf(text + n, cap - n, " %u", *bytes[i]);
+    n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\nEIHstCola %u\n", s.every,
+                          s.filter, s.scale, cola_framing(self));
+    if (s.narrowed) n += (size_t)snprintf(text + n, cap - n, "LMPoutputRange %d %d\n", s.start_e4, s.stop_e4);
+    snprintf(text + n, cap - n, "LocationName %s\n", s.location);
+}
+
+enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    char reply[MAX_REPLY];
+    const enum cola_error error = cola_args_end(args);
+    int kept = 1; /* a head without a file says so, too, and forgets */
+    if (error != COLA_OK) return error;
+    if (self->keeps) {
+        put_lines(self, self->stored, sizeof self->stored);
+        kept = self->host.store(self->host.ctx, self->stored) == 0 &&
+               self->host.command(self->host.ctx, "HEAD:STORe", reply, sizeof reply) == 0;
+    }
+    cola_put_u(out, 1, (uint32_t)kept);
+    return COLA_OK;
+}
+
+static int take_cfg(struct cola_settings *s, const char *at)
+{
+    uint8_t *bytes[CFG_NUMBERS - 1];
+    unsigned v;
+    int n;
+    list_cfg(s, bytes);
+    for (int i = 0; i < CFG_NUMBERS; i++, at += n) {
+        if (sscanf(at, " %5u%n", &v, &n) != 1 || v > (i < CFG_NUMBERS - 1 ? UINT8_MAX : UINT16_MAX)) return 0;
+        if (i < CFG_NUMBERS - 1)
+            *bytes[i] = (uint8_t)v;
+        else
+            s->every = (uint16_t)v;
+    }
+    return *at == '\0';
+}
+
+/* A whole number up to `most` that ends the line. */
+static int take_number(const char *at, unsigned most, unsigned *v)
+{
+    int n;
+    return sscanf(at, " %9u%n", v, &n) == 1 && at[n] == '\0' && *v <= most;
+}
+
+/* 1: done; 0: it is no line that cola_keep writes. */
+static int take_line(struct cola *self, const char *line)
+{
+    struct cola_settings *s = &self->set;
+    char name[COLA_MAX_NAME];
+    unsigned v;
+    int n;
+    if (sscanf(line, "%31[A-Za-z]%n", name, &n) != 1 || line[n] != ' ') return 0;
+    const char *at = line + n;
+    if (strcmp(name, "LMDscandatacfg") == 0) return take_cfg(s, at) && cola_scan_data_fits(self, s);
+    if (strcmp(name, "LMPoutputRange") == 0) {
+        s->narrowed = 1;
+        return sscanf(at, " %9d %9d%n", &s->start_e4, &s->stop_e4, &n) == 2 && at[n] == '\0' &&
+               s->start_e4 <= s->stop_e4;
+    }
+    if (strcmp(name, "LocationName") == 0)
+        return snprintf(s->location, sizeof s->location, "%s", at + 1) < COLA_MAX_NAME;
+    const int is_filter = strcmp(name, "FREchoFilter") == 0, is_scale = strcmp(name, "LMDscandatascalefactor") == 0,
+              is_framing = strcmp(name, "EIHstCola") == 0;
+    if (!is_filter && !is_scale && !is_framing) return 0;
+    if (!take_number(at, is_framing ? COLA_B : 2, &v)) return 0;
+    if (is_filter) s->filter = (uint8_t)v;
+    if (is_scale) s->scale = v;
+    if (is_framing) s->framing = (uint8_t)v;
+    return 1;
+}
+
+int cola_restore(struct cola *self, struct sh_err *err)
+{
+    char line[256];
+    for (const char *at = self->stored; *at != '\0'; at += strcspn(at, "\n") + 1) {
+        const size_t len = strcspn(at, "\n");
+        if (len < sizeof line) snprintf(line, sizeof line, "%.*s", (int)len, at);
+        if (len >= sizeof line || !take_line(self, line))
+            return sh_fail(err, SH_EINPUT,
+                           "head.settings_file: '%.60s' is no setting that cola stores; correct it, or remove the file",
+                           line);
+    }
+    return SH_OK;
+}

@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: MIT */
+/* The scanner's clock, and the time server that sets it: both belong to the head, not to this session. COLA.md says where
+ * each variable comes from. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/cola.h"
+#include "drivers/protocol/cola_clock.h"
+
+enum { MAX_REPLY = 512, N_ROLES = 3, N_INTERFACES = 2, ZONE_0 = 12, N_ZONES = 25 };
+
+/* ---- the clock */
+
+int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
+{
+    return self->host.date_ns(self->host.ctx, t_ns);
+}
+
+void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
+{
+    const struct cola_date d = cola_date_of(cola_clock_ns(self, t_ns));
+    cola_put_u(out, 2, d.year);
+    cola_put_u(out, 1, d.month);
+    cola_put_u(out, 1, d.day);
+    cola_put_u(out, 1, d.hour);
+    cola_put_u(out, 1, d.minute);
+    cola_put_u(out, 1, d.second);
+    cola_put_u(out, 4, d.us);
+}
+
+/* 1: the clock shows that time now. */
+static int set_clock(struct cola *self, int64_t ns)
+{
+    char line[48], reply[MAX_REPLY];
+    int64_t shift_ns;
+    if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
+        sscanf(reply, "%" SCNd64, &shift_ns) != 1)
+        return 0;
+    shift_ns += ns - cola_clock_ns(self, self->now_ns);
+    snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
+    return self->host.command(self->host.ctx, line, reply, sizeof reply) == 0;
+}
+
+/* ---- the time server */
+
+/* The settings of TIME:SERVer, in SOPAS' numbers. */
+struct cola_server {
+    uint32_t role, interface, address[4], update_s, zone; /* zone: h, ahead of UTC by 12 less */
+};
+
+static const char *const roles[N_ROLES] = {"NONE", "CLIENT", "SERVER"}, *const interfaces[N_INTERFACES] = {"ETH",
+                                                                                                           "CAN"};
+
+static uint32_t word_of(const char *const words[], uint32_t n, const char *word)
+{
+    uint32_t i = 0;
+    while (i < n && strcmp(words[i], word) != 0)
+        i++;
+    return i;
+}
+
+static enum cola_error get_server(struct cola *self, struct cola_server *s)
+{
+    char reply[MAX_REPLY], role[8], interface[4];
+    uint32_t *const a = s->address;
+    int zone_h;
+    if (self->host.command(self->host.ctx, "TIME:SERVer?", reply, sizeof reply) != 0 ||
+        sscanf(reply, "%7[A-Z],%3u.%3u.%3u.%3u,%6u,%3d,%3[A-Z]", role, &a[0], &a[1], &a[2], &a[3], &s->update_s,
+               &zone_h, interface) != 8)
+        return COLA_CONDITION;
+    s->role = word_of(roles, N_ROLES, role);
+    s->interface = word_of(interfaces, N_INTERFACES, interface);
+    s->zone = (uint32_t)(zone_h + ZONE_0);
+    return COLA_OK;
+}
+
+static enum cola_error put_server(struct cola *self, const struct cola_server *s)
+{
+    char line[96], reply[MAX_REPLY];
+    const uint32_t *const a = s->address;
+    if (s->role >= N_ROLES || s->interface >= N_INTERFACES || s->zone >= N_ZONES) return COLA_INVALID_DATA;
+    snprintf(line, sizeof line, "TIME:SERVer %s,%u.%u.%u.%u,%u,%d,%s", roles[s->role], a[0], a[1], a[2], a[3],
+             s->update_s, (int)s->zone - ZONE_0, interfaces[s->interface]);
+    const int error = self->host.command(self->host.ctx, line, reply, sizeof reply);
+    return error == 0 ? COLA_OK : error == -221 ? COLA_CONDITION : COLA_INVALID_DATA;
+}
+
+/* The variables that have one number: a member of struct cola_server, and its bytes. */
+static enum cola_error read_number(struct cola *self, size_t member, unsigned bytes, struct cola_args *args,
+                                   struct cola_out *out)
+{
+    struct cola_server s;
+    enum cola_error error = cola_args_end(args);
+    if (error == COLA_OK) error = get_server(self, &s);
+    if (error == COLA_OK) cola_put_u(out, bytes, *(const uint32_t *)((const char *)&s + member));
+    return error;
+}
+
+static enum cola_error write_number(struct cola *self, size_t member, unsigned bytes, struct cola_args *args)
+{
+    struct cola_server s;
+    const uint32_t value = cola_arg_u(args, bytes);
+    enum cola_error error = cola_args_end(args);
+    if (error == COLA_OK) error = get_server(self, &s);
+    if (error != COLA_OK) return error;
+    *(uint32_t *)((char *)&s + member) = value;
+    return put_server(self, &s);
+}
+
+#define NUMBER(name, member, bytes)                                                                    \
+    enum cola_error cola_read_##name(struct cola *self, struct cola_args *args, struct cola_out *out)  \
+    {                                                                                                  \
+        return read_number(self, offsetof(struct cola_server, member), bytes, args, out);              \
+    }                                                                                                  \
+    enum cola_error cola_write_##name(struct cola *self, struct cola_args *args, struct cola_out *out) \
+    {                                                                                                  \
+        (void)out;                                                                                     \
+        return write_number(self, offsetof(struct cola_server, member), bytes, args);                  \
+    }
+NUMBER(time_role, role, 1)
+NUMBER(time_interface, interface, 1)
+NUMBER(time_zone, zone, 1)
+NUMBER(time_update, update_s, 4)
+
+/* 4 x u8 */
+enum cola_error cola_read_time_address(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    struct cola_server s;
+    enum cola_error error = cola_args_end(args);
+    if (error == COLA_OK) error = get_server(self, &s);
+    for (int i = 0; i < 4 && error == COLA_OK; i++)
+        cola_put_u(out, 1, s.address[i]);
+    return error;
+}
+
+enum cola_error cola_write_time_address(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    struct cola_server s;
+    uint32_t address[4];
+    (void)out;
+    for (int i = 0; i < 4; i++)
+        address[i] = cola_arg_u(args, 1);
+    enum cola_error error = cola_args_end(args);
+    if (error == COLA_OK) error = get_server(self, &s);
+    if (error != COLA_OK) return error;
+    memcpy(s.address, address, sizeof s.address);
+    return put_server(self, &s);
+}
+
+/* One of the times, in ns, of TIME:SERVer? STATe: 0 the limit, 1 the offset, 2 the delay. float, s */
+static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
+{
+    char reply[MAX_REPLY];
+    int64_t ns[3];
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (self->host.command(self->host.ctx, "TIME:SERVer? STATe", reply, sizeof reply) != 0 ||
+        sscanf(reply, "%*[A-Z],%" SCNd64 ",%" SCNd64 ",%" SCNd64, &ns[0], &ns[1], &ns[2]) != 3)
+        return COLA_CONDITION;
+    cola_put_float(out, (float)(1e-9 * (double)ns[which]));
+    return COLA_OK;
+}
+
+enum cola_error cola_read_time_limit(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    return put_answered(self, 0, args, out);
+}
+
+enum cola_error cola_read_time_delay(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    return put_answered(self, 2, args, out);
+}
+
+/* u16 year, 5 x u8, u32 us; u8 1: set. A clock that a time server sets can't be set so. */
+enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    struct cola_date d = {.year = cola_arg_u(args, 2)};
+    uint32_t *const parts[] = {&d.month, &d.day, &d.hour, &d.minute, &d.second};
+    struct cola_server server;
+    int64_t ns;
+    for (int i = 0; i < 5; i++)
+        *parts[i] = cola_arg_u(args, 1);
+    d.us = cola_arg_u(args, 4);
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    const int is_synchronised = get_server(self, &server) == COLA_OK && server.role == 1;
+    cola_put_u(out, 1, (uint32_t)(!is_synchronised && cola_date_ns(&d, &ns) && set_clock(self, ns)));
+    return COLA_OK;
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: MIT */
+/* `TIME:SHIFt` and `TIME:SERVer`: the clock of a scanner that keeps a date of its own, and the time server that sets it.
+ *
+ *   TIME:SHIFt ns                             sets what the clock is ahead of that of power-up
+ *   TIME:SERVer role,address,update,zone,interface
+ *                                             NONE, CLIENT or SERVER; a numeric IPv4 address; s; h; ETH or CAN
+ *   TIME:SERVer?                              the same
+ *   TIME:SERVer? STATe                        state, limit, offset and delay (ns), and how many answers were good,
+ *                                             refused, missing */
+#ifndef FIRMWARE_SIM_COMMAND_TIME_SERVER_H
+#define FIRMWARE_SIM_COMMAND_TIME_SERVER_H
+
+struct command_call;
+struct command_unit;
+
+extern const struct command_unit command_unit_server;
+int command_shift_query(struct command_call *call);
+int command_shift_change(struct command_call *call);
+int command_server_query(struct command_call *call);
+int command_server_change(struct command_call *call);
+
+#endif

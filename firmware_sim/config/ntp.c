@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT */
+#include <arpa/inet.h>
+#include <math.h>
+
+#include "firmware_sim/config/check_ntp.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
+#include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
+
+void cfg_check_ntp(struct cfg_reader *rd, const struct config *cfg)
+{
+    const struct config_ntp *ntp = &cfg->ntp;
+    struct in_addr address;
+    char shown[CFG_SHOW_MAX];
+    if (inet_pton(AF_INET, ntp->address, &address) != 1)
+        cfg_fail_key(rd, "ntp.address", 0, "\"%s\"; allowed a numeric IPv4 address such as 127.0.0.1",
+                     cfg_show(ntp->address, shown));
+    if (floor(ntp->zone_h) != ntp->zone_h)
+        cfg_fail_key(rd, "ntp.zone_h", 0, "%.10g; allowed whole hours from -12 to 12", ntp->zone_h);
+    if (ntp->role == NTP_ROLE_CLIENT && cfg->loop.pace != PACE_REALTIME && CFG_SOUND(rd, 0, "ntp.role", "loop.pace"))
+        cfg_fail_key(rd, "ntp.role", 0, "client, but loop.pace is %s; allowed with realtime, since a server's time is",
+                     cfg_word(rd, "loop.pace", (int)cfg->loop.pace));
+}

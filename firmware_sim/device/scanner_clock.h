@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/* The clock of a scanner that has a date of its own and no battery, as SICK's: device time -> ns since 1970.
+ *
+ * It runs as the head's clock does, with its errors (head_clock.h). At power-up it shows UTC where the head knows the
+ * time of day and no time server is to be asked (ntp.role: client); else it begins with 1970. TIME:SHIFt sets it, and so
+ * do answers of a time server. The commands are journalled, so a replayed session has the same dates.
+ *
+ * Thread: any. */
+#ifndef FIRMWARE_SIM_DEVICE_SCANNER_CLOCK_H
+#define FIRMWARE_SIM_DEVICE_SCANNER_CLOCK_H
+
+#include <stdint.h>
+
+#include "drivers/protocol/ntp.h"
+#include "firmware_sim/command/command.h"
+
+struct device;
+
+/* Between two power-ups. */
+struct scanner_clock {
+    int64_t from_ns;  /* device time of power-up */
+    int by_utc;       /* it began with UTC */
+    int64_t zero_ns;  /* what the head's clock then showed, TAI */
+    int64_t shift_ns; /* of a clock whose power is gone; else that of the command set holds */
+};
+
+int64_t device_date_ns(struct device *device, int64_t t_ns);
+
+/* What a client of a time server needs to know. */
+struct device_time_server {
+    struct command_time_server set;
+    uint16_t port;
+    int asks;           /* 1: it is to be asked now */
+    int refused;        /* 1: it would be, but is not on this machine (ntp.anywhere) */
+    uint32_t power_ons; /* how often power has come */
+    int64_t max_offset_ns;
+};
+void device_get_time_server(struct device *device, struct device_time_server *out);
+/* An eventfd that is written whenever that may have changed; -1: none. */
+void device_watch_time_server(struct device *device, int fd);
+/* Applies injected faults to a server's answer that comes at a device time. 1: it is as if it had not come. */
+int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packet[NTP_LEN]);
+/* Sets the clock forward, as a command of the device itself. */
+void device_shift_date(struct device *device, int64_t by_ns, uint64_t released);
+/* Replaces what TIME:SERVer? STATe replies. report: error 107 and an event; NULL: nothing is to be reported. */
+void device_put_time_answers(struct device *device, const struct command_time_answers *answers, const char *report);
+
+#endif

@@ -1,0 +1,332 @@
+/* SPDX-License-Identifier: MIT */
+/* A SICK scanner asks a time server, which this test plays, and its scans have the server's time. The expected times are
+ * computed here from the request that came and the delay that the scanner reports. */
+#include <arpa/inet.h>
+#include <endian.h>
+#include <math.h>
+
+#include "drivers/protocol/cola_clock.h"
+#include "tests/wire/cola_client.h"
+#include "tests/wire/room.h"
+
+#define SECOND_US INT64_C(1000000)
+
+/* ---- the server */
+
+struct server {
+    int fd, port;
+    uint8_t request[48];
+    struct sockaddr_in from;
+};
+
+static void server_open(struct server *s)
+{
+    struct sockaddr_in own = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t len = sizeof own;
+    s->fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(s->fd, (struct sockaddr *)&own, sizeof own), 0);
+    assert_int_equal(getsockname(s->fd, (struct sockaddr *)&own, &len), 0);
+    s->port = ntohs(own.sin_port);
+}
+
+/* Returns T1 of the next request, in s since 1900. */
+static double server_wait(struct server *s)
+{
+    struct pollfd slot = {.fd = s->fd, .events = POLLIN};
+    socklen_t len = sizeof s->from;
+    uint32_t words[2];
+    assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+    assert_int_equal(recvfrom(s->fd, s->request, sizeof s->request, MSG_TRUNC, (struct sockaddr *)&s->from, &len), 48);
+    memcpy(words, s->request + 40, sizeof words);
+    return be32toh(words[0]) + 0x1p-32 * be32toh(words[1]);
+}
+
+/* Answers with times T2 = T3, s since 1900, a leap indicator and a stratum. kiss: 4 characters of the reference. */
+static void server_answer(const struct server *s, double t_s, int leap, int stratum, const char *kiss)
+{
+    uint8_t packet[48] = {(uint8_t)(leap << 6 | 4 << 3 | 4), (uint8_t)stratum, 0, 0xec};
+    const uint32_t words[2] = {htobe32((uint32_t)t_s), htobe32((uint32_t)((t_s - floor(t_s)) * 0x1p32))};
+    memcpy(packet + 12, kiss, 4);
+    memcpy(packet + 24, s->request + 40, 8);
+    memcpy(packet + 32, words, 8);
+    memcpy(packet + 40, words, 8);
+    assert_int_equal(sendto(s->fd, packet, sizeof packet, 0, (const struct sockaddr *)&s->from, sizeof s->from), 48);
+}
+
+/* ---- the scanner */
+
+static const double SECONDS_1900 = 2208988800.0; /* until 1970 */
+static const double SERVER_S = 1767323045.25;    /* 2026-01-02T03:04:05.25Z; exact in binary */
+
+static struct cola_client scanner;
+
+/* Returns the number of seconds that a variable has, a float as hexadecimal. */
+static double read_s(const char *name)
+{
+    char request[40];
+    uint32_t bits;
+    float s;
+    snprintf(request, sizeof request, "sRN %s", name);
+    const char *answer = cola_client_ask(&scanner, request);
+    assert_non_null(answer);
+    assert_int_equal(sscanf(answer, "sRA %*s %" SCNx32, &bits), 1);
+    memcpy(&s, &bits, sizeof s);
+    return s;
+}
+
+/* Reads the next scan's start by the counter since power-up, and by the date behind its data, both in us. */
+static void read_times(int64_t *start_us, int64_t *date_us)
+{
+    struct cola_date d;
+    unsigned us;
+    int64_t ns;
+    const char *scan = cola_client_ask(&scanner, "sRN LMDscandata");
+    assert_non_null(scan);
+    assert_int_equal(sscanf(scan, "sRA LMDscandata 1 1 %*s 0 0 %*X %*X %X", &us), 1);
+    const char *at = scan + strlen(scan);
+    for (int blanks = 0; blanks < 9; blanks += *at == ' ') /* 1, seven numbers of the time, and 0 */
+        at--;
+    assert_int_equal(
+        sscanf(at, " 1 %X %X %X %X %X %X %X 0", &d.year, &d.month, &d.day, &d.hour, &d.minute, &d.second, &d.us), 7);
+    assert_true(cola_date_ns(&d, &ns));
+    *start_us = us;
+    *date_us = ns / 1000;
+}
+
+/* `more` is YAML. The session is logged in, and its scans have the time. */
+static struct head scanner_start(struct wire *wire, const struct server *s, const char *more)
+{
+    char ntp[256];
+    snprintf(ntp, sizeof ntp, "ntp: {port: %d}\n%s", s->port, more);
+    const struct room_config config = {.profile = "sick-lms111",
+                                       .prr_hz = 36000,
+                                       .lines_hz = 50,
+                                       .links =
+                                           "links: [{type: tcp, port: 0, protocol: cola}, {type: pty, path: native}]\n",
+                                       .more = ntp};
+    room_write(wire);
+    const struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    scanner = (struct cola_client){.fd = raw_connect(head_endpoint(&head, "tcp"))};
+    cola_client_expect(&scanner, "sMN SetAccessMode 03 F4724744", "sAN SetAccessMode 1");
+    cola_client_expect(&scanner, "sWN LMDscandatacfg 1 0 0 0 0 0 0 0 0 0 1 1", "sWA LMDscandatacfg");
+    return head;
+}
+
+/* Asks until the state is that word. Returns the reply. */
+static const char *until_state(struct scanhead *sh, const char *state)
+{
+    int64_t since_ns = 0;
+    for (;;) {
+        const char *reply = client_ask(sh, "TIME:SERVer? STATe");
+        if (strncmp(reply, state, strlen(state)) == 0 && reply[strlen(state)] == ',') return reply;
+        wire_soon(&since_ns, client_time_ns(sh), state);
+    }
+}
+
+/* ---- the tests */
+
+/* Requests of sick_scan_xd, with its interval; the scans' dates before and after the answer, and without a further one. The
+ * head's clock gains 500 us a second. */
+static void scans_have_the_servers_time(void **state)
+{
+    struct wire *wire = *state;
+    struct server server;
+    int64_t start_us, date_us, later_us, later_date_us;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "time: {drift_ppm: 500}\n");
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    read_times(&start_us, &date_us); /* 1970, and the clock's gain. Both are rounded down to 1 us */
+    assert_true(llabs(date_us - start_us - start_us / 2000) <= 2);
+
+    cola_client_expect(&scanner, "sWN TSCTCInterface 0", "sWA TSCTCInterface");
+    cola_client_expect(&scanner, "sWN TSCTCSrvAddr 7F 00 00 01", "sWA TSCTCSrvAddr");
+    cola_client_expect(&scanner, "sWN TSCTCupdatetime 5", "sWA TSCTCupdatetime");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    const double t1_s = server_wait(&server) - SECONDS_1900;
+    static const uint8_t rest[39] = {0};
+    assert_int_equal(server.request[0], 0x23); /* version 4, client */
+    assert_memory_equal(server.request + 1, rest, sizeof rest);
+    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
+    until_state(sh, "SET");
+
+    /* T4 = T1 + delay, since T2 = T3. The time is a double of 0.25 us near 2^32 s; delay is a float of 24 bits */
+    const double delay_s = read_s("TSCTCdelay");
+    assert_true(delay_s > 0.0 && delay_s <= 1.0);
+    const double offset_us = 1e6 * (SERVER_S - t1_s - delay_s / 2);
+    read_times(&start_us, &date_us);
+    assert_true(fabs((double)(date_us - start_us - start_us / 2000) - offset_us) <= 4.0);
+    for (int i = 0; i < 20; i++) /* 0.4 s, in which it gains 200 us */
+        read_times(&later_us, &later_date_us);
+    const int64_t passed_us = later_us - start_us;
+    assert_true(llabs(later_date_us - date_us - passed_us - passed_us / 2000) <= 3);
+    cola_client_expect(&scanner, "sMN LSPsetdatetime 7E8 1 1 0 0 0 0", "sAN LSPsetdatetime 0"); /* the server sets it */
+    assert_true(read_s("TSCTCmaxoffset") == 18000.0);
+    scanhead_close(sh);
+    close(scanner.fd);
+    close(server.fd);
+    head_end(&head, SIGTERM);
+}
+
+/* Sends another request at once: any change of its settings begins anew with the server. */
+static double ask_again(struct server *server)
+{
+    static int update_s = 60;
+    char request[40];
+    snprintf(request, sizeof request, "sWN TSCTCupdatetime +%d", ++update_s);
+    cola_client_expect(&scanner, request, "sWA TSCTCupdatetime");
+    return server_wait(server);
+}
+
+/* What a wrong, a silent and a refusing server do; and a time zone. Refused answers leave the clock as it is. */
+static void wrong_servers(void **state)
+{
+    struct wire *wire = *state;
+    struct server server;
+    struct scanhead_frame frame;
+    int64_t start_us, date_us, start0_us, date0_us;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    cola_client_expect(&scanner, "sWN TSCTCupdatetime +60", "sWA TSCTCupdatetime");
+    cola_client_expect(&scanner, "sWN TSCTCtimezone D", "sWA TSCTCtimezone"); /* an hour ahead */
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    server_wait(&server);
+    server.request[47] ^= 1; /* an answer to another request is passed over */
+    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
+    server.request[47] ^= 1;
+    server_answer(&server, SERVER_S + SECONDS_1900, 3, 1, "TEST");
+    until_state(sh, "UNSYNCHRONISED");
+    client_until_soon(sh, SCANHEAD_EV_ERROR, &frame);
+    read_times(&start_us, &date_us);
+    assert_true(llabs(date_us - start_us) <= 1); /* still 1970 */
+    ask_again(&server);
+    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
+    until_state(sh, "SET");
+    read_times(&start0_us, &date0_us);
+    const int64_t since_us = date0_us - (int64_t)(1e6 * SERVER_S) - 3600 * SECOND_US;
+    assert_true(since_us > -SECOND_US && since_us < SOON_MS * 1000); /* the zone, and not the moment, is tested here */
+
+    double t1_s = ask_again(&server); /* by UTC; the clock shows local time */
+    assert_true(fabs(t1_s - SECONDS_1900 - SERVER_S) < 1e-3 * SOON_MS);
+    server_answer(&server, t1_s + 18001.0, 0, 1, "TEST");
+    until_state(sh, "OFFSET");
+    t1_s = ask_again(&server);
+    server_answer(&server, t1_s + 3.0, 0, 0, "DENY");
+    until_state(sh, "KISS");
+    read_times(&start_us, &date_us);
+    assert_true(llabs(date_us - date0_us - (start_us - start0_us)) <= 2);
+
+    t1_s = ask_again(&server); /* a step within the limit is taken */
+    server_answer(&server, t1_s + 17999.0, 0, 1, "TEST");
+    until_state(sh, "SET");
+    read_times(&start_us, &date_us);
+    const int64_t step_us = date_us - date0_us - (start_us - start0_us);
+    assert_true(step_us <= 17999 * SECOND_US + 2 &&
+                step_us > 17998 * SECOND_US); /* less half of the delay, below 1 s */
+    cola_client_expect(&scanner, "sWN TSCRole 0", "sWA TSCRole");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    t1_s = server_wait(&server); /* the limit is for a clock that this role has set */
+    server_answer(&server, t1_s + 20000.0, 0, 1, "TEST");
+    until_state(sh, "SET");
+    ask_again(&server);
+    unsigned good, refused, none;
+    assert_int_equal(sscanf(until_state(sh, "SILENT"), "SILENT,%*d,%*d,%*d,%u,%u,%u", &good, &refused, &none), 3);
+    assert_int_equal(good, 3);
+    assert_int_equal(refused, 3);
+    assert_int_equal(none, 1);
+    cola_client_expect(&scanner, "sWN TSCTCSrvAddr C0 0 2 1", "sWA TSCTCSrvAddr"); /* 192.0.2.1: not this machine */
+    until_state(sh, "REFUSED");
+    cola_client_expect(&scanner, "sMN mSCreboot", "sAN mSCreboot");
+    assert_null(cola_client_next(&scanner));
+    close(scanner.fd);
+    scanner = (struct cola_client){.fd = raw_connect_again(head_endpoint(&head, "tcp"), "\2sRN TSCRole\3")};
+    assert_string_equal(cola_client_next(&scanner), "sRA TSCRole 0");
+    cola_client_expect(&scanner, "sRN TSCTCdelay", "sRA TSCTCdelay 00000000");
+    close(scanner.fd);
+    close(server.fd);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* RATE: from then on it asks half as often. T1 of the requests tells their times by the scanner's own clock, which no
+ * answer sets. A request is late by what its thread waits for the processor. */
+static void a_kiss_slows_it_down(void **state)
+{
+    struct wire *wire = *state;
+    struct server server;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    cola_client_expect(&scanner, "sWN TSCTCupdatetime 1", "sWA TSCTCupdatetime");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    const double first_s = server_wait(&server);
+    server_answer(&server, first_s, 0, 0, "RATE");
+    const double late_s = server_wait(&server) - first_s - 2.0;
+    assert_true(late_s > -0.5 &&
+                late_s < 1e-3 * SOON_MS); /* below 0 where the first one was late; -1 without the kiss */
+    close(scanner.fd);
+    close(server.fd);
+    head_end(&head, SIGTERM);
+}
+
+/* Adds a fault, and waits until the command has taken effect: 100 ms of the head's time. */
+static void inject(struct scanhead *sh, const char *fault)
+{
+    char line[80];
+    snprintf(line, sizeof line, "FAUL:ADD %s", fault);
+    client_ask(sh, line);
+    const int64_t from_ns = client_time_ns(sh);
+    while (client_time_ns(sh) < from_ns + 100000000)
+        continue;
+}
+
+/* The same by injected faults, which a client adds and takes out: the server itself answers rightly. */
+static void injected_faults(void **state)
+{
+    static const struct {
+        const char *fault, *state;
+    } cases[] = {{"{kind: ntp_unsync}", "UNSYNCHRONISED"},
+                 {"{kind: ntp_kiss}", "KISS"},
+                 {"{kind: ntp_silent}", "SILENT"},
+                 {"{kind: ntp_step, jump_s: -18001}", "OFFSET"}};
+    struct wire *wire = *state;
+    struct server server;
+    int64_t start_us, date_us, start0_us, date0_us;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    server_wait(&server);
+    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
+    until_state(sh, "SET");
+    read_times(&start0_us, &date0_us);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        inject(sh, cases[i].fault);
+        const double t1_s = ask_again(&server);
+        server_answer(&server, t1_s, 0, 1, "TEST");
+        until_state(sh, cases[i].state);
+        client_tell(sh, "FAUL:CLE ALL");
+    }
+    read_times(&start_us, &date_us);
+    assert_true(llabs(date_us - date0_us - (start_us - start0_us)) <= 2);
+    inject(sh, "{kind: ntp_step, jump_s: 100}"); /* this one is believed */
+    server_answer(&server, ask_again(&server), 0, 1, "TEST");
+    until_state(sh, "SET");
+    read_times(&start_us, &date_us);
+    const int64_t step_us = date_us - date0_us - (start_us - start0_us);
+    assert_true(step_us <= 100 * SECOND_US + 2 && step_us > 99 * SECOND_US); /* less half of the delay, below 1 s */
+    close(scanner.fd);
+    close(server.fd);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(scans_have_the_servers_time, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(wrong_servers, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_kiss_slows_it_down, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(injected_faults, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests_name("time server", tests, NULL, NULL);
+}
