@@ -4,6 +4,7 @@
 #include <malloc.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/app.h"
@@ -101,6 +102,8 @@ int main(int argc, char **argv)
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
     if (!failed || status != APP_OK) return status;
+    /* A write that failed earlier has emptied the buffer, so that the last one had no reason to fail. */
+    if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
     fprintf(stderr, "%s: standard output: writing failed%s%s\n", app_program, errno != 0 ? ": " : "",
             errno != 0 ? strerror(errno) : "");
     return APP_FAILED;
