@@ -148,8 +148,9 @@ static void test_scip(void **state)
     struct head head =
         start(wire, "hokuyo-utm-30lx",
               "links: [{type: tcp, protocol: scip, port: 0}, {type: tcp, protocol: scip, port: 0}]\n", FAULTS, NULL);
-    const int clean = raw_connect(head_link(&head, 1)), faulty = raw_connect(head_link(&head, 0));
+    const int clean = raw_connect(head_link(&head, 1));
     scip_start(clean);
+    const int faulty = raw_connect(head_link(&head, 0)); /* its session begins later, so the clean one has all of it */
     scip_start(faulty);
     check_two_streams(wire, &head, &kind, faulty, clean, UNITS * 700);
 }
@@ -201,8 +202,9 @@ static void test_cola(void **state)
     struct head head =
         start(wire, "sick-tim571",
               "links: [{type: tcp, protocol: cola, port: 0}, {type: tcp, protocol: cola, port: 0}]\n", FAULTS, NULL);
-    const int clean = raw_connect(head_link(&head, 1)), faulty = raw_connect(head_link(&head, 0));
+    const int clean = raw_connect(head_link(&head, 1));
     cola_start(clean);
+    const int faulty = raw_connect(head_link(&head, 0)); /* its session begins later, so the clean one has all of it */
     cola_start(faulty);
     check_two_streams(wire, &head, &kind, faulty, clean, UNITS * 2552);
 }
