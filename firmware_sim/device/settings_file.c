@@ -35,6 +35,7 @@ struct settings_file {
     pthread_cond_t changed;
     struct image image;
     int is_new; /* the image is not written yet */
+    int failed; /* the last write did; the file has an older image */
     int ends;
     /* the thread's */
     struct image written;
@@ -175,15 +176,17 @@ static int put_image(const void *source, FILE *out, struct sh_err *why)
     return ferror(out) ? sh_fail(why, SH_EIO, "%s", strerror(errno)) : SH_OK;
 }
 
-/* Writes each new image, and the last one before it ends. */
+/* Writes each new image, and the last one before it ends. An image that could not be written is tried once more then. */
 static void *settings_file_main(void *arg)
 {
     struct settings_file *file = arg;
+    int is_last = 0;
     pthread_mutex_lock(&file->lock);
     for (;;) {
         while (!file->is_new && !file->ends)
             pthread_cond_wait(&file->changed, &file->lock);
-        if (!file->is_new) break;
+        if (!file->is_new && (is_last || !file->failed)) break;
+        is_last = file->ends;
         file->is_new = 0;
         file->written = file->image;
         pthread_mutex_unlock(&file->lock);
@@ -192,6 +195,7 @@ static void *settings_file_main(void *arg)
             sh_warn(file->report, "head.settings_file: %s; the settings stored last would be lost without power",
                     file->error.text);
         pthread_mutex_lock(&file->lock);
+        file->failed = file->error.code != SH_OK;
     }
     pthread_mutex_unlock(&file->lock);
     return NULL;
@@ -253,7 +257,7 @@ int settings_file_put(struct settings_file *file, const char *name, const char *
     char *part = add_part(&file->image, name);
     if (part != NULL) {
         rc = SH_OK;
-        file->is_new |= strcmp(part, text) != 0;
+        file->is_new |= file->failed || strcmp(part, text) != 0;
         strcpy(part, text);
         pthread_cond_signal(&file->changed);
     }
