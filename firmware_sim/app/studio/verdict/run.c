@@ -258,7 +258,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     r->options = options;
     r->verdict = verdict;
     r->stream.keeps = options->file != NULL;
-    watch_begin(&r->watch, cfg->n_links, options->link);
+    watch_begin(&r->watch, cfg->n_links, options->link, options->limit_s);
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].protocol == PROTOCOL_SCIP || cfg->link[i].protocol == PROTOCOL_COLA)
             r->watch.must_ask |= 1U << i;
