@@ -228,7 +228,13 @@ static int run_compare(struct run *r, struct sh_err *err)
         checks_no_points(r->verdict, VERDICT_FOUND, why.text);
         return SH_OK;
     }
-    const int rc = match_points(&r->stream, &r->watch, device_tick_ns(r->device), &cloud, match_of(r), &match, err);
+    const struct match_input in = {.stream = &r->stream,
+                                   .watch = &r->watch,
+                                   .tick_ns = device_tick_ns(r->device),
+                                   .cloud = &cloud,
+                                   .match_m = match_of(r),
+                                   .report = &app_report_stderr};
+    const int rc = match_points(&in, &match, err);
     if (rc == SH_OK && match.n == 0)
         checks_no_points(r->verdict, VERDICT_FOUND, "it has no point");
     else if (rc == SH_OK)
