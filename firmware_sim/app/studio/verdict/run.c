@@ -165,7 +165,7 @@ static void run_client(struct run *r)
     fault_board_remove(device_faults(r->device), 0);
     if (c->has_sessions ? is_connected(r) : there) run_settle(r);
     c->was_there = !client_has_ended(&r->client);
-    c->holds = c->was_there && held_any(&r->watch, r->client.pid);
+    c->holds = c->was_there && held_any(&r->watch);
     c->ended_ns = clock_now_ns();
     watch_end(&r->watch);
     client_end(&r->client, o->grace_s);
@@ -248,10 +248,13 @@ static int run_judge(struct run *r, struct sh_err *err)
     checks_judge(&r->checks, r->verdict);
     if (r->points == NULL)
         checks_no_points(r->verdict, VERDICT_NOT_JUDGED, "no --client-file");
-    else if (r->stream.short_of[0] != '\0')
-        checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
-    else
+    else if (r->stream.short_of[0] == '\0')
         return run_compare(r, err);
+    else {
+        checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
+        sh_warn(&app_report_stderr, "soak: %s: its points are not judged, as --client-file asks: %s",
+                r->verdict->scenario, r->stream.short_of);
+    }
     return SH_OK;
 }
 
