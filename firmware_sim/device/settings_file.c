@@ -8,9 +8,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
+#include "drivers/protocol/protocol.h"
 
 static const char title[] = "scanhead settings 1", of_profile[] = "profile ", end_line[] = "end";
 
@@ -91,6 +93,26 @@ __attribute__((format(printf, 4, 5))) static int fail_at(const struct settings_f
                    line_no, what);
 }
 
+/* Names are those that device_store gets: the head's own, and a protocol's. */
+static int is_known(const char *name)
+{
+    int known = strcmp(name, "head") == 0;
+    for (int id = 0; id < PROTOCOL_N && !known; id++) {
+        const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
+        known = ops != NULL && strcmp(name, ops->name) == 0;
+    }
+    return known;
+}
+
+/* Whether a line of text is of the same setting: "HEADER VALUE" or "name=value". */
+static int has_setting(const char *text, const char *line)
+{
+    const size_t n = strcspn(line, " =");
+    for (; *text != '\0'; text += strcspn(text, "\n") + 1)
+        if (strcspn(text, " =\n") == n && strncasecmp(text, line, n) == 0) return 1;
+    return 0;
+}
+
 /* A line "NAME TEXT". */
 static int take_line(struct settings_file *file, unsigned line_no, char *line, struct sh_err *err)
 {
@@ -99,6 +121,8 @@ static int take_line(struct settings_file *file, unsigned line_no, char *line, s
         return fail_at(file, line_no, err, "there must be a name, a blank and a setting, or the last line '%s'",
                        end_line);
     *blank = '\0';
+    if (!is_known(line))
+        return fail_at(file, line_no, err, "%.40s is no name here; allowed are head and names of protocols", line);
     char *text = add_part(&file->image, line);
     if (text == NULL)
         return fail_at(file, line_no, err, "too many names, or too long a name; allowed are %d of up to %d bytes",
@@ -108,6 +132,8 @@ static int take_line(struct settings_file *file, unsigned line_no, char *line, s
         return fail_at(file, line_no, err, "too long a setting; allowed are %d characters", MAX_SETTING);
     if (len + more + 2 > SETTINGS_FILE_TEXT)
         return fail_at(file, line_no, err, "too much under one name; allowed are %d bytes", SETTINGS_FILE_TEXT - 1);
+    if (has_setting(text, blank + 1))
+        return fail_at(file, line_no, err, "%.60s is stored twice; allowed is one line for each setting", blank + 1);
     memcpy(text + len, blank + 1, more);
     memcpy(text + len + more, "\n", 2);
     return SH_OK;
