@@ -151,7 +151,7 @@ static void judge_scans(const struct checks *c, struct verdict *v)
 
 static void judge_speed(const struct checks *c, struct verdict *v)
 {
-    const char *why = !c->has_sessions                ? "the link does not wait"
+    const char *why = !c->has_sessions               ? "the link does not wait"
                       : c->watch->first_open_ns == 0 ? "it did not connect"
                       : c->watch->stalls != 0        ? "the head stalled on request"
                                                      : NULL;
