@@ -419,6 +419,8 @@ int newfile_replace(const char *path, int *locked, newfile_put *put, const void 
     if (rc == SH_OK) rc = lock_part(part, &fd, err);
     if (rc == SH_OK) rc = write_part(path, fd, put, source, err);
     if (rc == SH_OK) rc = newfile_sync(part, fd, err);
+    if (rc == SH_OK && !is_named(path, *locked))
+        rc = sh_fail(err, SH_ESTATE, "%s: was removed or replaced by somebody else; it is not written any more", path);
     if (rc == SH_OK && rename(part, path) != 0) rc = fail_rename(path, part, err);
     if (rc == SH_OK) {
         close_renamed(path, *locked);

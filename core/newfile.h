@@ -33,7 +33,8 @@ int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err
 /* Such a file, written by put in one go, as PATH.part. Its errors follow "PATH: cannot be written: ". */
 typedef int newfile_put(const void *source, FILE *file, struct sh_err *why);
 int newfile_write(const char *path, newfile_put *put, const void *source, struct sh_err *err);
-/* The same for a file that newfile_append has opened: it stays locked, and *fd becomes that of the new file. */
+/* The same for a file that newfile_append has opened: it stays locked, and *fd becomes that of the new file.
+ * SH_ESTATE: path is that file no more, but another process's, or nobody's. */
 int newfile_replace(const char *path, int *fd, newfile_put *put, const void *source, struct sh_err *err);
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. It leaves no
  * file behind. */

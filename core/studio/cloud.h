@@ -36,6 +36,7 @@ struct cloud {
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
     double count_m; /* what the file rounds coordinates to, on the ground: of LAS the scale, of a PLY as text the 1e-6
                          * m that our recorder writes, in single precision two units in the last place; 0: nothing */
+    int is_single;  /* 1: in single precision */
     int is_text;    /* 1: the file holds coordinates as decimal numbers */
     int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
     /* Where they were asked for and the file has them, else NULL: */
@@ -47,6 +48,12 @@ struct cloud {
     uint8_t (*rgb)[3];     /* [n] sRGB */
     int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
+
+/* Two units in the last place of v in single precision. */
+static inline double cloud_single_unit(double v)
+{
+    return 1.2e-7 * v;
+}
 
 enum cloud_column {
     CLOUD_TIME = 1,

@@ -8,9 +8,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
+#include "drivers/protocol/protocol.h"
 
 static const char title[] = "scanhead settings 1", of_profile[] = "profile ", end_line[] = "end";
 
@@ -35,6 +37,7 @@ struct settings_file {
     pthread_cond_t changed;
     struct image image;
     int is_new; /* the image is not written yet */
+    int failed; /* the last write did; the file has an older image */
     int ends;
     /* the thread's */
     struct image written;
@@ -90,6 +93,26 @@ __attribute__((format(printf, 4, 5))) static int fail_at(const struct settings_f
                    line_no, what);
 }
 
+/* Names are those that device_store gets: the head's own, and a protocol's. */
+static int is_known(const char *name)
+{
+    int known = strcmp(name, "head") == 0;
+    for (int id = 0; id < PROTOCOL_N && !known; id++) {
+        const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
+        known = ops != NULL && strcmp(name, ops->name) == 0;
+    }
+    return known;
+}
+
+/* Whether a line of text is of the same setting: "HEADER VALUE" or "name=value". */
+static int has_setting(const char *text, const char *line)
+{
+    const size_t n = strcspn(line, " =");
+    for (; *text != '\0'; text += strcspn(text, "\n") + 1)
+        if (strcspn(text, " =\n") == n && strncasecmp(text, line, n) == 0) return 1;
+    return 0;
+}
+
 /* A line "NAME TEXT". */
 static int take_line(struct settings_file *file, unsigned line_no, char *line, struct sh_err *err)
 {
@@ -98,6 +121,8 @@ static int take_line(struct settings_file *file, unsigned line_no, char *line, s
         return fail_at(file, line_no, err, "there must be a name, a blank and a setting, or the last line '%s'",
                        end_line);
     *blank = '\0';
+    if (!is_known(line))
+        return fail_at(file, line_no, err, "%.40s is no name here; allowed are head and names of protocols", line);
     char *text = add_part(&file->image, line);
     if (text == NULL)
         return fail_at(file, line_no, err, "too many names, or too long a name; allowed are %d of up to %d bytes",
@@ -107,6 +132,8 @@ static int take_line(struct settings_file *file, unsigned line_no, char *line, s
         return fail_at(file, line_no, err, "too long a setting; allowed are %d characters", MAX_SETTING);
     if (len + more + 2 > SETTINGS_FILE_TEXT)
         return fail_at(file, line_no, err, "too much under one name; allowed are %d bytes", SETTINGS_FILE_TEXT - 1);
+    if (has_setting(text, blank + 1))
+        return fail_at(file, line_no, err, "%.60s is stored twice; allowed is one line for each setting", blank + 1);
     memcpy(text + len, blank + 1, more);
     memcpy(text + len + more, "\n", 2);
     return SH_OK;
@@ -175,15 +202,17 @@ static int put_image(const void *source, FILE *out, struct sh_err *why)
     return ferror(out) ? sh_fail(why, SH_EIO, "%s", strerror(errno)) : SH_OK;
 }
 
-/* Writes each new image, and the last one before it ends. */
+/* Writes each new image, and the last one before it ends. An image that could not be written is tried once more then. */
 static void *settings_file_main(void *arg)
 {
     struct settings_file *file = arg;
+    int is_last = 0;
     pthread_mutex_lock(&file->lock);
     for (;;) {
         while (!file->is_new && !file->ends)
             pthread_cond_wait(&file->changed, &file->lock);
-        if (!file->is_new) break;
+        if (!file->is_new && (is_last || !file->failed)) break;
+        is_last = file->ends;
         file->is_new = 0;
         file->written = file->image;
         pthread_mutex_unlock(&file->lock);
@@ -192,6 +221,7 @@ static void *settings_file_main(void *arg)
             sh_warn(file->report, "head.settings_file: %s; the settings stored last would be lost without power",
                     file->error.text);
         pthread_mutex_lock(&file->lock);
+        file->failed = file->error.code != SH_OK;
     }
     pthread_mutex_unlock(&file->lock);
     return NULL;
@@ -253,7 +283,7 @@ int settings_file_put(struct settings_file *file, const char *name, const char *
     char *part = add_part(&file->image, name);
     if (part != NULL) {
         rc = SH_OK;
-        file->is_new |= strcmp(part, text) != 0;
+        file->is_new |= file->failed || strcmp(part, text) != 0;
         strcpy(part, text);
         pthread_cond_signal(&file->changed);
     }

@@ -29,13 +29,23 @@ static int drop(void **state)
     return unlink(path);
 }
 
+static char warning[256];
+
+static void keep_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    snprintf(warning, sizeof warning, "%s", text);
+}
+
 static int try(const void *data, size_t len, struct cloud *cloud, struct sh_err *err)
 {
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(data, 1, len, file), len);
     assert_int_equal(fclose(file), 0);
-    return cloud_read_positions(path, NULL, cloud, err);
+    const struct sh_report report = {.warn = keep_warning};
+    warning[0] = '\0';
+    return cloud_read_positions(path, &report, cloud, err);
 }
 
 static void expect(const void *data, size_t len, size_t n, const double (*xyz)[3], int is_text)
@@ -76,6 +86,10 @@ static void test_text(void **state)
         {"t,Z,intensity,X,Y\n9,3.125,1,1.5,-2.25\n10,0,1,-0.5,8\n"},
         {"# x y z\n1.5 -2.25 3.125\n-0.5 8 0\n"},
         {"#t x y z\n7 1.5 -2.25 3.125\n7 -0.5 8 0\n"},
+        {"t,label,x,y,z,i\n1,,1.5,-2.25,3.125,9\n1,wall north,-0.5,8,0,\n"},
+        {"label x y z\nwall 1.5 -2.25 3.125\nfloor -0.5 8 0\n"},
+        {"1,5;-2,25;3,125\n-0,5 ; 8 ; 0\n"},
+        {"x;y;z\n1,5;-2,25;3,125\n-0,5;8;0;\n"},
         {"connected to 127.0.0.1\n2 scans\n1.5 -2.25 3.125\n-0.5 8 0\nbye\n"},
     };
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
@@ -84,6 +98,7 @@ static void test_text(void **state)
     expect("nan nan nan\n", 12, 1, empty, 1);
     expect_error("", 0, "no line of it is a point");
     expect_error("hello\n", 6, "no line of it is a point");
+    expect_error("x,y,z\n1,,3\n4,5\n", 16, "2: no line has numbers in the columns");
     expect_error("1 2 inf\n", 8, "is not a position");
     expect_error("1 2 3\nnan 2 3\n", 14, "line 2");
     struct cloud cloud;
@@ -153,6 +168,32 @@ static void test_pcd_compressed(void **state)
     expect_error(text, len + sizeof back, "damaged");
 }
 
+/* Without POINTS the sides of the grid count. What follows the points is left out with a word, but blank lines. */
+static void test_pcd_counts(void **state)
+{
+    (void)state;
+    static const char old[] = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 2\nDATA ascii\n"
+                              "1.5 -2.25 3.125\n-0.5 8 0\n";
+    char text[512];
+    expect(old, sizeof old - 1, 2, TWO, 1);
+    assert_string_equal(warning, "");
+    size_t len = put_header(text, XYZ, 2, "ascii");
+    len += (size_t)sprintf(text + len, "1.5 -2.25 3.125\n-0.5 8 0\n \n\n");
+    expect(text, len, 2, TWO, 1);
+    assert_string_equal(warning, "");
+    len += (size_t)sprintf(text + len, "1 2 3\n");
+    expect(text, len, 2, TWO, 1);
+    assert_non_null(strstr(warning, "goes on after the 2 points"));
+    len = put_header(text, XYZ, 2, "binary");
+    for (int i = 0; i < 6; i++, len += 4)
+        memcpy(text + len, &(float){(float)TWO[i / 3][i % 3]}, 4);
+    expect(text, len, 2, TWO, 0);
+    assert_string_equal(warning, "");
+    expect(text, len + 1, 2, TWO, 0);
+    assert_non_null(strstr(warning, "goes on after the 2 points"));
+    expect_error("VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA ascii\n1 2 3\n", 66, "no line POINTS");
+}
+
 static void test_pcd_that_is_wrong(void **state)
 {
     (void)state;
@@ -178,6 +219,7 @@ int main(void)
         cmocka_unit_test(test_text),
         cmocka_unit_test(test_pcd_as_text_and_binary),
         cmocka_unit_test(test_pcd_compressed),
+        cmocka_unit_test(test_pcd_counts),
         cmocka_unit_test(test_pcd_that_is_wrong),
     };
     return cmocka_run_group_tests(tests, make, drop);

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The file of stored settings. Its bytes are those of the picture in settings_file.h, written out here. */
+#include <sched.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -126,7 +128,10 @@ static const struct {
     {"scanhead settings 1\nprofile puck\nhead a\x01\nend\n", {":3: allowed are lines", ""}},
     {"scanhead settings 1\nprofile puck\nend\nhead a\n", {":4: nothing may follow 'end'", ""}},
     {"scanhead settings 1\nprofile puck\na-name-of-more-than-31-characters x\nend\n",
-     {":3: too many names", "31 bytes"}},
+     {":3: a-name-of-more-than-31-characters is no name here", "allowed are head and names of protocols"}},
+    {"scanhead settings 1\nprofile puck\nHead HEAD:LINes 15\nend\n", {":3: Head is no name here", ""}},
+    {"scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\nhead HEAD:LINEs2 1\nhead head:lines 5\nend\n",
+     {":5: head:lines 5 is stored twice", "one line for each setting"}},
 };
 
 static void expect_refused(const char *text, const char *const says[2])
@@ -173,6 +178,23 @@ static void two_heads_have_no_file_in_common(void **state)
     close_file(open_file());
 }
 
+/* Somebody removes the file of a head that runs, and another head makes it anew: it stays the other's. */
+static void a_file_of_another_is_not_replaced(void **state)
+{
+    (void)state;
+    begin();
+    struct settings_file *first = open_file();
+    assert_int_equal(unlink(path), 0);
+    struct settings_file *second = open_file();
+    assert_int_equal(settings_file_put(second, "head", "HEAD:LINes 5\n"), SH_OK);
+    close_file(second);
+    assert_int_equal(settings_file_put(first, "head", "HEAD:LINes 15\n"), SH_OK);
+    assert_int_equal(settings_file_close(first, &err), SH_ESTATE);
+    assert_non_null(strstr(err.text, "was removed or replaced by somebody else"));
+    expect_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 5\nend\n");
+    assert_int_equal(access(part, F_OK), -1);
+}
+
 /* A killed head has left part of a new file: the old one counts, and the next head takes the part over. */
 static void a_killed_writer_leaves_the_old_file(void **state)
 {
@@ -198,6 +220,15 @@ static void keep_warning(void *ctx, const char *text)
     snprintf(warning, sizeof warning, "%s", text);
 }
 
+static atomic_int n_warnings;
+
+static void count_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    (void)text;
+    atomic_fetch_add(&n_warnings, 1);
+}
+
 /* A folder in the place of the new file: its writer says so at once, and at the end. The settings themselves stay. */
 static void a_failure_to_write_is_said(void **state)
 {
@@ -214,6 +245,34 @@ static void a_failure_to_write_is_said(void **state)
     assert_non_null(strstr(warning, "the settings stored last would be lost without power"));
     expect_text("");
     assert_int_equal(rmdir(part), 0);
+}
+
+/* The warning says that the write has failed. Then its reason goes away, and the same text is stored once more. */
+static void what_could_not_be_written_is_written_later(void **state)
+{
+    (void)state;
+    const struct sh_report report = {.warn = count_warning};
+    struct settings_file *file;
+    for (int again = 0; again < 2; again++) {
+        begin();
+        atomic_store(&n_warnings, 0);
+        assert_int_equal(mkdir(part, 0700), 0);
+        assert_int_equal(settings_file_open(path, "puck", &report, &file, &err), SH_OK);
+        assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 5\n"), SH_OK);
+        while (atomic_load(&n_warnings) == 0) /* the limit of the program ends a wait for ever */
+            sched_yield();
+        assert_int_equal(rmdir(part), 0);
+        if (again) { /* by a client, at once */
+            struct stat st = {0};
+            while (st.st_size == 0) {
+                assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 5\n"), SH_OK);
+                assert_int_equal(stat(path, &st), 0);
+            }
+        }
+        close_file(file); /* or at the end */
+        expect_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 5\nend\n");
+        assert_int_equal(atomic_load(&n_warnings), 1);
+    }
 }
 
 static void links_and_folders_are_refused(void **state)
@@ -254,8 +313,10 @@ int main(void)
         cmocka_unit_test(wrong_text_is_refused),
         cmocka_unit_test(a_broken_or_foreign_file_is_refused_and_stays),
         cmocka_unit_test(two_heads_have_no_file_in_common),
+        cmocka_unit_test(a_file_of_another_is_not_replaced),
         cmocka_unit_test(a_killed_writer_leaves_the_old_file),
         cmocka_unit_test(a_failure_to_write_is_said),
+        cmocka_unit_test(what_could_not_be_written_is_written_later),
         cmocka_unit_test(links_and_folders_are_refused),
     };
     return cmocka_run_group_tests(tests, make_dir, remove_dir);

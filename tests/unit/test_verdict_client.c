@@ -86,6 +86,19 @@ static void wait_for(const char *line)
     }
 }
 
+static pid_t wait_for_number(void)
+{
+    int number = 0;
+    char end = 0;
+    while (end != '\n') {
+        FILE *file = fopen(log_path, "r");
+        assert_non_null(file);
+        if (fscanf(file, "%d%c", &number, &end) != 2) end = 0;
+        fclose(file);
+    }
+    return number;
+}
+
 /* It is in the group that the shell leaves behind, and does not end at SIGTERM. The whole group is waited for, and killed.
  * It says when it has set that up: a signal before that would end it. */
 static void test_what_the_shell_leaves(void **state)
@@ -98,6 +111,31 @@ static void test_what_the_shell_leaves(void **state)
     client_end(&client, 0.2);
     assert_true(client.had_to_be_killed && client_has_ended(&client));
     assert_int_equal(kill(-client.pid, 0), -1);
+}
+
+/* Programs that leave the group: with a session of their own, or as timeout does. Each says its number once it has. */
+static void test_what_leaves_the_group(void **state)
+{
+    (void)state;
+    static const char *const lines[] = {
+        "setsid sh -c 'echo $$; exec sleep 600' & wait", "timeout 600 sh -c 'echo $$; exec sleep 600'; true",
+        "(setsid sh -c 'echo $$; exec sleep 600' &) ; exit 0", /* its parent has ended: ours is the next */
+    };
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        struct client client;
+        begin(&client, lines[i]);
+        const pid_t pid = wait_for_number();
+        assert_false(client_has_ended(&client));
+        client_end(&client, 60.0);
+        assert_false(client.had_to_be_killed);
+        assert_int_equal(kill(pid, 0), -1);
+    }
+    struct client client;
+    begin(&client, "setsid sh -c 'trap \"\" TERM; echo $$; while :; do sleep 600; done' & wait");
+    const pid_t pid = wait_for_number();
+    client_end(&client, 0.2);
+    assert_true(client.had_to_be_killed);
+    assert_int_equal(kill(pid, 0), -1);
 }
 
 /* Some programs end with their input, or at a key. This one would end by itself, with status 5. */
@@ -114,9 +152,8 @@ static void test_its_input_stays_open(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_placeholders),
-        cmocka_unit_test(test_ends),
-        cmocka_unit_test(test_what_the_shell_leaves),
+        cmocka_unit_test(test_placeholders),          cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_what_the_shell_leaves), cmocka_unit_test(test_what_leaves_the_group),
         cmocka_unit_test(test_its_input_stays_open),
     };
     return cmocka_run_group_tests(tests, make, drop);

@@ -46,7 +46,9 @@ static struct match try(const struct cloud *cloud, double match_m)
 {
     struct match match;
     struct sh_err err;
-    assert_int_equal(match_points(&stream, &watch, TICK_NS, cloud, match_m, &match, &err), SH_OK);
+    const struct match_input in = {
+        .stream = &stream, .watch = &watch, .tick_ns = TICK_NS, .cloud = cloud, .match_m = match_m};
+    assert_int_equal(match_points(&in, &match, &err), SH_OK);
     return match;
 }
 
@@ -181,19 +183,82 @@ static void test_rounding(void **state)
         double points[2][3];
         memcpy(points, texts[i].xyz, sizeof points);
         struct cloud cloud = {.n = 2, .xyz_m = points, .is_text = 1};
-        assert_true(fabs(match_unit_m(&cloud) - texts[i].unit_m) < 1e-12);
+        assert_true(fabs(match_unit_m(&cloud, 1e3) - texts[i].unit_m) < 1e-12);
         cloud.is_text = 0;
         cloud.count_m = 2e-6;
-        assert_true(fabs(match_unit_m(&cloud) - 2e-6) <= 0.0);
+        assert_true(fabs(match_unit_m(&cloud, 1e3) - 2e-6) <= 0.0);
     }
+}
+
+/* A number that no head can have says nothing of how the others are rounded. */
+static void test_a_huge_coordinate(void **state)
+{
+    (void)state;
+    for (int single = 0; single < 2; single++) {
+        begin();
+        struct cloud cloud = cloud_of(0, N);
+        cloud.is_text = !single;
+        cloud.is_single = single;
+        for (int i = 0; i < N; i++)
+            for (int k = 0; k < 3; k++)
+                theirs[i][k] = round(1e3 * theirs[i][k]) / 1e3; /* as text has them */
+        theirs[7][1] = 1e30;
+        theirs[8][1] += 0.01; /* more than a millimetre, and 1e-5 m */
+        cloud.count_m = 1.2e23;
+        const struct match m = try(&cloud, 1e-5);
+        assert_int_equal(m.unknown, 2);
+        assert_int_equal(m.first_unknown, 7);
+        /* Points have three decimals, and are at most 10.01 m from 0 in each direction. */
+        assert_true(single ? m.unit_m > 0.0 && m.unit_m < 2e-6 : fabs(m.unit_m - 1e-3) < 1e-12);
+    }
+}
+
+/* --match-mm 0 with the head's own doubles: nothing is rounded. */
+static void test_exact_points(void **state)
+{
+    (void)state;
+    begin();
+    const struct cloud cloud = cloud_of(0, N);
+    theirs[7][2] += 1e-7;
+    struct match m = try(&cloud, 0.0);
+    assert_int_equal(m.unknown, 1);
+    assert_int_equal(m.repeated, 0);
+    stream.n = stream.n_frames = 0; /* a head that saw nothing */
+    m = try(&cloud, 0.0);
+    assert_int_equal(m.unknown, N);
+}
+
+static int always(void *ctx)
+{
+    (void)ctx;
+    return 1;
+}
+
+static void test_a_stop(void **state)
+{
+    (void)state;
+    begin();
+    const struct cloud cloud = cloud_of(0, N);
+    const struct sh_report report = {.stop = always};
+    const struct match_input in = {
+        .stream = &stream, .watch = &watch, .tick_ns = TICK_NS, .cloud = &cloud, .match_m = 100.0, .report = &report};
+    struct match match;
+    struct sh_err err;
+    assert_int_equal(match_points(&in, &match, &err), SH_ESTOPPED);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_right_client), cmocka_unit_test(test_unknown_and_empty),
-        cmocka_unit_test(test_repeated),       cmocka_unit_test(test_dense_points),
-        cmocka_unit_test(test_frames),         cmocka_unit_test(test_rounding),
+        cmocka_unit_test(test_a_right_client),
+        cmocka_unit_test(test_unknown_and_empty),
+        cmocka_unit_test(test_repeated),
+        cmocka_unit_test(test_dense_points),
+        cmocka_unit_test(test_frames),
+        cmocka_unit_test(test_rounding),
+        cmocka_unit_test(test_a_huge_coordinate),
+        cmocka_unit_test(test_exact_points),
+        cmocka_unit_test(test_a_stop),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,7 +27,7 @@ static void note(enum fault_kind kind, uint32_t link, double for_ms)
 static int begin(void **state)
 {
     (void)state;
-    watch_begin(&w, 2, 1);
+    watch_begin(&w, 2, 1, 60.0);
     return 0;
 }
 
@@ -108,6 +108,29 @@ static void test_silence(void **state)
     assert_true(watch_is_whole(&w));
 }
 
+/* A client that goes by itself, long after a stall, was not sent away by it. Times are made so, nothing waits. */
+static void test_an_end_long_after_a_silence(void **state)
+{
+    (void)state;
+    session(1, 1);
+    note(FAULT_STALL, 1, 10.0);
+    w.link[0].over_ns -= INT64_C(70000000000); /* it was over 70 s ago, and 60 s are the limit */
+    session(1, 0);
+    assert_int_equal(w.n_broken, 0);
+    session(1, 1);
+    note(FAULT_CABLE, 1, 10.0);
+    w.link[0].over_ns -= INT64_C(30000000000);
+    const int64_t ended_ns = clock_now_ns();
+    session(1, 0);
+    assert_int_equal(w.n_broken, 1);
+    assert_true(w.broken[0].over_ns >= ended_ns); /* it can come back from its own end on */
+    session(1, 1);
+    note(FAULT_DISCONNECT, 1, 0.0); /* this ends it, however late its thread reports that */
+    w.link[0].over_ns -= INT64_C(70000000000);
+    session(1, 0);
+    assert_int_equal(w.n_broken, 2);
+}
+
 /* A device that sends only what was asked for. */
 static void test_a_link_on_which_clients_must_ask(void **state)
 {
@@ -174,6 +197,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_a_client_that_goes_by_itself, begin, end),
         cmocka_unit_test_setup_teardown(test_whom_a_fault_concerns, begin, end),
         cmocka_unit_test_setup_teardown(test_silence, begin, end),
+        cmocka_unit_test_setup_teardown(test_an_end_long_after_a_silence, begin, end),
         cmocka_unit_test_setup_teardown(test_requests, begin, end),
         cmocka_unit_test_setup_teardown(test_a_link_on_which_clients_must_ask, begin, end),
         cmocka_unit_test_setup_teardown(test_spans_of_the_chosen_link, begin, end),

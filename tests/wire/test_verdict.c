@@ -210,6 +210,63 @@ static void test_scenarios_in_turn(void **state)
     free(text);
 }
 
+static void test_a_client_that_stays_away(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], json[352], names[256];
+    write_files(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(json, sizeof json, "%s", wire_path(wire, "json"));
+    const char *const args[] = {
+        "soak",    config,       "--client", "exec sleep 600",    "--json", json,      "--client-folder",
+        wire->dir, "--duration", "0.3",      "--reconnect-limit", "0.3",    "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 1);
+    char *text = wire_read(json, NULL);
+    find_names(text, names, sizeof names);
+    assert_string_equal(names, "connects");
+    assert_int_equal(count_of(text, "no frame was left out"), 0); /* nor is a speed judged that nobody saw */
+    free(text);
+}
+
+/* The second scenario's client asks for the end as a user does, at the program that has started it. */
+static void test_a_stop_in_the_second_scenario(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], first[352], second[352], json[352];
+    write_files(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(first, sizeof first, "%s",
+             wire_write_text(wire, "first.yaml", "faults: [{kind: stall, for_ms: 1, at: 1}]\n"));
+    snprintf(second, sizeof second, "%s",
+             wire_write_text(wire, "second.yaml", "faults: [{kind: stall, for_ms: 1, at: 1}]\n"));
+    snprintf(json, sizeof json, "%s", wire_path(wire, "json"));
+    const char *const args[] = {"soak",
+                                config,
+                                "--scenario",
+                                first,
+                                "--scenario",
+                                second,
+                                "--client",
+                                "case {out} in *2-second*) kill -INT $PPID;; esac; exec sleep 600",
+                                "--json",
+                                json,
+                                "--duration",
+                                "0.1",
+                                "--reconnect-limit",
+                                "0.1",
+                                "--client-folder",
+                                wire->dir,
+                                "--quiet",
+                                NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 1);
+    char *text = wire_read(json, NULL), *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_int_equal(count_of(text, "\"scenario\": \"1-first\""), 1);
+    assert_int_equal(count_of(text, "\"scenario\": \"2-second\""), 0);
+    assert_int_equal(count_of(err, "soak: stopped; of 2 scenarios 1 were judged"), 1);
+    free(text);
+    free(err);
+}
+
 static void expect_usage(struct wire *wire, const char *const *args, const char *says)
 {
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
@@ -233,10 +290,43 @@ static void test_wrong_usage(void **state)
     expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--link", "2", NULL}, "allowed 1 to 1");
     expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: 'null'}]", NULL},
                  "allowed are tcp, pty");
+    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: web}]", NULL},
+                 "allowed are tcp, pty, udp and usb");
     expect_usage(wire,
                  (const char *const[]){"soak", c, "--client", "true", "--truth", "t", "--scenario", "flaky-usb",
                                        "--scenario", "brown-out", NULL},
                  "--truth is one file");
+}
+
+/* None of them runs the client, whose log would be there. */
+static void test_files_that_do_not_go_together(void **state)
+{
+    struct wire *wire = *state;
+    char c[352], printed[352], points[352], bad[352], folder[402];
+    write_files(wire);
+    snprintf(c, sizeof c, "%s", wire_path(wire, "config.yaml"));
+    snprintf(printed, sizeof printed, "%s", wire_path(wire, "configuration.stdout"));
+    snprintf(points, sizeof points, "%s", wire_path(wire, "configuration.points"));
+    snprintf(bad, sizeof bad, "%s", wire_write_text(wire, "bad.yaml", "faults: [{kind: nonsense}]\n"));
+    memset(folder, 'x', sizeof folder - 1);
+    folder[sizeof folder - 1] = '\0';
+    const char *const dir = wire->dir;
+    expect_usage(wire,
+                 (const char *const[]){"soak", c, "--client", "true", "--client-folder", dir, "--client-file", "-",
+                                       "--json", printed, NULL},
+                 "configuration.stdout");
+    expect_usage(
+        wire,
+        (const char *const[]){"soak", c, "--client", "true {out}", "--client-folder", dir, "--truth", points, NULL},
+        "configuration.points");
+    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--client-folder", folder, NULL},
+                 "has 401 characters; allowed are 400");
+    expect_usage(wire,
+                 (const char *const[]){"soak", c, "--client", "true", "--client-folder", dir, "--scenario", "brown-out",
+                                       "--scenario", bad, NULL},
+                 "bad.yaml:1");
+    assert_int_equal(access(wire_path(wire, "1-brown-out.log"), F_OK), -1);
+    assert_int_equal(access(wire_path(wire, "configuration.log"), F_OK), -1);
 }
 
 static void need_python(void)
@@ -266,7 +356,10 @@ int main(int argc, char **argv)
         cmocka_unit_test_setup_teardown(test_a_client_in_c, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_other_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_scenarios_in_turn, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_client_that_stays_away, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_stop_in_the_second_scenario, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_files_that_do_not_go_together, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_in_python, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_of_scip, wire_setup, wire_teardown),
     };

@@ -49,7 +49,8 @@ void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_re
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fabs(cloud->xyz_m[i][k]));
     if (cloud->epsg == 4979) largest *= 111320.0; /* degrees */
-    cloud->count_m = fmax(cloud->count_m, largest * 1.2e-7);
+    cloud->count_m = fmax(cloud->count_m, cloud_single_unit(largest));
+    cloud->is_single = 1;
     if (largest * 6e-8 > worth_a_word_m)
         sh_warn(report, "%s: stored in single precision, with errors up to %.2g m", path, largest * 6e-8);
 }

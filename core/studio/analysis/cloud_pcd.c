@@ -24,7 +24,10 @@ struct pcd {
     struct cloud *cloud;
     struct pcd_field field[MAX_FIELDS];
     unsigned n_fields;
-    uint64_t n;        /* points */
+    uint64_t n; /* points */
+    uint64_t width, height;
+    bool has_points;   /* the header's line */
+    bool has_more;     /* there is something after the last point */
     size_t record_len; /* bytes of a point, uncompressed */
     char data[24];     /* ascii, binary or binary_compressed */
 };
@@ -81,14 +84,28 @@ static int read_header_line(struct pcd *g, bool *done, struct sh_err *err)
     if (text_is(key, "FIELDS") || text_is(key, "SIZE") || text_is(key, "TYPE") || text_is(key, "COUNT"))
         return read_fields(g, key, err);
     text_skip_blanks(&g->t);
-    if (text_is(key, "POINTS")) {
-        if (!text_integer(&g->t, &number) || number < 0) return pcd_fail(g, err, "POINTS is not a whole number");
-        g->n = (uint64_t)number;
+    if (text_is(key, "POINTS") || text_is(key, "WIDTH") || text_is(key, "HEIGHT")) {
+        if (!text_integer(&g->t, &number) || number < 0)
+            return pcd_fail(g, err, "POINTS, WIDTH or HEIGHT is not a whole number");
+        *(text_is(key, "POINTS") ? &g->n : text_is(key, "WIDTH") ? &g->width : &g->height) = (uint64_t)number;
+        g->has_points |= text_is(key, "POINTS");
     } else if (text_is(key, "DATA")) {
         const struct text_span word = text_word(&g->t);
         snprintf(g->data, sizeof g->data, "%.*s", (int)word.n, word.p);
         *done = true;
     }
+    return SH_OK;
+}
+
+/* Old files have no line POINTS, but the sides of their grid. */
+static int find_count(struct pcd *g, struct sh_err *err)
+{
+    if (g->has_points) return SH_OK;
+    if (g->width == 0 || g->height == 0)
+        return pcd_fail(g, err, "its header has no line POINTS, and no WIDTH and HEIGHT");
+    if (g->height > UINT64_MAX / g->width)
+        return pcd_fail(g, err, "the file is cut off: it can't hold the points its header counts");
+    g->n = g->width * g->height;
     return SH_OK;
 }
 
@@ -120,7 +137,8 @@ static int pcd_read_header(struct pcd *g, struct sh_err *err)
         if (rc != SH_OK) return rc;
         text_next_line(&g->t);
     }
-    return done ? check_fields(g, err) : pcd_fail(g, err, "its header has no line DATA");
+    const int rc = done ? find_count(g, err) : pcd_fail(g, err, "its header has no line DATA");
+    return rc == SH_OK ? check_fields(g, err) : rc;
 }
 
 /* ---- points */
@@ -131,10 +149,11 @@ static int keep_position(const struct pcd *g, size_t i, struct sh_err *err)
 }
 
 /* data: `len` bytes, where field f of point i stands at start + i * step. */
-static int take_binary(const struct pcd *g, const uint8_t *data, size_t len, bool by_field, struct sh_err *err)
+static int take_binary(struct pcd *g, const uint8_t *data, size_t len, bool by_field, struct sh_err *err)
 {
     if (g->n > len / g->record_len)
         return pcd_fail(g, err, "the file is cut off: it can't hold the points its header counts");
+    g->has_more = len > g->n * g->record_len;
     for (unsigned k = 0; k < g->n_fields; k++) {
         const struct pcd_field *f = &g->field[k];
         const uint8_t *p = data + (by_field ? f->at * g->n : f->at);
@@ -207,6 +226,9 @@ static int take_text(struct pcd *g, struct sh_err *err)
             }
         rc = keep_position(g, i, err);
     }
+    for (text_skip_blanks(&g->t); g->t.p < g->t.end && text_at_line_end(&g->t); text_skip_blanks(&g->t))
+        text_next_line(&g->t);
+    g->has_more = g->t.p < g->t.end;
     return rc;
 }
 
@@ -239,6 +261,9 @@ int cloud_read_pcd(const char *path, const struct sh_report *report, struct clou
     if (rc == SH_OK) rc = pcd_read_header(g, err);
     if (rc == SH_OK) rc = take_points(g, err);
     if (rc == SH_OK && pcd_is_single(g)) cloud_note_single(out, path, report);
+    if (rc == SH_OK && g->has_more)
+        sh_warn(report, "%s: it goes on after the %llu points that its header counts; the rest is left out", path,
+                (unsigned long long)g->n);
     text_close(&g->t);
     free(g);
     return rc;

@@ -111,6 +111,7 @@ def main(source, steps):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 1000)
+    steps = sys.argv[2] if len(sys.argv) > 2 else "1000"
+    if len(sys.argv) < 2 or not steps.isdecimal() or int(steps) < 100:
+        sys.exit("usage: lockstep.py SOURCE [STEPS, 100 or more]")
+    main(sys.argv[1], int(steps))

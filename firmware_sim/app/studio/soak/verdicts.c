@@ -9,7 +9,7 @@
 #include "firmware_sim/app/studio/soak/verdicts.h"
 #include "firmware_sim/config/config.h"
 
-enum { VERDICTS_PATH = 512 };
+enum { VERDICTS_PATH = 512, VERDICTS_MAX_FOLDER = 400, N_ENDINGS = 3 };
 
 struct verdicts_work {
     struct verdicts *verdicts;
@@ -17,7 +17,12 @@ struct verdicts_work {
     uint32_t n;
 };
 
-/* brown-out of "config/faults/brown-out.yaml"; where several have one name, their places make them different. */
+static uint32_t n_scenarios(const struct verdicts *v)
+{
+    return v->n != 0 ? v->n : 1;
+}
+
+/* A scenario has its file's name without folder and ending; of several, the place in front makes each name unique. */
 static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t cap)
 {
     const char *path = v->n != 0 ? v->scenario[i] : "configuration", *slash = strrchr(path, '/');
@@ -29,24 +34,38 @@ static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t
         snprintf(to, cap, "%.*s", len, name);
 }
 
-static int judge_one(struct config *cfg, void *ctx, struct sh_err *err)
+static int check_one(struct config *cfg, void *ctx, struct sh_err *err)
 {
-    struct verdicts_work *work = ctx;
-    struct verdict *made = &work->made[work->n];
-    const struct verdict_options *o = &work->verdicts->options;
+    const struct verdicts_work *work = ctx;
+    const uint32_t number = work->verdicts->options.link;
     if (cfg->loop.pace != PACE_REALTIME)
         return sh_fail(err, SH_EINPUT,
                        "--client: loop.pace is not realtime, and the client has no other time; allowed is "
                        "realtime");
-    if (o->link > cfg->n_links)
-        return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
-    const struct link_spec *link = &cfg->link[o->link - 1];
-    if (link->type == LINK_FILE || link->type == LINK_NULL)
+    if (number > cfg->n_links)
+        return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", number, cfg->n_links);
+    const enum link_type type = cfg->link[number - 1].type;
+    if (type == LINK_FILE || type == LINK_NULL || type == LINK_WEB)
         return sh_fail(err, SH_EINPUT,
-                       "--link %u: no client can have a link of type %s; allowed are tcp, pty, udp, usb and web",
-                       o->link, link_ops_get(link->type)->name);
+                       "--link %u: a client can't be judged on a link of type %s; allowed are tcp, pty, udp and usb",
+                       number, link_ops_get(type)->name);
+    return SH_OK;
+}
+
+static int fail_stopped(const struct verdicts_work *work, struct sh_err *err)
+{
+    return sh_fail(err, SH_ESTOPPED, "soak: stopped; of %u scenarios %u were judged", n_scenarios(work->verdicts),
+                   work->n);
+}
+
+static int judge_one(struct config *cfg, void *ctx, struct sh_err *err)
+{
+    struct verdicts_work *work = ctx;
+    struct verdict *made = &work->made[work->n];
+    if (work->n == 0) app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     name_scenario(work->verdicts, work->n, made->scenario, sizeof made->scenario);
-    const int rc = verdict_run(cfg, o, made, err);
+    const int rc = verdict_run(cfg, &work->verdicts->options, made, err);
+    if (rc == SH_ESTOPPED) return fail_stopped(work, err);
     if (rc != SH_OK) return rc;
     work->n++;
     verdict_print(made, stdout);
@@ -83,6 +102,9 @@ static int write_files(const struct verdicts_work *work, struct sh_err *err)
 static int make_folder(struct verdicts *v, char *own, size_t cap, struct sh_err *err)
 {
     const char *temporary = getenv("TMPDIR");
+    if (v->options.folder != NULL && strlen(v->options.folder) > VERDICTS_MAX_FOLDER)
+        return sh_fail(err, SH_EINPUT, "--client-folder: has %zu characters; allowed are %d", strlen(v->options.folder),
+                       VERDICTS_MAX_FOLDER);
     if (v->options.folder != NULL) {
         if (mkdir(v->options.folder, 0777) == 0 || errno == EEXIST) return SH_OK;
         return sh_fail(err, SH_EINPUT, "--client-folder %s: %s", v->options.folder, strerror(errno));
@@ -103,33 +125,60 @@ static int say_findings(const struct verdicts_work *work, struct sh_err *err)
     return found == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "soak: the client has findings: %u", found);
 }
 
-/* The logs, so that none of them is a file that is read. `paths` keeps their names. */
-static int add_logs(const struct verdicts *v, struct app_input *in, char (*paths)[VERDICTS_PATH], uint32_t n)
+static int has_out(const char *text)
 {
+    return text != NULL && strstr(text, "{out}") != NULL;
+}
+
+/* Whether a run writes a file of that ending: its log, what the client prints, and {out}. */
+static int is_written(const struct verdict_options *o, const char *ending)
+{
+    if (strcmp(ending, "stdout") == 0) return o->file != NULL && strcmp(o->file, "-") == 0;
+    return strcmp(ending, "points") != 0 || has_out(o->command) || has_out(o->file);
+}
+
+/* Adds what the runs write, so that none of them is another file of the command line. `paths` keeps their names. */
+static int add_outputs(const struct verdicts *v, struct app_input *in, char (*paths)[N_ENDINGS][VERDICTS_PATH])
+{
+    static const char *const endings[N_ENDINGS] = {"log", "stdout", "points"};
     char name[64];
-    for (uint32_t i = 0; i < n; i++) {
-        name_scenario(v, i, name, sizeof name);
-        snprintf(paths[i], VERDICTS_PATH, "%.400s/%s.log", v->options.folder, name);
-        const struct app_file file = {.option = "client-folder", .path = paths[i], .use = APP_WRITES};
-        if (app_add_file(in, &file) != APP_OK) return APP_USAGE;
-    }
+    for (uint32_t i = 0; i < n_scenarios(v); i++)
+        for (int k = 0; k < N_ENDINGS; k++) {
+            char *path = paths[i][k];
+            name_scenario(v, i, name, sizeof name);
+            snprintf(path, VERDICTS_PATH, "%.*s/%s.%s", VERDICTS_MAX_FOLDER, v->options.folder, name, endings[k]);
+            const struct app_file file = {.option = "client-folder", .path = path, .use = APP_WRITES};
+            const int is_named = v->options.file != NULL && strcmp(v->options.file, path) == 0; /* {out}, written out */
+            if (!is_written(&v->options, endings[k]) || is_named) continue;
+            if (app_add_file(in, &file) != APP_OK) return APP_USAGE;
+        }
     return APP_OK;
+}
+
+/* A scenario that can't be loaded costs no run of another: all are checked before the first. */
+static int run_all(struct verdicts_work *work, struct app_input *in)
+{
+    const struct verdicts *v = work->verdicts;
+    int status = APP_OK;
+    for (int judges = 0; judges < 2; judges++)
+        for (uint32_t i = 0; i < n_scenarios(v) && status == APP_OK && !app_interrupted(); i++) {
+            in->scenario = v->n != 0 ? v->scenario[i] : NULL;
+            status = app_with_config(in, judges ? judge_one : check_one, work);
+        }
+    return status;
 }
 
 int verdicts_run(struct verdicts *v, struct app_input *in)
 {
-    const uint32_t n = v->n != 0 ? v->n : 1;
     struct sh_err err = {0};
-    char own[352], logs[VERDICTS_MAX_SCENARIOS][VERDICTS_PATH];
-    struct verdicts_work work = {.verdicts = v, .made = calloc(n, sizeof *work.made)};
+    char own[352], paths[VERDICTS_MAX_SCENARIOS][N_ENDINGS][VERDICTS_PATH];
+    struct verdicts_work work = {.verdicts = v, .made = calloc(n_scenarios(v), sizeof *work.made)};
     int rc = work.made != NULL ? make_folder(v, own, sizeof own, &err) : sh_fail(&err, SH_ENOMEM, "no memory");
-    int status = rc == SH_OK ? add_logs(v, in, logs, n) : APP_OK;
-    for (uint32_t i = 0; rc == SH_OK && i < n && status == APP_OK && !app_interrupted(); i++) {
-        in->scenario = v->n != 0 ? v->scenario[i] : NULL;
-        status = app_with_config(in, judge_one, &work);
-    }
-    if (rc == SH_OK && status == APP_OK) rc = write_files(&work, &err);
-    if (rc == SH_OK && status == APP_OK) rc = say_findings(&work, &err);
+    int status = rc == SH_OK ? add_outputs(v, in, paths) : APP_OK;
+    if (rc == SH_OK && status == APP_OK) status = run_all(&work, in);
+    if (rc == SH_OK && work.n > 0) rc = write_files(&work, &err);
+    if (rc == SH_OK && status == APP_OK)
+        rc = work.n == n_scenarios(v) ? say_findings(&work, &err) : fail_stopped(&work, &err);
     free(work.made);
     return rc == SH_OK ? status : app_fail(&err);
 }

@@ -102,7 +102,9 @@ static void judge_absences(const struct checks *c, struct verdict *v)
     v->figures.back_mean_s = a.n > 0 ? a.sum_s / (double)a.n : (double)NAN;
     v->figures.back_max_s = a.n > 0 ? a.max_s : (double)NAN;
     say(v, VERDICT_LETS_GO, a.n > 0 ? VERDICT_PASSED : VERDICT_NOT_JUDGED, "%s",
-        a.n > 0 ? "each time" : "no fault ended a connection");
+        a.n > 0         ? "each time"
+        : a.missing > 0 ? "it did not come back"
+                        : "no fault ended a connection");
     if (a.missing > 0)
         judge_missing(c, &a, v);
     else if (a.n > 0 && a.max_s > c->options->limit_s)
@@ -149,9 +151,12 @@ static void judge_scans(const struct checks *c, struct verdict *v)
 
 static void judge_speed(const struct checks *c, struct verdict *v)
 {
-    if (!c->has_sessions || c->watch->stalls != 0)
-        say(v, VERDICT_KEEPS_UP, VERDICT_NOT_JUDGED, "%s",
-            c->has_sessions ? "the head stalled on request" : "the link does not wait");
+    const char *why = !c->has_sessions               ? "the link does not wait"
+                      : c->watch->first_open_ns == 0 ? "it did not connect"
+                      : c->watch->stalls != 0        ? "the head stalled on request"
+                                                     : NULL;
+    if (why != NULL)
+        say(v, VERDICT_KEEPS_UP, VERDICT_NOT_JUDGED, "%s", why);
     else if (v->figures.left_out != 0)
         say(v, VERDICT_KEEPS_UP, VERDICT_FOUND, "%" PRIu64 " frames were left out, since it read too slowly",
             v->figures.left_out);

@@ -12,6 +12,7 @@
 
 #include "core/newfile.h"
 #include "firmware_sim/app/studio/verdict/client.h"
+#include "firmware_sim/app/studio/verdict/family.h"
 #include "firmware_sim/base/clock.h"
 
 enum { LOOK_MS = 5, PART_LEN = 512 };
@@ -92,6 +93,8 @@ static int client_fork(struct client *client, int log_fd, int out_fd, const char
     if (pipe2(in, O_CLOEXEC) != 0) return sh_fail(err, SH_EIO, "pipe: %s", strerror(errno));
     client->in_fd = in[1];
     client->started_ns = clock_now_ns();
+    siginfo_t child;
+    client->has_others = waitid(P_ALL, 0, &child, WEXITED | WNOHANG | WNOWAIT) == 0;
     /* Processes that the shell leaves behind become children of this one, which can then wait for them. */
     prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0);
     const pid_t pid = fork();
@@ -120,7 +123,7 @@ int client_has_ended(struct client *client)
     int status;
     pid_t pid;
     if (client->pid == 0 || client->ended_ns != 0) return 1;
-    while ((pid = waitpid(-client->pid, &status, WNOHANG)) > 0)
+    while ((pid = waitpid(client->has_others ? -client->pid : -1, &status, WNOHANG)) > 0)
         if (pid == client->pid) client->status = status;
     if (pid == 0) return 0;
     client->ended_ns = clock_now_ns();
@@ -136,14 +139,41 @@ static int wait_for_end(struct client *client, double s)
     return client_has_ended(client);
 }
 
+struct signal_to {
+    int number;
+    pid_t group; /* has got it */
+};
+
+static int client_signal_one(void *ctx, pid_t pid)
+{
+    const struct signal_to *to = ctx;
+    if (getpgid(pid) != to->group) kill(pid, to->number);
+    return 0;
+}
+
+static void client_signal(const struct client *client, int number)
+{
+    struct signal_to to = {number, client->pid};
+    kill(-client->pid, number);
+    if (!client->has_others) family_any(client_signal_one, &to);
+}
+
+/* What is killed may have started another process just before, so it is looked for again. */
+static void client_kill(struct client *client)
+{
+    static const double KILLED_WITHIN_S = 5.0, AGAIN_S = 0.1; /* a process that the kernel holds is not waited for */
+    const int64_t until_ns = clock_now_ns() + (int64_t)(1e9 * KILLED_WITHIN_S);
+    do
+        client_signal(client, SIGKILL);
+    while (!wait_for_end(client, AGAIN_S) && clock_now_ns() < until_ns);
+}
+
 void client_end(struct client *client, double grace_s)
 {
-    static const double KILLED_WITHIN_S = 5.0; /* a process that the kernel holds is not waited for */
     if (client->pid != 0 && !client_has_ended(client)) {
-        kill(-client->pid, SIGTERM);
+        client_signal(client, SIGTERM);
         client->had_to_be_killed = !wait_for_end(client, grace_s);
-        if (client->had_to_be_killed) kill(-client->pid, SIGKILL);
-        wait_for_end(client, KILLED_WITHIN_S);
+        if (client->had_to_be_killed) client_kill(client);
     }
     if (client->in_fd >= 0) close(client->in_fd);
     client->in_fd = -1;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client's process. In: a command for sh -c. Out: whether it runs, and how it ended. It and all that it starts are one
- * process group. */
+/* The client's process. In: a command for sh -c. Out: whether it runs, and how it ended. The client is the shell and all that
+ * descends from it. Only the shell ends with this program if that is killed: what has left the shell then goes on. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
 
@@ -21,14 +21,15 @@ char *client_fill(const char *text, const struct client_words *words);
 struct client {
     int in_fd; /* its standard input, which stays open and has nothing: some clients end with it, or at a key */
     pid_t pid; /* of the shell, and of the group; 0: none was started */
-    int64_t started_ns, ended_ns; /* ended_ns 0: some process of the group is there */
+    int64_t started_ns, ended_ns; /* ended_ns 0: some process of the client is there */
     int status;                   /* the shell's, as waitpid has it */
     int had_to_be_killed;
+    int has_others; /* this process had children before: only the client's group is waited for and ended then */
 };
 
 /* out: the file for standard output; NULL: it goes into the log, as standard error does. Both are emptied. */
 int client_start(struct client *client, const char *line, const char *log, const char *out, struct sh_err *err);
-/* 1: the whole group has ended. */
+/* 1: all of it has ended. */
 int client_has_ended(struct client *client);
 /* SIGTERM, after grace_s SIGKILL. Due after each start. */
 void client_end(struct client *client, double grace_s);

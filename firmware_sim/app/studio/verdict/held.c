@@ -1,19 +1,22 @@
 /* SPDX-License-Identifier: MIT */
 /* A connection that the client still has is in the system's table of TCP, unless the head's end was abrupt: then its socket
  * is in no table any more, and only the client's open descriptors show it. */
+#include <arpa/inet.h>
 #include <dirent.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "firmware_sim/app/studio/verdict/family.h"
 #include "firmware_sim/app/studio/verdict/held.h"
 
 /* States of /proc/net/tcp (tcp_states.h of Linux): the client's end is open, or it has only not closed yet. */
-enum { STATE_ESTABLISHED = 1, STATE_CLOSE_WAIT = 8, PATH_BYTES = 320 };
+enum { STATE_ESTABLISHED = 1, STATE_CLOSE_WAIT = 8, PATH_BYTES = 320, MAX_ADDRESSES = 256 };
 
 /* Calls see for each line of a file until it returns 1; then that, else 0. */
-static int any_line(const char *path, int (*see)(const char *line, unsigned long what), unsigned long what)
+static int any_line(const char *path, int (*see)(const char *line, uint64_t what), uint64_t what)
 {
     FILE *file = fopen(path, "r");
     char line[512];
@@ -24,22 +27,28 @@ static int any_line(const char *path, int (*see)(const char *line, unsigned long
     return seen;
 }
 
-static int is_held(const char *line, unsigned long port)
+/* The table has the host as its four bytes in memory are read. */
+static uint64_t address_of(uint32_t host, unsigned port)
 {
-    unsigned local, state;
-    return sscanf(line, " %*u: %*8x:%4x %*8x:%*4x %2x", &local, &state) == 2 && local == port &&
-           (state == STATE_ESTABLISHED || state == STATE_CLOSE_WAIT);
+    return (uint64_t)host << 16 | port;
 }
 
-static int has_inode(const char *line, unsigned long inode)
+static int is_held(const char *line, uint64_t address)
+{
+    unsigned host, port, state;
+    return sscanf(line, " %*u: %8x:%4x %*8x:%*4x %2x", &host, &port, &state) == 3 &&
+           address_of(host, port) == address && (state == STATE_ESTABLISHED || state == STATE_CLOSE_WAIT);
+}
+
+static int has_inode(const char *line, uint64_t inode)
 {
     char word[32];
-    snprintf(word, sizeof word, " %lu ", inode);
+    snprintf(word, sizeof word, " %" PRIu64 " ", inode);
     return strstr(line, word) != NULL;
 }
 
 /* Whether a socket is in no table: it was connected, and is so no more. */
-static int is_dead(unsigned long inode)
+static int is_dead(uint64_t inode)
 {
     static const char *const tables[] = {"tcp", "tcp6", "udp", "udp6", "unix", "netlink", "raw", "packet"};
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
@@ -50,56 +59,50 @@ static int is_dead(unsigned long inode)
     return 1;
 }
 
-static int has_dead(const char *process)
+static int has_dead(void *ctx, pid_t pid)
 {
     char path[PATH_BYTES], link[PATH_BYTES];
-    snprintf(path, sizeof path, "/proc/%.20s/fd", process);
+    (void)ctx;
+    snprintf(path, sizeof path, "/proc/%d/fd", (int)pid);
     DIR *folder = opendir(path);
     int dead = 0;
     for (struct dirent *entry; folder != NULL && !dead && (entry = readdir(folder)) != NULL;) {
-        unsigned long inode;
-        snprintf(path, sizeof path, "/proc/%.20s/fd/%.20s", process, entry->d_name);
+        uint64_t inode;
+        snprintf(path, sizeof path, "/proc/%d/fd/%.20s", (int)pid, entry->d_name);
         const ssize_t len = readlink(path, link, sizeof link - 1);
         if (len < 0) continue;
         link[len] = '\0';
-        dead = sscanf(link, "socket:[%lu]", &inode) == 1 && is_dead(inode);
+        dead = sscanf(link, "socket:[%" SCNu64 "]", &inode) == 1 && is_dead(inode);
     }
     if (folder != NULL) closedir(folder);
     return dead;
 }
 
-/* /proc/N/stat: the group is the third field after the name in brackets. */
-static int is_of_group(const char *line, unsigned long group)
+/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so files are
+ * read without it. */
+static size_t copy_addresses(struct watch *watch, uint64_t *address, size_t cap)
 {
-    const char *name_end = strrchr(line, ')');
-    long of;
-    return name_end != NULL && sscanf(name_end, ") %*c %*d %ld", &of) == 1 && of == (long)group;
-}
-
-static int has_dead_in_group(pid_t group)
-{
-    DIR *processes = opendir("/proc");
-    int dead = 0;
-    for (struct dirent *entry; processes != NULL && !dead && (entry = readdir(processes)) != NULL;) {
-        char path[PATH_BYTES];
-        if (entry->d_name[0] < '1' || entry->d_name[0] > '9') continue;
-        snprintf(path, sizeof path, "/proc/%.20s/stat", entry->d_name);
-        dead = any_line(path, is_of_group, (unsigned long)group) && has_dead(entry->d_name);
-    }
-    if (processes != NULL) closedir(processes);
-    return dead;
-}
-
-int held_any(struct watch *watch, pid_t group)
-{
-    int missing = 0, held = 0;
+    size_t n = 0;
     pthread_mutex_lock(&watch->lock);
-    for (size_t i = 0; i < watch->n_broken && !held; i++) {
-        const char *port = strrchr(watch->broken[i].peer, ':');
+    for (size_t i = 0; i < watch->n_broken && n < cap; i++) {
+        const char *peer = watch->broken[i].peer, *port = strrchr(peer, ':');
+        char text[INET_ADDRSTRLEN];
+        struct in_addr host;
         if (watch->broken[i].back_ns != 0 || port == NULL) continue;
-        missing = 1;
-        held = any_line("/proc/net/tcp", is_held, strtoul(port + 1, NULL, 10));
+        snprintf(text, sizeof text, "%.*s", (int)(port - peer), peer);
+        if (inet_pton(AF_INET, text, &host) != 1) continue;
+        address[n++] = address_of(host.s_addr, (unsigned)strtoul(port + 1, NULL, 10));
     }
     pthread_mutex_unlock(&watch->lock);
-    return held || (missing && has_dead_in_group(group));
+    return n;
+}
+
+int held_any(struct watch *watch)
+{
+    uint64_t address[MAX_ADDRESSES];
+    const size_t n = copy_addresses(watch, address, MAX_ADDRESSES);
+    int held = 0;
+    for (size_t i = 0; i < n && !held; i++)
+        held = any_line("/proc/net/tcp", is_held, address[i]);
+    return held || (n > 0 && family_any(has_dead, NULL));
 }

@@ -1,14 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Connections that the head has ended, and that the client still has. In: the peers of sessions that have ended, and the
- * client's process group. Out: whether there is one. By Linux's /proc, so of clients on this machine. */
+/* Connections that the head has ended, and that the client still has. In: the peers of sessions that have ended. Out: whether there is one. By Linux's /proc, so of clients on this machine. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_HELD_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_HELD_H
-
-#include <sys/types.h>
 
 #include "firmware_sim/app/studio/verdict/watch.h"
 
 /* Looks at sessions after which nobody came back. */
-int held_any(struct watch *watch, pid_t group);
+int held_any(struct watch *watch);
 
 #endif

@@ -3,7 +3,8 @@
  *
  * A point of the client's may agree with several of the head's. These are then one group, and counts are compared by group.
  * A client that has each point that it was sent once can't have more points in a group than were sent: each of its points
- * agrees with the one that it comes from, so both are in the same group. So dense points give no false finding. */
+ * agrees with the one that it comes from, so both are in the same group. Dense points therefore give no false finding. */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 #include "firmware_sim/app/studio/verdict/match.h"
 #include "firmware_sim/app/studio/verdict/match_index.h"
 
-enum { TRIED_POINTS = 2000, MAX_WAYS = 4 };
+enum { TRIED_POINTS = 2000, MAX_WAYS = 4, LOOK_POINTS = 64 };
 
 /* ---- coordinate frames */
 
@@ -78,15 +79,16 @@ static int is_empty(const double p[3])
 }
 
 /* The way by which most points agree, of some from all over the cloud. */
-static const struct way *best_way(const struct match_index *index, const struct cloud *cloud, const struct way *ways,
+static const struct way *best_way(const struct match_index *index, const struct match_input *in, const struct way *ways,
                                   int n_ways)
 {
+    const struct cloud *cloud = in->cloud;
     const size_t step = cloud->n / TRIED_POINTS + 1;
     const struct way *best = ways;
     size_t most = 0;
     for (int k = 0; k < n_ways; k++) {
         size_t n = 0;
-        for (size_t i = 0; i < cloud->n; i += step) {
+        for (size_t i = 0; i < cloud->n && !sh_stopped(in->report); i += step) {
             double p[3];
             if (is_empty(cloud->xyz_m[i])) continue;
             match_go(&ways[k], cloud->xyz_m[i], p);
@@ -122,15 +124,16 @@ static uint32_t count_sent(const struct watch *watch, int64_t tick_ns, const str
     return n;
 }
 
-static int index_stream(const struct own_stream *stream, struct watch *watch, int64_t tick_ns,
-                        struct match_index *index, struct sh_err *err)
+static int index_stream(const struct match_input *in, struct match_index *index, struct sh_err *err)
 {
+    const struct own_stream *stream = in->stream;
+    struct watch *watch = in->watch;
     size_t n = 0;
     index->entry = malloc((stream->n + 1) * sizeof *index->entry);
     if (index->entry == NULL) return sh_fail(err, SH_ENOMEM, "no memory to compare %zu points", stream->n);
     if (watch->n_spoiled != 0) qsort(watch->spoiled, watch->n_spoiled, sizeof *watch->spoiled, compare_spoiled);
     for (size_t f = 0; f < stream->n_frames; f++) {
-        const uint32_t sent = count_sent(watch, tick_ns, &stream->frame[f]);
+        const uint32_t sent = count_sent(watch, in->tick_ns, &stream->frame[f]);
         for (; n < stream->frame[f].end; n++) {
             memcpy(index->entry[n].p, stream->xyz_m[n], sizeof index->entry[n].p);
             index->entry[n].sent = sent;
@@ -157,11 +160,27 @@ static void match_take(void *ctx, size_t entry)
         match_index_join(taker->index, taker->first, entry);
 }
 
-static void count_points(struct match_index *index, const struct cloud *cloud, const struct way *way, struct match *m)
+static void count_groups(const struct match_index *index, struct match *m)
 {
-    for (size_t i = 0; i < cloud->n; i++) {
+    for (size_t i = 0; i < index->n; i++) {
+        const struct match_entry *e = &index->entry[i];
+        if (e->parent != i) continue;
+        m->sent += e->sent;
+        m->again += e->sent > 0 ? e->sent - 1 : 0;
+        if (e->got > e->sent) m->repeated += e->got - e->sent;
+    }
+}
+
+/* With a large distance each point agrees with very many, so a stop is looked for often. */
+static int count_points(struct match_index *index, const struct match_input *in, const struct way *way, struct match *m,
+                        struct sh_err *err)
+{
+    const struct cloud *cloud = in->cloud;
+    int rc = SH_OK;
+    for (size_t i = 0; i < cloud->n && rc == SH_OK; i++) {
         struct taker taker = {index, SIZE_MAX};
         double p[3];
+        if (i % LOOK_POINTS == 0) rc = sh_check_stop(in->report, err);
         if (is_empty(cloud->xyz_m[i])) {
             m->empty++;
             continue;
@@ -174,26 +193,48 @@ static void count_points(struct match_index *index, const struct cloud *cloud, c
         else if (m->unknown++ == 0)
             m->first_unknown = i;
     }
-    for (size_t i = 0; i < index->n; i++) {
-        const struct match_entry *e = &index->entry[i];
-        if (e->parent != i) continue;
-        m->sent += e->sent;
-        m->again += e->sent > 0 ? e->sent - 1 : 0;
-        if (e->got > e->sent) m->repeated += e->got - e->sent;
-    }
+    count_groups(index, m);
+    return rc;
 }
 
-double match_unit_m(const struct cloud *cloud)
+/* ---- how far coordinates may differ */
+
+/* No point of the head has a coordinate beyond this one, in any of the frames: a rotation keeps lengths. */
+static double limit_of(const struct own_stream *stream)
+{
+    const double *at = stream->info.station_m;
+    double largest = 0.0;
+    for (size_t i = 0; i < stream->n; i++) {
+        const double *p = stream->xyz_m[i];
+        largest = fmax(largest, sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]));
+    }
+    return largest + sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
+}
+
+static int is_within(const double p[3], double limit_m)
+{
+    return fabs(p[0]) <= limit_m && fabs(p[1]) <= limit_m && fabs(p[2]) <= limit_m;
+}
+
+static double single_unit_m(const struct cloud *cloud, double limit_m)
+{
+    double largest = 0.0;
+    for (size_t i = 0; i < cloud->n; i++)
+        for (int k = 0; k < 3 && is_within(cloud->xyz_m[i], limit_m); k++)
+            largest = fmax(largest, fabs(cloud->xyz_m[i][k]));
+    return cloud_single_unit(largest);
+}
+
+double match_unit_m(const struct cloud *cloud, double limit_m)
 {
     const size_t step = cloud->n / TRIED_POINTS + 1;
-    int decimals = 0, digits = 0;
+    int decimals = 0, digits = 1;
     double largest = 0.0;
-    if (!cloud->is_text) return cloud->count_m;
+    if (!cloud->is_text) return cloud->is_single ? single_unit_m(cloud, limit_m) : cloud->count_m;
     for (size_t i = 0; i < cloud->n; i++)
-        for (int k = 0; k < 3; k++) {
+        for (int k = 0; k < 3 && is_within(cloud->xyz_m[i], limit_m); k++) {
             const double v = fabs(cloud->xyz_m[i][k]);
             char text[32];
-            if (isnan(v)) continue;
             if (v > largest) largest = v;
             if (i % step != 0) continue;
             /* 15 digits are what a double keeps of a decimal number; without zeros at their end: D.DDDDe-02 */
@@ -211,18 +252,25 @@ double match_unit_m(const struct cloud *cloud)
     return pow(10.0, -last);
 }
 
-int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,
-                 double match_m, struct match *match, struct sh_err *err)
+/* Two programs that compute the same coordinate in double precision, by rotation and sum, differ by some units in the last
+ * place of the largest one. A nanometre more is less than any link resolves. */
+static double rounding_m(double limit_m)
 {
+    return fmax(4.0 * DBL_EPSILON * limit_m, 1e-9);
+}
+
+int match_points(const struct match_input *in, struct match *match, struct sh_err *err)
+{
+    const double limit_m = limit_of(in->stream);
     struct match_index index = {0};
     struct way ways[MAX_WAYS];
-    *match = (struct match){.unit_m = match_unit_m(cloud)};
-    match->within_m = index.within_m = match->unit_m + match_m;
-    const int rc = index_stream(stream, watch, tick_ns, &index, err);
+    *match = (struct match){.unit_m = match_unit_m(in->cloud, limit_m)};
+    match->within_m = index.within_m = fmax(match->unit_m + in->match_m, rounding_m(limit_m));
+    int rc = index_stream(in, &index, err);
     if (rc == SH_OK) {
-        const struct way *way = best_way(&index, cloud, ways, find_ways(stream, ways));
+        const struct way *way = best_way(&index, in, ways, find_ways(in->stream, ways));
         match->frame = way->frame;
-        count_points(&index, cloud, way, match);
+        rc = count_points(&index, in, way, match, err);
     }
     free(index.entry);
     return rc;

@@ -20,12 +20,20 @@ struct match {
     double unit_m, within_m; /* what the file rounds to; how far a coordinate may differ */
 };
 
-/* match_m: beside what the file rounds to. tick_ns: sessions begin and end with ticks. */
-int match_points(const struct own_stream *stream, struct watch *watch, int64_t tick_ns, const struct cloud *cloud,
-                 double match_m, struct match *match, struct sh_err *err);
+struct match_input {
+    const struct own_stream *stream;
+    struct watch *watch;
+    int64_t tick_ns; /* sessions begin and end with ticks */
+    const struct cloud *cloud;
+    double match_m; /* beside what the file rounds to */
+    const struct sh_report *report;
+};
 
-/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, else
- * count_m. */
-double match_unit_m(const struct cloud *cloud);
+/* SH_ESTOPPED where report asks to stop. */
+int match_points(const struct match_input *in, struct match *match, struct sh_err *err);
+
+/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, in single
+ * precision by the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
+double match_unit_m(const struct cloud *cloud, double limit_m);
 
 #endif

@@ -28,11 +28,25 @@ static int compare_entries(const void *left, const void *right)
     return by_cell;
 }
 
+static void widen(struct match_index *index, const double p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        index->least[k] = fmin(index->least[k], p[k]);
+        index->most[k] = fmax(index->most[k], p[k]);
+    }
+}
+
 void match_index_make(struct match_index *index)
 {
     size_t n = 0;
-    for (size_t i = 0; i < index->n; i++)
+    for (int k = 0; k < 3; k++) {
+        index->least[k] = INFINITY;
+        index->most[k] = -INFINITY;
+    }
+    for (size_t i = 0; i < index->n; i++) {
         cell_of(index, index->entry[i].p, index->entry[i].cell);
+        widen(index, index->entry[i].p);
+    }
     qsort(index->entry, index->n, sizeof *index->entry, compare_entries);
     for (size_t i = 0; i < index->n; i++) {
         struct match_entry *e = &index->entry[i];
@@ -67,11 +81,20 @@ static int agrees(const struct match_index *index, const struct match_entry *e, 
            fabs(e->p[2] - p[2]) <= index->within_m;
 }
 
+/* A place far away has no cell, since its number would be too large. */
+static int is_near_any(const struct match_index *index, const double p[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (!(p[k] >= index->least[k] - index->within_m && p[k] <= index->most[k] + index->within_m)) return 0;
+    return 1;
+}
+
 size_t match_index_near(const struct match_index *index, const double p[3], void (*hit)(void *ctx, size_t entry),
                         void *ctx)
 {
     int64_t middle[3];
     size_t n = 0;
+    if (!is_near_any(index, p)) return 0;
     cell_of(index, p, middle);
     for (int side = 0; side < 9; side++) { /* a column of three cells each */
         const int64_t first[3] = {middle[0] + side / 3 - 1, middle[1] + side % 3 - 1, middle[2] - 1};

@@ -17,7 +17,8 @@ struct match_entry {
 struct match_index {
     struct match_entry *entry; /* sorted by cell and place */
     size_t n;
-    double within_m;
+    double within_m;          /* more than 0 */
+    double least[3], most[3]; /* coordinates of entries */
 };
 
 /* Sorts the n entries, of which p and sent are filled, and joins those of one place. */

@@ -165,7 +165,7 @@ static void run_client(struct run *r)
     fault_board_remove(device_faults(r->device), 0);
     if (c->has_sessions ? is_connected(r) : there) run_settle(r);
     c->was_there = !client_has_ended(&r->client);
-    c->holds = c->was_there && held_any(&r->watch, r->client.pid);
+    c->holds = c->was_there && held_any(&r->watch);
     c->ended_ns = clock_now_ns();
     watch_end(&r->watch);
     client_end(&r->client, o->grace_s);
@@ -228,7 +228,13 @@ static int run_compare(struct run *r, struct sh_err *err)
         checks_no_points(r->verdict, VERDICT_FOUND, why.text);
         return SH_OK;
     }
-    const int rc = match_points(&r->stream, &r->watch, device_tick_ns(r->device), &cloud, match_of(r), &match, err);
+    const struct match_input in = {.stream = &r->stream,
+                                   .watch = &r->watch,
+                                   .tick_ns = device_tick_ns(r->device),
+                                   .cloud = &cloud,
+                                   .match_m = match_of(r),
+                                   .report = &app_report_stderr};
+    const int rc = match_points(&in, &match, err);
     if (rc == SH_OK && match.n == 0)
         checks_no_points(r->verdict, VERDICT_FOUND, "it has no point");
     else if (rc == SH_OK)
@@ -242,10 +248,13 @@ static int run_judge(struct run *r, struct sh_err *err)
     checks_judge(&r->checks, r->verdict);
     if (r->points == NULL)
         checks_no_points(r->verdict, VERDICT_NOT_JUDGED, "no --client-file");
-    else if (r->stream.short_of[0] != '\0')
-        checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
-    else
+    else if (r->stream.short_of[0] == '\0')
         return run_compare(r, err);
+    else {
+        checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
+        sh_warn(&app_report_stderr, "soak: %s: its points are not judged, as --client-file asks: %s",
+                r->verdict->scenario, r->stream.short_of);
+    }
     return SH_OK;
 }
 
@@ -258,7 +267,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     r->options = options;
     r->verdict = verdict;
     r->stream.keeps = options->file != NULL;
-    watch_begin(&r->watch, cfg->n_links, options->link);
+    watch_begin(&r->watch, cfg->n_links, options->link, options->limit_s);
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].protocol == PROTOCOL_SCIP || cfg->link[i].protocol == PROTOCOL_COLA)
             r->watch.must_ask |= 1U << i;

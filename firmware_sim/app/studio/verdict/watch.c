@@ -49,6 +49,24 @@ static void begin_session(struct watch *w, uint32_t session, int64_t t_ns)
     w->span[w->n_span++] = (struct watch_span){session, t_ns, INT64_MAX};
 }
 
+/* A client may end its own session after some faults; others end it. */
+static int leaves_sessions(enum fault_kind kind)
+{
+    return kind == FAULT_STALL || kind == FAULT_CABLE || kind == FAULT_ENDPOINT_STALL || kind == FAULT_SHORT_PACKETS;
+}
+
+/* Whether the fault is why a session ends now. The client has its whole limit from the end on, so it makes no difference
+ * on which side of a bound the end falls: what the fault did not cause is the client's own. */
+static int is_caused(const struct watch *w, const struct watch_link *link, int64_t *over_ns)
+{
+    const int64_t now_ns = clock_now_ns();
+    *over_ns = link->over_ns;
+    if (!link->acted) return 0;
+    if (!leaves_sessions(link->kind)) return 1;
+    if (now_ns > *over_ns) *over_ns = now_ns;
+    return now_ns <= link->over_ns + w->limit_ns;
+}
+
 static void end_session(struct watch *w, uint32_t session, const char *peer, int64_t t_ns)
 {
     const uint32_t number = link_of(session);
@@ -56,8 +74,8 @@ static void end_session(struct watch *w, uint32_t session, const char *peer, int
     link->open -= link->open != 0;
     for (size_t i = w->n_span; i-- > 0;)
         if (w->span[i].session == session && w->span[i].to_ns == INT64_MAX) w->span[i].to_ns = t_ns;
-    if (!link->acted || w->is_over) return;
-    struct watch_break broken = {.link = number, .kind = link->kind, .over_ns = link->over_ns};
+    struct watch_break broken = {.link = number, .kind = link->kind};
+    if (w->is_over || !is_caused(w, link, &broken.over_ns)) return;
     snprintf(broken.peer, sizeof broken.peer, "%s", peer);
     add_break(w, &broken);
 }
@@ -207,9 +225,10 @@ int64_t watch_first_open_ns(struct watch *w)
     return first_ns;
 }
 
-void watch_begin(struct watch *w, uint32_t n_links, uint32_t chosen)
+void watch_begin(struct watch *w, uint32_t n_links, uint32_t chosen, double limit_s)
 {
     memset(w, 0, sizeof *w);
+    w->limit_ns = (int64_t)(1e9 * limit_s);
     w->n_links = n_links;
     w->chosen = chosen;
     pthread_mutex_init(&w->lock, NULL);

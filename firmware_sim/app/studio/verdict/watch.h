@@ -46,6 +46,7 @@ struct watch {
     struct links_observer observer;
     uint32_t n_links, chosen; /* chosen: the client's, from 1 */
     uint32_t must_ask; /* bit per link: who has come back there gets nothing before a request, and is back with it */
+    int64_t limit_ns;  /* how long after a fault that leaves sessions their end still counts as caused by it */
     int is_over;       /* what follows is the end of the run, and no client's doing */
     int is_short;      /* memory was */
     struct watch_link link[CONFIG_MAX_LINKS];
@@ -59,8 +60,8 @@ struct watch {
     char last[WATCH_LINE];                       /* what was heard last, printable */
 };
 
-/* Links after the first n_links are not watched. */
-void watch_begin(struct watch *watch, uint32_t n_links, uint32_t chosen);
+/* Links after the first n_links are not watched. limit_s: the time that a client has to come back. */
+void watch_begin(struct watch *watch, uint32_t n_links, uint32_t chosen, double limit_s);
 void watch_end(struct watch *watch);
 void watch_free(struct watch *watch);
 /* The listener of the board. */
