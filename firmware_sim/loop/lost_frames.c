@@ -93,9 +93,27 @@ static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
     return frames;
 }
 
+/* Counts what the ring no longer has of a session that is gone: nobody will take the next tick, which would show it. */
+static void count_overtaken(struct pump *pump, struct session *s)
+{
+    struct ring *ring = &pump->stream->ring;
+    const uint64_t released = stream_released(pump->stream);
+    struct ring_copy tick;
+    if (!s->lost.have_seq || released - s->cursor <= ring->queue_ticks) return;
+    enum ring_read got = RING_LOST;
+    for (uint64_t at = released - ring->queue_ticks; at < released && got == RING_LOST; at++) {
+        got = ring_look(ring, s->reader, at, &tick);
+        ring_leave(ring, s->reader);
+    }
+    if (got != RING_READ || tick.first_seq == s->lost.next_seq) return;
+    count_lost(pump, tick.first_seq - s->lost.next_seq, tick.pulses_before - s->lost.next_pulse);
+    lost_frames_report(pump, s);
+}
+
 void session_gone(struct pump *pump, struct session *s)
 {
     uint64_t pulses = 0;
+    count_overtaken(pump, s);
     const int native = pump->protocol->passes_native;
     const struct faulty_unwritten in_link = faulty_forget(pump->link, session_index(pump, s));
     if (native) count_unwritten(s, &pulses);

@@ -279,6 +279,32 @@ static void test_head_ends_first(void **state)
     assert_int_equal(stats_uint(wire, "reader_lost_pulses"), left_out);
 }
 
+/* A reader that never reads, and leaves: it takes no further tick, whose number would show the loss. */
+static void test_gone(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &RATE), NULL);
+    struct tally other = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1};
+    const int fd = raw_connect(head_endpoint(&head, "tcp"));
+    struct scanhead_frame frame;
+    client_wait_state(other.sh, "idle");
+    client_tell(other.sh, "SCAN:START");
+    while (other.bytes < HOLD_BYTES) {
+        client_next(other.sh, &frame);
+        take(&other, &frame);
+    }
+    close(fd);
+    int number;
+    for (int64_t since_ns = 0; (number = atoi(client_ask(other.sh, "SYST:ERR?"))) != 102;) {
+        if (number == 0) client_next(other.sh, &frame);
+        wire_soon(&since_ns, client_time_ns(other.sh), "an error of the reader");
+    }
+    scanhead_close(other.sh);
+    head_end(&head, SIGTERM);
+    assert_true(stats_uint(wire, "reader_lost_frames") > 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -287,6 +313,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_lost, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_head_ends_first, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_gone, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
