@@ -232,6 +232,26 @@ static void changes_are_sent(void **state)
     fields_expect("200");
 }
 
+/* Fields are evaluated while the session measures. What was seen before is not valid afterwards. */
+static void a_stopped_session_evaluates_nothing(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    EXPECT_B("sEN LFErec \1", "sEA LFErec \1");
+    fields_object(350, 5, 1.0);
+    fields_turn();
+    fields_expect("200");
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    protocol_rig_clear(&cola);
+    fields_turn();
+    assert_int_equal(cola.n_units, 0);
+    fields_expect("000");
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    fields_turn();
+    fields_expect("200");
+}
+
 /* Scan k begins at k / 15 s; the clock counts from 1970 without UTC. */
 static void a_result_has_the_time_of_its_change(void **state)
 {
@@ -326,6 +346,7 @@ int main(void)
         CASE(results_follow_the_scan),
         CASE(chords),
         CASE(changes_are_sent),
+        CASE(a_stopped_session_evaluates_nothing),
         CASE(a_result_has_the_time_of_its_change),
         CASE(scans_carry_the_outputs),
         CASE(telegrams_choose_the_set),
