@@ -101,6 +101,7 @@ static void fields_and_the_window(void **state)
     close(late.fd);
     poll_until(&c, "sRN LCMstate", "sRA LCMstate 0");
     const long soiled = strtol(client_ask(native, "FAULt:ADD {kind: window_soiled, loss_db: 3}"), NULL, 10);
+    assert_true(soiled > 0);
     poll_until(&c, "sRN LCMstate", "sRA LCMstate 2");
     char line[40];
     snprintf(line, sizeof line, "FAULt:CLEar %ld", soiled);
