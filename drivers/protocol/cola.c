@@ -81,7 +81,7 @@ void cola_deliver(struct cola *self)
     if (!self->pending) return;
     cola_follow_dialect(self);
     self->pending = self->wants_scan = 0;
-    const unsigned news = self->watch.on ? cola_ports_scan(self) : 0;
+    const unsigned news = self->watch.on && self->measures ? cola_ports_scan(self) : 0;
     deliver_scan(self);
     if (news != 0) cola_ports_report(self, news);
 }

@@ -169,6 +169,8 @@ uint32_t cola_outputs(const struct cola *self);
 void cola_fields_load(struct cola *self);
 /* The same, and no events, and outputs off. */
 void cola_ports_reset(struct cola *self);
+/* Begins the evaluation anew: results are invalid until the next scan. */
+void cola_ports_select(struct cola *self);
 /* A scan is done: evaluates the fields. */
 unsigned cola_ports_scan(struct cola *self);
 /* Sends what changed, to a client that asked for it. */

@@ -7,8 +7,6 @@
 
 #include "drivers/protocol/cola_units.h"
 
-#define TAU 6.283185307179586
-
 enum { MM_UM = 1000, MOST_COUNT = 65534 };
 
 uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t *next_ns)
@@ -69,6 +67,13 @@ static void take_no_part(struct cola_args *args)
     if (take_flag(args)) args->error = COLA_INVALID_DATA;
 }
 
+/* A record without a part erases its field; a model's record of an empty field has none. */
+static int has_part_of_type(const struct cola_record *r)
+{
+    if (r->type == COLA_FIELD_RECTANGLE) return !r->is_segmented;
+    return r->type == COLA_FIELD_SEGMENTED && !r->is_rectangle;
+}
+
 enum cola_error cola_record_take(struct cola_args *args, struct cola_record *r)
 {
     memset(r, 0, sizeof *r);
@@ -86,6 +91,7 @@ enum cola_error cola_record_take(struct cola_args *args, struct cola_record *r)
     take_no_part(args); /* dynamic */
     if (take_flag(args)) cola_arg_text(args, r->name, sizeof r->name);
     take_no_part(args); /* comment */
+    if (args->error == COLA_OK && !has_part_of_type(r)) args->error = COLA_INVALID_DATA;
     return cola_args_end(args);
 }
 
@@ -153,12 +159,11 @@ enum cola_error cola_record_shape(const struct cola_record *r, const struct plan
                                   struct cola_shape *shape)
 {
     memset(shape, 0, sizeof *shape);
-    if (r->is_segmented && r->is_rectangle) return COLA_INVALID_DATA;
     if (r->is_segmented) return chain(r, head, shape);
     if (!r->is_rectangle) return COLA_OK;
     const double turns = ((double)r->angle_e4 + (from_first ? r->first_e4 : 0)) / COLA_TURN_E4;
     const double d_um = length_um(r, r->distance);
-    const double corner[2] = {d_um * cos(TAU * turns), d_um * sin(TAU * turns)};
+    const double corner[2] = {d_um * cos(COLA_TURN_RAD * turns), d_um * sin(COLA_TURN_RAD * turns)};
     const double size[2] = {(double)r->width_mm * MM_UM, (double)r->length_mm * MM_UM};
     return cola_shape_rectangle(shape, corner, size, (double)r->turn_e4 / COLA_TURN_E4) == 0 ? COLA_OK
                                                                                              : COLA_INVALID_DATA;
@@ -166,10 +171,10 @@ enum cola_error cola_record_shape(const struct cola_record *r, const struct plan
 
 /* ---- a shape as a record */
 
+/* The scale is such that the farthest place has a count. */
 static uint16_t counts_of(const struct cola_record *r, double um)
 {
-    const double counts = um / MM_UM / (double)r->scale;
-    return (uint16_t)lround(counts < MOST_COUNT ? counts : MOST_COUNT);
+    return (uint16_t)lround(um / MM_UM / (double)r->scale);
 }
 
 /* A direction of the shape at a beam. Points of the same beam are joined. */
@@ -208,20 +213,28 @@ static double beam_turns(const struct planar_head *head, uint32_t beam)
     return (double)cola_beam_quarters(head, beam) / (4.0 * head->steps);
 }
 
+/* A shape that is wider than the view ends with it. */
+static void add_ends(struct cola_record *r, const struct cola_shape *shape, const struct planar_head *head)
+{
+    add_direction(r, shape, head, beam_turns(head, 0));
+    add_direction(r, shape, head, beam_turns(head, head->n - 1));
+}
+
 static void describe_sector(struct cola_record *r, const struct cola_shape *shape, const struct planar_head *head)
 {
-    for (uint32_t i = 0; i < COLA_SHAPE_LINKS; i++)
+    enum { SPREAD = COLA_SHAPE_LINKS - 2 };
+    add_ends(r, shape, head);
+    for (uint32_t i = 0; i < SPREAD; i++)
         add_direction(r, shape, head,
-                      (shape->sector.start_e4 + shape->sector.span_e4 * (i / (COLA_SHAPE_LINKS - 1.0))) / COLA_TURN_E4);
+                      (shape->sector.start_e4 + shape->sector.span_e4 * (i / (SPREAD - 1.0))) / COLA_TURN_E4);
 }
 
 static void describe_polygon(struct cola_record *r, const struct cola_shape *shape, const struct planar_head *head)
 {
-    add_direction(r, shape, head, beam_turns(head, 0));
-    add_direction(r, shape, head, beam_turns(head, head->n - 1));
+    add_ends(r, shape, head);
     for (uint32_t i = 0; i < shape->n; i++)
         if (shape->corner[i].x_um != 0 || shape->corner[i].y_um != 0)
-            add_direction(r, shape, head, atan2(shape->corner[i].y_um, shape->corner[i].x_um) / TAU);
+            add_direction(r, shape, head, atan2(shape->corner[i].y_um, shape->corner[i].x_um) / COLA_TURN_RAD);
 }
 
 static double farthest_um(const struct cola_shape *shape)
@@ -233,9 +246,15 @@ static double farthest_um(const struct cola_shape *shape)
     return far_um;
 }
 
+/* Whole millimetres, at least one: counts of u16 then reach as far as the shape. */
+static float scale_of(const struct cola_shape *shape)
+{
+    return (float)fmax(1.0, ceil(farthest_um(shape) / MM_UM / MOST_COUNT));
+}
+
 static void describe_rectangle(const struct cola_field *field, struct cola_record *r, int from_first)
 {
-    const double turns = atan2(field->corner_um[1], field->corner_um[0]) / TAU;
+    const double turns = atan2(field->corner_um[1], field->corner_um[0]) / COLA_TURN_RAD;
     r->type = COLA_FIELD_RECTANGLE;
     r->is_segmented = 0;
     r->is_rectangle = 1;
@@ -249,7 +268,7 @@ static void describe_rectangle(const struct cola_field *field, struct cola_recor
 void cola_field_describe(const struct cola_field *field, const struct planar_head *head, int from_first,
                          struct cola_record *out)
 {
-    *out = (struct cola_record){.scale = farthest_um(&field->shape) > 65.5e6 ? 2.0f : 1.0f,
+    *out = (struct cola_record){.scale = scale_of(&field->shape),
                                 .step_e4 = cola_step_angle(head),
                                 .first_e4 = cola_beam_angle(head, 0),
                                 .type = COLA_FIELD_SEGMENTED,

@@ -15,7 +15,7 @@ static int cola_ports_is_lms(const struct cola *self)
 /* ---- what is watched */
 
 /* A TiM watches the three fields of a set, for an output each. An LMS watches all its fields that have a shape. */
-static void select_fields(struct cola *self)
+void cola_ports_select(struct cola *self)
 {
     uint32_t numbers[COLA_WATCH_SLOTS], n = 0;
     uint8_t outputs[COLA_WATCH_SLOTS];
@@ -43,7 +43,7 @@ void cola_fields_load(struct cola *self)
         memset(&self->fields, 0, sizeof self->fields);
     self->ports.by_telegram = 0;
     self->ports.set = (uint16_t)(self->ports.seen + 1);
-    select_fields(self);
+    cola_ports_select(self);
 }
 
 void cola_ports_reset(struct cola *self)
@@ -128,7 +128,7 @@ enum cola_error cola_write_field(struct cola *self, uint32_t field, struct cola_
     f->record = record;
     f->has_record = 1;
     f->shape = shape;
-    select_fields(self);
+    cola_ports_select(self);
     return COLA_OK;
 }
 
@@ -176,7 +176,7 @@ static void take_set(struct cola *self, uint32_t set)
 {
     if (set == self->ports.set) return;
     self->ports.set = (uint16_t)set;
-    select_fields(self);
+    cola_ports_select(self);
 }
 
 enum cola_error cola_write_set_method(struct cola *self, struct cola_args *args, struct cola_out *out)

@@ -3,11 +3,9 @@
 
 #include <math.h>
 
-#define TAU 6.283185307179586
-
 struct cola_measured cola_measured_at(int32_t step, int32_t steps, int32_t range_um)
 {
-    const double angle = TAU * step / steps;
+    const double angle = COLA_TURN_RAD * step / steps;
     return (struct cola_measured){
         {(int32_t)lround(range_um * cos(angle)), (int32_t)lround(range_um * sin(angle))}, range_um, step, steps};
 }
@@ -58,16 +56,26 @@ static int64_t chain_turn(const struct cola_measured *m, const struct cola_link 
     return (int64_t)m->step * link->steps - (int64_t)link->step * m->steps;
 }
 
-/* Between two links the head is left of the far line and the field right of the near one. */
-static int chain_has(const struct cola_shape *s, const struct cola_measured *m)
+/* The beam's step with whole turns added or taken away, up to less than a turn from the first link on. */
+static int32_t chain_step(const struct cola_measured *m, const struct cola_link *first)
 {
+    const int64_t turn = (int64_t)m->steps * first->steps, beyond = chain_turn(m, first);
+    const int64_t turns = beyond / turn - (beyond % turn < 0);
+    return (int32_t)(m->step - turns * m->steps);
+}
+
+/* Between two links the head is left of the far line and the field right of the near one. */
+static int chain_has(const struct cola_shape *s, const struct cola_measured *seen)
+{
+    struct cola_measured m = *seen;
+    if (s->n != 0) m.step = chain_step(seen, &s->link[0]);
     for (uint32_t i = 0; i < s->n; i++) {
         const struct cola_link *link = &s->link[i];
-        const int64_t beyond = chain_turn(m, link);
-        if (beyond == 0) return m->range_um >= link->near_um && m->range_um <= link->far_um;
+        const int64_t beyond = chain_turn(&m, link);
+        if (beyond == 0) return m.range_um >= link->near_um && m.range_um <= link->far_um;
         if (beyond > 0) continue;
-        return i > 0 && cola_shape_side(&link[-1].far, &link->far, &m->at) >= 0 &&
-               cola_shape_side(&link[-1].near, &link->near, &m->at) <= 0;
+        return i > 0 && cola_shape_side(&link[-1].far, &link->far, &m.at) >= 0 &&
+               cola_shape_side(&link[-1].near, &link->near, &m.at) <= 0;
     }
     return 0;
 }
@@ -104,7 +112,7 @@ static void cut_edge(const struct cola_point *a, const struct cola_point *b, con
 int cola_shape_cut(const struct cola_shape *s, double turns, int32_t *near_um, int32_t *far_um)
 {
     static const struct cola_point head = {0, 0};
-    const double ray[2] = {cos(TAU * turns), sin(TAU * turns)};
+    const double ray[2] = {cos(COLA_TURN_RAD * turns), sin(COLA_TURN_RAD * turns)};
     double near = HUGE_VAL, far = -1.0;
     if (s->kind == COLA_SHAPE_SECTOR) {
         double after_e4 = fmod(turns * COLA_TURN_E4 - s->sector.start_e4, COLA_TURN_E4);
@@ -131,7 +139,8 @@ static uint32_t sector_outline(const struct cola_shape *s, double out_m[][2])
     uint32_t n = 0;
     for (uint32_t i = 0; i < 2 * STEPS; i++) { /* out along the outer arc, and back along the inner one */
         const uint32_t k = i < STEPS ? i : 2 * STEPS - 1 - i;
-        const double angle = TAU * (s->sector.start_e4 + (double)s->sector.span_e4 * k / (STEPS - 1)) / COLA_TURN_E4;
+        const double angle =
+            COLA_TURN_RAD * (s->sector.start_e4 + (double)s->sector.span_e4 * k / (STEPS - 1)) / COLA_TURN_E4;
         const double radius_m = 1e-6 * (i < STEPS ? s->sector.outer_um : s->sector.inner_um);
         out_m[n][0] = radius_m * cos(angle);
         out_m[n++][1] = radius_m * sin(angle);
@@ -167,6 +176,7 @@ int cola_shape_link(struct cola_shape *shape, int32_t step, int32_t steps, int32
     const struct cola_measured here = {.step = step, .steps = steps};
     if (shape->n == COLA_SHAPE_LINKS || far_um > COLA_SHAPE_REACH_UM || near_um > far_um) return -1;
     if (shape->n != 0 && chain_turn(&here, &shape->link[shape->n - 1]) <= 0) return -1;
+    if (shape->n != 0 && chain_turn(&here, &shape->link[0]) > (int64_t)steps * steps) return -1;
     shape->kind = COLA_SHAPE_CHAIN;
     shape->link[shape->n++] = (struct cola_link){step,
                                                  steps,
@@ -179,7 +189,7 @@ int cola_shape_link(struct cola_shape *shape, int32_t step, int32_t steps, int32
 
 int cola_shape_rectangle(struct cola_shape *shape, const double corner_um[2], const double size_um[2], double turns)
 {
-    const double c = cos(TAU * turns), s = sin(TAU * turns);
+    const double c = cos(COLA_TURN_RAD * turns), s = sin(COLA_TURN_RAD * turns);
     for (int i = 0; i < 4; i++) {
         const double right = i == 1 || i == 2 ? size_um[0] : 0.0, forward = i >= 2 ? size_um[1] : 0.0;
         if (cola_shape_add(shape, corner_um[0] + right * c - forward * s, corner_um[1] + right * s + forward * c) != 0)

@@ -8,8 +8,8 @@
  * inside and may lie across any angle. A point on an edge or on a corner is in it. Where edges cross, a point is in it
  * if the outline winds about it (nonzero rule).
  * Sector: from start to stop counter-clockwise, and from the inner to the outer radius; all four limits are in it.
- * Chain: directions in ascending order, each with a nearest and a farthest distance; straight lines join those of
- * neighbours. A beam that looks in one of the directions is compared with its two distances; limits are in it.
+ * Chain: directions in ascending order, a turn at most, each with a nearest and a farthest distance; straight lines join
+ * those of neighbours. A beam that looks in one of the directions is compared with its two distances; limits are in it.
  *
  * Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_SHAPE_H
@@ -23,6 +23,7 @@ enum {
     COLA_SHAPE_REACH_UM = 1000000000, /* no coordinate is larger: 64 bits then hold each product of the predicate */
     COLA_TURN_E4 = 3600000,
 };
+static const double COLA_TURN_RAD = 6.283185307179586;
 
 enum cola_shape_kind { COLA_SHAPE_NONE, COLA_SHAPE_POLYGON, COLA_SHAPE_SECTOR, COLA_SHAPE_CHAIN };
 
@@ -68,7 +69,8 @@ int cola_shape_cut(const struct cola_shape *shape, double turns, int32_t *near_u
 uint32_t cola_shape_outline(const struct cola_shape *shape, double out_m[COLA_SHAPE_CORNERS][2]);
 /* Adds a corner of a polygon: -1 where it is farther than COLA_SHAPE_REACH_UM, or there are too many. */
 int cola_shape_add(struct cola_shape *shape, double x_um, double y_um);
-/* Adds a link: -1 where its direction isn't beyond the last one's, near is beyond far, or as above. */
+/* Adds a link: -1 where its direction isn't beyond the last one's, or is more than a turn beyond the first one's, near is
+ * beyond far, or as above. All links of a shape have the same steps. */
 int cola_shape_link(struct cola_shape *shape, int32_t step, int32_t steps, int32_t near_um, int32_t far_um);
 /* A rectangle: width to the right and length forward from its corner, then turned counter-clockwise about the corner. -1
  * as above. */

@@ -6,8 +6,6 @@
 
 #include "drivers/protocol/cola_units.h"
 
-#define TAU 6.283185307179586
-
 void cola_watch_select(struct cola_watch *watch, const struct cola_fields *fields, const uint32_t *numbers,
                        const uint8_t *outputs, uint32_t n)
 {
@@ -66,7 +64,7 @@ static int32_t nearest_in(const struct cola_shape *shape, const struct cola_meas
 
 static void end_run(struct cola_slot *slot, const struct cola_field *field, uint32_t steps)
 {
-    const double width_um = slot->run * (TAU / steps) * slot->run_um;
+    const double width_um = slot->run * (COLA_TURN_RAD / steps) * slot->run_um;
     if (slot->run != 0 && width_um >= field->blanking_um) slot->is_hit = 1;
     slot->run = 0;
     slot->run_um = INT32_MAX;

@@ -209,6 +209,8 @@ struct config {
  * scanner. config_is_alone: whether all have it. The stops of a platform have the scanner of the one station. */
 int config_serves(const struct config *cfg, uint32_t i);
 int config_is_alone(const struct config *cfg);
+/* Whether a link speaks that protocol, of enum protocol_id. */
+int config_speaks(const struct config *cfg, int protocol);
 /* Gives a configuration other ranges, noise and step, as if its keys had them. cfg is a copy of a loaded one; the
  * settings must be allowed for it (command.h). SH_EINPUT: no ring of the sphere is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults that change what is measured: checks that the head has what they act on. */
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
@@ -34,15 +35,16 @@ static void check_factor(struct cfg_reader *rd, const struct config *cfg, const 
                      f->factor, lines_hz, cfg->profile.name, most_hz / lines_hz);
 }
 
-/* A soiled window shows only in amplitudes, or in noise that grows as the signal fades. */
+/* A soiled window shows only in amplitudes, in noise that grows as the signal fades, or in LCMstate of cola. The
+ * scanner of head.station has the links. */
 static void check_window(struct cfg_reader *rd, const struct config *cfg, uint32_t i)
 {
     const int is_noisy = cfg->noise.range == RANGE_NOISE_ON && cfg->profile.range_sigma_m > 0.0;
-    if (!cfg->signal.on && !is_noisy)
+    if (!cfg->signal.on && !is_noisy && !cfg->links_are_not_here && !config_speaks(cfg, PROTOCOL_COLA))
         cfg_fail_key(
             rd, "faults[].kind", i,
-            "window_soiled would have no effect: no signal is modelled, and ranges have no noise; allowed with "
-            "signal.model: on, or noise.range: on and noise.sigma_m above 0");
+            "window_soiled would have no effect: no signal is modelled, ranges have no noise, and no link speaks cola; "
+            "allowed with signal.model: on, or noise.range: on and noise.sigma_m above 0, or links[].protocol: cola");
 }
 
 void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)

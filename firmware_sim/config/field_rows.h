@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Rows of the table of keys: monitored fields. Private to keys.c, whose macros they are written with. */
 /* clang-format off */
-    {"fields", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_FIELDS, LIST_OF(field, n_fields),
+    {"fields", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_FIELDS, LIST_OF(field, n_fields), .flags = CFG_SPECIAL,
      .help = "Monitored fields of SICK scanners, for links that speak cola: a TiM7xx has 16 sets of three fields, an "
              "LMS1xx ten fields. Clients can read them, write others and get their results."},
     {"fields[]", .type = CFG_MAP, .help = "A field. Edges and corners belong to it."},
@@ -36,7 +36,7 @@
     {FIELD(output), CFG_COUNT, NULL, "0", 0, 3,
      .help = "LMS1xx: the digital output that is active while the field is infringed; 0: none. Several fields may "
              "share one. TiM7xx: the first field of a set has output 1, and so on."},
-    {"inputs", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_INPUTS, LIST_OF(input, n_inputs),
+    {"inputs", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_INPUTS, LIST_OF(input, n_inputs), .flags = CFG_SPECIAL,
      .help = "Digital inputs of a SICK scanner, for links that speak cola: when they are active. In a TiM7xx they choose "
              "the set of fields: the first input counts 1, the second 2, and so on."},
     {"inputs[]", .type = CFG_MAP, .help = "A time in which an input is active. An input may have several."},

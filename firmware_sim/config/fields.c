@@ -38,11 +38,31 @@ static void check_keys(struct cfg_reader *rd, const struct config_field *f, uint
     }
 }
 
+/* Twice the area of the triangle of the first corner, corner k and the next, square micrometres. */
+static double triangle_um2(const struct config_field *f, uint32_t k)
+{
+    const double(*at)[2] = f->points_m.at;
+    return 1e12 *
+           ((at[k][0] - at[0][0]) * (at[k + 1][1] - at[0][1]) - (at[k][1] - at[0][1]) * (at[k + 1][0] - at[0][0]));
+}
+
+static void check_polygon(struct cfg_reader *rd, const struct config_field *f, uint32_t i)
+{
+    const uint32_t n = f->points_m.n;
+    double most_um2 = 0.0;
+    if (f->shape != FIELD_POLYGON || !cfg_is_given(rd, "fields[].points_m", i)) return;
+    if (n < 3) cfg_fail_key(rd, "fields[].points_m", i, "%u corners; allowed 3 to %d", n, CONFIG_MAX_POINTS);
+    for (uint32_t k = 1; k + 1 < n; k++)
+        most_um2 = fmax(most_um2, fabs(triangle_um2(f, k)));
+    if (n >= 3 && most_um2 < 1.0)
+        cfg_fail_key(rd, "fields[].points_m", i,
+                     "its %u corners enclose no area; allowed are corners that do not lie on one line", n);
+}
+
 static void check_values(struct cfg_reader *rd, const struct config_field *f, uint32_t i)
 {
     const double span_deg = f->angles_deg[1] - f->angles_deg[0];
-    if (f->shape == FIELD_POLYGON && f->points_m.n != 0 && f->points_m.n < 3)
-        cfg_fail_key(rd, "fields[].points_m", i, "%u corners; allowed 3 to %d", f->points_m.n, CONFIG_MAX_POINTS);
+    check_polygon(rd, f, i);
     if (f->shape == FIELD_SEGMENT && (span_deg < 0.0 || span_deg > 360.0))
         cfg_fail_key(rd, "fields[].angles_deg", i, "%.10g to %.10g; allowed a second angle of 0 to 360 deg more",
                      f->angles_deg[0], f->angles_deg[1]);

@@ -161,3 +161,10 @@ void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_links; i++)
         check_protocol(rd, cfg, i);
 }
+
+int config_speaks(const struct config *cfg, int protocol)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].protocol == protocol) return 1;
+    return 0;
+}

@@ -172,6 +172,16 @@ static int has_needed(const char *section)
     return 0;
 }
 
+/* Whether the key is a list for some heads only, or in one. */
+static int is_special(const char *path)
+{
+    for (size_t i = 0; i < cfg_config_table.n; i++) {
+        const struct cfg_key *key = &cfg_config_table.keys[i];
+        if ((key->flags & CFG_SPECIAL) != 0 && cfg_is_in(path, key->path)) return 1;
+    }
+    return 0;
+}
+
 /* The indent of a key's line: sections and elements of lists each add two blanks. */
 static int indent_of(const char *path)
 {
@@ -209,7 +219,8 @@ static void print_example_key(const struct cfg_key *key, const struct config_pro
     const int indent = indent_of(key->path), is_section = key->type == CFG_MAP || key->type == CFG_LIST;
     const char *dot = strrchr(key->path, '.'), *word = dot != NULL ? dot + 1 : key->path;
     const int is_element = strcmp(word + strlen(word) - 2, "[]") == 0;
-    const char *hidden = (is_section ? has_needed(key->path) : is_needed(key)) ? "" : "#";
+    const int is_shown = (is_section ? has_needed(key->path) : is_needed(key)) && !is_special(key->path);
+    const char *hidden = is_shown ? "" : "#";
     if (is_element && is_section) {
         fprintf(out, "%s%*s-\n", hidden, indent, "");
         return;

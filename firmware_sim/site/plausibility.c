@@ -9,6 +9,7 @@
 #include "core/distance.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/plausibility.h"
 #include "firmware_sim/site/site.h"
@@ -102,6 +103,16 @@ static void doubt_colours(const struct site *site, const struct sh_report *repor
         "%s: output.colour: reflectance, but signal.model is off: no point has a reflectance, so all have the colour "
         "for a missing one",
         cfg->file);
+}
+
+static void doubt_fields(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    if (cfg->n_fields + cfg->n_inputs == 0 || cfg->links_are_not_here || config_speaks(cfg, PROTOCOL_COLA)) return;
+    sh_warn(report, "%s: %s: no link has protocol: cola, so nothing evaluates them", cfg->file,
+            cfg->n_inputs == 0   ? "fields"
+            : cfg->n_fields == 0 ? "inputs"
+                                 : "fields and inputs");
 }
 
 /* Warns of transparent surfaces without a rule. A file's transparency is for pictures; only the configuration says
@@ -328,6 +339,7 @@ int site_check_plausibility(const struct site *site, const struct sh_report *rep
     doubt_size(site, report);
     doubt_step(site, report);
     doubt_lines(site, report);
+    doubt_fields(site, report);
     doubt_attributes(site, report);
     doubt_colours(site, report);
     doubt_clear(site, report);

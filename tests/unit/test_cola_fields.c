@@ -58,6 +58,81 @@ static void records_that_say_nothing_are_refused(void **state)
     cola_expect(HEAD "0 0 0 0 1 8 Field002 0", "sFA A");
 }
 
+/* A type has its own part alone. An LMS1xx gives records of type 2 without one for empty fields, so these are taken. */
+static void a_record_has_the_part_of_its_type(void **state)
+{
+    (void)state;
+    static const char *const part[] = {"1 1 F6 FFFF FA 0", "0 1 0 FA 0 64 64", "1 1 F6 FFFF FA 1 0 FA 0 64 64", "0 0"};
+    static const char *const takes[] = {"....", ".x.x", "x..x", "...."}; /* by type, for each part */
+    open_tim();
+    for (int type = 0; type < 4; type++)
+        for (int k = 0; k < 4; k++) {
+            char request[128];
+            snprintf(request, sizeof request, "sWN field001 3F800000 00000000 D05 FFF92230 %d 2 %s 0 0 0 0", type,
+                     part[k]);
+            cola_expect(request, takes[type][k] == 'x' ? "sWA field001" : "sFA 5");
+        }
+}
+
+/* The beams of a TiM look from -45 to 225 degrees, 1/3 degree apart: 90 to 105 degrees are 405 to 450. */
+static void directions_are_taken_modulo_a_turn(void **state)
+{
+    (void)state;
+    static const char *const first[] = {"DBBA0" /* 90 */, "44AA20" /* 450 */, "FFD6CD20" /* -270 degrees */};
+    open_tim();
+    for (size_t i = 0; i < sizeof first / sizeof first[0]; i++) {
+        char request[128];
+        snprintf(request, sizeof request,
+                 "sWN field000 3F800000 00000000 C350 %s 2 1 1 2 0 FFFF 7D0 3 FFFF 7D0 0 0 0 0 0", first[i]);
+        cola_expect(request, "sWA field000");
+        static const struct {
+            int beam;
+            const char *results;
+        } cases[] = {{404, "100"}, {405, "200"}, {450, "200"}, {451, "100"}, {0, "100"}, {810, "100"}};
+        for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+            fields_object(cases[k].beam, 1, 1.0);
+            fields_turn();
+            fields_expect(cases[k].results);
+        }
+    }
+#define TURN(last) "sWN field000 3F800000 00000000 2710 0 2 1 1 2 0 FFFF 7D0 " last " FFFF 7D0 0 0 0 0 0"
+    cola_expect(TURN("168"), "sWA field000");
+    cola_expect(TURN("169"), "sFA 5"); /* 361 degrees */
+    cola_expect(TURN("FFFF"), "sFA 5");
+}
+
+static struct cola_fields *a_sector(int32_t start_e4, int32_t span_e4, int32_t outer_um)
+{
+    static struct cola_fields fields;
+    memset(&fields, 0, sizeof fields);
+    fields.field[0].shape = (struct cola_shape){
+        .kind = COLA_SHAPE_SECTOR, .sector = {.start_e4 = start_e4, .span_e4 = span_e4, .outer_um = outer_um}};
+    return &fields;
+}
+
+/* A segment of a turn has the first and the last beam, 0 and 810, in its record. */
+static void a_record_reaches_to_the_ends_of_the_view(void **state)
+{
+    (void)state;
+    open_tim();
+    fields_open(a_sector(0, COLA_TURN_E4, 1500000));
+    const char *record = cola_ask("sRN field000");
+    assert_non_null(strstr(record, "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 "));
+    assert_non_null(strstr(record, " 0 FFFF 5DC "));
+    assert_non_null(strstr(record, " 32A FFFF 5DC 0 0 0 1 "));
+}
+
+/* 500 m are 62500 counts of 8 mm; with 7 mm they would be more than 65534. */
+static void far_fields_have_a_scale_for_it(void **state)
+{
+    (void)state;
+    open_tim();
+    fields_open(a_sector(900000, 0, 500000000));
+    cola_expect("sRN field000", "sRA field000 41000000 00000000 D05 FFF92230 2 1 1 1 195 FFFF F424 0 0 0 1 0 0");
+    fields_open(a_sector(900000, 0, 65534000));
+    cola_expect("sRN field000", "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 1 195 FFFF FFFE 0 0 0 1 0 0");
+}
+
 /* ---- evaluation */
 
 /* Field 1: 0.5 to 2 m between the beams 300 and 500. */
@@ -157,6 +232,26 @@ static void changes_are_sent(void **state)
     fields_expect("200");
 }
 
+/* Fields are evaluated while the session measures. What was seen before is not valid afterwards. */
+static void a_stopped_session_evaluates_nothing(void **state)
+{
+    (void)state;
+    open_tim();
+    write_field_1();
+    EXPECT_B("sEN LFErec \1", "sEA LFErec \1");
+    fields_object(350, 5, 1.0);
+    fields_turn();
+    fields_expect("200");
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    protocol_rig_clear(&cola);
+    fields_turn();
+    assert_int_equal(cola.n_units, 0);
+    fields_expect("000");
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    fields_turn();
+    fields_expect("200");
+}
+
 /* Scan k begins at k / 15 s; the clock counts from 1970 without UTC. */
 static void a_result_has_the_time_of_its_change(void **state)
 {
@@ -244,9 +339,14 @@ int main(void)
     const struct CMUnitTest tests[] = {
         CASE(a_record_is_read_back_as_it_was_written),
         CASE(records_that_say_nothing_are_refused),
+        CASE(a_record_has_the_part_of_its_type),
+        CASE(directions_are_taken_modulo_a_turn),
+        CASE(a_record_reaches_to_the_ends_of_the_view),
+        CASE(far_fields_have_a_scale_for_it),
         CASE(results_follow_the_scan),
         CASE(chords),
         CASE(changes_are_sent),
+        CASE(a_stopped_session_evaluates_nothing),
         CASE(a_result_has_the_time_of_its_change),
         CASE(scans_carry_the_outputs),
         CASE(telegrams_choose_the_set),

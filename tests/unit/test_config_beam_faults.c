@@ -51,8 +51,19 @@ static void a_head_has_faults_of_what_it_has(void **state)
         assert_refused(cases[i].profile, cases[i].rest, cases[i].item, cases[i].says);
 }
 
+/* Without noise and signal LCMstate alone follows the window. */
+static void a_client_of_cola_is_told_of_a_soiled_window(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"links=[{type: tcp, protocol: cola}]"};
+    assert_refused("sick-tim781", "", "{kind: window_soiled}", "window_soiled would have no effect: ");
+    load_sets(sets, 1);
+    assert_loads(err.code);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_head_has_faults_of_what_it_has)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_head_has_faults_of_what_it_has),
+                                       cmocka_unit_test(a_client_of_cola_is_told_of_a_soiled_window)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -42,6 +42,13 @@ static void fields_that_say_nothing_are_refused(void **state)
          "that is not below the inner"},
         {"sick-tim781", "{number: 1, shape: polygon}", "fields[0].points_m: missing; required with shape: polygon"},
         {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1, 1]]}", "2 corners; allowed 3 to 62"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: []}", "0 corners; allowed 3 to 62"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[1, 2], [1, 2], [1, 2]]}",
+         "its 3 corners enclose no area"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0.1, 0.1], [0.2, 0.2], [0.7, 0.7], [0.3, 0.3]]}",
+         "its 4 corners enclose no area"},
+        {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 0], [1, 1], [1, 0], [0, 1]]}",
+         NULL}, /* crosses itself */
         {"sick-tim781", "{number: 1, shape: polygon, points_m: 3}", "allowed [[x, y], ...], each -1000 to 1000 m"},
         {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1], [1, 1]]}", "point 2 is not two numbers"},
         {"sick-tim781", "{number: 1, shape: polygon, points_m: [[0, 1], [1, x], [1, 1]]}", "\"x\" is not a number"},

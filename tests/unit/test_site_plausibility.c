@@ -132,6 +132,22 @@ static void attributes_that_nothing_fills(void **state)
     says_nothing();
 }
 
+static void fields_that_no_link_speaks_of(void **state)
+{
+    (void)state;
+#define FIELD "fields: [{number: 1, shape: segment, angles_deg: [0, 90], radii_m: [0, 1]}]"
+    write_box(0, 10);
+    load("0, 0, 1.7", 1, "", FIELD);
+    says("fields: no link has protocol: cola, so nothing evaluates them");
+    load("0, 0, 1.7", 1, "", "links: [{type: tcp}]\ninputs: [{input: 1}]");
+    says("inputs: no link has protocol: cola, so nothing evaluates them");
+    write_in("test.yaml",
+             "head: {profile: sick-tim781}\nscene:\n  meshes: [{file: mesh.obj, up: z, scale: 1}]\n"
+             "stations:\n  - {position_m: [0, 0, 1.7]}\nlinks: [{type: tcp, protocol: cola}]\n" FIELD "\n");
+    load_file(config_path);
+    assert_null(strstr(warned, "fields"));
+}
+
 #ifndef SH_SANITIZE /* the house is large, and loading it has a test of its own */
 /* config/README.md calls them ready to run. */
 static void configurations_of_this_tree_are_silent(void **state)
@@ -165,6 +181,7 @@ int main(void)
         cmocka_unit_test(a_scale_that_is_a_thousand_times_off),
         cmocka_unit_test(a_window_between_two_pulses),
         cmocka_unit_test(attributes_that_nothing_fills),
+        cmocka_unit_test(fields_that_no_link_speaks_of),
 #ifndef SH_SANITIZE
         cmocka_unit_test(configurations_of_this_tree_are_silent),
 #endif

@@ -170,12 +170,43 @@ static void test_fields(void **state)
     free(svg);
 }
 
+static double width_of(const char *svg)
+{
+    double width = 0.0;
+    assert_int_equal(sscanf(strstr(svg, " width="), " width=\"%lf\"", &width), 1);
+    return width;
+}
+
+/* Fields are those of head.station's scanner. A station with another one has none, nor room for them. */
+static void test_fields_of_one_scanner(void **state)
+{
+    struct wire *wire = *state;
+    const char *const more[] = {"--pixel-m", "0.01",
+                                "--set",     "stations.2.scanner.head.lines_hz=50",
+                                "--set",     "fields=[{number: 1, shape: rectangle, corner_m: [0, 1], size_m: [1, 2]}]",
+                                NULL};
+    char *svg = draw(wire, more, "map.svg", 0);
+    const char *p = strstr(svg, "<title>monitored fields</title>");
+    assert_non_null(p);
+    const char *end = strstr(p, "</g>");
+    int lines = 0;
+    assert_non_null(end);
+    while ((p = strstr(p + 1, "<line x1=")) != NULL && p < end)
+        lines++;
+    assert_int_equal(lines, 2 * 4); /* two stations, four sides */
+    char *without = draw(wire, (const char *const[]){"--pixel-m", "0.01", NULL}, "map.svg", 0);
+    assert_true(width_of(svg) == width_of(without));
+    free(without);
+    free(svg);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_marks, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_open_edges, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fields, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_fields_of_one_scanner, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_heights, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_cuts, wire_setup, wire_teardown),
     };

@@ -31,6 +31,7 @@ enum cfg_flags {
     CFG_ASCII = 2,    /* goes into *IDN?: printable ASCII without comma and quotes */
     CFG_WRITTEN = 16, /* of CFG_PATH: the file is written; without it, it is read */
     CFG_NEEDED = 8,   /* has no default that suits most configurations: the example gives it a value */
+    CFG_SPECIAL = 32, /* a list for some heads only: the example comments it out with all that is in it */
 };
 
 enum { CFG_MAX_ROWS = 320, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96 };

@@ -114,6 +114,13 @@ static int add_field_line(void *ctx, const double a[3], const double b[3], struc
     return map_add_field(run->map, from, to, err);
 }
 
+/* Fields belong to links, and so to the scanner of head.station alone. */
+static int each_field_line(const struct map_run *run, uint32_t station, const struct placement *at, field_line *take,
+                           void *ctx, struct sh_err *err)
+{
+    return config_serves(run->cfg, station) ? field_lines_each(run->cfg, at, take, ctx, err) : SH_OK;
+}
+
 /* The height of a head is in the site of its own scanner alone. */
 static int prepare(void *ctx, uint32_t station, struct sh_err *err)
 {
@@ -122,7 +129,7 @@ static int prepare(void *ctx, uint32_t station, struct sh_err *err)
     for (; rc == SH_OK && run->marked < station; run->marked++) {
         const struct site_station *at = &heads_site(&run->heads)->station[run->marked];
         rc = add_station(run, at, err);
-        if (rc == SH_OK) rc = field_lines_each(run->cfg, &at->at, add_field_line, run, err);
+        if (rc == SH_OK) rc = each_field_line(run, run->marked, &at->at, add_field_line, run, err);
     }
     return rc;
 }
@@ -176,7 +183,7 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
     for (uint32_t s = 0; s < site->n_stations; s++) {
         to_map(run, site->station[s].at.position_m, mark);
         include(&spec, mark);
-        rc = field_lines_each(run->cfg, &site->station[s].at, include_line, &(struct map_fields){run, &spec}, err);
+        rc = each_field_line(run, s, &site->station[s].at, include_line, &(struct map_fields){run, &spec}, err);
         if (rc != SH_OK) return rc;
     }
     double span_m = fmax(spec.max_m[0] - spec.min_m[0], spec.max_m[1] - spec.min_m[1]);
