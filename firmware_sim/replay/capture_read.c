@@ -11,6 +11,7 @@
 enum { FRONT_BYTES = 4096, MAX_FLOWS = 1000 };
 static const size_t MAX_FILE = (size_t)2 << 30;
 static const int64_t MAX_SPAN_NS = INT64_C(10000000000000000); /* sums of times then fit */
+static const int64_t LEAST_STEP_NS = 100000000;                /* packets in a wrong order differ by less */
 
 int capture_is(const char *path)
 {
@@ -103,19 +104,36 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
     return SH_OK;
 }
 
+/* Sets c->now_ns, the time of a packet since the first one. It never goes back: the order of the file goes before its
+ * times. A clock that was set back goes on from there, so that the delays behind that stay. */
+static int pass_time(struct replay_capture *c, const struct pcapng_packet *packet, struct sh_err *err)
+{
+    if (!packet->has_time) {
+        c->counts.untimed++;
+        return SH_OK;
+    }
+    if (!c->has_clock) c->clock_ns = packet->t_ns;
+    c->has_clock = 1;
+    const int64_t passed_ns = packet->t_ns - c->clock_ns; /* neither is negative */
+    c->counts.backward += passed_ns < 0;
+    if (passed_ns > MAX_SPAN_NS - c->now_ns)
+        return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",
+                       (unsigned long long)c->counts.packets, 1e-9 * ((double)c->now_ns + (double)passed_ns),
+                       1e-9 * (double)MAX_SPAN_NS);
+    if (passed_ns > 0) c->now_ns += passed_ns;
+    if (passed_ns > 0 || passed_ns < -LEAST_STEP_NS) c->clock_ns = packet->t_ns;
+    return SH_OK;
+}
+
 static int take_packet(struct replay_capture *c, const struct pcapng_packet *packet, struct sh_err *err)
 {
     struct ip_packet p;
-    const int64_t t_ns = packet->has_time && packet->t_ns > c->last_ns ? packet->t_ns : c->last_ns;
-    if (c->counts.packets++ == 0) c->first_ns = t_ns;
-    if (t_ns - c->first_ns > MAX_SPAN_NS)
-        return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",
-                       (unsigned long long)c->counts.packets, 1e-9 * (double)(t_ns - c->first_ns),
-                       1e-9 * (double)MAX_SPAN_NS);
-    c->last_ns = t_ns; /* the order of the file goes before its times */
+    c->counts.packets++;
+    const int rc = pass_time(c, packet, err);
+    if (rc != SH_OK) return rc;
     switch (ip_packet_read(packet->link, packet->data, packet->len, &p)) {
     case IP_PACKET_FOUND:
-        return add_packet(c, &p, t_ns, err);
+        return add_packet(c, &p, c->now_ns, err);
     case IP_PACKET_FRAGMENT:
         c->counts.fragments++;
         return SH_OK;
@@ -123,10 +141,9 @@ static int take_packet(struct replay_capture *c, const struct pcapng_packet *pac
         c->counts.damaged++;
         return SH_OK;
     case IP_PACKET_LINK:
-        return sh_fail(err, SH_EINPUT,
-                       "packets of link type %u; allowed are Ethernet (1), raw IP (101, 228, 229), Linux cooked (113, "
-                       "276) and loopback (0, 108)",
-                       packet->link);
+        c->counts.unknown_links++;
+        c->counts.unknown_link = packet->link;
+        return SH_OK;
     case IP_PACKET_OTHER:
         c->counts.others++;
     }

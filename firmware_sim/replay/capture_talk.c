@@ -195,11 +195,11 @@ static int put_runs(struct builder *b)
 
 /* ---- places */
 
-static int by_time(const void *a, const void *b)
+/* The order of the file is that of time, and decides where clocks are too coarse to. */
+static int by_order(const void *a, const void *b)
 {
     const struct capture_said *one = a, *other = b;
-    if (one->end_ns != other->end_ns) return one->end_ns < other->end_ns ? -1 : 1;
-    if (one->side != other->side) return one->side < other->side ? -1 : 1;
+    if (one->number != other->number) return one->number < other->number ? -1 : 1;
     return one->at < other->at ? -1 : one->at > other->at;
 }
 
@@ -228,7 +228,7 @@ static int add_flow(struct builder *b, const struct capture_flow *f, int64_t t0_
     int rc = SH_OK;
     for (uint32_t side = 0; side < 2 && rc == SH_OK; side++)
         rc = capture_add_messages(b->capture, f, side, b->place->talk.kind, b->store, &b->said);
-    if (rc == SH_OK && b->said.n != 0) qsort(b->said.said, b->said.n, sizeof *b->said.said, by_time);
+    if (rc == SH_OK && b->said.n != 0) qsort(b->said.said, b->said.n, sizeof *b->said.said, by_order);
     if (rc == SH_OK) rc = own_all(b, f->device);
     if (rc == SH_OK) rc = put_messages(b, f->device, t0_ns);
     b->place->n_connections++;

@@ -125,6 +125,13 @@ static void warn_of_capture(const struct capture_run *run)
     if (c.missing_bytes != 0)
         sh_warn(&app_report_stderr, "%s: %llu bytes are missing in it; what follows them may be wrong", file,
                 (unsigned long long)c.missing_bytes);
+    if (c.backward + c.untimed != 0)
+        sh_warn(&app_report_stderr,
+                "%s: the times of %llu packets go back, and %llu packets have none; their delays may be wrong", file,
+                (unsigned long long)c.backward, (unsigned long long)c.untimed);
+    if (c.unknown_links != 0)
+        sh_warn(&app_report_stderr, "%s: left out %llu packets of other link types, such as %u", file,
+                (unsigned long long)c.unknown_links, c.unknown_link);
     if (c.fragments + c.damaged != 0)
         sh_warn(&app_report_stderr, "%s: left out %llu fragments of datagrams, and %llu packets with damaged headers",
                 file, (unsigned long long)c.fragments, (unsigned long long)c.damaged);
