@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The packets of a capture: the file's blocks in, flows out. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/grow.h"
@@ -13,21 +14,37 @@ static const size_t MAX_FILE = (size_t)2 << 30;
 static const int64_t MAX_SPAN_NS = INT64_C(10000000000000000); /* sums of times then fit */
 static const int64_t LEAST_STEP_NS = 100000000;                /* packets in a wrong order differ by less */
 
-int capture_is(const char *path)
+/* Reads until the file's first interface says which packets it has. */
+static int is_of_packets(FILE *file, uint8_t **bytes)
 {
-    const char *why;
-    uint8_t bytes[FRONT_BYTES];
     struct pcapng_reader reader = {0};
     struct pcapng_packet packet;
     struct sh_err err;
+    size_t room = 0, n = 0, at = 0, used;
+    for (;;) {
+        if (!grow(bytes, &room, n + FRONT_BYTES, 1)) return 0;
+        const size_t got = fread(*bytes + n, 1, room - n, file);
+        n += got;
+        if (at == 0 && n >= 4 && pcap_is(*bytes)) return 1;
+        for (int item = PCAPNG_OTHER; item > 0; at += used) {
+            item = pcapng_read(&reader, *bytes + at, n - at, &packet, &used, &err);
+            if (item < 0) return 0;
+            if (reader.n_interfaces != 0) return reader.interface[0].link != PCAPNG_USER0;
+        }
+        if (got == 0) return 0;
+    }
+}
+
+int capture_is(const char *path)
+{
+    const char *why;
+    uint8_t *bytes = NULL;
     FILE *file = infile_open(path, &why);
     if (file == NULL) return 0;
-    const size_t n = fread(bytes, 1, sizeof bytes, file);
+    const int is = is_of_packets(file, &bytes);
+    free(bytes);
     fclose(file);
-    if (n >= 4 && pcap_is(bytes)) return 1;
-    for (size_t at = 0, used; reader.n_interfaces == 0; at += used)
-        if (pcapng_read(&reader, bytes + at, n - at, &packet, &used, &err) <= 0) return 0;
-    return reader.interface[0].link != PCAPNG_USER0;
+    return is;
 }
 
 static int read_file(struct replay_capture *c, const char *path, struct sh_err *err)

@@ -251,7 +251,8 @@ static int build_place(struct replay_capture *c, const struct capture_flow *firs
     struct builder b = {.capture = c, .place = place, .store = &c->store[c->n_places]};
     c->n_places++; /* also where this fails: capture_free frees the store */
     describe(place, first);
-    place->talk = (struct talk){.kind = kind_of(c, first), .connection_run = TALK_NO_RUN};
+    place->talk =
+        (struct talk){.kind = kind_of(c, first), .is_datagrams = !first->is_tcp, .connection_run = TALK_NO_RUN};
     int rc = SH_OK;
     for (const struct capture_flow *f = first; f < c->flow + c->n_flows && rc == SH_OK; f++)
         if (is_at(f, first)) rc = add_flow(&b, f, f->is_tcp ? f->t0_ns : udp_t0_ns);

@@ -75,7 +75,9 @@ static int client_send(void *ctx, const void *unit, size_t len)
 
 static void client_count(void *ctx, enum protocol_count what, uint64_t n)
 {
-    ((struct client *)ctx)->wrong += what == PROTOCOL_WRONG ? (int)n : 0;
+    struct client *c = ctx;
+    c->wrong += what == PROTOCOL_WRONG ? (int)n : 0;
+    c->lost += what == PROTOCOL_INPUT_LOST ? n : 0;
 }
 
 static void client_hang_up(void *ctx)

@@ -41,6 +41,7 @@ struct client {
     char got[4096]; /* "at 5: text|" for each unit */
     int64_t now_ms;
     int wrong, ended;
+    uint64_t lost; /* bytes of it */
     char told[120];
 };
 

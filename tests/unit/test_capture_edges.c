@@ -136,6 +136,53 @@ static void test_without_times(void **state)
     capture_free(capture);
 }
 
+/* ---- files */
+
+/* A capture is known by its bytes, also where its first block is long. Section header: type, length, magic, version 1.0,
+ * section length -1, an option 1 (comment) of 60,000 bytes, end of options, length. */
+static void test_long_front(void **state)
+{
+    (void)state;
+    static struct made m;
+    enum { COMMENT = 60000, WHOLE = 12 + 16 + 4 + COMMENT + 4 };
+    const uint32_t head[7] = {0x0a0d0d0a, WHOLE, 0x1a2b3c4d, 1, 0xffffffff, 0xffffffff, 1 | (uint32_t)COMMENT << 16},
+                   whole = WHOLE;
+    memset(&m, 0, sizeof m);
+    memcpy(m.bytes, head, sizeof head); /* little-endian, as this machine */
+    memcpy(m.bytes + WHOLE - 4, &whole, 4);
+    m.len = WHOLE + pcapng_put_interface(m.bytes + WHOLE, PCAPNG_ETHERNET, 0, NULL, NULL);
+    assert_int_equal(capture_is(made_write(&m, m.len)), 1);
+    assert_int_equal(capture_is(made_write(&m, WHOLE)), 0); /* no interface says which packets it has */
+    m.len = WHOLE + pcapng_put_interface(m.bytes + WHOLE, PCAPNG_USER0, 0, NULL, NULL);
+    const char *path = made_write(&m, m.len);
+    assert_int_equal(capture_is(path), 0);
+    unlink(path);
+}
+
+/* Packets of a link type that is not read are left out; where nothing else is there, the file is refused. */
+static void test_unknown_link(void **state)
+{
+    (void)state;
+    static struct made m;
+    struct capture_counts counts;
+    struct replay_capture *capture;
+    struct sh_err err = {0};
+    const uint8_t junk[20] = {0};
+    made_begin(&m);
+    m.len += pcapng_put_interface(m.bytes + m.len, (enum pcapng_link)220, 0, NULL, NULL);
+    m.len += pcapng_put_packet(m.bytes + m.len, 1, 0, junk, sizeof junk);
+    const char *path = made_write(&m, m.len);
+    assert_int_equal(capture_load(path, &capture, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "link type 220; allowed are Ethernet (1)"));
+    made_connect(&m, 0);
+    made_say(&m, 1, 1, "hello");
+    capture = made_load(&m);
+    capture_get_counts(capture, &counts);
+    assert_int_equal(counts.unknown_links, 1);
+    assert_int_equal(capture_n(capture), 1);
+    capture_free(capture);
+}
+
 /* ---- streams */
 
 /* The capture begins within a connection, and the first two segments of the answer are in the wrong order. */
@@ -193,13 +240,125 @@ static void test_scans_stop(void **state)
     capture_free(capture);
 }
 
+/* ---- clients */
+
+/* From a device that speaks in turns, a second request waits for the answer to the first. */
+static void test_pipelined_turns(void **state)
+{
+    (void)state;
+    static struct made m;
+    struct client c;
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 10, 0, "a\n");
+    made_say(&m, 13, 1, "one\n");
+    made_say(&m, 20, 0, "b\n");
+    made_say(&m, 22, 1, "two\n");
+    struct replay_capture *capture = made_load(&m);
+    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    /* a is taken at 0 and answered at 3; b is taken with the tick after that, and answered 2 ms later. */
+    assert_string_equal(client_ask(&c, "a\nb\n", 10), "3:one\n|6:two\n|");
+    client_close(&c);
+    capture_free(capture);
+}
+
+/* Many more requests than can be answered at a time: none is lost, also where the client sends more than fits. */
+static void test_pipelined_flood(void **state)
+{
+    (void)state;
+    static struct made m;
+    struct client c;
+    static const char request[] = "\x02sRN A\x03";
+    enum { LEN = sizeof request - 1, N = 20000 };
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 10, 0, request);
+    made_say(&m, 15, 1, "\x02sRA A 1\x03");
+    struct replay_capture *capture = made_load(&m);
+    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    int sent = 0, answers = 0;
+    size_t at = 0; /* in the request that is being sent */
+    for (int tick = 0; answers < N && tick < 100 * N; tick++) {
+        for (; sent < N && c.ops->takes(c.protocol) != 0; at = at + 1 == LEN ? 0 : at + 1) {
+            c.ops->input(c.protocol, (const uint8_t *)request + at, 1);
+            sent += at + 1 == LEN;
+        }
+        client_ask(&c, "", 1);
+        for (const char *a = c.got; (a = strstr(a, "sRA A 1")) != NULL; a++)
+            answers++;
+    }
+    assert_int_equal(answers, N);
+    assert_int_equal(c.lost + (uint64_t)c.wrong, 0);
+    client_close(&c);
+    capture_free(capture);
+}
+
+/* Bytes that never become a request are left out, counted and said, and the next request is answered. */
+static void test_endless_request(void **state)
+{
+    (void)state;
+    static struct made m;
+    struct client c;
+    static uint8_t many[TALK_MAX_REQUEST];
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 10, 0, "a\n");
+    made_say(&m, 10, 1, "one\n");
+    struct replay_capture *capture = made_load(&m);
+    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    memset(many, 'x', sizeof many);
+    c.ops->input(c.protocol, many, sizeof many);
+    assert_int_equal(c.ops->takes(c.protocol), 0);
+    assert_string_equal(client_ask(&c, "", 1), "");
+    assert_int_equal(c.lost, sizeof many);
+    assert_non_null(strstr(c.told, "65536"));
+    assert_string_equal(client_ask(&c, "a\n", 1), "1:one\n|");
+    c.ops->input(c.protocol, many, 5);
+    client_ask(&c, "", 1);
+    assert_int_equal(c.ops->owes(c.protocol), 0); /* no more comes for half a request */
+    client_close(&c);
+    capture_free(capture);
+}
+
+/* Two datagrams are two requests, whatever their bytes are together. */
+static void test_datagrams_stay_apart(void **state)
+{
+    (void)state;
+    static struct made m;
+    uint8_t frame[ETHERNET_MAX_FRAME];
+    struct client c;
+    made_begin(&m);
+    made_add(&m, 10, frame, ethernet_put_udp(frame, &DRIVER, &DEVICE, "PING", 4));
+    made_add(&m, 10, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "pong", 4));
+    struct replay_capture *capture = made_load(&m);
+    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    c.ops->input(c.protocol, (const uint8_t *)"PI", 2);
+    c.ops->input(c.protocol, (const uint8_t *)"NG", 2);
+    assert_string_equal(client_ask(&c, "", 3), "");
+    assert_int_equal(c.wrong, 2);
+    c.ops->input(c.protocol, (const uint8_t *)"PING", 4);
+    c.ops->input(c.protocol, (const uint8_t *)"PING", 4);
+    assert_string_equal(client_ask(&c, "", 3), "3:pong|4:pong|");
+    client_close(&c);
+    capture_free(capture);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_kinds),         cmocka_unit_test(test_http),
-        cmocka_unit_test(test_equal_times),   cmocka_unit_test(test_clock_steps),
-        cmocka_unit_test(test_without_times), cmocka_unit_test(test_swapped_beginning),
+        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_http),
+        cmocka_unit_test(test_equal_times),
+        cmocka_unit_test(test_clock_steps),
+        cmocka_unit_test(test_without_times),
+        cmocka_unit_test(test_swapped_beginning),
         cmocka_unit_test(test_scans_stop),
+        cmocka_unit_test(test_pipelined_turns),
+        cmocka_unit_test(test_pipelined_flood),
+        cmocka_unit_test(test_endless_request),
+        cmocka_unit_test(test_datagrams_stay_apart),
+        cmocka_unit_test(test_long_front),
+        cmocka_unit_test(test_unknown_link),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -203,7 +203,7 @@ static int run_run(int argc, char **argv)
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
     const char *path = o.in.operand[0];
-    const int is_capture = app_ends_in(path, ".pcap") || (app_ends_in(path, ".pcapng") && capture_is(path));
+    const int is_capture = app_ends_in(path, ".pcap") || capture_is(path);
     const int is_recording = is_capture || app_is_recording(path);
     status = run_check_options(&o, is_recording);
     if (status != APP_GO_ON) return status;
