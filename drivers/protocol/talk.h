@@ -2,8 +2,8 @@
 /* A talk: what a device answered to each request, and what it sent unasked, as a capture has it. The protocol `capture`
  * (talk.c) says it again to a client.
  *
- * A run is what followed one request: the answer, and the stream that the request began. What belongs to no request
- * is the run of the connection. Times of messages count from their request, or from the connection's beginning.
+ * A run is what followed one request: the answer, and the stream that the request began. All that belongs to no
+ * request is the run of the connection. Times of messages count from their request, or from the connection's beginning.
  *
  * Constant once it is built (firmware_sim/replay/capture_talk.c does so). Pure. */
 #ifndef DRIVERS_PROTOCOL_TALK_H

@@ -93,7 +93,7 @@ static struct capture_flow *find_flow(struct replay_capture *c, const struct ip_
 
 static struct capture_flow *add_flow(struct replay_capture *c, const struct ip_packet *p, int64_t t_ns)
 {
-    if (c->n_flows == MAX_FLOWS || !grow(&c->flow, &c->flow_room, c->n_flows + 1, sizeof *c->flow)) return NULL;
+    if (!grow(&c->flow, &c->flow_room, c->n_flows + 1, sizeof *c->flow)) return NULL;
     struct capture_flow *f = &c->flow[c->n_flows++];
     *f = (struct capture_flow){.is_tcp = p->is_tcp, .end = {p->from, p->to}, .t0_ns = t_ns};
     return f;
@@ -103,10 +103,13 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
 {
     uint8_t side = 0;
     struct capture_flow *f = find_flow(c, p, &side);
+    if (f == NULL && c->n_flows == MAX_FLOWS)
+        return sh_fail(
+            err, SH_EINPUT,
+            "more than %d connections, which are allowed; a filter of tcpdump or Wireshark makes a smaller file",
+            (int)MAX_FLOWS);
     if (f == NULL) f = add_flow(c, p, t_ns);
-    if (f == NULL)
-        return sh_fail(err, SH_EINPUT, "more than %d connections, which are allowed, or no memory for them",
-                       (int)MAX_FLOWS);
+    if (f == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     if (p->is_tcp && (p->flags & TCP_SYN) != 0) {
         f->device = (p->flags & TCP_ACK) != 0 ? side : !side;
         f->has_begin = 1;
