@@ -5,14 +5,16 @@
 
 #include "firmware_sim/replay/capture_inside.h"
 
-int capture_load(const char *path, struct replay_capture **out, struct sh_err *err)
+int capture_load(const char *path, const struct sh_report *report, struct replay_capture **out, struct sh_err *err)
 {
     struct sh_err why = {0};
     *out = NULL;
     struct replay_capture *c = calloc(1, sizeof *c);
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for it", path);
+    c->report = report;
     int rc = capture_read_flows(c, path, err);
     if (rc == SH_OK && (rc = capture_build(c, &why)) != SH_OK) sh_fail(err, rc, "%s: %s", path, why.text);
+    if (rc == SH_ESTOPPED) sh_fail_stopped(err);
     if (rc == SH_OK && c->n_places == 0 && c->counts.unknown_links != 0)
         rc =
             sh_fail(err, SH_EINPUT,

@@ -35,6 +35,7 @@ struct capture_said {
 };
 
 struct replay_capture {
+    const struct sh_report *report; /* while it is read */
     uint8_t *file;
     size_t file_len;
     struct capture_flow *flow;

@@ -186,6 +186,7 @@ int capture_read_flows(struct replay_capture *c, const char *path, struct sh_err
                           : pcapng_read(&ng, c->file + at, c->file_len - at, &packet, &used, &why);
         at += used;
         if (item == PCAPNG_PACKET) rc = take_packet(c, &packet, &why);
+        if (rc == SH_OK) rc = sh_check_stop(c->report, &why);
     }
     if (item < 0 || rc != SH_OK) return sh_fail(err, item < 0 ? item : rc, "%s: %s", path, why.text);
     if (at < c->file_len)

@@ -122,6 +122,7 @@ static int own_all(struct builder *b, int device)
     b->n_streaming = 0;
     for (size_t i = 0; i < b->said.n; i++) {
         const struct capture_said *s = &b->said.said[i];
+        if (sh_stopped(b->capture->report)) return SH_ESTOPPED;
         if ((int)s->side == device) {
             b->owner[i] = find_owner(b, s);
             continue;
@@ -307,6 +308,7 @@ int capture_build(struct replay_capture *c, struct sh_err *err)
         const int rc = build_place(c, f, udp_t0_ns);
         if (rc == SH_EINPUT)
             return sh_fail(err, rc, "more than %d different requests to a port, which are allowed", (int)MAX_REQUESTS);
+        if (rc == SH_ESTOPPED) return rc;
         if (rc != SH_OK) return sh_fail(err, rc, "no memory for its messages");
         if (c->place[c->n_places - 1].n_messages == 0) capture_forget(c, --c->n_places);
     }

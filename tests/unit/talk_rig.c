@@ -57,7 +57,7 @@ struct replay_capture *made_load(const struct made *m)
     struct replay_capture *capture;
     struct sh_err err = {0};
     const char *path = made_write(m, m->len);
-    const int rc = capture_load(path, &capture, &err);
+    const int rc = capture_load(path, NULL, &capture, &err);
     unlink(path);
     if (rc != SH_OK) fail_msg("%s", err.text);
     return capture;

@@ -235,7 +235,7 @@ static void test_hostile(void **state)
             struct sh_err err = {0};
             changed = m;
             if (how == 1) changed.bytes[i] ^= 0x55;
-            const int rc = capture_load(made_write(&changed, how == 0 ? i : m.len), &capture, &err);
+            const int rc = capture_load(made_write(&changed, how == 0 ? i : m.len), NULL, &capture, &err);
             refused += rc != SH_OK;
             loaded += rc == SH_OK;
             assert_true((rc == SH_OK) == (capture != NULL));

@@ -172,7 +172,7 @@ static void test_unknown_link(void **state)
     m.len += pcapng_put_interface(m.bytes + m.len, (enum pcapng_link)220, 0, NULL, NULL);
     m.len += pcapng_put_packet(m.bytes + m.len, 1, 0, junk, sizeof junk);
     const char *path = made_write(&m, m.len);
-    assert_int_equal(capture_load(path, &capture, &err), SH_EINPUT);
+    assert_int_equal(capture_load(path, NULL, &capture, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "link type 220; allowed are Ethernet (1)"));
     made_connect(&m, 0);
     made_say(&m, 1, 1, "hello");
@@ -181,6 +181,35 @@ static void test_unknown_link(void **state)
     assert_int_equal(counts.unknown_links, 1);
     assert_int_equal(capture_n(capture), 1);
     capture_free(capture);
+}
+
+static int ask_to_stop(void *ctx)
+{
+    return --*(int *)ctx < 0;
+}
+
+/* The load of a capture ends where the caller asks for it, at whichever step that is. */
+static void test_stopped(void **state)
+{
+    (void)state;
+    static struct made m;
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 1, 0, "a\n");
+    made_say(&m, 2, 1, "one\n");
+    const char *path = made_write(&m, m.len);
+    int stopped = 0;
+    for (int rc = SH_ESTOPPED; rc == SH_ESTOPPED; stopped++) {
+        int left = stopped;
+        const struct sh_report report = {.ctx = &left, .stop = ask_to_stop};
+        struct replay_capture *capture;
+        struct sh_err err = {0};
+        rc = capture_load(path, &report, &capture, &err);
+        assert_true(rc == SH_OK || (rc == SH_ESTOPPED && err.text[0] != '\0' && capture == NULL));
+        capture_free(capture);
+    }
+    unlink(path);
+    assert_true(stopped > 5 + 2); /* 5 packets and 2 messages, at least */
 }
 
 /* ---- streams */
@@ -359,6 +388,7 @@ int main(void)
         cmocka_unit_test(test_datagrams_stay_apart),
         cmocka_unit_test(test_long_front),
         cmocka_unit_test(test_unknown_link),
+        cmocka_unit_test(test_stopped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -240,7 +240,7 @@ int run_capture(struct run_options *o)
     struct sh_err err = {0};
     int status = check_options(o);
     if (status != APP_GO_ON) return status;
-    if (capture_load(o->in.operand[0], &run.capture, &err) != SH_OK) return app_fail(&err);
+    if (capture_load(o->in.operand[0], &app_report_stderr, &run.capture, &err) != SH_OK) return app_fail(&err);
     status = with_links(&run, &err);
     capture_free(run.capture);
     return status;
