@@ -75,14 +75,14 @@ static int is_event(const struct telegram *t, int on)
     return (t->text[n + 1] & 1) == on; /* 0 or 1 as a digit or as a byte */
 }
 
-/* "verb name": the telegram's first two words. */
+/* Whether these, as "sMN LMCstopmeas", are the telegram's first two words. */
 static int begins(const struct telegram *t, const char *words)
 {
     const size_t n = strlen(words);
     return words_len(t, 2) == n && memcmp(t->text, words, n) == 0;
 }
 
-/* An event's name and "sEN" or "sSN" in front. LMCstartmeas, too, begins the stream of scans (COLA.md). */
+/* "sEN name 1" begins the stream of "sSN name". LMCstartmeas, too, begins that of scans (COLA.md). */
 static int cola_streams(const uint8_t *request, size_t request_len, const uint8_t *message, size_t len)
 {
     const struct telegram asked = cola_inside(request, request_len), said = cola_inside(message, len);
