@@ -210,7 +210,8 @@ static void talk_lose(struct capture_session *s, size_t len)
 {
     s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, len);
     if (s->host.tell_once != NULL)
-        s->host.tell_once(s->host.ctx, "bytes of a client were left out: more than 65536 of them wait, or are one request");
+        s->host.tell_once(s->host.ctx,
+                          "bytes of a client were left out: more than 65536 of them wait, or are one request");
 }
 
 static void take_requests(struct capture_session *s)
