@@ -98,7 +98,8 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
     }
     const struct planar_news news = planar_scan_frame(&self->scan, frame);
     if (h.type == NATIVE_POSES) cola_way_add(&self->way, self->scan.scan, frame + NATIVE_HEADER_LEN, h.length);
-    if (news.begun) self->encoder_now = cola_way_at(&self->way, self->scan.scan, h.t_ns - self->scan.scan_t0_ns);
+    if (news.begun)
+        self->encoder_now = cola_way_at(&self->way, self->scan.scan, native_since_ns(h.t_ns, self->scan.scan_t0_ns));
     if (news.whole) self->encoder = self->encoder_now;
     if (news.whole) self->pending = 1;
     if (self->scan.whole == NULL) self->pending = 0;

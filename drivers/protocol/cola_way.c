@@ -32,8 +32,8 @@ void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, siz
 struct cola_encoder cola_way_at(const struct cola_way *w, uint32_t scan, int64_t t_ns)
 {
     if (scan != w->scan) return (struct cola_encoder){0, 0};
-    const double span_ns = (double)(w->t1_ns - w->t0_ns), way_m = w->path1_m - w->path0_m;
-    double part = span_ns > 0 ? (double)(t_ns - w->t0_ns) / span_ns : 1.0;
+    const double span_ns = (double)native_since_ns(w->t1_ns, w->t0_ns), way_m = w->path1_m - w->path0_m;
+    double part = span_ns > 0 ? (double)native_since_ns(t_ns, w->t0_ns) / span_ns : 1.0;
     double speed_mm_s = span_ns > 0 ? way_m * 1e12 / span_ns : 0.0;
     if (part < 0.0) part = 0.0;
     if (part > 1.0) part = 1.0;

@@ -175,6 +175,17 @@ struct native_points { /* begin of a points payload, 40 bytes; then n points of 
     uint32_t n_pulses, n_points;
 };
 
+/* Times of a stream may be any: their differences and sums wrap instead of overflowing. */
+static inline int64_t native_since_ns(int64_t t_ns, int64_t t0_ns)
+{
+    return (int64_t)((uint64_t)t_ns - (uint64_t)t0_ns);
+}
+
+static inline int64_t native_after_ns(int64_t t0_ns, int64_t dt_ns)
+{
+    return (int64_t)((uint64_t)t0_ns + (uint64_t)dt_ns);
+}
+
 /* 20 bytes: 0 u32 a, 4 u32 b, 8 u32 c, 12 i16 reflectance 0.01 dB, 14 u16 label,
  * 16 u32: bits 0..23 time after t0_ns in ns, 24..27 echo number, 28..31 echo count */
 struct native_point {

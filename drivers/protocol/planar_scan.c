@@ -116,7 +116,7 @@ static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, in
     s->seen = news->begun = 1;
     s->scan_t0_ns = scan_t0_ns;
     s->line = line;
-    s->now->t0_ns = s->t0_ns = scan_t0_ns + line_t0_ns;
+    s->now->t0_ns = s->t0_ns = native_after_ns(scan_t0_ns, line_t0_ns);
     s->now->number = s->number0 + line;
     s->n_seen = s->n_waiting = 0;
     memset(s->now->n, PLANAR_UNSEEN, s->head.n);
@@ -175,7 +175,8 @@ static void add_points(struct planar_scan *s, const uint8_t *payload, uint32_t n
 static void planar_scan_take_points(struct planar_scan *s, const struct native_header *header, const uint8_t *payload,
                                     const struct native_points *points, struct planar_news *news)
 {
-    turn_to(s, header->t_ns - points->t0_ns, points->line, points->line_t0_ns, from_start(s, payload, points), news);
+    turn_to(s, native_since_ns(header->t_ns, points->t0_ns), points->line, points->line_t0_ns,
+            from_start(s, payload, points), news);
     if (s->n_waiting != 0) break_turn(s, news); /* the attributes of the points before are missing */
     if (s->done) return;
     add_points(s, payload, points->n_points);
@@ -203,7 +204,7 @@ static void take_attributes(struct planar_scan *s, const uint8_t *payload, const
 static void take_line_end(struct planar_scan *s, const struct native_header *header, const struct line_end *end,
                           struct planar_news *news)
 {
-    turn_to(s, header->t_ns - end->t1_ns, end->line, end->t0_ns, 0, news);
+    turn_to(s, native_since_ns(header->t_ns, end->t1_ns), end->line, end->t0_ns, 0, news);
     if (!s->done && (end->status & LINE_PARTIAL) == 0) break_turn(s, news);
     s->done = 1;
 }

@@ -192,8 +192,11 @@ struct protocol_ops {
     /* All frames before device time t_ns have come. Called for each tick, also of those without frames. Where the client
      * was too slow, time jumps after a gap. */
     void (*time)(void *protocol, int64_t t_ns);
-    /* Bytes from the client, in pieces of any size. */
+    /* Bytes from the client, in pieces of any size; from a link of datagrams each call has a whole one. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
+    /* How many bytes input() can take now. Until it takes some, those of the client wait, in the end on the wire. Not
+     * asked for datagrams. May be NULL: any number. */
+    size_t (*takes)(const void *protocol);
     /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
      * takes time. 0: its session ends. May be NULL: they come without being asked for. */
     int (*owes)(const void *protocol);

@@ -27,9 +27,10 @@ struct capture_session {
     int64_t now_ns;
     int is_begun, is_over;
     struct played played[MAX_PLAYED];
-    size_t len; /* of what the client sent, and was not taken */
-    uint8_t in[TALK_MAX_REQUEST];
-    uint32_t times[]; /* of each request, so far */
+    int is_partial;               /* the bytes are not yet a whole request */
+    size_t len;                   /* of bytes that the client sent, and that were not taken */
+    uint8_t in[TALK_MAX_REQUEST]; /* each datagram has its length in front */
+    uint32_t times[];             /* of each request, so far */
 };
 
 static int talk_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
@@ -68,7 +69,20 @@ static void talk_begin(struct capture_session *s, int run, int request)
         s->played[i] = (struct played){r, request, 0, s->now_ns};
         return;
     }
-    s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, r->n);
+}
+
+/* A request waits while no place is free. From a device that speaks in turns it also waits for the beginning of the answer
+ * to the one before, which it would end. */
+static int must_wait(const struct capture_session *s)
+{
+    const int takes_turns = s->talk->kind->stops == NULL;
+    int n_free = 0;
+    for (int i = 0; i < MAX_PLAYED; i++) {
+        const struct played *p = &s->played[i];
+        n_free += p->run == NULL;
+        if (takes_turns && p->run != NULL && p->request != NO_REQUEST && p->next == 0) return 1;
+    }
+    return n_free == 0;
 }
 
 /* A stream that begins again goes on as evenly as it was: after its last message, its mean period passes. Messages that
@@ -177,19 +191,48 @@ static size_t match_beginning(const struct capture_session *s)
     return best != 0 ? best : may_come ? 0 : s->len;
 }
 
+/* The first request of the bytes. Returns how many bytes it has with its length in front; 0: it is not whole. */
+static size_t next_request(const struct capture_session *s, const uint8_t **request, size_t *len)
+{
+    const struct talk_kind *kind = s->talk->kind;
+    uint32_t n;
+    *request = s->in;
+    if (s->talk->is_datagrams) {
+        memcpy(&n, s->in, sizeof n);
+        *request += sizeof n;
+        *len = n;
+        return sizeof n + n;
+    }
+    return *len = kind->request_len != NULL ? kind->request_len(s->in, s->len) : match_beginning(s);
+}
+
+static void talk_lose(struct capture_session *s, size_t len)
+{
+    s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, len);
+    if (s->host.tell_once != NULL)
+        s->host.tell_once(s->host.ctx,
+                          "bytes of a client were left out: more than 65536 of them wait, or are one request");
+}
+
 static void take_requests(struct capture_session *s)
 {
-    while (s->len != 0 && !s->is_over) {
-        const size_t n =
-            s->talk->kind->request_len != NULL ? s->talk->kind->request_len(s->in, s->len) : match_beginning(s);
-        if (n == 0) break;
-        const int request = talk_find(s->talk, s->in, n);
+    while (s->len != 0 && !s->is_partial && !s->is_over && !must_wait(s)) {
+        const uint8_t *bytes;
+        size_t len;
+        const size_t used = next_request(s, &bytes, &len);
+        s->is_partial = used == 0;
+        if (used == 0) break;
+        const int request = talk_find(s->talk, bytes, len);
         if (request >= 0)
             take_known(s, request);
         else
-            take_unknown(s, s->in, n);
-        s->len -= n;
-        memmove(s->in, s->in + n, s->len);
+            take_unknown(s, bytes, len);
+        s->len -= used;
+        memmove(s->in, s->in + used, s->len);
+    }
+    if (s->is_partial && s->len == sizeof s->in) {
+        talk_lose(s, s->len);
+        s->len = 0;
     }
     if (s->is_over) s->len = 0;
 }
@@ -209,12 +252,22 @@ static void open_at(void *protocol, int64_t t_ns)
 static void input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct capture_session *s = protocol;
-    if (s->len + len > sizeof s->in) {
-        s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->len);
-        s->len = 0;
+    const uint32_t n = (uint32_t)len;
+    const size_t front = s->talk->is_datagrams ? sizeof n : 0;
+    if (len > sizeof s->in - s->len || front > sizeof s->in - s->len - len) {
+        talk_lose(s, len);
+        return;
     }
-    memcpy(s->in + s->len, bytes, len);
-    s->len += len;
+    if (front != 0) memcpy(s->in + s->len, &n, front);
+    memcpy(s->in + s->len + front, bytes, len);
+    s->len += front + len;
+    s->is_partial = 0;
+}
+
+static size_t takes(const void *protocol)
+{
+    const struct capture_session *s = protocol;
+    return sizeof s->in - s->len;
 }
 
 static void talk_time(void *protocol, int64_t t_ns)
@@ -228,7 +281,7 @@ static void talk_time(void *protocol, int64_t t_ns)
 static int64_t talk_next_ns(const void *protocol)
 {
     const struct capture_session *s = protocol;
-    int64_t next_ns = s->len != 0 ? s->now_ns : INT64_MAX;
+    int64_t next_ns = s->len != 0 && !s->is_partial ? s->now_ns : INT64_MAX;
     for (int i = 0; i < MAX_PLAYED; i++)
         if (s->played[i].run != NULL && due_ns(s, &s->played[i]) < next_ns) next_ns = due_ns(s, &s->played[i]);
     return next_ns;
@@ -249,6 +302,7 @@ const struct protocol_ops protocol_capture = {
     .open = open_at,
     .time = talk_time,
     .input = input,
+    .takes = takes,
     .owes = owes,
     .next_ns = talk_next_ns,
 };

@@ -2,8 +2,8 @@
 /* A talk: what a device answered to each request, and what it sent unasked, as a capture has it. The protocol `capture`
  * (talk.c) says it again to a client.
  *
- * A run is what followed one request: the answer, and the stream that the request began. What belongs to no request
- * is the run of the connection. Times of messages count from their request, or from the connection's beginning.
+ * A run is what followed one request: the answer, and the stream that the request began. All that belongs to no
+ * request is the run of the connection. Times of messages count from their request, or from the connection's beginning.
  *
  * Constant once it is built (firmware_sim/replay/capture_talk.c does so). Pure. */
 #ifndef DRIVERS_PROTOCOL_TALK_H
@@ -38,6 +38,7 @@ struct talk_request {
 
 struct talk {
     const struct talk_kind *kind;
+    int is_datagrams; /* each input of a client is one request, whatever its bytes */
     const uint8_t *bytes;
     const struct talk_message *message;
     const struct talk_run *run;
@@ -46,7 +47,7 @@ struct talk {
     int connection_run; /* TALK_NO_RUN: there is none */
 };
 
-/* What is done with a request that the capture does not have. */
+/* The device does this with a request that the capture does not have. */
 enum talk_unknown { TALK_SILENCE, TALK_ERROR, TALK_CLOSE };
 
 struct talk_options {
@@ -75,7 +76,7 @@ extern const struct talk_kind talk_cola, talk_scip, talk_lines, talk_bytes;
 
 /* The kind of a connection, by the first bytes that a client sent in it. */
 const struct talk_kind *talk_kind_of(const uint8_t *bytes, size_t len);
-/* What kind of request it is, as text: "sRN LMPscancfg", "MD". */
+/* Writes the kind of a request as text: "sRN LMPscancfg", "MD". */
 enum { TALK_NAME_LEN = 40 };
 void talk_name(const struct talk_kind *kind, const uint8_t *request, size_t len, char name[TALK_NAME_LEN]);
 

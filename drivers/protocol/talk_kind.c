@@ -75,10 +75,19 @@ static int is_event(const struct telegram *t, int on)
     return (t->text[n + 1] & 1) == on; /* 0 or 1 as a digit or as a byte */
 }
 
+/* Whether these, as "sMN LMCstopmeas", are the telegram's first two words. */
+static int begins(const struct telegram *t, const char *words)
+{
+    const size_t n = strlen(words);
+    return words_len(t, 2) == n && memcmp(t->text, words, n) == 0;
+}
+
+/* "sEN name 1" begins the stream of "sSN name". LMCstartmeas, too, begins that of scans (COLA.md). */
 static int cola_streams(const uint8_t *request, size_t request_len, const uint8_t *message, size_t len)
 {
     const struct telegram asked = cola_inside(request, request_len), said = cola_inside(message, len);
     const size_t n = words_len(&said, 2);
+    if (begins(&asked, "sMN LMCstartmeas")) return begins(&said, "sSN LMDscandata");
     return is_event(&asked, 1) && n > 4 && memcmp(said.text, "sSN ", 4) == 0 && words_len(&asked, 2) == n &&
            memcmp(asked.text + 3, said.text + 3, n - 3) == 0;
 }
@@ -86,9 +95,15 @@ static int cola_streams(const uint8_t *request, size_t request_len, const uint8_
 static int cola_stops(const uint8_t *request, size_t len, const uint8_t *began, size_t began_len)
 {
     const struct telegram now = cola_inside(request, len), then = cola_inside(began, began_len);
+    const int is_start = begins(&then, "sMN LMCstartmeas");
+    const int is_scans = is_start || begins(&then, "sEN LMDscandata");
+    if (!is_start && !is_event(&then, 1)) return 0;
+    if (begins(&now, "sMN mSCreboot")) return 1;
+    if (begins(&now, "sMN LMCstopmeas") || begins(&now, "sMN LMCstandby")) return is_scans;
+    if (!is_event(&now, 0) && !is_event(&now, 1)) return 0;
+    if (is_start) return begins(&now, "sEN LMDscandata");
     const size_t n = words_len(&now, 2);
-    return is_event(&then, 1) && (is_event(&now, 0) || is_event(&now, 1)) && words_len(&then, 2) == n &&
-           memcmp(now.text, then.text, n) == 0;
+    return words_len(&then, 2) == n && memcmp(now.text, then.text, n) == 0;
 }
 
 /* sFA, and that the variable, the method or the event is not known. */
@@ -209,13 +224,19 @@ const struct talk_kind talk_scip = {.name = "SCIP",
 
 /* ---- which it is */
 
+/* Two letters are no proof: what follows a name is its first digit, or the end of a command without digits. */
 static int is_scip(const uint8_t *bytes, size_t len)
 {
-    static const char *const names[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "TM", "SS", "CR",     "HS",
-                                        "GD", "GS", "GE", "MD", "MS", "ME", "HD", "HE", "ND", "NE", "SCIP2.0"};
+    static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "SCIP2.0"};
+    static const char *const counted[] = {"TM", "SS", "CR", "HS", "GD", "GS", "GE",
+                                          "MD", "MS", "ME", "HD", "HE", "ND", "NE"};
     if (len != 0 && bytes[0] == '%') bytes++, len--;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (len > strlen(names[i]) && memcmp(bytes, names[i], strlen(names[i])) == 0) return 1;
+    for (size_t i = 0; i < sizeof bare / sizeof *bare; i++) {
+        const size_t n = strlen(bare[i]);
+        if (len > n && memcmp(bytes, bare[i], n) == 0 && memchr("\n\r;", bytes[n], 3) != NULL) return 1;
+    }
+    for (size_t i = 0; i < sizeof counted / sizeof *counted; i++)
+        if (len > 2 && memcmp(bytes, counted[i], 2) == 0 && bytes[2] >= '0' && bytes[2] <= '9') return 1;
     return 0;
 }
 
@@ -232,8 +253,9 @@ const struct talk_kind *talk_kind_of(const uint8_t *bytes, size_t len)
 {
     const size_t line = line_len(bytes, len);
     if (len >= 2 && bytes[0] == STX && (bytes[1] == 's' || bytes[1] == STX)) return &talk_cola;
+    if (is_http(bytes, len)) return &talk_bytes;
     if (is_scip(bytes, len) && scip_request_len(bytes, len) != 0) return &talk_scip;
-    if (line == 0 || is_http(bytes, len)) return &talk_bytes;
+    if (line == 0) return &talk_bytes;
     for (size_t i = 0; i < line; i++)
         if ((bytes[i] < 0x20 || bytes[i] > 0x7e) && strchr("\t\r\n", bytes[i]) == NULL) return &talk_bytes;
     return &talk_lines;

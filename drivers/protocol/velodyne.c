@@ -212,7 +212,7 @@ static void add_firing(struct velodyne *v, const uint8_t *payload, uint32_t firs
     uint8_t *block = v->packet + pair * VELODYNE_BLOCK_LEN * (dual ? 2u : 1u), *at = block + 4 + entry * ENTRY_LEN;
     struct native_point p;
     native_decode_point(payload, first + n - 1, &p); /* the last; of a single return the only one */
-    if (v->n_firings == 0) v->t0_ns = frame_t_ns + p.dt_ns;
+    if (v->n_firings == 0) v->t0_ns = native_after_ns(frame_t_ns, p.dt_ns);
     if (entry == 0) put_azimuth(v, block, p.c);
     put_entry(v, at, &p);
     if (dual) {

@@ -17,7 +17,9 @@ void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
 /* Fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
 void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
 void cfg_set_usb_personality(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
-/* Checks the needs of the protocols of links. */
+/* Checks which links the protocols are spoken on, and sets what follows from a protocol. */
+void cfg_check_protocols_alone(struct cfg_reader *rd, struct config *cfg);
+/* Checks also their needs of the stream and of the head. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
 /* Whether the protocol can describe a head of this emitter. */
 int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter);

@@ -168,7 +168,8 @@ static const struct cfg_key config_keys[] = {
            [PROTOCOL_VELODYNE_HTTP] = "velodyne-http", [PROTOCOL_CAPTURE] = "capture"),
      .help = "native: the head's own stream and commands; nmea: the GNSS receiver, which sends NMEA 0183 and takes no "
              "commands; scip: as a Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, "
-             "velodyne-position: position packets, velodyne-http: settings, as a VLP-16."},
+             "velodyne-position: position packets, velodyne-http: settings, as a VLP-16; capture: what a device said, "
+             "only with `run FILE.pcap`."},
     {LINK(dialect), CFG_ENUM, .def = "any",
      WORDS([PROTOCOL_DIALECT_ANY] = "any", [PROTOCOL_COLA_A] = "cola-a", [PROTOCOL_COLA_B] = "cola-b"),
      .help = "cola: any: each request is answered in its own dialect. cola-a, cola-b: the link understands that one "

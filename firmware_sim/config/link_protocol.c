@@ -132,19 +132,19 @@ static void set_source_port(const struct cfg_reader *rd, struct link_spec *link,
     link->usual_port = 1;
 }
 
-static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i)
+/* Returns whether the link can have its protocol. */
+static int check_link_alone(struct cfg_reader *rd, struct link_spec *link, uint32_t i)
 {
-    struct link_spec *link = &cfg->link[i];
     const struct protocol_ops *ops = ops_of(link);
-    if (!CFG_SOUND(rd, i, "links[]")) return; /* with all its keys */
+    if (!CFG_SOUND(rd, i, "links[]")) return 0; /* with all its keys */
     if (ops == NULL) {
         cfg_fail_key(rd, PROTOCOL_KEY, i, "this build does not have it");
-        return;
+        return 0;
     }
     if (!is_spoken_on(link)) {
         cfg_fail_key(rd, PROTOCOL_KEY, i, "protocol %s is not available on a %s link; allowed %s", ops->name,
                      cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
-        return;
+        return 0;
     }
     if (link->dialect != PROTOCOL_DIALECT_ANY && link->protocol != PROTOCOL_COLA)
         cfg_fail_key(rd, "links[].dialect", i, "%s, but the protocol is %s; allowed with protocol: cola, or any",
@@ -152,14 +152,22 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
     set_source_port(rd, link, i);
     /* The real device turns a second client away. */
     if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
-    check_stream(rd, cfg, i, ops);
-    check_head(rd, cfg, i, ops);
+    return 1;
+}
+
+void cfg_check_protocols_alone(struct cfg_reader *rd, struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        check_link_alone(rd, &cfg->link[i], i);
 }
 
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg)
 {
-    for (uint32_t i = 0; i < cfg->n_links; i++)
-        check_protocol(rd, cfg, i);
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        if (!check_link_alone(rd, &cfg->link[i], i)) continue;
+        check_stream(rd, cfg, i, ops_of(&cfg->link[i]));
+        check_head(rd, cfg, i, ops_of(&cfg->link[i]));
+    }
 }
 
 int config_speaks(const struct config *cfg, int protocol)

@@ -42,6 +42,7 @@ int config_load_links(const char *text, const char *name, const char *const *set
     cfg_close_file(doc);
     cfg_fill_defaults(&rd, NULL);
     cfg_check_links(&rd, cfg);
+    cfg_check_protocols_alone(&rd, cfg);
     cfg_check_loop(&rd, cfg);
     cfg_check_faults(&rd, &cfg->faults);
     cfg_check_fault_links(&rd, cfg, &cfg->faults);

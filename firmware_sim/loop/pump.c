@@ -156,7 +156,7 @@ static void handle(struct pump *pump, const struct link_event *event)
         break;
     case LINK_READABLE:
         if (s->open && !pump->protocol->passes_native)
-            pump_read(pump, s, event->session);
+            session_read_protocol(pump, s, event->session);
         else if (s->open)
             pump_read_commands(pump, s, event->session);
         break;

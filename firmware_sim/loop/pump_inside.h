@@ -168,6 +168,8 @@ void session_close_protocol(struct pump *pump, struct session *s);
 int session_restart_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);
+/* Reads bytes of a client, for the protocol. */
+void session_read_protocol(struct pump *pump, struct session *s, int index);
 /* Whether something is still due to a client that sends nothing more. */
 int session_owes_protocol(const struct pump *pump, const struct session *s);
 /* The first tick from the cursor on that must wake the protocol although it has no frames. */

@@ -283,25 +283,43 @@ static int has_room(const struct session *s)
     return unit_queue_room(&s->units) >= s->units.cap / 2;
 }
 
-/* Gives the client's bytes to the protocol while answers have room. Without room it still goes on once the input buffer
- * is full: a client that sends and never reads loses answers. Returns whether it took any bytes. */
+/* How many bytes the protocol is given at once now. While answers have no room it still goes on once the input buffer is
+ * full: a client that sends and never reads loses answers. Datagrams stay whole. */
+static uint32_t piece_of(const struct pump *pump, const struct session *s)
+{
+    const struct session_commands *c = &s->commands;
+    const uint32_t n = c->in_len - c->in_pos;
+    if (pump->ops->datagrams) return n;
+    if (c->wrong >= WRONG_AT_ONCE || (!has_room(s) && n != READ_BYTES)) return 0;
+    const size_t most = pump->protocol->takes != NULL ? pump->protocol->takes(s->protocol) : n;
+    const uint32_t piece = n < PIECE_BYTES ? n : PIECE_BYTES;
+    return piece < most ? piece : (uint32_t)most;
+}
+
+/* Gives the client's bytes to the protocol. Returns whether it took any bytes. */
 static int take_input(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     const uint32_t from = c->in_pos;
-    while (c->in_pos < c->in_len && c->wrong < WRONG_AT_ONCE && !s->hang_up &&
-           (has_room(s) || c->in_len - c->in_pos == READ_BYTES)) {
-        uint32_t n = c->in_len - c->in_pos < PIECE_BYTES ? c->in_len - c->in_pos : PIECE_BYTES;
+    for (uint32_t n; !s->hang_up && (n = piece_of(pump, s)) != 0; c->in_pos += n) {
         s->answering = 1;
         pump->protocol->input(s->protocol, c->in + c->in_pos, n);
         s->answering = 0;
-        c->in_pos += n;
     }
     if (s->hang_up && c->in_pos != c->in_len) {
         host_count(s, PROTOCOL_INPUT_LOST, c->in_len - c->in_pos);
         c->in_pos = c->in_len;
     }
     return c->in_pos != from;
+}
+
+void session_read_protocol(struct pump *pump, struct session *s, int index)
+{
+    struct session_commands *c = &s->commands;
+    pump_read(pump, s, index);
+    if (pump->ops->datagrams) take_input(pump, s); /* before the next one comes */
+    /* Without a rest, poll() would say over and over that there is more, for which there is no room. */
+    if (c->in_len - c->in_pos == READ_BYTES && piece_of(pump, s) == 0) c->wrong = WRONG_AT_ONCE;
 }
 
 /* Writes until the link is full (1), or there is nothing left (0). Negative: the session is gone. */

@@ -5,14 +5,22 @@
 
 #include "firmware_sim/replay/capture_inside.h"
 
-int capture_load(const char *path, struct replay_capture **out, struct sh_err *err)
+int capture_load(const char *path, const struct sh_report *report, struct replay_capture **out, struct sh_err *err)
 {
     struct sh_err why = {0};
     *out = NULL;
     struct replay_capture *c = calloc(1, sizeof *c);
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for it", path);
+    c->report = report;
     int rc = capture_read_flows(c, path, err);
     if (rc == SH_OK && (rc = capture_build(c, &why)) != SH_OK) sh_fail(err, rc, "%s: %s", path, why.text);
+    if (rc == SH_ESTOPPED) sh_fail_stopped(err);
+    if (rc == SH_OK && c->n_places == 0 && c->counts.unknown_links != 0)
+        rc =
+            sh_fail(err, SH_EINPUT,
+                    "%s: packets of link type %u; allowed are Ethernet (1), raw IP (101, 228, 229), Linux cooked (113, "
+                    "276) and loopback (0, 108)",
+                    path, c->counts.unknown_link);
     if (rc == SH_OK && c->n_places == 0)
         rc = sh_fail(
             err, SH_EFORMAT,
@@ -68,5 +76,5 @@ void capture_get_counts(const struct replay_capture *c, struct capture_counts *c
 
 double capture_duration_s(const struct replay_capture *c)
 {
-    return 1e-9 * (double)(c->last_ns - c->first_ns);
+    return 1e-9 * (double)c->now_ns;
 }

@@ -26,15 +26,18 @@ struct capture_place {
 struct capture_counts {
     uint64_t packets, others; /* all; those that are neither TCP nor UDP */
     uint64_t fragments, damaged;
-    uint64_t missing_bytes; /* of TCP streams and of packets that were cut off */
+    uint64_t backward, untimed; /* packets with a time before that of an earlier one; without any */
+    uint64_t unknown_links;     /* packets of link types that are not read */
+    unsigned unknown_link;      /* the last one of these */
+    uint64_t missing_bytes;     /* of TCP streams and of packets that were cut off */
 };
 
 struct replay_capture;
 
 /* 1: the file is a capture of packets, not a recording of the native stream. 0: it isn't, or it can't be read. */
 int capture_is(const char *path);
-/* SH_EINPUT, SH_EFORMAT, SH_EIO with the path. */
-int capture_load(const char *path, struct replay_capture **out, struct sh_err *err);
+/* SH_EINPUT, SH_EFORMAT, SH_EIO with the path; SH_ESTOPPED where the report, which may be NULL, ends the work. */
+int capture_load(const char *path, const struct sh_report *report, struct replay_capture **out, struct sh_err *err);
 void capture_free(struct replay_capture *capture);
 uint32_t capture_n(const struct replay_capture *capture);
 const struct capture_place *capture_place(const struct replay_capture *capture, uint32_t i);

@@ -26,20 +26,24 @@ struct capture_flow {
     int64_t t0_ns;
 };
 
-/* What a device and its client said in a flow, in the order of time. */
+/* A message of a device or of its client. */
 struct capture_said {
     size_t at; /* in bytes of the builder */
     uint32_t len, side;
     int64_t begin_ns, end_ns; /* of its first and its last byte */
+    size_t number;            /* of the flow's segment that made it whole */
 };
 
 struct replay_capture {
+    const struct sh_report *report; /* while it is read */
     uint8_t *file;
     size_t file_len;
     struct capture_flow *flow;
     size_t n_flows, flow_room;
     struct capture_counts counts;
-    int64_t first_ns, last_ns;
+    int64_t now_ns;   /* of the last packet that was read, since the first one */
+    int64_t clock_ns; /* the file's time then */
+    int has_clock;
     uint32_t n_places;
     struct capture_place place[CAPTURE_MAX_TALKS];
     struct capture_store { /* what the talk of a place points to */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The packets of a capture: the file's blocks in, flows out. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/grow.h"
@@ -11,22 +12,39 @@
 enum { FRONT_BYTES = 4096, MAX_FLOWS = 1000 };
 static const size_t MAX_FILE = (size_t)2 << 30;
 static const int64_t MAX_SPAN_NS = INT64_C(10000000000000000); /* sums of times then fit */
+static const int64_t LEAST_STEP_NS = 100000000;                /* packets in a wrong order differ by less */
+
+/* Reads until the file's first interface says which packets it has. */
+static int is_of_packets(FILE *file, uint8_t **bytes)
+{
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    struct sh_err err;
+    size_t room = 0, n = 0, at = 0, used;
+    for (;;) {
+        if (!grow(bytes, &room, n + FRONT_BYTES, 1)) return 0;
+        const size_t got = fread(*bytes + n, 1, room - n, file);
+        n += got;
+        if (at == 0 && n >= 4 && pcap_is(*bytes)) return 1;
+        for (int item = PCAPNG_OTHER; item > 0; at += used) {
+            item = pcapng_read(&reader, *bytes + at, n - at, &packet, &used, &err);
+            if (item < 0) return 0;
+            if (reader.n_interfaces != 0) return reader.interface[0].link != PCAPNG_USER0;
+        }
+        if (got == 0) return 0;
+    }
+}
 
 int capture_is(const char *path)
 {
     const char *why;
-    uint8_t bytes[FRONT_BYTES];
-    struct pcapng_reader reader = {0};
-    struct pcapng_packet packet;
-    struct sh_err err;
+    uint8_t *bytes = NULL;
     FILE *file = infile_open(path, &why);
     if (file == NULL) return 0;
-    const size_t n = fread(bytes, 1, sizeof bytes, file);
+    const int is = is_of_packets(file, &bytes);
+    free(bytes);
     fclose(file);
-    if (n >= 4 && pcap_is(bytes)) return 1;
-    for (size_t at = 0, used; reader.n_interfaces == 0; at += used)
-        if (pcapng_read(&reader, bytes + at, n - at, &packet, &used, &err) <= 0) return 0;
-    return reader.interface[0].link != PCAPNG_USER0;
+    return is;
 }
 
 static int read_file(struct replay_capture *c, const char *path, struct sh_err *err)
@@ -75,7 +93,7 @@ static struct capture_flow *find_flow(struct replay_capture *c, const struct ip_
 
 static struct capture_flow *add_flow(struct replay_capture *c, const struct ip_packet *p, int64_t t_ns)
 {
-    if (c->n_flows == MAX_FLOWS || !grow(&c->flow, &c->flow_room, c->n_flows + 1, sizeof *c->flow)) return NULL;
+    if (!grow(&c->flow, &c->flow_room, c->n_flows + 1, sizeof *c->flow)) return NULL;
     struct capture_flow *f = &c->flow[c->n_flows++];
     *f = (struct capture_flow){.is_tcp = p->is_tcp, .end = {p->from, p->to}, .t0_ns = t_ns};
     return f;
@@ -85,10 +103,13 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
 {
     uint8_t side = 0;
     struct capture_flow *f = find_flow(c, p, &side);
+    if (f == NULL && c->n_flows == MAX_FLOWS)
+        return sh_fail(
+            err, SH_EINPUT,
+            "more than %d connections, which are allowed; a filter of tcpdump or Wireshark makes a smaller file",
+            (int)MAX_FLOWS);
     if (f == NULL) f = add_flow(c, p, t_ns);
-    if (f == NULL)
-        return sh_fail(err, SH_EINPUT, "more than %d connections, which are allowed, or no memory for them",
-                       (int)MAX_FLOWS);
+    if (f == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     if (p->is_tcp && (p->flags & TCP_SYN) != 0) {
         f->device = (p->flags & TCP_ACK) != 0 ? side : !side;
         f->has_begin = 1;
@@ -103,19 +124,36 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
     return SH_OK;
 }
 
+/* Sets c->now_ns, the time of a packet since the first one. It never goes back: the order of the file goes before its
+ * times. A clock that was set back goes on from there, so that the delays behind that stay. */
+static int pass_time(struct replay_capture *c, const struct pcapng_packet *packet, struct sh_err *err)
+{
+    if (!packet->has_time) {
+        c->counts.untimed++;
+        return SH_OK;
+    }
+    if (!c->has_clock) c->clock_ns = packet->t_ns;
+    c->has_clock = 1;
+    const int64_t passed_ns = packet->t_ns - c->clock_ns; /* neither is negative */
+    c->counts.backward += passed_ns < 0;
+    if (passed_ns > MAX_SPAN_NS - c->now_ns)
+        return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",
+                       (unsigned long long)c->counts.packets, 1e-9 * ((double)c->now_ns + (double)passed_ns),
+                       1e-9 * (double)MAX_SPAN_NS);
+    if (passed_ns > 0) c->now_ns += passed_ns;
+    if (passed_ns > 0 || passed_ns < -LEAST_STEP_NS) c->clock_ns = packet->t_ns;
+    return SH_OK;
+}
+
 static int take_packet(struct replay_capture *c, const struct pcapng_packet *packet, struct sh_err *err)
 {
     struct ip_packet p;
-    const int64_t t_ns = packet->has_time && packet->t_ns > c->last_ns ? packet->t_ns : c->last_ns;
-    if (c->counts.packets++ == 0) c->first_ns = t_ns;
-    if (t_ns - c->first_ns > MAX_SPAN_NS)
-        return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",
-                       (unsigned long long)c->counts.packets, 1e-9 * (double)(t_ns - c->first_ns),
-                       1e-9 * (double)MAX_SPAN_NS);
-    c->last_ns = t_ns; /* the order of the file goes before its times */
+    c->counts.packets++;
+    const int rc = pass_time(c, packet, err);
+    if (rc != SH_OK) return rc;
     switch (ip_packet_read(packet->link, packet->data, packet->len, &p)) {
     case IP_PACKET_FOUND:
-        return add_packet(c, &p, t_ns, err);
+        return add_packet(c, &p, c->now_ns, err);
     case IP_PACKET_FRAGMENT:
         c->counts.fragments++;
         return SH_OK;
@@ -123,10 +161,9 @@ static int take_packet(struct replay_capture *c, const struct pcapng_packet *pac
         c->counts.damaged++;
         return SH_OK;
     case IP_PACKET_LINK:
-        return sh_fail(err, SH_EINPUT,
-                       "packets of link type %u; allowed are Ethernet (1), raw IP (101, 228, 229), Linux cooked (113, "
-                       "276) and loopback (0, 108)",
-                       packet->link);
+        c->counts.unknown_links++;
+        c->counts.unknown_link = packet->link;
+        return SH_OK;
     case IP_PACKET_OTHER:
         c->counts.others++;
     }
@@ -149,6 +186,7 @@ int capture_read_flows(struct replay_capture *c, const char *path, struct sh_err
                           : pcapng_read(&ng, c->file + at, c->file_len - at, &packet, &used, &why);
         at += used;
         if (item == PCAPNG_PACKET) rc = take_packet(c, &packet, &why);
+        if (rc == SH_OK) rc = sh_check_stop(c->report, &why);
     }
     if (item < 0 || rc != SH_OK) return sh_fail(err, item < 0 ? item : rc, "%s: %s", path, why.text);
     if (at < c->file_len)

@@ -13,12 +13,13 @@ struct part {
     size_t len;
     int64_t from; /* its first byte's place in the side's bytes */
     int64_t t_ns;
-    size_t number; /* in the order of the file */
+    size_t number; /* of its segment in the flow, in the order of the file */
 };
 
 struct parts {
     struct part *part;
     size_t n, room;
+    int has_begin; /* the side's SYN is there: place 0 is its first byte */
 };
 
 static int by_place(const void *a, const void *b)
@@ -39,27 +40,31 @@ static int collect(const struct capture_flow *f, uint32_t side, struct parts *pa
         if (s->side != side) continue;
         const int is_syn = f->is_tcp && (s->flags & TCP_SYN) != 0;
         const uint32_t seq = s->seq + (uint32_t)is_syn;
-        if (!is_known) base = seq;
+        if (!is_known) {
+            base = seq;
+            parts->has_begin = is_syn || !f->is_tcp;
+        }
         is_known = 1;
         if (s->len == 0) continue;
         const int64_t from = f->is_tcp ? last + (int32_t)(seq - base - (uint32_t)last) : last;
         last = f->is_tcp ? from : last + s->len;
         if (!grow(&parts->part, &parts->room, parts->n + 1, sizeof *parts->part)) return SH_ENOMEM;
-        parts->part[parts->n] = (struct part){s->data, s->len, from, s->t_ns, parts->n};
-        parts->n++;
+        parts->part[parts->n++] = (struct part){s->data, s->len, from, s->t_ns, i};
     }
     if (parts->n != 0) qsort(parts->part, parts->n, sizeof *parts->part, by_place);
     return SH_OK;
 }
 
-/* Leaves out bytes that came before. A receiver has a byte once all before it have come. */
+/* Leaves out bytes that came before. A receiver has a byte once all before it have come. Without a SYN the first segment
+ * of the file need not be the first of the stream. */
 static void trim(struct replay_capture *c, struct parts *parts)
 {
-    int64_t place = 0, t_ns = INT64_MIN;
-    size_t n = 0;
+    int64_t place = parts->has_begin || parts->n == 0 ? 0 : parts->part[0].from, t_ns = INT64_MIN;
+    size_t n = 0, number = 0;
     for (size_t i = 0; i < parts->n; i++) {
         struct part p = parts->part[i];
         if (p.t_ns < t_ns) p.t_ns = t_ns;
+        if (p.number < number) p.number = number;
         if (p.from > place) c->counts.missing_bytes += (uint64_t)(p.from - place);
         const int64_t had = p.from < place ? place - p.from : 0;
         if (had >= (int64_t)p.len) continue;
@@ -67,6 +72,7 @@ static void trim(struct replay_capture *c, struct parts *parts)
         p.len -= (size_t)had;
         place = p.from + had + (int64_t)p.len;
         t_ns = p.t_ns;
+        number = p.number;
         parts->part[n++] = p;
     }
     parts->n = n;
@@ -92,16 +98,16 @@ static int add_said(struct capture_list *list, const struct capture_said *said)
     return SH_OK;
 }
 
-/* Where a message begins and ends in the parts, as times. at, end: of the side's bytes without gaps. */
+/* Where a message begins and ends in the parts. at: of the side's bytes without gaps. */
 struct cursor {
     size_t part, passed; /* passed: bytes of the parts before */
 };
 
-static int64_t time_at(const struct parts *parts, struct cursor *c, size_t at)
+static const struct part *part_at(const struct parts *parts, struct cursor *c, size_t at)
 {
     while (at >= c->passed + parts->part[c->part].len && c->part + 1 < parts->n)
         c->passed += parts->part[c->part++].len;
-    return parts->part[c->part].t_ns;
+    return &parts->part[c->part];
 }
 
 static int cut(const struct parts *parts, const uint8_t *bytes, size_t len, size_t base, uint32_t side,
@@ -112,8 +118,9 @@ static int cut(const struct parts *parts, const uint8_t *bytes, size_t len, size
     for (size_t at = 0, n; at < len && rc == SH_OK; at += n) {
         n = message_len(bytes + at, len - at);
         if (n == 0) n = len - at; /* the capture ends within it */
-        const int64_t begin_ns = time_at(parts, &cursor, at), end_ns = time_at(parts, &cursor, at + n - 1);
-        rc = add_said(list, &(struct capture_said){base + at, (uint32_t)n, side, begin_ns, end_ns});
+        const int64_t begin_ns = part_at(parts, &cursor, at)->t_ns;
+        const struct part *end = part_at(parts, &cursor, at + n - 1);
+        rc = add_said(list, &(struct capture_said){base + at, (uint32_t)n, side, begin_ns, end->t_ns, end->number});
     }
     return rc;
 }
@@ -134,7 +141,8 @@ int capture_add_messages(struct replay_capture *c, const struct capture_flow *fl
         }
         memcpy(store->bytes + store->n_bytes, p->data, p->len);
         if (message_len == NULL)
-            rc = add_said(list, &(struct capture_said){store->n_bytes, (uint32_t)p->len, side, p->t_ns, p->t_ns});
+            rc = add_said(list,
+                          &(struct capture_said){store->n_bytes, (uint32_t)p->len, side, p->t_ns, p->t_ns, p->number});
         store->n_bytes += p->len;
     }
     if (rc == SH_OK && message_len != NULL && parts.n != 0)

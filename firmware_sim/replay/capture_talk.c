@@ -122,6 +122,7 @@ static int own_all(struct builder *b, int device)
     b->n_streaming = 0;
     for (size_t i = 0; i < b->said.n; i++) {
         const struct capture_said *s = &b->said.said[i];
+        if (sh_stopped(b->capture->report)) return SH_ESTOPPED;
         if ((int)s->side == device) {
             b->owner[i] = find_owner(b, s);
             continue;
@@ -195,11 +196,11 @@ static int put_runs(struct builder *b)
 
 /* ---- places */
 
-static int by_time(const void *a, const void *b)
+/* The order of the file is that of time, and decides where clocks are too coarse to. */
+static int by_order(const void *a, const void *b)
 {
     const struct capture_said *one = a, *other = b;
-    if (one->end_ns != other->end_ns) return one->end_ns < other->end_ns ? -1 : 1;
-    if (one->side != other->side) return one->side < other->side ? -1 : 1;
+    if (one->number != other->number) return one->number < other->number ? -1 : 1;
     return one->at < other->at ? -1 : one->at > other->at;
 }
 
@@ -228,7 +229,7 @@ static int add_flow(struct builder *b, const struct capture_flow *f, int64_t t0_
     int rc = SH_OK;
     for (uint32_t side = 0; side < 2 && rc == SH_OK; side++)
         rc = capture_add_messages(b->capture, f, side, b->place->talk.kind, b->store, &b->said);
-    if (rc == SH_OK && b->said.n != 0) qsort(b->said.said, b->said.n, sizeof *b->said.said, by_time);
+    if (rc == SH_OK && b->said.n != 0) qsort(b->said.said, b->said.n, sizeof *b->said.said, by_order);
     if (rc == SH_OK) rc = own_all(b, f->device);
     if (rc == SH_OK) rc = put_messages(b, f->device, t0_ns);
     b->place->n_connections++;
@@ -251,7 +252,8 @@ static int build_place(struct replay_capture *c, const struct capture_flow *firs
     struct builder b = {.capture = c, .place = place, .store = &c->store[c->n_places]};
     c->n_places++; /* also where this fails: capture_free frees the store */
     describe(place, first);
-    place->talk = (struct talk){.kind = kind_of(c, first), .connection_run = TALK_NO_RUN};
+    place->talk =
+        (struct talk){.kind = kind_of(c, first), .is_datagrams = !first->is_tcp, .connection_run = TALK_NO_RUN};
     int rc = SH_OK;
     for (const struct capture_flow *f = first; f < c->flow + c->n_flows && rc == SH_OK; f++)
         if (is_at(f, first)) rc = add_flow(&b, f, f->is_tcp ? f->t0_ns : udp_t0_ns);
@@ -306,6 +308,7 @@ int capture_build(struct replay_capture *c, struct sh_err *err)
         const int rc = build_place(c, f, udp_t0_ns);
         if (rc == SH_EINPUT)
             return sh_fail(err, rc, "more than %d different requests to a port, which are allowed", (int)MAX_REQUESTS);
+        if (rc == SH_ESTOPPED) return rc;
         if (rc != SH_OK) return sh_fail(err, rc, "no memory for its messages");
         if (c->place[c->n_places - 1].n_messages == 0) capture_forget(c, --c->n_places);
     }

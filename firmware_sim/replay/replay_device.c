@@ -11,7 +11,7 @@
 
 /* ---- which device it can be */
 
-/* What the stream must have beside its emitter. NULL: it has it. Amplitudes are not asked for: without them protocols
+/* Names a thing that the stream must have beside its emitter, and lacks. NULL: it lacks none. Amplitudes are not asked for: without them protocols
  * take reflectances. */
 static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e)

@@ -9,7 +9,7 @@
 #include "firmware_sim/replay/recording.h"
 #include "firmware_sim/replay/replay.h"
 
-enum { REPLAY_CHANGES = 32, REPLAY_FRONT = 3, REPLAY_FRONT_ROOM = 2048 };
+enum { REPLAY_CHANGES = 32, REPLAY_FRONT = 3, REPLAY_FRONT_ROOM = 2048, REPLAY_MOST_BYTES = 1 << 20 /* of a tick */ };
 
 /* The last descriptor, emitter and anchor of the stream. */
 struct replay_front {
@@ -86,6 +86,12 @@ void replay_overlong(void *self, uint32_t session, struct command_result *out);
 void replay_session_opened(void *self, uint32_t session, const char *who);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
 void replay_report(void *self, int number, const char *text);
+
+/* replay_player.c, by the player's thread. Begins to play with this tick. */
+void replay_begin(struct replay *replay, uint64_t tick);
+/* Fills a tick with its frames. may_skip: time without frames passes at once. */
+void replay_fill(struct replay *replay, uint64_t tick, int may_skip);
+void replay_stop(struct replay *replay, uint64_t tick, int wants_again);
 
 /* replay_notes.c: a frame goes out with a tick. With the lock held; counts into r->tick. */
 void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);

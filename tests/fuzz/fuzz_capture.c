@@ -118,7 +118,7 @@ static void answer(const char *path, int loop)
     struct replay_capture *capture;
     struct sh_err err = {0};
     capture_is(path);
-    if (capture_load(path, &capture, &err) != SH_OK) {
+    if (capture_load(path, NULL, &capture, &err) != SH_OK) {
         fuzz_must_be_line(&err);
         return;
     }

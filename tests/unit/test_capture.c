@@ -1,156 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Captures that answer. Files are made packet by packet: with ethernet.h, whose frames test_ethernet checks by their
- * offsets, and headers of other link types by their documents. A host of the test's own takes what is sent. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
+/* Captures that answer (talk_rig.h). */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/protocol/ethernet.h"
-#include "drivers/protocol/pcapng.h"
-#include "drivers/protocol/protocol.h"
-#include "firmware_sim/replay/capture.h"
-
-enum { FILE_ROOM = 1 << 16, MS = 1000000 };
-
-static const struct ethernet_end DRIVER = {.address = {10, 0, 0, 2}, .port = 40000};
-static const struct ethernet_end DEVICE = {.address = {10, 0, 0, 1}, .port = 2112};
-
-/* ---- a capture that is being made */
-
-struct made {
-    uint8_t bytes[FILE_ROOM];
-    size_t len;
-    struct tcp_talk talk;
-};
-
-static void made_begin(struct made *m)
-{
-    memset(m, 0, sizeof *m);
-    m->len = pcapng_put_section(m->bytes, "test");
-    m->len += pcapng_put_interface(m->bytes + m->len, PCAPNG_ETHERNET, 0, NULL, NULL);
-    m->talk.end[0] = DRIVER;
-    m->talk.end[1] = DEVICE;
-    m->talk.next[0] = 0xfffffff0u; /* its numbers wrap */
-    m->talk.next[1] = 77;
-}
-
-static void made_add(struct made *m, int64_t t_ms, const uint8_t *frame, size_t len)
-{
-    assert_true(m->len + len + 64 < sizeof m->bytes);
-    m->len += pcapng_put_packet(m->bytes + m->len, 0, t_ms * MS, frame, len);
-}
-
-static void made_connect(struct made *m, int64_t t_ms)
-{
-    uint8_t frame[ETHERNET_MAX_FRAME];
-    made_add(m, t_ms, frame, tcp_put_syn(&m->talk, 0, frame));
-    made_add(m, t_ms, frame, tcp_put_syn(&m->talk, 1, frame));
-    made_add(m, t_ms, frame, tcp_put_ack(&m->talk, 0, frame));
-}
-
-static void made_say(struct made *m, int64_t t_ms, int side, const char *text)
-{
-    uint8_t frame[ETHERNET_MAX_FRAME];
-    made_add(m, t_ms, frame, tcp_put_data(&m->talk, side, text, strlen(text), frame));
-}
-
-static const char *made_write(const struct made *m, size_t len)
-{
-    static char path[64];
-    snprintf(path, sizeof path, "/tmp/test_capture.%d.pcapng", (int)getpid());
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(m->bytes, 1, len, file), len);
-    fclose(file);
-    return path;
-}
-
-static struct replay_capture *made_load(const struct made *m)
-{
-    struct replay_capture *capture;
-    struct sh_err err = {0};
-    const char *path = made_write(m, m->len);
-    const int rc = capture_load(path, &capture, &err);
-    unlink(path);
-    if (rc != SH_OK) fail_msg("%s", err.text);
-    return capture;
-}
-
-/* ---- a client */
-
-struct client {
-    const struct protocol_ops *ops;
-    void *protocol;
-    char got[4096]; /* "at 5: text|" for each unit */
-    int64_t now_ms;
-    int wrong, ended;
-    char told[120];
-};
-
-static int client_send(void *ctx, const void *unit, size_t len)
-{
-    struct client *c = ctx;
-    const size_t n = strlen(c->got);
-    snprintf(c->got + n, sizeof c->got - n, "%d:%.*s|", (int)c->now_ms, (int)len, (const char *)unit);
-    return 0;
-}
-
-static void client_count(void *ctx, enum protocol_count what, uint64_t n)
-{
-    ((struct client *)ctx)->wrong += what == PROTOCOL_WRONG ? (int)n : 0;
-}
-
-static void client_hang_up(void *ctx)
-{
-    ((struct client *)ctx)->ended = 1;
-}
-
-static void client_tell_once(void *ctx, const char *text)
-{
-    snprintf(((struct client *)ctx)->told, 120, "%s", text);
-}
-
-static void client_open(struct client *c, const struct talk *talk, const struct talk_options *options)
-{
-    const struct protocol_spec spec = {.host = {.ctx = c,
-                                                .send = client_send,
-                                                .count = client_count,
-                                                .hang_up = client_hang_up,
-                                                .tell_once = client_tell_once},
-                                       .talk = talk,
-                                       .talk_options = options};
-    struct sh_err err;
-    memset(c, 0, sizeof *c);
-    c->ops = protocol_ops_get(PROTOCOL_CAPTURE);
-    assert_int_equal(c->ops->create(&spec, &c->protocol, &err), SH_OK);
-    c->ops->open(c->protocol, 0);
-}
-
-/* Sends the text in pieces of a byte, and then lets time pass, a millisecond a tick. Returns what came meanwhile. */
-static const char *client_ask(struct client *c, const char *text, int ms)
-{
-    c->got[0] = '\0';
-    for (; *text != '\0'; text++)
-        c->ops->input(c->protocol, (const uint8_t *)text, 1);
-    for (int i = 0; i < ms; i++) {
-        c->ops->time(c->protocol, c->now_ms * MS);
-        c->now_ms++;
-    }
-    return c->got;
-}
-
-static void client_close(struct client *c)
-{
-    c->ops->destroy(c->protocol);
-}
-
-/* ---- tests */
+#include "tests/unit/talk_rig.h"
 
 /* A CoLa connection: an answer after 3 ms and another to the same request, a stream of 10 ms, an event that nobody asked
  * for, and an answer within the stream. */
@@ -360,8 +214,10 @@ static void test_asked_datagrams(void **state)
     assert_int_equal(capture_n(capture), 1);
     assert_int_equal(capture_place(capture, 0)->port, DRIVER.port);
     client_open(&c, &capture_place(capture, 0)->talk, &options);
-    assert_string_equal(client_ask(&c, "ask", 6), "4:one|");
-    assert_string_equal(client_ask(&c, "ask", 6), "7:two|");
+    c.ops->input(c.protocol, (const uint8_t *)"ask", 3);
+    assert_string_equal(client_ask(&c, "", 6), "4:one|");
+    c.ops->input(c.protocol, (const uint8_t *)"ask", 3);
+    assert_string_equal(client_ask(&c, "", 6), "7:two|");
     client_close(&c);
     capture_free(capture);
 }
@@ -379,7 +235,7 @@ static void test_hostile(void **state)
             struct sh_err err = {0};
             changed = m;
             if (how == 1) changed.bytes[i] ^= 0x55;
-            const int rc = capture_load(made_write(&changed, how == 0 ? i : m.len), &capture, &err);
+            const int rc = capture_load(made_write(&changed, how == 0 ? i : m.len), NULL, &capture, &err);
             refused += rc != SH_OK;
             loaded += rc == SH_OK;
             assert_true((rc == SH_OK) == (capture != NULL));

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* A head is captured with `record --raw`; the capture then answers in its place. A client that says the same gets the
  * same bytes, over TCP and UDP. */
+#include "drivers/protocol/ethernet.h"
+#include "tests/wire/capture_rig.h"
 #include "tests/wire/captured.h"
+#include "tests/wire/replay_rig.h"
 #include "tests/wire/room.h"
 
 enum { PACKET = 1206, ROOM = 1 << 20 };
@@ -119,11 +122,55 @@ static void test_udp(void **state)
     captured_free(&captured);
 }
 
+/* A capture of one answer over TCP, and of one datagram. */
+static const char *make_capture(struct wire *wire, int is_tcp)
+{
+    const struct ethernet_end client = {.address = {10, 0, 0, 2}, .port = 40000},
+                              device = {.address = {10, 0, 0, 1}, .port = 2112};
+    struct tcp_talk talk = {.end = {client, device}};
+    uint8_t frame[ETHERNET_MAX_FRAME];
+    struct capture capture = {0};
+    capture_begin(&capture);
+    const uint32_t at = capture_interface(&capture, CAPTURE_ETHERNET);
+    if (is_tcp) {
+        capture_packet(&capture, at, frame, tcp_put_syn(&talk, 0, frame));
+        capture_packet(&capture, at, frame, tcp_put_data(&talk, 0, "a\n", 2, frame));
+        capture_packet(&capture, at, frame, tcp_put_data(&talk, 1, "b\n", 2, frame));
+    } else {
+        capture_packet(&capture, at, frame, ethernet_put_udp(frame, &device, &client, "b", 1));
+    }
+    /* The name of the file says nothing. */
+    const char *path = wire_write(wire, is_tcp ? "tcp" : "udp.pcapng", capture.bytes, capture.len);
+    free(capture.bytes);
+    return path;
+}
+
+static void test_refused(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        int is_tcp;
+        const char *option, *value, *said;
+    } cases[] = {
+        {1, "--device-port", "1", "no such port; it has tcp 2112 of 10.0.0.1"},
+        {1, "--link", "usb", "allowed pty, tcp, udp"},
+        {1, "--link", "null", "allowed pty, tcp, udp"},
+        {1, "--link", "web", "allowed pty, tcp, udp"},
+        {0, "--unknown", "close", "which has no connection to end"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const char *const args[] = {"run", make_capture(wire, cases[i].is_tcp), cases[i].option, cases[i].value, NULL};
+        assert_int_equal(replay_call(wire, args), 2);
+        replay_said(wire, cases[i].said);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_tcp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_udp, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

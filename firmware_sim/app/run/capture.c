@@ -49,7 +49,7 @@ static void given_links(const char *given, char *text, size_t cap)
     }
 }
 
-/* "tcp 2112 (CoLa), udp 2368" */
+/* "tcp 2112 of 10.0.0.1, udp 2368 of 10.0.0.1" */
 static void name_places(const struct capture_run *run, char *text, size_t cap)
 {
     size_t n = 0;
@@ -78,13 +78,22 @@ static const struct capture_place *place_for(const struct capture_run *run, cons
 static int join_links(struct capture_run *run, struct config *cfg, struct sh_err *err)
 {
     char places[400];
+    name_places(run, places, sizeof places);
+    if (cfg->n_links == 0 && run->o->device_port != 0)
+        return sh_fail(err, SH_EINPUT, "--device-port %ld: %s has no such port; it has %s", run->o->device_port,
+                       run->o->in.operand[0], places);
+    if (cfg->n_links == 0) return sh_fail(err, SH_EINPUT, "%s: links: none; allowed are 1 or more", cfg->file);
     for (uint32_t i = 0; i < cfg->n_links; i++) {
         struct link_spec *spec = &cfg->link[i];
         const struct capture_place *place = place_for(run, spec);
         if (spec->protocol != PROTOCOL_CAPTURE)
             return sh_fail(err, SH_EINPUT, "%s: links[%u].protocol: %s is a capture; allowed is only capture",
                            cfg->file, i, run->o->in.operand[0]);
-        name_places(run, places, sizeof places);
+        if (spec->type == LINK_UDP && run->o->replay.talk_options.unknown == TALK_CLOSE)
+            return sh_fail(err, SH_EINPUT,
+                           "--unknown close: links[%u] is udp, which has no connection to end; allowed are silence, "
+                           "error, and with tcp close",
+                           i);
         if (place == NULL)
             return sh_fail(err, SH_EINPUT, "%s: links[%u]: no port of %s is left for it%s; it has %s", cfg->file, i,
                            run->o->in.operand[0], run->o->device_port != 0 ? " with --device-port" : "", places);
@@ -125,6 +134,13 @@ static void warn_of_capture(const struct capture_run *run)
     if (c.missing_bytes != 0)
         sh_warn(&app_report_stderr, "%s: %llu bytes are missing in it; what follows them may be wrong", file,
                 (unsigned long long)c.missing_bytes);
+    if (c.backward + c.untimed != 0)
+        sh_warn(&app_report_stderr,
+                "%s: the times of %llu packets go back, and %llu packets have none; their delays may be wrong", file,
+                (unsigned long long)c.backward, (unsigned long long)c.untimed);
+    if (c.unknown_links != 0)
+        sh_warn(&app_report_stderr, "%s: left out %llu packets of other link types, such as %u", file,
+                (unsigned long long)c.unknown_links, c.unknown_link);
     if (c.fragments + c.damaged != 0)
         sh_warn(&app_report_stderr, "%s: left out %llu fragments of datagrams, and %llu packets with damaged headers",
                 file, (unsigned long long)c.fragments, (unsigned long long)c.damaged);
@@ -224,7 +240,7 @@ int run_capture(struct run_options *o)
     struct sh_err err = {0};
     int status = check_options(o);
     if (status != APP_GO_ON) return status;
-    if (capture_load(o->in.operand[0], &run.capture, &err) != SH_OK) return app_fail(&err);
+    if (capture_load(o->in.operand[0], &app_report_stderr, &run.capture, &err) != SH_OK) return app_fail(&err);
     status = with_links(&run, &err);
     capture_free(run.capture);
     return status;

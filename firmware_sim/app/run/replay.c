@@ -69,7 +69,8 @@ static void say_what_runs(const struct run_options *o, struct replay *replay, co
     replay_get_summary(replay, &s);
     fprintf(stderr, "%s: replay of %s: %s\n", app_program, o->in.operand[0], s.idn);
     run_say_links(loop);
-    if (!o->device.start) fprintf(stderr, "%s: it is played when a client commands SCAN:START\n", app_program);
+    if (!o->device.start)
+        fprintf(stderr, "%s: it is played when a client starts scans, natively with SCAN:START\n", app_program);
 }
 
 static void say_what_ran(const struct run_options *o, struct replay *replay)

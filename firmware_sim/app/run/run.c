@@ -203,7 +203,7 @@ static int run_run(int argc, char **argv)
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
     const char *path = o.in.operand[0];
-    const int is_capture = app_ends_in(path, ".pcap") || (app_ends_in(path, ".pcapng") && capture_is(path));
+    const int is_capture = app_ends_in(path, ".pcap") || capture_is(path);
     const int is_recording = is_capture || app_is_recording(path);
     status = run_check_options(&o, is_recording);
     if (status != APP_GO_ON) return status;
@@ -257,7 +257,8 @@ static const struct app_option OPTIONS[] = {
     {APP_FLAG, "loop", NULL, .at = AT(replay.loop), .help = "repeat a recording from its beginning at its end"},
     {APP_CALL, "link", "LINK", .apply = run_take_link,
      .help = "serve a recording on this link: pty, tcp, usb, web, file or null; or keys as in a configuration, such "
-             "as 'type: tcp, port: 5025'; may be repeated (default: pty and tcp)"},
+             "as 'type: tcp, port: 5025'; may be repeated (default: pty and tcp). A capture has links of tcp, pty and "
+             "udp, such as 'type: udp, port: 2368' (default: one for each port of its devices)"},
     {APP_TEXT, "unknown", "WORD", .at = AT(unknown),
      .help = "what a capture does with a request that is not in it: silence (default), error (the protocol's own, of CoLa "
              "and SCIP), close"},
@@ -277,9 +278,10 @@ static const char NOTES[] =
     "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"
     "\n"
-    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, with\n"
-    "their recorded timing, from the first one on each time that a client commands SCAN:STARt. With --start they\n"
-    "are served at once, and the run ends with them. Queries are answered from the recording's descriptor;\n"
+    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, or as\n"
+    "what another protocol of the link makes of them, with their recorded timing, from the first one on each time\n"
+    "that a client commands SCAN:STARt, or starts scans in that protocol. With --start they are served at once, and\n"
+    "the run ends with them. Queries are answered from the recording's descriptor;\n"
     "settings can't change. Faults on the wire and of links apply.\n"
     "\n"
     "So may a capture of any device's traffic, FILE.pcap or FILE.pcapng of tcpdump, Wireshark or record --raw. Each\n"
@@ -288,7 +290,7 @@ static const char NOTES[] =
 
 const struct app_command app_run = {
     .name = "run",
-    .operand = {"CONFIG|FILE.shs"},
+    .operand = {"CONFIG|FILE.shs|FILE.pcap"},
     .summary = "serve the head, or a recording of one, on links until stopped",
     .options = OPTIONS,
     .opens_links = 1,
