@@ -42,6 +42,7 @@ struct cola {
     struct cola_settings set;
     char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
     int keeps, dialect;           /* of the spec */
+    uint8_t power_framing;        /* EIHstCola at power-up, as configured or stored */
     _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
@@ -135,8 +136,9 @@ cola_handler cola_keep;
 
 /* cola_dialect.c */
 
-/* EIHstCola as it is now: enum cola_form. */
+/* EIHstCola as it is now, and where nobody has written it: enum cola_form. */
 uint32_t cola_framing(const struct cola *self);
+uint32_t cola_configured_framing(const struct cola *self);
 int cola_understands(const struct cola *self, enum cola_form form);
 /* Another session may have changed it: streamed telegrams have its form. */
 void cola_follow_dialect(struct cola *self);

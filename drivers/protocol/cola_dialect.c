@@ -16,13 +16,18 @@ static int is_strict(const struct cola *self)
     return self->dialect != PROTOCOL_DIALECT_ANY && self->shared != NULL;
 }
 
+uint32_t cola_configured_framing(const struct cola *self)
+{
+    return self->dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
+}
+
 uint32_t cola_framing(const struct cola *self)
 {
     if (!is_strict(self)) return self->set.framing;
     const uint32_t word = atomic_load(self->shared);
     if (word == word_of(self, COLA_A)) return COLA_A;
     if (word == word_of(self, COLA_B)) return COLA_B;
-    return self->stored[0] != '\0' ? self->set.framing : self->dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
+    return self->power_framing;
 }
 
 int cola_understands(const struct cola *self, enum cola_form form)

@@ -25,22 +25,25 @@ static void put_lines(const struct cola *self, char *text, size_t cap)
     list_cfg(&s, bytes);
     for (int i = 0; i < CFG_NUMBERS - 1; i++)
         n += (size_t)snprintf(text + n, cap - n, " %u", *bytes[i]);
-    n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\nEIHstCola %u\n", s.every,
-                          s.filter, s.scale, cola_framing(self));
+    n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\n", s.every, s.filter,
+                          s.scale);
+    if (cola_framing(self) != cola_configured_framing(self)) /* other links may be configured for another dialect */
+        n += (size_t)snprintf(text + n, cap - n, "EIHstCola %u\n", cola_framing(self));
     if (s.narrowed) n += (size_t)snprintf(text + n, cap - n, "LMPoutputRange %d %d\n", s.start_e4, s.stop_e4);
     snprintf(text + n, cap - n, "LocationName %s\n", s.location);
 }
 
 enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    char reply[MAX_REPLY];
+    char reply[MAX_REPLY], text[PROTOCOL_STORED];
     const enum cola_error error = cola_args_end(args);
     int kept = 1; /* a head without a file says so, too, and forgets */
     if (error != COLA_OK) return error;
     if (self->keeps) {
-        put_lines(self, self->stored, sizeof self->stored);
-        kept = self->host.store(self->host.ctx, self->stored) == 0 &&
-               self->host.command(self->host.ctx, "HEAD:STORe", reply, sizeof reply) == 0;
+        put_lines(self, text, sizeof text);
+        kept = self->host.command(self->host.ctx, "HEAD:STORe", reply, sizeof reply) == 0 &&
+               self->host.store(self->host.ctx, text) == 0;
+        if (kept) strcpy(self->stored, text);
     }
     cola_put_u(out, 1, (uint32_t)kept);
     return COLA_OK;
