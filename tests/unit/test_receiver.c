@@ -166,6 +166,23 @@ static void sentences_go_wrong(void **state)
     rig_close(rig);
 }
 
+/* As late as settings and faults together can be, at the highest rate: 5 s and 10 s, though the faults have 20 s. All
+ * sentences under way are still there. */
+static void late_sentences_are_not_lost(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"gnss.rate_hz=20",    "gnss.nmea_late_ms=5000", "faults[0].kind=nmea_late",
+                                       "faults[0].from_s=4", "faults[0].for_ms=5000",  "faults[1].kind=nmea_late",
+                                       "faults[1].from_s=4", "faults[1].for_ms=5000",  "faults[2].kind=nmea_late",
+                                       "faults[2].from_s=4", "faults[2].for_ms=5000",  "faults[3].kind=nmea_late",
+                                       "faults[3].from_s=4", "faults[3].for_ms=5000"};
+    struct nmea_fix fix;
+    struct rig *rig = open_with(sets, sizeof sets / sizeof *sets);
+    assert_int_equal(second_at(rig, 19.49, &fix), 1); /* that of 4.45 */
+    assert_int_equal(second_at(rig, 19.5, &fix), 2);  /* that of 4.5 */
+    rig_close(rig);
+}
+
 /* Turns of the rotor at the full second at device time t_s, by the segment that has the pulses around it. */
 static double turn_at(struct rig *rig, double t_s)
 {
@@ -268,6 +285,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_what_comes),
         cmocka_unit_test(sentences_go_wrong),
+        cmocka_unit_test(late_sentences_are_not_lost),
         cmocka_unit_test(the_rotor_is_where_the_lock_wants_it),
         cmocka_unit_test(the_phase_is_lost_with_the_pulses),
         cmocka_unit_test(only_whole_turns_are_held),

@@ -167,7 +167,7 @@ static void scans_have_the_servers_time(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Sends another request at once: any change of its settings begins anew with the server. */
+/* Lets it ask again, at most a second after the last request: any change of its settings begins anew with the server. */
 static double ask_again(struct server *server)
 {
     static int update_s = 60;
@@ -268,6 +268,25 @@ static void a_kiss_slows_it_down(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* A client that writes again and again makes it ask no more often than once a second, by its own clock. */
+static void it_never_floods_a_server(void **state)
+{
+    struct wire *wire = *state;
+    struct server server;
+    double t1_s[3];
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    t1_s[0] = server_wait(&server);
+    t1_s[1] = ask_again(&server);
+    t1_s[2] = ask_again(&server);
+    for (int i = 0; i < 2; i++) /* T1 is read less than half a second after the clock that paces */
+        assert_true(t1_s[i + 1] - t1_s[i] > 0.5);
+    close(scanner.fd);
+    close(server.fd);
+    head_end(&head, SIGTERM);
+}
+
 /* Adds a fault, and waits until the command has taken effect: 100 ms of the head's time. */
 static void inject(struct scanhead *sh, const char *fault)
 {
@@ -326,6 +345,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(scans_have_the_servers_time, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_servers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_kiss_slows_it_down, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(it_never_floods_a_server, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(injected_faults, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("time server", tests, NULL, NULL);
