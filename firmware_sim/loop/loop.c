@@ -208,7 +208,7 @@ int loop_start(struct loop *loop, struct sh_err *err)
     if (rc == SH_OK) rc = pacer_start(loop, err);
     if (rc == SH_OK) rc = loop->device != NULL ? casters_start(loop, err) : player_start(loop, err);
     if (rc == SH_OK && asks_time(loop))
-        rc = time_client_start(loop->device, &loop->stream, loop->pacer.pace.epoch_ns, &loop->client, err);
+        rc = time_client_start(loop->device, loop->pacer.pace.epoch_ns, &loop->client, err);
     if (rc == SH_OK && loop->device != NULL) loop->cost = cost_watch_start(loop);
     return rc;
 }

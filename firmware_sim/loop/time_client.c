@@ -21,7 +21,6 @@ static const int64_t LEAST_NS = SECOND_NS; /* between two requests, whatever cha
 
 struct time_client {
     struct device *device;
-    const struct stream *stream;
     int64_t epoch_ns;
     int wake_fd, fd; /* fd: -1: no server is asked */
     _Atomic int ending;
@@ -158,7 +157,7 @@ static void take_good(struct time_client *c, const struct ntp_answer *answer)
         time_client_say(c, "OFFSET", text);
         return;
     }
-    device_shift_date(c->device, off_ns + zone_ns - c->zone_ns, stream_released(c->stream));
+    if (!device_shift_date(c->device, &c->server, off_ns + zone_ns - c->zone_ns)) return;
     c->zone_ns = zone_ns;
     c->is_set = 1;
     c->answers.good++;
@@ -224,14 +223,12 @@ static void time_client_free(struct time_client *c)
     free(c);
 }
 
-int time_client_start(struct device *device, const struct stream *stream, int64_t epoch_ns, struct time_client **out,
-                      struct sh_err *err)
+int time_client_start(struct device *device, int64_t epoch_ns, struct time_client **out, struct sh_err *err)
 {
     struct time_client *c = calloc(1, sizeof *c);
     *out = NULL;
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     c->device = device;
-    c->stream = stream;
     c->epoch_ns = epoch_ns;
     c->fd = -1;
     c->ask_ns = c->give_up_ns = INT64_MAX;

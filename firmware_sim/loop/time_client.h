@@ -20,13 +20,11 @@
 #define FIRMWARE_SIM_LOOP_TIME_CLIENT_H
 
 #include "firmware_sim/device/device.h"
-#include "firmware_sim/loop/stream.h"
 
 struct time_client;
 
 /* epoch_ns: device time 0, by clock_now_ns(). */
-int time_client_start(struct device *device, const struct stream *stream, int64_t epoch_ns, struct time_client **out,
-                      struct sh_err *err);
+int time_client_start(struct device *device, int64_t epoch_ns, struct time_client **out, struct sh_err *err);
 /* Ends the thread; client may be NULL. */
 void time_client_join(struct time_client *client);
 
