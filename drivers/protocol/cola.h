@@ -182,7 +182,7 @@ void cola_ports_time(struct cola *self);
 
 /* Time of day of the scanner's clock at a device time, ns since 1970. */
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
-/* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
+/* Writes that time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
 cola_handler cola_set_clock, cola_read_time_role, cola_write_time_role, cola_read_time_interface,
     cola_write_time_interface, cola_read_time_address, cola_write_time_address, cola_read_time_zone,

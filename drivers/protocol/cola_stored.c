@@ -66,14 +66,14 @@ static int take_cfg(struct cola_settings *s, const char *at)
 }
 
 /* A whole number up to `most` that ends the line. */
-static int take_number(const char *at, unsigned most, unsigned *v)
+static int cola_stored_take_number(const char *at, unsigned most, unsigned *v)
 {
     int n;
     return sscanf(at, " %9u%n", v, &n) == 1 && at[n] == '\0' && *v <= most;
 }
 
 /* 1: done; 0: it is no line that cola_keep writes. */
-static int take_line(struct cola *self, const char *line)
+static int cola_stored_take_line(struct cola *self, const char *line)
 {
     struct cola_settings *s = &self->set;
     char name[COLA_MAX_NAME];
@@ -92,7 +92,7 @@ static int take_line(struct cola *self, const char *line)
     const int is_filter = strcmp(name, "FREchoFilter") == 0, is_scale = strcmp(name, "LMDscandatascalefactor") == 0,
               is_framing = strcmp(name, "EIHstCola") == 0;
     if (!is_filter && !is_scale && !is_framing) return 0;
-    if (!take_number(at, is_framing ? COLA_B : 2, &v)) return 0;
+    if (!cola_stored_take_number(at, is_framing ? COLA_B : 2, &v)) return 0;
     if (is_filter) s->filter = (uint8_t)v;
     if (is_scale) s->scale = v;
     if (is_framing) s->framing = (uint8_t)v;
@@ -105,7 +105,7 @@ int cola_restore(struct cola *self, struct sh_err *err)
     for (const char *at = self->stored; *at != '\0'; at += strcspn(at, "\n") + 1) {
         const size_t len = strcspn(at, "\n");
         if (len < sizeof line) snprintf(line, sizeof line, "%.*s", (int)len, at);
-        if (len >= sizeof line || !take_line(self, line))
+        if (len >= sizeof line || !cola_stored_take_line(self, line))
             return sh_fail(err, SH_EINPUT,
                            "head.settings_file: '%.60s' is no setting that cola stores; correct it, or remove the file",
                            line);

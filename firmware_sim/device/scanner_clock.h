@@ -26,7 +26,7 @@ struct scanner_clock {
 
 int64_t device_date_ns(struct device *device, int64_t t_ns);
 
-/* What a client of a time server needs to know. */
+/* A client of a time server needs to know this. */
 struct device_time_server {
     struct command_time_server set;
     uint16_t port;

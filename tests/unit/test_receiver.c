@@ -95,7 +95,7 @@ static void follows_what_comes(void **state)
           {6.4, LOCKED, 2.9},
           {7.6, LOCKED, 5.1}}},
         {{"gnss.nmea_late_ms=300", "gnss.cold=on", NULL}, {{2.6, LOCKED, 3.1}, {2.8, LOCKED, 0.3}, {3.6, LOCKED, 1.1}}},
-        /* What is missing, wrong or void at first; the last does not matter. */
+        /* Sentences are missing, wrong or void at first; void ones do no harm. */
         {{"gnss.cold=on", "faults[0].kind=nmea_lost", "faults[0].until_s=4", NULL},
          {{3.6, LOCKED, 4.1}, {4.4, LOCKED, 4.9}, {4.6, LOCKED, 2.1}}},
         {{"gnss.cold=on", "faults[0].kind=nmea_checksum", "faults[0].until_s=4", NULL},
@@ -157,7 +157,7 @@ static void sentences_go_wrong(void **state)
     assert_int_equal(second_at(rig, 6.5, &fix), 4);
     assert_true(fix.quality == 1 && fix.is_spoilt);
     assert_int_equal(second_at(rig, 8.5, &fix), 5);
-    /* That of 8.5 arrives at 9.75, and the next one does not overtake it. */
+    /* The sentence of 8.5 arrives at 9.75, and the next one does not overtake it. */
     assert_int_equal(second_at(rig, 9.749, &fix), 5);
     assert_int_equal(second_at(rig, 9.75, &fix), 6);
     assert_int_equal(second_at(rig, 9.751, &fix), 7);

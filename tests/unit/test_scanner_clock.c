@@ -40,7 +40,7 @@ static void it_begins_with_power(void **state)
     }
 }
 
-/* What an answer does to a server's client that has the settings as they are. */
+/* Does as an answer to a request with the present settings. */
 static void shift(struct rig *rig, int64_t by_ns)
 {
     struct device_time_server server;

@@ -177,7 +177,7 @@ static double ask_again(struct server *server)
     return server_wait(server);
 }
 
-/* What a wrong, a silent and a refusing server do; and a time zone. Refused answers leave the clock as it is. */
+/* A wrong, a silent and a refusing server set nothing; a time zone adds hours. Refused answers leave the clock as it is. */
 static void wrong_servers(void **state)
 {
     struct wire *wire = *state;
