@@ -193,7 +193,7 @@ static void lock_memory(const struct loop *loop)
 /* A SICK scanner, in real time. A journal that is replayed has what its time server's answers did. */
 static int asks_time(const struct loop *loop)
 {
-    int asks = loop->cfg->ntp.role == NTP_ROLE_CLIENT;
+    int asks = 0;
     for (uint32_t i = 0; i < loop->cfg->n_links; i++)
         asks |= loop->cfg->link[i].protocol == PROTOCOL_COLA;
     return asks && loop->device != NULL && !loop->stream.waits && !device_replays(loop->device);

@@ -273,15 +273,11 @@ static void it_never_floods_a_server(void **state)
 {
     struct wire *wire = *state;
     struct server server;
-    double t1_s[3];
     server_open(&server);
     struct head head = scanner_start(wire, &server, "");
     cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
-    t1_s[0] = server_wait(&server);
-    t1_s[1] = ask_again(&server);
-    t1_s[2] = ask_again(&server);
-    for (int i = 0; i < 2; i++) /* T1 is read less than half a second after the clock that paces */
-        assert_true(t1_s[i + 1] - t1_s[i] > 0.5);
+    const double t1_s = server_wait(&server);
+    assert_true(ask_again(&server) - t1_s > 0.5); /* a second, less what the first one's T1 is read late */
     close(scanner.fd);
     close(server.fd);
     head_end(&head, SIGTERM);
