@@ -16,7 +16,9 @@ int cola_power_up(struct cola *self, struct sh_err *err)
     self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
     self->n_waiting = self->since_sent = 0;
     self->telegrams = (uint16_t)(0U - self->near_wrap);
-    return cola_restore(self, err);
+    const int rc = cola_restore(self, err);
+    self->power_framing = self->set.framing;
+    return rc;
 }
 
 uint32_t cola_time_us(const struct cola *self, int64_t t_ns)

@@ -42,6 +42,7 @@ struct cola {
     struct cola_settings set;
     char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
     int keeps, dialect;           /* of the spec */
+    uint8_t power_framing;        /* EIHstCola at power-up, as configured or stored */
     _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
@@ -135,8 +136,9 @@ cola_handler cola_keep;
 
 /* cola_dialect.c */
 
-/* EIHstCola as it is now: enum cola_form. */
+/* EIHstCola as it is now, and where nobody has written it: enum cola_form. */
 uint32_t cola_framing(const struct cola *self);
+uint32_t cola_configured_framing(const struct cola *self);
 int cola_understands(const struct cola *self, enum cola_form form);
 /* Another session may have changed it: streamed telegrams have its form. */
 void cola_follow_dialect(struct cola *self);
@@ -182,7 +184,7 @@ void cola_ports_time(struct cola *self);
 
 /* Time of day of the scanner's clock at a device time, ns since 1970. */
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
-/* That time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
+/* Writes that time as telegrams have it: u16 year, 5 x u8 month to second, u32 us. */
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out);
 cola_handler cola_set_clock, cola_read_time_role, cola_write_time_role, cola_read_time_interface,
     cola_write_time_interface, cola_read_time_address, cola_write_time_address, cola_read_time_zone,

@@ -47,8 +47,11 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
     (void)out;
     cola_arg_text(args, name, sizeof name);
     const enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) memcpy(self->set.location, name, sizeof name);
-    return error;
+    if (error != COLA_OK) return error;
+    for (const char *c = name; *c != '\0'; c++)
+        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* a stored one is a line of the settings' file */
+    memcpy(self->set.location, name, sizeof name);
+    return COLA_OK;
 }
 
 /* ---- states */

@@ -6,7 +6,7 @@
 #include "drivers/protocol/cola.h"
 
 /* The link's word has the form that EIHstCola has set since power came, and which time that was. */
-static uint32_t word_of(const struct cola *self, uint32_t form)
+static uint32_t cola_dialect_word_of(const struct cola *self, uint32_t form)
 {
     return self->power_ons << 2 | (form + 1);
 }
@@ -16,13 +16,18 @@ static int is_strict(const struct cola *self)
     return self->dialect != PROTOCOL_DIALECT_ANY && self->shared != NULL;
 }
 
+uint32_t cola_configured_framing(const struct cola *self)
+{
+    return self->dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
+}
+
 uint32_t cola_framing(const struct cola *self)
 {
     if (!is_strict(self)) return self->set.framing;
     const uint32_t word = atomic_load(self->shared);
-    if (word == word_of(self, COLA_A)) return COLA_A;
-    if (word == word_of(self, COLA_B)) return COLA_B;
-    return self->stored[0] != '\0' ? self->set.framing : self->dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
+    if (word == cola_dialect_word_of(self, COLA_A)) return COLA_A;
+    if (word == cola_dialect_word_of(self, COLA_B)) return COLA_B;
+    return self->power_framing;
 }
 
 int cola_understands(const struct cola *self, enum cola_form form)
@@ -51,6 +56,6 @@ enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, st
     if (form > COLA_B) return COLA_INVALID_DATA;
     self->set.framing = (uint8_t)form;
     self->stream_form = (enum cola_form)form;
-    if (is_strict(self)) atomic_store(self->shared, word_of(self, form));
+    if (is_strict(self)) atomic_store(self->shared, cola_dialect_word_of(self, form));
     return COLA_OK;
 }

@@ -8,8 +8,11 @@
 void cola_settings_reset(struct cola *self)
 {
     const char *name = self->identity->name;
-    self->set = (struct cola_settings){
-        .channels = {1, 0}, .rssi = self->model->rssi, .rssi_16bit = self->model->rssi_16bit, .every = 1};
+    self->set = (struct cola_settings){.channels = {1, 0},
+                                       .rssi = self->model->rssi,
+                                       .rssi_16bit = self->model->rssi_16bit,
+                                       .every = 1,
+                                       .framing = (uint8_t)cola_configured_framing(self)};
     snprintf(self->set.location, sizeof self->set.location, "%s", name[0] != 0 ? name : "not defined");
 }
 

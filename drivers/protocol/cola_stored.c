@@ -25,22 +25,25 @@ static void put_lines(const struct cola *self, char *text, size_t cap)
     list_cfg(&s, bytes);
     for (int i = 0; i < CFG_NUMBERS - 1; i++)
         n += (size_t)snprintf(text + n, cap - n, " %u", *bytes[i]);
-    n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\nEIHstCola %u\n", s.every,
-                          s.filter, s.scale, cola_framing(self));
+    n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\n", s.every, s.filter,
+                          s.scale);
+    if (cola_framing(self) != cola_configured_framing(self)) /* other links may be configured for another dialect */
+        n += (size_t)snprintf(text + n, cap - n, "EIHstCola %u\n", cola_framing(self));
     if (s.narrowed) n += (size_t)snprintf(text + n, cap - n, "LMPoutputRange %d %d\n", s.start_e4, s.stop_e4);
     snprintf(text + n, cap - n, "LocationName %s\n", s.location);
 }
 
 enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    char reply[MAX_REPLY];
+    char reply[MAX_REPLY], text[PROTOCOL_STORED];
     const enum cola_error error = cola_args_end(args);
     int kept = 1; /* a head without a file says so, too, and forgets */
     if (error != COLA_OK) return error;
     if (self->keeps) {
-        put_lines(self, self->stored, sizeof self->stored);
-        kept = self->host.store(self->host.ctx, self->stored) == 0 &&
-               self->host.command(self->host.ctx, "HEAD:STORe", reply, sizeof reply) == 0;
+        put_lines(self, text, sizeof text);
+        kept = self->host.command(self->host.ctx, "HEAD:STORe", reply, sizeof reply) == 0 &&
+               self->host.store(self->host.ctx, text) == 0;
+        if (kept) strcpy(self->stored, text);
     }
     cola_put_u(out, 1, (uint32_t)kept);
     return COLA_OK;
@@ -63,14 +66,14 @@ static int take_cfg(struct cola_settings *s, const char *at)
 }
 
 /* A whole number up to `most` that ends the line. */
-static int take_number(const char *at, unsigned most, unsigned *v)
+static int cola_stored_take_number(const char *at, unsigned most, unsigned *v)
 {
     int n;
     return sscanf(at, " %9u%n", v, &n) == 1 && at[n] == '\0' && *v <= most;
 }
 
 /* 1: done; 0: it is no line that cola_keep writes. */
-static int take_line(struct cola *self, const char *line)
+static int cola_stored_take_line(struct cola *self, const char *line)
 {
     struct cola_settings *s = &self->set;
     char name[COLA_MAX_NAME];
@@ -89,7 +92,7 @@ static int take_line(struct cola *self, const char *line)
     const int is_filter = strcmp(name, "FREchoFilter") == 0, is_scale = strcmp(name, "LMDscandatascalefactor") == 0,
               is_framing = strcmp(name, "EIHstCola") == 0;
     if (!is_filter && !is_scale && !is_framing) return 0;
-    if (!take_number(at, is_framing ? COLA_B : 2, &v)) return 0;
+    if (!cola_stored_take_number(at, is_framing ? COLA_B : 2, &v)) return 0;
     if (is_filter) s->filter = (uint8_t)v;
     if (is_scale) s->scale = v;
     if (is_framing) s->framing = (uint8_t)v;
@@ -102,7 +105,7 @@ int cola_restore(struct cola *self, struct sh_err *err)
     for (const char *at = self->stored; *at != '\0'; at += strcspn(at, "\n") + 1) {
         const size_t len = strcspn(at, "\n");
         if (len < sizeof line) snprintf(line, sizeof line, "%.*s", (int)len, at);
-        if (len >= sizeof line || !take_line(self, line))
+        if (len >= sizeof line || !cola_stored_take_line(self, line))
             return sh_fail(err, SH_EINPUT,
                            "head.settings_file: '%.60s' is no setting that cola stores; correct it, or remove the file",
                            line);

@@ -98,6 +98,10 @@ void cola_arg_text(struct cola_args *args, char *dst, size_t cap)
         cola_telegram_fail(args, COLA_OVERFLOW);
         return;
     }
+    if (memchr(args->at, 0, len) != NULL) {
+        cola_telegram_fail(args, COLA_INVALID_DATA);
+        return;
+    }
     memcpy(dst, args->at, len);
     dst[len] = 0;
     args->at += len;

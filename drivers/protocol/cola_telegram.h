@@ -42,7 +42,8 @@ struct cola_args {
 /* bytes: 1, 2 or 4, the value's width in CoLa-B and its limit in CoLa-A. */
 uint32_t cola_arg_u(struct cola_args *args, unsigned bytes);
 int32_t cola_arg_i(struct cola_args *args, unsigned bytes);
-/* Length (CoLa-B: u16) and characters; dst gets them with a NUL. COLA_OVERFLOW where cap is too small. */
+/* Length (CoLa-B: u16) and characters; dst gets them with a NUL. COLA_OVERFLOW where cap is too small,
+ * COLA_INVALID_DATA where there is a NUL among them. */
 void cola_arg_text(struct cola_args *args, char *dst, size_t cap);
 /* The error so far; COLA_TOO_LONG where values are left. */
 enum cola_error cola_args_end(const struct cola_args *args);

@@ -52,7 +52,7 @@ struct cola_server {
 static const char *const roles[N_ROLES] = {"NONE", "CLIENT", "SERVER"}, *const interfaces[N_INTERFACES] = {"ETH",
                                                                                                            "CAN"};
 
-static uint32_t word_of(const char *const words[], uint32_t n, const char *word)
+static uint32_t cola_time_word_of(const char *const words[], uint32_t n, const char *word)
 {
     uint32_t i = 0;
     while (i < n && strcmp(words[i], word) != 0)
@@ -69,8 +69,8 @@ static enum cola_error get_server(struct cola *self, struct cola_server *s)
         sscanf(reply, "%7[A-Z],%3u.%3u.%3u.%3u,%6u,%3d,%3[A-Z]", role, &a[0], &a[1], &a[2], &a[3], &s->update_s,
                &zone_h, interface) != 8)
         return COLA_CONDITION;
-    s->role = word_of(roles, N_ROLES, role);
-    s->interface = word_of(interfaces, N_INTERFACES, interface);
+    s->role = cola_time_word_of(roles, N_ROLES, role);
+    s->interface = cola_time_word_of(interfaces, N_INTERFACES, interface);
     s->zone = (uint32_t)(zone_h + ZONE_0);
     return COLA_OK;
 }

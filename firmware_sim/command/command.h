@@ -124,7 +124,7 @@ struct command_time_server {
     uint32_t update_s; /* from request to request */
     int32_t zone_h;    /* what local time is ahead of UTC */
 };
-/* What has come of it since power-up. */
+/* Its answers since power-up. */
 struct command_time_answers {
     int64_t max_offset_ns;       /* the clock once set, an answer farther from it is refused */
     int64_t offset_ns, delay_ns; /* of the last answer that set the clock */

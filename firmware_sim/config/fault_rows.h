@@ -13,7 +13,7 @@
      .help = "On the wire, at a frame: drop, duplicate, reorder, delay, jitter, truncate, flip, stall, split, merge, "
              "garbage, disconnect, unplug, cable, usb_reset, endpoint_stall, short_packets; at a reply: no_reply, "
              "late_reply, wrong_reply, echo; at a connection: refuse, slow_enumeration, descriptor_length. All other "
-             "kinds are in the head, and change the measurement."},
+             "kinds are in the head, and change the measurement, or what the head says of the time."},
     {FAULT(link), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_LINKS,
      .help = "Number of the link, in the order of links, from 1; 0: all links that can have the fault."},
     {FAULT(of), CFG_ENUM, .def = "stream", .names = (const char *const[]){"stream", "notices", NULL},
@@ -53,7 +53,8 @@
              "its reader's system would drop it."},
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
      .help = "Duration; jitter: the largest one. On the wire it is time of the clock, in the head device time. "
-             "pps_jitter: how late every second pulse is, up to 400; nmea_late: how late sentences are, up to 5000."},
+             "pps_jitter: how late every second pulse is, up to 400; nmea_late: how late sentences are, up to 5000, and "
+             "several together up to 10000."},
     {FAULT(reset), CFG_BOOL, .def = "off",
      .help = "cable: connections are reset once it is plugged in again; else they go on."},
     {FAULT(factor), CFG_REAL, NULL, "0.5", 0.01, 2, .help = "mirror_slow: the mirror's speed is multiplied by it."},

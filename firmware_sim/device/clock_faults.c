@@ -8,6 +8,7 @@
 #include "firmware_sim/device/events.h"
 #include "firmware_sim/device/head_clock.h"
 
+static const double MOST_LATE_MS = 10000.0; /* of a sentence; RECEIVER_KEPT has room for so many */
 static const uint64_t GAINS = HEAD_FAULT(FAULT_CLOCK_DRIFT) | HEAD_FAULTS_HOLDOVER;
 
 static void add_leap(struct head_clock *clock, struct device_events *events, const struct head_fault *f)
@@ -76,7 +77,7 @@ int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns)
     double sum_ms = 0.0;
     for (uint32_t i = 0; i < faults->n; i++)
         if (has_moment(&faults->fault[i], FAULT_NMEA_LATE, t_ns)) sum_ms += faults->fault[i].fault.for_ms;
-    return llround(1e6 * sum_ms);
+    return llround(1e6 * fmin(sum_ms, MOST_LATE_MS));
 }
 
 int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns)

@@ -191,7 +191,7 @@ const struct site *device_hold_site(struct device *device, struct device_version
 void device_give_back(struct device_version *version);
 const struct site *device_site_of(const struct device_version *version);
 
-/* What a protocol's sessions have stored (settings_file.h). Both return 1 where the head keeps nothing, 0 else. */
+/* Stored settings of a protocol's sessions (settings_file.h). Both return 1 where the head keeps nothing, 0 else. */
 int device_store(struct device *device, const char *name, const char *text);
 int device_stored(const struct device *device, const char *name, char text[SETTINGS_FILE_TEXT]);
 

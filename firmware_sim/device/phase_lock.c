@@ -20,7 +20,7 @@ static double wrap(double turn)
     return turn - round(turn);
 }
 
-/* Of the rotor's present sweep, at a time since the scan's start near pulse k. */
+/* Turns of the rotor's present sweep, at a time since the scan's start near pulse k. */
 static double turn_at(const struct schedule_segment *seg, uint64_t k, int64_t t_ns)
 {
     const double since_s = (double)(t_ns - schedule_time_ns(seg, k)) / SECOND_NS;

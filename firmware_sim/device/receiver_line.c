@@ -22,7 +22,7 @@ static uint64_t oldest_of(const struct receiver_line *line)
 }
 
 /* Each kind that strikes at this fix counts it. */
-static int strikes(struct head_faults *faults, enum fault_kind kind, int64_t t_ns)
+static int receiver_line_strikes(struct head_faults *faults, enum fault_kind kind, int64_t t_ns)
 {
     if (!device_has_clock_fault(faults, kind, t_ns)) return 0;
     device_count_clock_fault(faults, kind, t_ns);
@@ -33,10 +33,10 @@ static void send_fix(struct receiver_line *line, const struct gnss *gnss, struct
 {
     const int64_t t_ns = gnss_time_ns(gnss, index);
     struct receiver_sentence next = {.t_ns = t_ns + configured_ns(gnss), .index = index};
-    if (strikes(faults, FAULT_NMEA_LOST, t_ns) || !gnss->site->cfg->gnss.nmea) return;
-    next.is_void = strikes(faults, FAULT_NMEA_VOID, t_ns);
-    next.is_spoilt = strikes(faults, FAULT_NMEA_CHECKSUM, t_ns);
-    if (strikes(faults, FAULT_NMEA_LATE, t_ns)) next.t_ns += device_sentence_late_ns(faults, t_ns);
+    if (receiver_line_strikes(faults, FAULT_NMEA_LOST, t_ns) || !gnss->site->cfg->gnss.nmea) return;
+    next.is_void = receiver_line_strikes(faults, FAULT_NMEA_VOID, t_ns);
+    next.is_spoilt = receiver_line_strikes(faults, FAULT_NMEA_CHECKSUM, t_ns);
+    if (receiver_line_strikes(faults, FAULT_NMEA_LATE, t_ns)) next.t_ns += device_sentence_late_ns(faults, t_ns);
     if (line->n != 0 && next.t_ns <= sentence_at(line, line->n - 1)->t_ns)
         next.t_ns = sentence_at(line, line->n - 1)->t_ns + 1;
     line->kept[line->n++ % RECEIVER_KEPT] = next;

@@ -12,7 +12,8 @@
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_faults.h"
 
-enum { RECEIVER_KEPT = 256 };
+/* Sentences under way must fit: 20 a second, late by up to 5 s (gnss.nmea_late_ms) and 10 s (faults). */
+enum { RECEIVER_KEPT = 512 };
 
 struct receiver_sentence {
     int64_t t_ns;           /* device time of its arrival */

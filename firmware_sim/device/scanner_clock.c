@@ -110,15 +110,18 @@ int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packe
     return is_silent;
 }
 
-void device_shift_date(struct device *device, int64_t by_ns, uint64_t released)
+int device_shift_date(struct device *device, const struct device_time_server *asked, int64_t by_ns)
 {
-    struct command_result result;
     char line[40];
-    pthread_mutex_lock(&device->lock);
-    const int64_t shift_ns = device->cmd.shift_ns + by_ns;
+    pthread_mutex_lock(&device->lock); /* a client may set the clock, and power may go, at any moment */
+    const int is_asked =
+        memcmp(&device->cmd.server, &asked->set, sizeof asked->set) == 0 && device->power.again + 1 == asked->power_ons;
+    if (is_asked) {
+        snprintf(line, sizeof line, "TIME:SHIFt %lld", (long long)(device->cmd.shift_ns + by_ns));
+        device_carry_out_line(device, line);
+    }
     pthread_mutex_unlock(&device->lock);
-    snprintf(line, sizeof line, "TIME:SHIFt %lld", (long long)shift_ns);
-    device_command(device, 0, line, released, &result);
+    return is_asked;
 }
 
 void device_put_time_answers(struct device *device, const struct command_time_answers *answers, const char *report)

@@ -26,7 +26,7 @@ struct scanner_clock {
 
 int64_t device_date_ns(struct device *device, int64_t t_ns);
 
-/* What a client of a time server needs to know. */
+/* A client of a time server needs to know this. */
 struct device_time_server {
     struct command_time_server set;
     uint16_t port;
@@ -40,8 +40,9 @@ void device_get_time_server(struct device *device, struct device_time_server *ou
 void device_watch_time_server(struct device *device, int fd);
 /* Applies injected faults to a server's answer that comes at a device time. 1: it is as if it had not come. */
 int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packet[NTP_LEN]);
-/* Sets the clock forward, as a command of the device itself. */
-void device_shift_date(struct device *device, int64_t by_ns, uint64_t released);
+/* Sets the clock forward, as a command of the device itself, by the answer of a server that was asked with these
+ * settings. 0: they or power have changed since, and the clock stays. */
+int device_shift_date(struct device *device, const struct device_time_server *asked, int64_t by_ns);
 /* Replaces what TIME:SERVer? STATe replies. report: error 107 and an event; NULL: nothing is to be reported. */
 void device_put_time_answers(struct device *device, const struct command_time_answers *answers, const char *report);
 

@@ -114,7 +114,7 @@ static int has_setting(const char *text, const char *line)
 }
 
 /* A line "NAME TEXT". */
-static int take_line(struct settings_file *file, unsigned line_no, char *line, struct sh_err *err)
+static int settings_file_take_line(struct settings_file *file, unsigned line_no, char *line, struct sh_err *err)
 {
     char *blank = strchr(line, ' ');
     if (blank == NULL || blank == line || blank[1] == '\0')
@@ -181,7 +181,7 @@ static int read_image(struct settings_file *file, FILE *in, struct sh_err *err)
         has_end = line_no > 2 && strcmp(line, end_line) == 0;
         rc = line_no <= 2 ? check_head(file, line_no, line, err)
              : has_end    ? SH_OK
-                          : take_line(file, line_no, line, err);
+                          : settings_file_take_line(file, line_no, line, err);
         if (rc != SH_OK) return rc;
     }
     if (rc == 0 && line_no > 1 && !has_end)

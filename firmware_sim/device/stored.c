@@ -31,6 +31,11 @@ int device_restore(struct device *device, struct sh_err *err)
         if (command_stored_apply(&device->cmd, text, restore_line, device, why, sizeof why) != 0)
             return sh_fail(err, SH_EINPUT, "head.settings_file: %s: %s; correct it, or remove the file",
                            settings_file_path(settings), why);
+        if (device->cmd.server.role == COMMAND_TIME_CLIENT && device->site->cfg->loop.pace != PACE_REALTIME)
+            return sh_fail(err, SH_EINPUT,
+                           "head.settings_file: %s: TIME:SERVer CLIENT is stored, and a server's time is real; allowed "
+                           "with loop.pace realtime, or use another file",
+                           settings_file_path(settings));
         device_carry_out_line(device, "HEAD:STORe");
     }
     device->settings = settings;

@@ -99,6 +99,7 @@ int links_open(struct links *links, const struct config *cfg, const struct link_
         links->n++;
         warn_open(links, spec, links->pump[i]);
         rc = check_capacity(links, cfg, links->pump[i], err);
+        if (rc == SH_OK) rc = pump_check_stored(links->pump[i], err);
     }
     return rc;
 }

@@ -193,7 +193,7 @@ static void lock_memory(const struct loop *loop)
 /* A SICK scanner, in real time. A journal that is replayed has what its time server's answers did. */
 static int asks_time(const struct loop *loop)
 {
-    const int asks = loop->cfg->ntp.role == NTP_ROLE_CLIENT || config_speaks(loop->cfg, PROTOCOL_COLA);
+    const int asks = config_speaks(loop->cfg, PROTOCOL_COLA);
     return asks && loop->device != NULL && !loop->stream.waits && !device_replays(loop->device);
 }
 
@@ -206,7 +206,7 @@ int loop_start(struct loop *loop, struct sh_err *err)
     if (rc == SH_OK) rc = pacer_start(loop, err);
     if (rc == SH_OK) rc = loop->device != NULL ? casters_start(loop, err) : player_start(loop, err);
     if (rc == SH_OK && asks_time(loop))
-        rc = time_client_start(loop->device, &loop->stream, loop->pacer.pace.epoch_ns, &loop->client, err);
+        rc = time_client_start(loop->device, loop->pacer.pace.epoch_ns, &loop->client, err);
     if (rc == SH_OK && loop->device != NULL) loop->cost = cost_watch_start(loop);
     return rc;
 }

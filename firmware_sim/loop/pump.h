@@ -9,6 +9,8 @@
 
 /* links must outlive the pump. index: of the link, from 0; session numbers follow from it. */
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err);
+/* Before the start: whether sessions can be made with what clients have stored. SH_EINPUT: they can't. */
+int pump_check_stored(struct pump *pump, struct sh_err *err);
 int pump_start(struct pump *pump, struct sh_err *err);
 void pump_join(struct pump *pump);
 void pump_close(struct pump *pump);

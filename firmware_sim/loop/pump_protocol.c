@@ -220,6 +220,19 @@ static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_
     return pump->protocol->create(&spec, &s->protocol, err);
 }
 
+int pump_check_stored(struct pump *pump, struct sh_err *err)
+{
+    const struct loop_source *source = pump->links->source;
+    char stored[SETTINGS_FILE_TEXT];
+    if (pump->protocol->passes_native || source->ops->stored == NULL ||
+        source->ops->stored(source->self, pump->protocol->name, stored) != 0 || stored[0] == '\0')
+        return SH_OK;
+    struct session *s = &pump->session[0];
+    const int rc = pump_protocol_create(pump, s, err);
+    if (rc == SH_OK) session_close_protocol(pump, s);
+    return rc;
+}
+
 int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err)
 {
     const int rc = pump_protocol_create(pump, s, err);

@@ -41,6 +41,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     struct sh_err err = {.text = "no memory for a session"};
     if (native ? s->out == NULL : session_open_protocol(pump, s, &err) != SH_OK) {
         source_report(pump->links->source, CMD_E_REFUSED, err.text);
+        if (pump->ops->end != NULL) pump->ops->end(pump->link, session_index(pump, s));
         return;
     }
     s->open = 1;
@@ -71,6 +72,7 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
     if (session_restart_protocol(pump, s) == SH_OK) return;
     source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
     session_cut(pump, s);
+    if (pump->ops->end != NULL) pump->ops->end(pump->link, session_index(pump, s));
 }
 
 uint64_t session_off_tick(const struct pump *pump, const struct session *s)

@@ -17,10 +17,10 @@
 
 #define SECOND_NS INT64_C(1000000000)
 enum { MOST_HALVINGS = 10, MAX_PACKET = 512 };
+static const int64_t LEAST_NS = SECOND_NS; /* between two requests, whatever changes meanwhile */
 
 struct time_client {
     struct device *device;
-    const struct stream *stream;
     int64_t epoch_ns;
     int wake_fd, fd; /* fd: -1: no server is asked */
     _Atomic int ending;
@@ -28,6 +28,7 @@ struct time_client {
     struct device_time_server server;
     struct command_time_answers answers;
     int64_t ask_ns;     /* clock: when to ask next; INT64_MAX: never */
+    int64_t asked_ns;   /* clock: when it asked last */
     int64_t give_up_ns; /* clock: until when an answer is awaited; INT64_MAX: none is */
     int64_t t1_ns;      /* of the request, UTC by the scanner's clock */
     int64_t zone_ns;    /* what the scanner's clock is ahead of UTC since it was set */
@@ -53,6 +54,11 @@ static void time_client_say(struct time_client *c, const char *state, const char
 
 /* ---- the server */
 
+static int64_t period_ns(const struct time_client *c)
+{
+    return c->server.set.update_s * SECOND_NS << c->halvings;
+}
+
 static void close_server(struct time_client *c)
 {
     if (c->fd >= 0) close(c->fd);
@@ -61,17 +67,20 @@ static void close_server(struct time_client *c)
     c->halvings = 0;
 }
 
+/* Where the machine has no route yet, it is tried again a period later. */
 static void open_server(struct time_client *c)
 {
+    const int64_t now_ns = clock_now_ns(), soonest_ns = c->asked_ns + LEAST_NS;
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons(c->server.port)};
     memcpy(&at.sin_addr, c->server.set.address, sizeof c->server.set.address);
     c->fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (c->fd < 0 || connect(c->fd, (struct sockaddr *)&at, sizeof at) != 0) {
         close_server(c);
+        c->ask_ns = now_ns + period_ns(c);
         time_client_say(c, "SILENT", "there is no way to this server");
         return;
     }
-    c->ask_ns = clock_now_ns();
+    c->ask_ns = now_ns > soonest_ns ? now_ns : soonest_ns;
     time_client_say(c, "ASKING", NULL);
 }
 
@@ -103,13 +112,17 @@ static void take_settings(struct time_client *c)
 static void ask(struct time_client *c, int64_t now_ns)
 {
     uint8_t packet[NTP_LEN];
+    if (c->fd < 0) { /* there was no way to it */
+        open_server(c);
+        if (c->fd < 0) return;
+    }
+    c->asked_ns = now_ns;
     c->t1_ns = utc_now_ns(c);
     ntp_write_request(packet, c->t1_ns);
     (void)!send(c->fd, packet, sizeof packet, 0); /* one that is lost is missed as an answer */
     c->give_up_ns = now_ns + SECOND_NS;
-    const int64_t period_ns = c->server.set.update_s * SECOND_NS << c->halvings;
-    c->ask_ns += period_ns;
-    if (c->ask_ns <= now_ns) c->ask_ns = now_ns + period_ns; /* the machine stood still */
+    c->ask_ns += period_ns(c);
+    if (c->ask_ns <= now_ns) c->ask_ns = now_ns + period_ns(c); /* the machine stood still */
 }
 
 static void give_up(struct time_client *c)
@@ -126,7 +139,7 @@ static void take_kiss(struct time_client *c, const char *kiss)
     const int ends = strcmp(kiss, "DENY") == 0 || strcmp(kiss, "RSTR") == 0;
     if (ends) c->ask_ns = INT64_MAX;
     if (strcmp(kiss, "RATE") == 0 && c->halvings < MOST_HALVINGS) {
-        c->ask_ns += c->server.set.update_s * SECOND_NS << c->halvings;
+        c->ask_ns += period_ns(c);
         c->halvings++;
     }
     snprintf(text, sizeof text, "kiss-o'-death %s%s", kiss, ends ? ", it is asked no more" : "");
@@ -144,7 +157,7 @@ static void take_good(struct time_client *c, const struct ntp_answer *answer)
         time_client_say(c, "OFFSET", text);
         return;
     }
-    device_shift_date(c->device, off_ns + zone_ns - c->zone_ns, stream_released(c->stream));
+    if (!device_shift_date(c->device, &c->server, off_ns + zone_ns - c->zone_ns)) return;
     c->zone_ns = zone_ns;
     c->is_set = 1;
     c->answers.good++;
@@ -160,9 +173,9 @@ static void take_answer(struct time_client *c)
     const ssize_t len = recv(c->fd, packet, sizeof packet, 0);
     const int64_t t4_ns = utc_now_ns(c);
     if (len < NTP_LEN || c->give_up_ns == INT64_MAX) return; /* one that comes too late is none */
+    if (ntp_read_answer(packet, (size_t)len, c->t1_ns, t4_ns, &answer) == NTP_FOREIGN) return; /* no fault counts it */
     if (device_change_time_answer(c->device, clock_now_ns() - c->epoch_ns, packet)) return;
     const enum ntp_kind kind = ntp_read_answer(packet, (size_t)len, c->t1_ns, t4_ns, &answer);
-    if (kind == NTP_FOREIGN) return;
     c->give_up_ns = INT64_MAX;
     if (kind == NTP_GOOD) {
         take_good(c, &answer);
@@ -210,14 +223,12 @@ static void time_client_free(struct time_client *c)
     free(c);
 }
 
-int time_client_start(struct device *device, const struct stream *stream, int64_t epoch_ns, struct time_client **out,
-                      struct sh_err *err)
+int time_client_start(struct device *device, int64_t epoch_ns, struct time_client **out, struct sh_err *err)
 {
     struct time_client *c = calloc(1, sizeof *c);
     *out = NULL;
     if (c == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     c->device = device;
-    c->stream = stream;
     c->epoch_ns = epoch_ns;
     c->fd = -1;
     c->ask_ns = c->give_up_ns = INT64_MAX;

@@ -9,21 +9,22 @@
  *   beyond max_offset_s   is refused, once the clock was set: error 107
  *   no answer in 1 s      is counted; the clock runs on. Error 107 where one had come before
  *   not synchronised      is counted as refused: error 107
- *   kiss-o'-death         DENY and RSTR: the server is asked no more, until TIME:SERVer or a power cycle; RATE: from then
- *                         on it is asked half as often; others only count as refused. Error 107
+ *   kiss-o'-death         DENY and RSTR: the server is asked no more, until TIME:SERVer changes a setting or a power cycle;
+ *                         RATE: from then on it is asked half as often; others only count as refused. Error 107
+ *   no route              is tried again after update_s
+ *
+ * Two requests are at least 1 s apart, however often settings change.
  *
  * An error is reported when the state changes, not for each answer. */
 #ifndef FIRMWARE_SIM_LOOP_TIME_CLIENT_H
 #define FIRMWARE_SIM_LOOP_TIME_CLIENT_H
 
 #include "firmware_sim/device/device.h"
-#include "firmware_sim/loop/stream.h"
 
 struct time_client;
 
 /* epoch_ns: device time 0, by clock_now_ns(). */
-int time_client_start(struct device *device, const struct stream *stream, int64_t epoch_ns, struct time_client **out,
-                      struct sh_err *err);
+int time_client_start(struct device *device, int64_t epoch_ns, struct time_client **out, struct sh_err *err);
 /* Ends the thread; client may be NULL. */
 void time_client_join(struct time_client *client);
 

@@ -81,6 +81,22 @@ static void what_is_refused_is_not_kept(void **state)
     cola.replies = refuses;
     cola_authorise();
     cola_expect("sMN mEEwriteall", "sAN mEEwriteall 0");
+    assert_string_equal(cola.stored, "");
+}
+
+/* A name with a line's end would be two lines of the file, and one with other bytes could not be stored. */
+static void names_are_printable(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    EXPECT_B("sMN SetAccessMode \3\xf4\x72\x47\x44", "sAN SetAccessMode \1");
+    EXPECT_B("sWN LocationName \0\4a\nbc", "sFA\0\5");
+    EXPECT_B("sWN LocationName \0\4B\xfc"
+             "ro",
+             "sFA\0\5"); /* Latin-1 */
+    EXPECT_B("sWN LocationName \0\4a\0bc", "sFA\0\5");
+    EXPECT_B("sWN LocationName \0\4 ~bc", "sWA LocationName ");
+    EXPECT_B("sRN LocationName", "sRA LocationName \0\4 ~bc");
 }
 
 static void wrong_lines_are_refused(void **state)
@@ -166,6 +182,27 @@ static void one_dialect_at_a_time(void **state)
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
 }
 
+/* mEEwriteall and mSCloadappdef leave a link its dialect, and others theirs. */
+static void storing_keeps_the_dialect(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    open_strict(PROTOCOL_COLA_B);
+    cola.spec.keeps = 1;
+    assert_int_equal(open_again(&err), 0);
+    EXPECT_B("sMN SetAccessMode \3\xf4\x72\x47\x44", "sAN SetAccessMode \1");
+    EXPECT_B("sMN mEEwriteall", "sAN mEEwriteall \1");
+    assert_null(strstr(cola.stored, "EIHstCola")); /* nobody has written it */
+    EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
+
+    cola.spec.dialect = PROTOCOL_COLA_A;
+    cola.spec.stored = "EIHstCola 1\n";
+    assert_int_equal(open_again(&err), 0);
+    EXPECT_B("sMN SetAccessMode \3\xf4\x72\x47\x44", "sAN SetAccessMode \1");
+    EXPECT_B("sMN mSCloadappdef", "sAN mSCloadappdef ");
+    EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
+}
+
 /* Another session has changed it: the stream goes on in the new one. */
 static void the_stream_follows(void **state)
 {
@@ -201,8 +238,10 @@ int main(void)
         CASE(settings_are_kept),
         CASE(without_a_file_nothing_is_kept),
         CASE(what_is_refused_is_not_kept),
+        CASE(names_are_printable),
         CASE(wrong_lines_are_refused),
         CASE(one_dialect_at_a_time),
+        CASE(storing_keeps_the_dialect),
         CASE(the_stream_follows),
         CASE(garbage_of_the_other_dialect),
     };

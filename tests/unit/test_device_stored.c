@@ -145,9 +145,10 @@ static void limits_that_depend_on_each_other_are_no_matter(void **state)
 
 static void expect_refused(const char *text, const char *says)
 {
+    static const char *const fast[] = {"loop.pace=fast"};
     struct sh_err err = {0};
     struct device *device;
-    struct rig *rig = rig_open(NULL, NULL, 0); /* for its site */
+    struct rig *rig = rig_open(NULL, fast, 1); /* for its site */
     struct settings_file *file = open_settings();
     assert_int_equal(settings_file_put(file, "head", text), SH_OK);
     const int rc = device_create(rig->site, &(struct device_options){.settings = file}, &device, &err);
@@ -166,6 +167,7 @@ static void what_the_head_does_not_take_is_refused(void **state)
     expect_refused("SCAN:STARt\n", "'SCAN:STARt' is no setting that this head stores");
     expect_refused("HEAD:STATION 2\n", "'HEAD:STATION 2' is no setting that this head stores");
     expect_refused("HEAD:REBoot\n", "is no setting that this head stores");
+    expect_refused("TIME:SERVer CLIENT,127.0.0.1,600,0,ETH\n", "allowed with loop.pace realtime");
     expect_refused("NOTHING 1\n", "is no setting that this head stores");
 }
 

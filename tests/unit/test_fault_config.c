@@ -57,6 +57,16 @@ static int has(const char *keys, const char *key)
     return at != NULL && (at == keys || at[-1] == ' ') && (at[len] == ' ' || at[len] == '\0');
 }
 
+/* The scanner that has dates speaks cola; another head has none that a time server could set. */
+static void a_time_server_needs_dates(void **state)
+{
+    (void)state;
+    const char *const client[] = {"ntp.role=client"};
+    write_file(config_path, base, strlen(base));
+    assert_int_equal(load_sets(client, 1), SH_EINPUT);
+    assert_says("ntp.role: client, but no link sends dates; allowed with a link of protocol: cola");
+}
+
 /* The list is not cut off. */
 static void an_unknown_kind_is_told_all_kinds(void **state)
 {
@@ -268,6 +278,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_unknown_kind_is_told_all_kinds),
+        cmocka_unit_test(a_time_server_needs_dates),
         cmocka_unit_test(a_kind_has_its_keys_and_no_others),
         cmocka_unit_test(what_is_not_given_is_as_said),
         cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),

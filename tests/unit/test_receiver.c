@@ -95,7 +95,7 @@ static void follows_what_comes(void **state)
           {6.4, LOCKED, 2.9},
           {7.6, LOCKED, 5.1}}},
         {{"gnss.nmea_late_ms=300", "gnss.cold=on", NULL}, {{2.6, LOCKED, 3.1}, {2.8, LOCKED, 0.3}, {3.6, LOCKED, 1.1}}},
-        /* What is missing, wrong or void at first; the last does not matter. */
+        /* Sentences are missing, wrong or void at first; void ones do no harm. */
         {{"gnss.cold=on", "faults[0].kind=nmea_lost", "faults[0].until_s=4", NULL},
          {{3.6, LOCKED, 4.1}, {4.4, LOCKED, 4.9}, {4.6, LOCKED, 2.1}}},
         {{"gnss.cold=on", "faults[0].kind=nmea_checksum", "faults[0].until_s=4", NULL},
@@ -157,12 +157,29 @@ static void sentences_go_wrong(void **state)
     assert_int_equal(second_at(rig, 6.5, &fix), 4);
     assert_true(fix.quality == 1 && fix.is_spoilt);
     assert_int_equal(second_at(rig, 8.5, &fix), 5);
-    /* That of 8.5 arrives at 9.75, and the next one does not overtake it. */
+    /* The sentence of 8.5 arrives at 9.75, and the next one does not overtake it. */
     assert_int_equal(second_at(rig, 9.749, &fix), 5);
     assert_int_equal(second_at(rig, 9.75, &fix), 6);
     assert_int_equal(second_at(rig, 9.751, &fix), 7);
     assert_int_equal(second_at(rig, 1.5, &fix), 3599); /* a session that is late asks for the past */
     assert_string_equal(rig_tell(rig, "FAULt:INJected?", rig->next), "4");
+    rig_close(rig);
+}
+
+/* As late as settings and faults together can be, at the highest rate: 5 s and 10 s, though the faults have 20 s. All
+ * sentences under way are still there. */
+static void late_sentences_are_not_lost(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"gnss.rate_hz=20",    "gnss.nmea_late_ms=5000", "faults[0].kind=nmea_late",
+                                       "faults[0].from_s=4", "faults[0].for_ms=5000",  "faults[1].kind=nmea_late",
+                                       "faults[1].from_s=4", "faults[1].for_ms=5000",  "faults[2].kind=nmea_late",
+                                       "faults[2].from_s=4", "faults[2].for_ms=5000",  "faults[3].kind=nmea_late",
+                                       "faults[3].from_s=4", "faults[3].for_ms=5000"};
+    struct nmea_fix fix;
+    struct rig *rig = open_with(sets, sizeof sets / sizeof *sets);
+    assert_int_equal(second_at(rig, 19.49, &fix), 1); /* that of 4.45 */
+    assert_int_equal(second_at(rig, 19.5, &fix), 2);  /* that of 4.5 */
     rig_close(rig);
 }
 
@@ -268,6 +285,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_what_comes),
         cmocka_unit_test(sentences_go_wrong),
+        cmocka_unit_test(late_sentences_are_not_lost),
         cmocka_unit_test(the_rotor_is_where_the_lock_wants_it),
         cmocka_unit_test(the_phase_is_lost_with_the_pulses),
         cmocka_unit_test(only_whole_turns_are_held),

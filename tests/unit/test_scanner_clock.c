@@ -31,7 +31,6 @@ static void it_begins_with_power(void **state)
         {{"time.epoch=2026-01-01T00:00:00Z", "time.drift_ppm=-25", "ntp.role=server"},
          EPOCH_NS,
          EPOCH_NS + 2 * S - 50000},
-        {{"time.epoch=2026-01-01T00:00:00Z", "time.drift_ppm=-25", "ntp.role=client"}, 0, 2 * S - 50000},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct rig *rig = rig_open(NULL, cases[i].sets, 3);
@@ -39,6 +38,14 @@ static void it_begins_with_power(void **state)
         if (device_date_ns(rig->device, 2 * S) != cases[i].after_2_s_ns) fail_msg("case %zu after 2 s", i);
         rig_close(rig);
     }
+}
+
+/* Does as an answer to a request with the present settings. */
+static void shift(struct rig *rig, int64_t by_ns)
+{
+    struct device_time_server server;
+    device_get_time_server(rig->device, &server);
+    assert_int_equal(device_shift_date(rig->device, &server, by_ns), 1);
 }
 
 static void a_power_cycle_begins_anew(void **state)
@@ -51,7 +58,11 @@ static void a_power_cycle_begins_anew(void **state)
     expect(rig, "TIME:SHIF 40 S", "OK");
     expect(rig, "TIME:SERV NONE,127.0.0.1,5,1,ETH", "OK");
     assert_true(device_date_ns(rig->device, 300 * MS) == 40 * S + 300 * MS);
-    device_shift_date(rig->device, -S, rig->next); /* what an answer does */
+    shift(rig, -S);
+    device_get_time_server(rig->device, &server);
+    expect(rig, "TIME:SERV NONE,127.0.0.1,5,2,ETH", "OK"); /* an answer from before sets nothing */
+    assert_int_equal(device_shift_date(rig->device, &server, -S), 0);
+    expect(rig, "TIME:SERV NONE,127.0.0.1,5,1,ETH", "OK");
     expect(rig, "TIME:SHIF?", "39000000000");
     expect(rig, "HEAD:REB", "OK");
     rig_go_to(rig, 310); /* power came with tick 301 */
@@ -61,6 +72,9 @@ static void a_power_cycle_begins_anew(void **state)
     expect(rig, "TIME:SERV?", "NONE,127.0.0.1,9,0,ETH");
     device_get_time_server(rig->device, &server);
     assert_int_equal(server.power_ons, 2);
+    server.power_ons = 1; /* nor does one from before the power cycle */
+    assert_int_equal(device_shift_date(rig->device, &server, -S), 0);
+    expect(rig, "TIME:SHIF?", "0");
     rig_close(rig);
 }
 
@@ -131,9 +145,9 @@ static void a_journal_has_the_dates(void **state)
                                                .replay = again ? journal_path : NULL};
         struct rig *rig = rig_open(&options, NULL, 0);
         rig_go_to(rig, 400);
-        if (!again) device_shift_date(rig->device, EPOCH_NS + 123456789, rig->next);
+        if (!again) shift(rig, EPOCH_NS + 123456789);
         rig_go_to(rig, 500);
-        if (!again) device_shift_date(rig->device, -987654321, rig->next);
+        if (!again) shift(rig, -987654321);
         rig_go_to(rig, 600);
         for (int i = 0; i < 4; i++)
             dates_ns[again][i] = device_date_ns(rig->device, 550 * MS + i);
@@ -141,6 +155,27 @@ static void a_journal_has_the_dates(void **state)
     }
     assert_true(dates_ns[0][3] == EPOCH_NS + 123456789 - 987654321 + 550 * MS + 3);
     assert_memory_equal(dates_ns[0], dates_ns[1], sizeof dates_ns[0]);
+}
+
+/* It has no UTC where a time server is to be asked; only a scanner with dates can ask one. The configuration stays. */
+static void a_client_begins_with_1970(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"ntp.role=client", "time.drift_ppm=-25"};
+    char path[96];
+    snprintf(path, sizeof path, "%s/run.yaml", folder);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f, "head: {profile: sick-lms111, lines_hz: 50, prr_hz: 36000, frames: 0}\n"
+               "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+               "stations: [{position_m: [0, 0, 0]}]\n"
+               "links: [{type: tcp, port: 0, protocol: cola}]\n"
+               "time: {epoch: 2026-01-01T00:00:00Z}\n");
+    assert_int_equal(fclose(f), 0);
+    struct rig *rig = rig_open(NULL, sets, 2);
+    assert_true(device_date_ns(rig->device, 0) == 0);
+    assert_true(device_date_ns(rig->device, 2 * S) == 2 * S - 50000);
+    rig_close(rig);
 }
 
 int main(void)
@@ -151,6 +186,7 @@ int main(void)
         cmocka_unit_test(who_is_asked),
         cmocka_unit_test(the_server_is_stored),
         cmocka_unit_test(a_journal_has_the_dates),
+        cmocka_unit_test(a_client_begins_with_1970), /* the last one */
     };
     return cmocka_run_group_tests_name("scanner clock", tests, make_folder, remove_folder);
 }

@@ -50,7 +50,7 @@ static void examples(void **state)
     }
 }
 
-/* What the driver makes of errors: 0x00 is a break, 0x66 has an error, and 0xe6 has none. */
+/* The driver marks errors: 0x00 is a break, 0x66 has an error, and 0xe6 has none. */
 static void errors(void **state)
 {
     (void)state;

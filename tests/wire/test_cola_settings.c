@@ -3,6 +3,7 @@
  * link that speaks one dialect at a time. */
 #include "tests/wire/cola_client.h"
 #include "tests/wire/room.h"
+#include "tests/wire/usage_rig.h"
 
 static struct cola_client c;
 
@@ -115,11 +116,26 @@ static void a_link_has_one_dialect(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* The run ends at its start, before a client could find it silent. */
+static void a_wrong_line_is_found_at_the_start(void **state)
+{
+    struct wire *wire = *state;
+    char set[400];
+    snprintf(set, sizeof set, "head.settings_file=%s",
+             wire_write_text(wire, "settings.txt", "scanhead settings 1\nprofile sick-lms111\ncola hello 7\nend\n"));
+    const char *config = config_write(wire, "links: [{type: tcp, port: 0, protocol: cola}]\n");
+    const char *const args[] = {"run", config, "--duration", "0.1", "--quiet", "--set", set, NULL};
+    usage_expect(wire, "a wrong line of cola", args, 2,
+                 (const char *const[]){"head.settings_file", "'hello 7' is no setting that cola stores", NULL});
+    assert_int_equal(usage_complaints, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(stored_settings_survive, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_link_has_one_dialect, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_wrong_line_is_found_at_the_start, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("cola settings", tests, NULL, NULL);
 }

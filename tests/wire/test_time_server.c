@@ -167,7 +167,7 @@ static void scans_have_the_servers_time(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Sends another request at once: any change of its settings begins anew with the server. */
+/* Lets it ask again, at most a second after the last request: any change of its settings begins anew with the server. */
 static double ask_again(struct server *server)
 {
     static int update_s = 60;
@@ -177,7 +177,7 @@ static double ask_again(struct server *server)
     return server_wait(server);
 }
 
-/* What a wrong, a silent and a refusing server do; and a time zone. Refused answers leave the clock as it is. */
+/* A wrong, a silent and a refusing server set nothing; a time zone adds hours. Refused answers leave the clock as it is. */
 static void wrong_servers(void **state)
 {
     struct wire *wire = *state;
@@ -268,6 +268,21 @@ static void a_kiss_slows_it_down(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* A client that writes again and again makes it ask no more often than once a second, by its own clock. */
+static void it_never_floods_a_server(void **state)
+{
+    struct wire *wire = *state;
+    struct server server;
+    server_open(&server);
+    struct head head = scanner_start(wire, &server, "");
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    const double t1_s = server_wait(&server);
+    assert_true(ask_again(&server) - t1_s > 0.5); /* a second, less what the first one's T1 is read late */
+    close(scanner.fd);
+    close(server.fd);
+    head_end(&head, SIGTERM);
+}
+
 /* Adds a fault, and waits until the command has taken effect: 100 ms of the head's time. */
 static void inject(struct scanhead *sh, const char *fault)
 {
@@ -326,6 +341,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(scans_have_the_servers_time, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_servers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_kiss_slows_it_down, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(it_never_floods_a_server, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(injected_faults, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("time server", tests, NULL, NULL);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What stands beside a view: stations and the legend. */
+/* Stations and the legend are drawn beside a view. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

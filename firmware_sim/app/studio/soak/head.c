@@ -14,7 +14,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/fault.h"
 
-/* What another reader of the stream would take for a step of the clock: far above a nanosecond, far below a jump. */
+/* Another reader of the stream would take this for a step of the clock: far above a nanosecond, far below a jump. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
 /* Kinds that a client can't notice by itself, and why. */
@@ -289,7 +289,7 @@ static int is_all_empty(struct soak_link *link, const struct scanhead_frame *fra
     return frame->n_points != 0;
 }
 
-/* Of the mirror's encoder, rad/s; NaN: not known. */
+/* Returns the rate of the mirror's encoder, rad/s; NaN: not known. */
 static double turn_rate(struct soak_link *link, const struct scanhead_frame *frame)
 {
     struct scanhead_point first, last;
