@@ -52,6 +52,10 @@ int faulty_pass(struct faulty_link *link, int session, int64_t t_ns);
 /* A command of the session changed the faults. Its own reply is the last of the next n ones. */
 void faulty_changed(struct faulty_link *link, int session, uint64_t n_replies);
 
+/* Notes that a cable which was pulled is plugged in, or that something else took its place: another act, or the end of
+ * the run. */
+void faulty_end_cable(struct faulty_link *link);
+
 struct faulty_state {
     int waits;        /* bytes wait in the wire */
     int keeps_back;   /* a fault holds them back; else they wait for the inner link */
