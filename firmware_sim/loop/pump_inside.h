@@ -43,6 +43,7 @@ struct session {
     int reader;          /* of the stream */
     uint64_t cursor;     /* next tick to take */
     uint64_t power_from; /* power that goes with a tick before this one does not end it */
+    uint64_t came_at;    /* ticks before are looked back at, and not received (look_back) */
     struct {
         int have_seq; /* next_seq and next_pulse are known */
         uint32_t next_seq;

@@ -158,7 +158,7 @@ static void look_back(const struct pump *pump, struct session *s)
     const uint64_t power = (uint64_t)(source->ops->power_ns(source->self) / pump->stream->tick_ns);
     uint64_t from = s->cursor > ticks ? s->cursor - ticks : 0;
     if (from < power) from = power;
-    s->power_from = s->cursor; /* power that went before the client came doesn't end its session */
+    s->power_from = s->came_at = s->cursor; /* power that went before the client came doesn't end its session */
     if (from < s->cursor) s->cursor = from;
 }
 
