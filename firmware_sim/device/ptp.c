@@ -121,7 +121,7 @@ static int64_t sum_ns(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns)
     return sum;
 }
 
-/* The fault that describes the grandmaster with this identity; of several, the last in the list. NULL: there is none. */
+/* The fault that describes the grandmaster with this identity; of several, the last in the list. NULL: none does. */
 static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identity, int64_t t_ns)
 {
     const struct head_fault *f = NULL, *last = NULL;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults of a link: acts at frames, clients that are turned away, and USB enumerations that go wrong.
  *
- * Connections are counted from 1 on the link, those that are turned away too, but not those that come while the head has
- * no power: nobody is there to count them. On a USB link, each time that a host gets the device is a connection. */
+ * Connections are counted from 1 on the link, those that are turned away too, but not those that come while the head
+ * has no power: nobody is there to count them. On a USB link, each time that a host gets the device is a connection. */
 #include <stdio.h>
 #include <string.h>
 

@@ -49,8 +49,8 @@ struct faulty_link {
 void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piece *act);
 /* The cable of the link is pulled now. */
 int faulty_is_pulled(const struct faulty_link *f);
-/* The act is another session's of the fault that has pulled the cable, and came due before the cable was in again. A link
- * has one cable, which is pulled once. */
+/* The act is another session's of the fault that has pulled the cable, and came due before the cable was in again. A
+ * link has one cable, which is pulled once. */
 int faulty_is_same_pull(const struct faulty_link *f, const struct wire_piece *act);
 /* Takes out the act that is first in the session's wire. It has not struck. */
 void faulty_drop_act(struct faulty_link *f, int session, const struct wire_piece *act);

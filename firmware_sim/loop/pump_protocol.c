@@ -148,8 +148,8 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
     }
 }
 
-/* A device has watched its fields before the client came. A new session looks at the ticks that the ring still has, since
- * power came, so that results are there at once. It sends nothing meanwhile: its client has asked for nothing. */
+/* A device has watched its fields before the client came. A new session looks at the ticks that the ring still has,
+ * since power came, so that results are there at once. It sends nothing meanwhile: its client has asked for nothing. */
 static void look_back(const struct pump *pump, struct session *s)
 {
     const struct loop_source *source = pump->links->source;
