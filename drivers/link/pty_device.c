@@ -22,36 +22,37 @@ static int pair_open(int *master, char *slave, size_t slave_len)
 }
 
 /* The master's ioctls for settings act on the slave. TCOFLUSH drops what is still on its way to the slave's line
- * discipline, then TCSAFLUSH what that holds. Unlike tcflush on the slave they need no open slave. */
-static void drop_output(int master, const struct termios *settings)
+ * discipline, then TCSAFLUSH what that holds. Unlike tcflush on the slave they need no open slave. The settings are
+ * read just before they are written, as the next client may set its own at any moment. */
+static int drop_output(int master, int makes_raw)
 {
+    struct termios settings;
     tcflush(master, TCOFLUSH);
-    tcsetattr(master, TCSAFLUSH, settings);
+    if (tcgetattr(master, &settings) != 0) return -1;
+    if (makes_raw) cfmakeraw(&settings);
+    tcsetattr(master, TCSAFLUSH, &settings);
+    return 0;
 }
 
 void pty_device_drop_output(struct pty_device *device)
 {
-    struct termios now;
-    if (tcgetattr(device->master, &now) == 0) drop_output(device->master, &now);
+    drop_output(device->master, 0);
 }
 
 /* Opening and closing the slave once also makes the master report the hang-up from then on. */
 static int slave_rest(struct pty_device *device)
 {
-    struct termios raw;
-    if (tcgetattr(device->master, &raw) != 0) return -1;
-    cfmakeraw(&raw);
     int fd = open(device->slave, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) {
         const int error = errno;
-        drop_output(device->master, &raw);
-        return error == EMFILE || error == ENFILE || error == ENOMEM ? 0 : -1;
+        const int rc = drop_output(device->master, 1);
+        return error == EMFILE || error == ENFILE || error == ENOMEM ? rc : -1;
     }
     ioctl(fd, TIOCNXCL);
     tcflow(fd, TCOON);
-    drop_output(device->master, &raw);
+    const int rc = drop_output(device->master, 1);
     close(fd);
-    return 0;
+    return rc;
 }
 
 static int link_refuse(const char *path, const char *why, struct sh_err *err)

@@ -21,8 +21,8 @@ int pty_rate_from_client(int master, uint32_t baud, struct uart *uart)
     return SH_OK;
 }
 
-/* Without INPCK Linux's drivers pass on a byte with a wrong stop bit as it was sampled. PARMRK's marks can't be made on a
- * pseudo terminal, whose line discipline would mark them again, so its client gets 0. */
+/* Without INPCK Linux's drivers pass on a byte with a wrong stop bit as it was sampled. PARMRK's marks can't be made on
+ * a pseudo terminal, whose line discipline would mark them again, so its client gets 0. */
 int pty_rate_to_client(int master, uint32_t baud, struct uart *uart)
 {
     struct termios2 settings;

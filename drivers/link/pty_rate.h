@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads the rates that a terminal's client has set. Private to the pty link. It has a file of its own, since the kernel's
- * struct with rates of any number can't be had beside termios.h. */
+/* Reads the rates that a terminal's client has set. Private to the pty link. It has a file of its own, since the
+ * kernel's struct with rates of any number can't be had beside termios.h. */
 #ifndef DRIVERS_LINK_PTY_RATE_H
 #define DRIVERS_LINK_PTY_RATE_H
 

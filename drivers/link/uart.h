@@ -18,7 +18,7 @@
 /* A byte needs a falling edge, and the ten bits of a sent byte have five at most. */
 enum { UART_MOST_PER_BYTE = 5 };
 
-/* What the receiver's driver makes of a byte whose stop bit was 0. */
+/* The receiver's driver keeps a byte whose stop bit was 0, makes it 0, or drops it. */
 enum uart_errors { UART_KEEPS_ERRORS, UART_ZEROES_ERRORS, UART_DROPS_ERRORS };
 
 struct uart {

@@ -13,12 +13,16 @@
 /* A peer confirms after 40 ms at most, if it reads. After 200 ms (TCP_RTO_MIN) the system begins to repeat. */
 enum { CONFIRM_MS = 200, MOST_HOPS = 255 };
 
-/* A socket of IPv6 may have a peer of IPv4, so both are set. */
+/* A socket of IPv6 may have a peer of IPv4, so there both are needed. */
 static int take_from(int fd, int least_ttl)
 {
+    int family = AF_INET;
+    socklen_t len = sizeof family;
+    getsockopt(fd, SOL_SOCKET, SO_DOMAIN, &family, &len);
     const int by_v4 = setsockopt(fd, IPPROTO_IP, IP_MINTTL, &least_ttl, sizeof least_ttl);
-    const int by_v6 = setsockopt(fd, IPPROTO_IPV6, IPV6_MINHOPCOUNT, &least_ttl, sizeof least_ttl);
-    return by_v4 == 0 || by_v6 == 0 ? SH_OK : SH_ESTATE;
+    const int by_v6 =
+        family == AF_INET6 ? setsockopt(fd, IPPROTO_IPV6, IPV6_MINHOPCOUNT, &least_ttl, sizeof least_ttl) : 0;
+    return by_v4 == 0 && by_v6 == 0 ? SH_OK : SH_ESTATE;
 }
 
 static int is_any_unconfirmed(const int *fds, int n)

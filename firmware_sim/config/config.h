@@ -173,6 +173,7 @@ struct config {
     const char *const *sets; /* the --set that it was loaded with; not copied */
     int n_sets;
     char scenario_file[CONFIG_PATH_LEN]; /* the scenario that was added; empty: none */
+    int has_no_head;                     /* 1: it is that of a recording, which refuses faults in the head by itself */
     int links_are_not_here;              /* 1: this is not the scanner of head.station, which has the links */
     char profile_file[CONFIG_PATH_LEN];
     struct config_profile profile;

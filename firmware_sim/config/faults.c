@@ -189,10 +189,11 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
     for (uint32_t i = 0; i < list->n; i++) {
         const struct fault *f = &list->fault[i];
         if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
-        if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
+        if (!cfg->has_no_head && needs_time(f->kind) &&
+            (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
             cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
                          fault_names[f->kind]);
-        if (needs_ptp(f->kind) && !cfg->time.ptp.follower)
+        if (!cfg->has_no_head && needs_ptp(f->kind) && !cfg->time.ptp.follower)
             cfg_fail_key(rd, "faults[].kind", i, "%s needs a follower of PTP; allowed where time.ptp.follower is on",
                          fault_names[f->kind]);
         if (cfg->links_are_not_here) continue; /* checked with the scanner that has the links */

@@ -32,6 +32,7 @@ int config_load_links(const char *text, const char *name, const char *const *set
     struct cfg_reader rd;
     struct cfg_document *doc;
     memset(cfg, 0, sizeof *cfg);
+    cfg->has_no_head = 1;
     memset(faults, 0, sizeof *faults);
     snprintf(cfg->file, sizeof cfg->file, "%s", name);
     for (size_t i = 0; i < cfg_config_table.n; i++)

@@ -7,8 +7,8 @@
  * it. The key time.epoch gives the true time of day at power-up. The head's clock may be wrong:
  * it is the sum of the true time, time.offset_s, time.drift_ppm of the time since power-up, and,
  * from time.jump_at_s on, time.jump_s. While all of them are 0, the head's clock shows the true time. Injected
- * faults add jumps, gains and times in which it stands, and so does the servo of a PTP follower (ptp.h). All of these are
- * changes of one kind, and between two of them the clock runs evenly.
+ * faults add jumps, gains and times in which it stands, and so does the servo of a PTP follower (ptp.h). All of these
+ * are changes of one kind, and between two of them the clock runs evenly.
  *
  *   by the head's clock  PPS events, the GPS time of SCAN_START (and with them scanhead_gps_time), UTC in telemetry,
  *                        TIME:UTC?, TIME:GPS?

@@ -121,7 +121,7 @@ static int64_t sum_ns(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns)
     return sum;
 }
 
-/* What a fault says of the grandmaster with this identity: of several, the last in the list. NULL: none does. */
+/* The fault that describes the grandmaster with this identity; of several, the last in the list. NULL: none does. */
 static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identity, int64_t t_ns)
 {
     const struct head_fault *f = NULL, *last = NULL;
@@ -310,7 +310,7 @@ static int64_t next_moment(const struct ptp *ptp, int64_t t_ns, int64_t end_ns)
     int64_t next_ns = least_of(end_ns, next_multiple(t_ns, ptp->cfg->announce_ms * MS_NS));
     next_ns = least_of(next_ns, next_multiple(t_ns, ptp->cfg->sync_ms * MS_NS));
     if (has_master(ptp) && lost_at(ptp) >= t_ns) next_ns = least_of(next_ns, lost_at(ptp));
-    if (ptp->is_faulty && !holds(ptp, FAULT_PTP_FAULTY, t_ns)) return t_ns;
+    if (ptp->is_faulty != holds(ptp, FAULT_PTP_FAULTY, t_ns)) return t_ns; /* it has changed while power was off */
     while ((f = head_faults_next(ptp->faults, FAULT_PTP_FAULTY, f)) != NULL) {
         if (f->begin_ns >= t_ns) next_ns = least_of(next_ns, f->begin_ns);
         if (f->until_ns >= t_ns) next_ns = least_of(next_ns, f->until_ns);
@@ -335,6 +335,7 @@ static void change_power(struct ptp *ptp, int64_t t_ns, int is_up)
         ptp->estimate_ppt = 0;
         ptp->n_samples = ptp->has_locked = 0;
         ptp->n_heard = 0;
+        ptp->is_faulty = 0;
         ptp->now = (struct ptp_status){
             .port = NATIVE_PTP_INITIALIZING, .clock_class = CLASS_OF_NONE, .clock_accuracy = ACCURACY_OF_NONE};
         ptp_keep(ptp, t_ns);

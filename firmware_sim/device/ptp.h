@@ -9,14 +9,14 @@
  *        +----------------------------------------------------+
  *
  * The master has the true time (head_clock.h), plus what faults add to it. Announce and Sync messages come at whole
- * multiples of their interval in device time. The port changes its states as ptp4l of linuxptp does where it is a client
- * only, and the texts of its events are those of ptp4l's log:
+ * multiples of their interval in device time. The port changes its states as ptp4l of linuxptp does where it is a
+ * client only, and the texts of its events are those of ptp4l's log:
  *
  *     INITIALIZING --boot over--> LISTENING --2nd Announce--> UNCALIBRATED <--servo--> SLAVE
  *     UNCALIBRATED, SLAVE --no Announce for 3 intervals--> LISTENING      any state --fault--> FAULTY --> LISTENING
  *
- * The servo is a PI controller: of the offset o, ns, over the Sync interval T it corrects the rate by 0.7 o / T, and its
- * estimate of the oscillator by 0.3 o / T. Those are linuxptp's gains for T = 1 s. Its states:
+ * The servo is a PI controller: of the offset o, ns, over the Sync interval T it corrects the rate by 0.7 o / T, and
+ * its estimate of the oscillator by 0.3 o / T. Those are linuxptp's gains for T = 1 s. Its states:
  *     s0 unlocked   an offset is measured
  *     s1 jump       with the second one the rate is known; the clock is stepped where the offset is too large
  *     s2 locked     each Sync corrects the rate

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults of a link: acts at frames, clients that are turned away, and USB enumerations that go wrong.
  *
- * Connections are counted from 1 on the link, those that are turned away too, but not those that come while the head has
- * no power: nobody is there to count them. On a USB link, each time that a host gets the device is a connection. */
+ * Connections are counted from 1 on the link, those that are turned away too, but not those that come while the head
+ * has no power: nobody is there to count them. On a USB link, each time that a host gets the device is a connection. */
 #include <stdio.h>
 #include <string.h>
 
@@ -49,7 +49,7 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
     const enum link_fault what = link_fault_of(kind);
     const double for_ms = act->for_ms;
     const uint32_t n = act->n;
-    const struct fault_note note = *wire_act_note(act);
+    struct fault_note note = *wire_act_note(act);
     const int rc = f->inner->fault(f->link, what, session, n, for_ms);
     wire_pop(wire);
     if (what == LINK_FAULT_BUS_RESET) f->plug_ns = in_ms(0.0); /* a reset may unplug, and fail to plug in again */
@@ -60,6 +60,8 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
         f->spec.say(f->spec.owner, text);
         return;
     }
+    if (f->pulled.ended && note.t_ns <= f->pulled.t_ns) /* it has waited for the cable */
+        note.t_ns = f->spec.time_ns(f->spec.owner);
     fault_board_note(f->spec.board, &note);
     if (what == LINK_FAULT_UNPLUG || what == LINK_FAULT_CABLE) f->plug_ns = in_ms(for_ms);
     if (note.kind == FAULT_CABLE) f->pulled = note;
@@ -68,16 +70,36 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
     end_sessions(f, session, what);
 }
 
-/* Notes that a cable which was pulled is plugged in, or that another act took its place. */
-static void faulty_acts_end_cable(struct faulty_link *f)
+int faulty_is_pulled(const struct faulty_link *f)
 {
-    struct fault_note over = f->pulled;
-    if (f->pulled.fault == 0) return;
-    f->pulled.fault = 0;
-    over = (struct fault_note){.fault = over.fault, .kind = over.kind, .link = over.link, .of = over.of};
-    over.t_ns = f->spec.time_ns(f->spec.owner);
-    over.byte = -1;
-    over.ended = 1;
+    return f->pulled.fault != 0 && !f->pulled.ended;
+}
+
+int faulty_is_same_pull(const struct faulty_link *f, const struct wire_piece *act)
+{
+    const struct fault_note *note = wire_act_note(act);
+    return note->fault == f->pulled.fault && note->session != f->pulled.session &&
+           (!f->pulled.ended || note->t_ns <= f->pulled.t_ns);
+}
+
+void faulty_drop_act(struct faulty_link *f, int session, const struct wire_piece *act)
+{
+    --*fault_tally_hits(&f->tally, wire_act_note(act)->fault);
+    wire_pop(f->session[session].wire);
+}
+
+void faulty_end_cable(struct faulty_link *f)
+{
+    if (!faulty_is_pulled(f)) return;
+    f->pulled.ended = 1;
+    f->pulled.t_ns = f->spec.time_ns(f->spec.owner);
+    const struct fault_note over = {.fault = f->pulled.fault,
+                                    .kind = f->pulled.kind,
+                                    .t_ns = f->pulled.t_ns,
+                                    .link = f->pulled.link,
+                                    .of = f->pulled.of,
+                                    .byte = -1,
+                                    .ended = 1};
     fault_board_note(f->spec.board, &over);
 }
 
@@ -87,7 +109,7 @@ void faulty_plug(struct faulty_link *f)
     if (f->inner->fault(f->link, LINK_FAULT_PLUG, 0, (uint32_t)f->resets, 0.0) == SH_OK) {
         if (f->plug_failed) f->spec.say(f->spec.owner, "is there again");
         f->plug_ns = f->plug_failed = f->resets = 0;
-        faulty_acts_end_cable(f);
+        faulty_end_cable(f);
         return;
     }
     if (!f->plug_failed)
@@ -102,7 +124,7 @@ int faulty_fault(void *link, enum link_fault what, int session, uint32_t n, doub
     struct faulty_link *f = link;
     if (what != LINK_FAULT_PLUG) {
         f->plug_ns = f->refuse_until_ns = f->resets = 0;
-        faulty_acts_end_cable(f);
+        faulty_end_cable(f);
         return f->inner->fault(f->link, what, session, n, for_ms);
     }
     f->plug_ns = clock_now_ns(); /* now, or once its endpoint is free */

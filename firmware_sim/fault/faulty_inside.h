@@ -38,7 +38,7 @@ struct faulty_link {
     struct faulty_session session[LINK_MAX_SESSIONS];
     struct faulty_connections connections;
     int64_t plug_ns;          /* clock: when an unplugged link is there again; 0: it is */
-    struct fault_note pulled; /* the cable that is pulled; fault 0: none is */
+    struct fault_note pulled; /* the cable that was pulled last; once it is in again, `ended` and the time of that */
     int resets;               /* and what was connected is reset after it */
     int plug_failed;          /* it could not come back so far, and that was reported */
     int64_t refuse_until_ns;  /* clock: until then clients are turned away */
@@ -47,6 +47,13 @@ struct faulty_link {
 /* faulty_acts.c */
 /* Carries out the act that is first in the session's wire. */
 void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piece *act);
+/* The cable of the link is pulled now. */
+int faulty_is_pulled(const struct faulty_link *f);
+/* The act is another session's of the fault that has pulled the cable, and came due before the cable was in again. A
+ * link has one cable, which is pulled once. */
+int faulty_is_same_pull(const struct faulty_link *f, const struct wire_piece *act);
+/* Takes out the act that is first in the session's wire. It has not struck. */
+void faulty_drop_act(struct faulty_link *f, int session, const struct wire_piece *act);
 /* Brings an unplugged link back when its time is over. */
 void faulty_plug(struct faulty_link *f);
 /* The link's fault(), called by its owner: this ends what earlier faults began. */

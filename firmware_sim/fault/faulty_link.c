@@ -103,7 +103,11 @@ static int flush(struct faulty_link *f, int session)
     while (!s->is_gone) {
         struct wire_piece *piece = wire_due(s->wire, clock_now_ns());
         if (piece == NULL) return !wire_is_full(s->wire, f->spec.room, clock_now_ns());
-        if (piece->kind == WIRE_ACT && f->pulled.fault != 0) { /* nothing else is done to it meanwhile */
+        if (piece->kind == WIRE_ACT && faulty_is_same_pull(f, piece)) {
+            faulty_drop_act(f, session, piece);
+            continue;
+        }
+        if (piece->kind == WIRE_ACT && faulty_is_pulled(f)) { /* nothing else is done to it meanwhile */
             s->is_blocked = 1;
             return 0;
         }

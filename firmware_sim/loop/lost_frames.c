@@ -64,7 +64,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
     s->lost.have_seq |= tick->n_frames != 0;
     s->lost.next_seq = tick->first_seq + tick->n_frames;
     s->lost.next_pulse = tick->pulses_before + tick->n_cast;
-    pump->counts.received_pulses += tick->n_cast;
+    if (s->cursor >= s->came_at) pump->counts.received_pulses += tick->n_cast;
     return frames;
 }
 

@@ -27,11 +27,16 @@ static int64_t device_time_ns(void *owner)
     return (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
 }
 
-/* In the pace step links are there while power is not. */
+/* In the pace step links are there while power is not. A client that knows of the change from another link may come
+ * before this link's thread has carried it out (pump_power), so the stream is asked. */
 static int has_no_power(void *owner)
 {
     const struct pump *pump = owner;
-    return pump->power_seen % 2 != 0;
+    const uint64_t released = stream_released(pump->stream);
+    uint32_t passed = pump->power_seen;
+    while (stream_power_tick(pump->stream, passed) < released)
+        passed++;
+    return passed % 2 != 0;
 }
 
 static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t index, struct sh_err *err)
@@ -278,6 +283,7 @@ static void *pump_main(void *arg)
                     pump->session[i].unread);
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);
     }
+    faulty_end_cable(pump->link);
     atomic_fetch_sub(&pump->links->n_busy, 1);
     return NULL;
 }

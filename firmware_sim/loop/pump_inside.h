@@ -43,6 +43,7 @@ struct session {
     int reader;          /* of the stream */
     uint64_t cursor;     /* next tick to take */
     uint64_t power_from; /* power that goes with a tick before this one does not end it */
+    uint64_t came_at;    /* ticks before are looked back at, and not received (look_back) */
     struct {
         int have_seq; /* next_seq and next_pulse are known */
         uint32_t next_seq;
@@ -113,8 +114,8 @@ int session_write(struct pump *pump, struct session *s, int index);
  * nothing more and nothing is due to it. */
 int session_is_done(const struct pump *pump, const struct session *s);
 
-/* Lets the link know that all before the session's cursor was written, so that it passes on what is due. is_last: and that
- * nothing follows; nor does it at a power cycle. As faulty_pass. */
+/* Lets the link know that all before the session's cursor was written, so that it passes on what is due. is_last: and
+ * that nothing follows; nor does it at a power cycle. As faulty_pass. */
 int session_pass(struct pump *pump, struct session *s, int is_last);
 /* Whether bytes that were written wait in the link. */
 int session_waits(const struct pump *pump, const struct session *s);

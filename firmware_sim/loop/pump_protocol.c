@@ -148,8 +148,8 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
     }
 }
 
-/* A device has watched its fields before the client came. A new session looks at the ticks that the ring still has, since
- * power came, so that results are there at once. It sends nothing meanwhile: its client has asked for nothing. */
+/* A device has watched its fields before the client came. A new session looks at the ticks that the ring still has,
+ * since power came, so that results are there at once. It sends nothing meanwhile: its client has asked for nothing. */
 static void look_back(const struct pump *pump, struct session *s)
 {
     const struct loop_source *source = pump->links->source;
@@ -158,7 +158,7 @@ static void look_back(const struct pump *pump, struct session *s)
     const uint64_t power = (uint64_t)(source->ops->power_ns(source->self) / pump->stream->tick_ns);
     uint64_t from = s->cursor > ticks ? s->cursor - ticks : 0;
     if (from < power) from = power;
-    s->power_from = s->cursor; /* power that went before the client came doesn't end its session */
+    s->power_from = s->came_at = s->cursor; /* power that went before the client came doesn't end its session */
     if (from < s->cursor) s->cursor = from;
 }
 

@@ -34,7 +34,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     clear(s);
     s->moved_ns = clock_now_ns();
     s->cursor = stream_released(pump->stream);
-    s->power_from = 0;
+    s->power_from = s->came_at = 0;
     s->shut = s->left = 0;
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address is shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);

@@ -36,7 +36,7 @@ struct loop_source_ops {
     int (*store)(void *self, const char *name, const char *text);
     int (*stored)(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
     double (*window_loss_db)(void *self);
-    /* What a link of the protocol `capture`, counted from 0, has to say; NULL: the source has none. */
+    /* The conversation that a link of the protocol `capture`, counted from 0, has; NULL: the source has none. */
     const struct talk *(*talk)(const void *self, uint32_t link, const struct talk_options **options);
 
     /* ---- the run */

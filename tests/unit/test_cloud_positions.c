@@ -191,7 +191,8 @@ static void test_pcd_counts(void **state)
     assert_string_equal(warning, "");
     expect(text, len + 1, 2, TWO, 0);
     assert_non_null(strstr(warning, "goes on after the 2 points"));
-    expect_error("VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA ascii\n1 2 3\n", 66, "no line POINTS");
+    static const char NO_COUNT[] = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA ascii\n1 2 3\n";
+    expect_error(NO_COUNT, sizeof NO_COUNT - 1, "no line POINTS");
 }
 
 static void test_pcd_that_is_wrong(void **state)

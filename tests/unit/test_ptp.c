@@ -221,6 +221,31 @@ static void the_states_are_those_of_ptp4l(void **state)
     rig_close(rig);
 }
 
+/* A head that comes up with a faulty port says so at once, whether the fault began before power went or meanwhile. */
+static void a_faulty_port_outlasts_power(void **state)
+{
+    (void)state;
+    static const char *const faults[] = {"{kind: power_cycle, from_s: 8, until_s: 8.1, for_ms: 2000}",
+                                         "{kind: power_cycle, from_s: 20.5, until_s: 20.6, for_ms: 2000}",
+                                         "{kind: ptp_faulty, from_s: 7.0001, until_s: 15.0002, ppm: 0}",
+                                         "{kind: ptp_faulty, from_s: 21.1, until_s: 30.0003, ppm: 0}"};
+    static const struct said want[] = {
+        {7000100000, 2, 2, "SLAVE to FAULTY on FAULT_DETECTED"},
+        {10200000000, 4, 0, "INITIALIZING to LISTENING on INIT_COMPLETE"},
+        {10200000000, 2, 0, "LISTENING to FAULTY on FAULT_DETECTED"},
+        {15000200000, 4, 0, "FAULTY to LISTENING on INIT_COMPLETE"},
+        {18000000000, 8, 0, "LISTENING to UNCALIBRATED on RS_SLAVE"},
+        {19000000000, 9, 2, "UNCALIBRATED to SLAVE on MASTER_CLOCK_SELECTED, servo s0 to s2"},
+        {22700000000, 4, 0, "INITIALIZING to LISTENING on INIT_COMPLETE"},
+        {22700000000, 2, 0, "LISTENING to FAULTY on FAULT_DETECTED"},
+        {30000300000, 4, 0, "FAULTY to LISTENING on INIT_COMPLETE"},
+    };
+    struct rig *rig = follow(NULL, 0, faults, 4);
+    rig_go_to(rig, 6000);
+    expect_events(rig, want, (int)(sizeof want / sizeof want[0]), 31000, 0);
+    rig_close(rig);
+}
+
 /* The other grandmaster's time is shown, exactly, and its identity and class are reported. */
 static void another_grandmaster_has_another_time(void **state)
 {
@@ -412,6 +437,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_clock_is_as_computed),
         cmocka_unit_test(the_states_are_those_of_ptp4l),
+        cmocka_unit_test(a_faulty_port_outlasts_power),
         cmocka_unit_test(another_grandmaster_has_another_time),
         cmocka_unit_test(the_same_grandmaster_changes),
         cmocka_unit_test(a_jump_of_the_clock_is_corrected),

@@ -67,11 +67,8 @@ static void poll_until(struct client *c, const char *request, const char *answer
 
 /* The head stands in a closed room, so that the walls are in the one field and not in the other. No signal is modelled:
  * LCMstate alone shows that the window is soiled. */
-static void fields_and_the_window(void **state)
+static struct head start(struct wire *wire)
 {
-    struct wire *wire = *state;
-    static struct client c;
-    char results[4];
     const struct room_config config = {
         .profile = "sick-tim781",
         .prr_hz = 16200,
@@ -82,7 +79,15 @@ static void fields_and_the_window(void **state)
                 "  - {number: 1, name: walls, shape: segment, angles_deg: [-45, 225], radii_m: [0, 20]}\n"
                 "  - {number: 2, name: near, shape: rectangle, corner_m: [-0.2, -0.2], size_m: [0.4, 0.4]}\n"};
     room_write(wire);
-    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    return head_start(wire, room_config_write(wire, &config), NULL);
+}
+
+static void fields_and_the_window(void **state)
+{
+    struct wire *wire = *state;
+    static struct client c;
+    char results[4];
+    struct head head = start(wire);
     struct scanhead *native = client_open(head_endpoint(&head, "pty"));
     c.fd = raw_connect(head_endpoint(&head, "tcp"));
     send_request(&c, "sEN LFErec 1");
@@ -116,9 +121,34 @@ static void fields_and_the_window(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* A session looks at what was seen before its client came, which that client has not received. */
+static void received_is_from_the_first_moment_on(void **state)
+{
+    struct wire *wire = *state;
+    static struct client c;
+    uint64_t before = 0;
+    struct head head = start(wire);
+    struct scanhead *native = client_open(head_endpoint(&head, "pty"));
+    struct scanhead_frame frame;
+    client_wait_state(native, "idle");
+    client_tell(native, "SCAN:START");
+    while (before < 5000) { /* a third of a second, and the session looks back for one and a half */
+        client_next(native, &frame);
+        before += frame.n_pulses;
+    }
+    c.fd = raw_connect(head_endpoint(&head, "tcp"));
+    send_request(&c, "sRN LFErec");
+    wait_for(&c, "sRA LFErec 3 ");
+    close(c.fd);
+    scanhead_close(native);
+    head_end(&head, SIGTERM);
+    assert_in_range(stats_link_uint(wire, "received_pulses"), 0, stats_uint(wire, "pulses") - before);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(fields_and_the_window, wire_setup, wire_teardown)};
+        cmocka_unit_test_setup_teardown(fields_and_the_window, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(received_is_from_the_first_moment_on, wire_setup, wire_teardown)};
     return cmocka_run_group_tests_name("cola fields", tests, NULL, NULL);
 }

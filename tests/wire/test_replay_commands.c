@@ -294,6 +294,8 @@ static void test_faults_by_command(void **state)
     starts_with(sh, "FAULt:ADD {kind: mirror_stop, every: 10}", "ERR ", "");
     starts_with(sh, "HEAD:REBOOT", "ERR -221", "a recording is replayed");
     starts_with(sh, "FAULt:ADD {kind: power_cycle, for_ms: 200, from_s: 1}", "ERR ", "a recording has no head");
+    starts_with(sh, "FAULt:ADD {kind: ptp_lost}", "ERR ", "a recording has no head");
+    starts_with(sh, "FAULt:ADD {kind: clock_stop}", "ERR ", "a recording has no head");
     starts_with(sh, "FAULt:ADD {kind: none_such}", "ERR ", "");
     assert_string_equal(client_ask(sh, "FAULt:LIST?"), "none");
     assert_string_equal(client_ask(sh, "FAULt:ADD {kind: drop, every: 10}"), "1");
