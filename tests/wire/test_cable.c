@@ -76,6 +76,14 @@ static void is_pulled_once_for_all(void **state)
     check_truth(wire, 1, "");
 }
 
+static int was_pulled(struct wire *wire)
+{
+    char *told = wire_read(wire_path(wire, "truth.json"), NULL);
+    const int pulled = strstr(told, "\"cable\"") != NULL;
+    free(told);
+    return pulled;
+}
+
 /* A queue of a tenth of a second can't hold four of them: the client learns how many frames it lost. */
 static void loses_what_the_queue_cant_hold(void **state)
 {
@@ -86,9 +94,10 @@ static void loses_what_the_queue_cant_hold(void **state)
     struct scanhead_stats stats;
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:START");
-    do
+    for (int has_lost = 0; !has_lost || !was_pulled(wire);) { /* on a busy machine it may lose frames before the pull */
         client_next(sh, &frame);
-    while (!is_event(&frame, SCANHEAD_EV_READER_LOST));
+        has_lost |= is_event(&frame, SCANHEAD_EV_READER_LOST);
+    }
     scanhead_get_stats(sh, &stats);
     assert_true(stats.reader_lost > 0);
     scanhead_close(sh);
