@@ -1,36 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A TiM781 watches fields of its configuration: a client polls the results and gets the changes. Faults make them
  * change: a laser that is off, and a soiled window. */
+#include "tests/wire/cola_client.h"
 #include "tests/wire/room.h"
 #include "tests/wire/wire.h"
 
-struct client {
-    int fd;
-    char bytes[1 << 16], text[1 << 16];
-    size_t len;
-};
-
-/* Returns the next telegram without its marks. */
-static const char *next(struct client *c)
-{
-    for (;;) {
-        const char *end = memchr(c->bytes, 3, c->len);
-        if (end != NULL) {
-            const size_t n = (size_t)(end - c->bytes);
-            memcpy(c->text, c->bytes + 1, n - 1);
-            c->text[n - 1] = '\0';
-            memmove(c->bytes, end + 1, c->len -= n + 1);
-            return c->text;
-        }
-        struct pollfd slot = {.fd = c->fd, .events = POLLIN};
-        assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
-        const ssize_t got = read(c->fd, c->bytes + c->len, sizeof c->bytes - c->len);
-        assert_true(got > 0);
-        c->len += (size_t)got;
-    }
-}
-
-static void send_request(struct client *c, const char *request)
+static void send_request(struct cola_client *c, const char *request)
 {
     char line[64];
     const int n = snprintf(line, sizeof line, "\2%s\3", request);
@@ -38,11 +13,13 @@ static void send_request(struct client *c, const char *request)
 }
 
 /* Waits for a telegram that begins so. */
-static const char *wait_for(struct client *c, const char *begin)
+static const char *wait_for(struct cola_client *c, const char *begin)
 {
     const char *text;
-    while (strncmp(text = next(c), begin, strlen(begin)) != 0)
-        continue;
+    do {
+        text = cola_client_next(c);
+        assert_non_null(text);
+    } while (strncmp(text, begin, strlen(begin)) != 0);
     return text;
 }
 
@@ -58,7 +35,7 @@ static void read_results(const char *telegram, char results[4])
     results[3] = '\0';
 }
 
-static void poll_until(struct client *c, const char *request, const char *answer)
+static void poll_until(struct cola_client *c, const char *request, const char *answer)
 {
     do
         send_request(c, request);
@@ -85,7 +62,7 @@ static struct head start(struct wire *wire)
 static void fields_and_the_window(void **state)
 {
     struct wire *wire = *state;
-    static struct client c;
+    static struct cola_client c;
     char results[4];
     struct head head = start(wire);
     struct scanhead *native = client_open(head_endpoint(&head, "pty"));
@@ -98,7 +75,7 @@ static void fields_and_the_window(void **state)
     read_results(wait_for(&c, "sSN LFErec 3 "), results);
     assert_string_equal(results, "210");
     assert_non_null(strstr(wait_for(&c, "sSN LIDoutputstate 0 "), " 1 1 0 0 0 0 0 0 0 0 0"));
-    static struct client late; /* the first answer has what was seen before it came */
+    static struct cola_client late; /* the first answer has what was seen before it came */
     late.fd = raw_connect(head_endpoint(&head, "tcp"));
     send_request(&late, "sRN LFErec");
     read_results(wait_for(&late, "sRA LFErec 3 "), results);
@@ -125,7 +102,7 @@ static void fields_and_the_window(void **state)
 static void received_is_from_the_first_moment_on(void **state)
 {
     struct wire *wire = *state;
-    static struct client c;
+    static struct cola_client c;
     uint64_t before = 0;
     struct head head = start(wire);
     struct scanhead *native = client_open(head_endpoint(&head, "pty"));

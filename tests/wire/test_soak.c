@@ -217,27 +217,19 @@ static void test_datagrams(void **state)
     free(said);
 }
 
-static void expect_usage(struct wire *wire, const char *const *args, const char *says)
-{
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
-    char *text = wire_read(wire_path(wire, "err"), NULL);
-    if (strstr(text, says) == NULL) fail_msg("'%s' is not in: %s", says, text);
-    free(text);
-}
-
 static void test_wrong_usage(void **state)
 {
     struct wire *wire = *state;
     room_write(wire);
     char config[352];
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SLOW));
-    expect_usage(wire, (const char *const[]){"soak", config, "--scenario", "nothing", NULL}, "no such scenario");
-    expect_usage(wire, (const char *const[]){"soak", config, "--link", "3", NULL}, "allowed 1 to 2");
-    expect_usage(wire, (const char *const[]){"soak", config, "--pace", "step", NULL}, "allowed realtime and fast");
+    wire_expect_usage(wire, (const char *const[]){"soak", config, "--scenario", "nothing", NULL}, "no such scenario");
+    wire_expect_usage(wire, (const char *const[]){"soak", config, "--link", "3", NULL}, "allowed 1 to 2");
+    wire_expect_usage(wire, (const char *const[]){"soak", config, "--pace", "step", NULL}, "allowed realtime and fast");
     struct room_config none = SLOW;
     none.links = "links: [{type: null}]\n";
     snprintf(config, sizeof config, "%s", room_config_write(wire, &none));
-    expect_usage(wire, (const char *const[]){"soak", config, NULL}, "soak can use none of them");
+    wire_expect_usage(wire, (const char *const[]){"soak", config, NULL}, "soak can use none of them");
 }
 
 int main(void)

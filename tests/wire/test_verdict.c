@@ -267,35 +267,31 @@ static void test_a_stop_in_the_second_scenario(void **state)
     free(err);
 }
 
-static void expect_usage(struct wire *wire, const char *const *args, const char *says)
-{
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
-    char *text = wire_read(wire_path(wire, "err"), NULL);
-    if (strstr(text, says) == NULL) fail_msg("'%s' is not in: %s", says, text);
-    free(text);
-}
-
 static void test_wrong_usage(void **state)
 {
     struct wire *wire = *state;
     char c[352];
     write_files(wire);
     snprintf(c, sizeof c, "%s", wire_path(wire, "config.yaml"));
-    expect_usage(wire, (const char *const[]){"soak", c, "--junit", "x", NULL}, "need --client");
-    expect_usage(wire, (const char *const[]){"soak", c, "--reconnect-limit", "3", NULL}, "need --client");
-    expect_usage(wire, (const char *const[]){"soak", c, "--scenario", "a", "--scenario", "b", NULL}, "need --client");
-    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--allow", "speed", NULL}, "no such check");
-    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--pace", "fast", NULL},
-                 "allowed is realtime");
-    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--link", "2", NULL}, "allowed 1 to 1");
-    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: 'null'}]", NULL},
-                 "allowed are tcp, pty");
-    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: web}]", NULL},
-                 "allowed are tcp, pty, udp and usb");
-    expect_usage(wire,
-                 (const char *const[]){"soak", c, "--client", "true", "--truth", "t", "--scenario", "flaky-usb",
-                                       "--scenario", "brown-out", NULL},
-                 "--truth is one file");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--junit", "x", NULL}, "need --client");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--reconnect-limit", "3", NULL}, "need --client");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--scenario", "a", "--scenario", "b", NULL},
+                      "need --client");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--allow", "speed", NULL},
+                      "no such check");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--pace", "fast", NULL},
+                      "allowed is realtime");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--link", "2", NULL},
+                      "allowed 1 to 1");
+    wire_expect_usage(wire,
+                      (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: 'null'}]", NULL},
+                      "allowed are tcp, pty");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: web}]", NULL},
+                      "allowed are tcp, pty, udp and usb");
+    wire_expect_usage(wire,
+                      (const char *const[]){"soak", c, "--client", "true", "--truth", "t", "--scenario", "flaky-usb",
+                                            "--scenario", "brown-out", NULL},
+                      "--truth is one file");
 }
 
 /* None of them runs the client, whose log would be there. */
@@ -311,20 +307,20 @@ static void test_files_that_do_not_go_together(void **state)
     memset(folder, 'x', sizeof folder - 1);
     folder[sizeof folder - 1] = '\0';
     const char *const dir = wire->dir;
-    expect_usage(wire,
-                 (const char *const[]){"soak", c, "--client", "true", "--client-folder", dir, "--client-file", "-",
-                                       "--json", printed, NULL},
-                 "configuration.stdout");
-    expect_usage(
+    wire_expect_usage(wire,
+                      (const char *const[]){"soak", c, "--client", "true", "--client-folder", dir, "--client-file", "-",
+                                            "--json", printed, NULL},
+                      "configuration.stdout");
+    wire_expect_usage(
         wire,
         (const char *const[]){"soak", c, "--client", "true {out}", "--client-folder", dir, "--truth", points, NULL},
         "configuration.points");
-    expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--client-folder", folder, NULL},
-                 "has 401 characters; allowed are 400");
-    expect_usage(wire,
-                 (const char *const[]){"soak", c, "--client", "true", "--client-folder", dir, "--scenario", "brown-out",
-                                       "--scenario", bad, NULL},
-                 "bad.yaml:1");
+    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--client-folder", folder, NULL},
+                      "has 401 characters; allowed are 400");
+    wire_expect_usage(wire,
+                      (const char *const[]){"soak", c, "--client", "true", "--client-folder", dir, "--scenario",
+                                            "brown-out", "--scenario", bad, NULL},
+                      "bad.yaml:1");
     assert_int_equal(access(wire_path(wire, "1-brown-out.log"), F_OK), -1);
     assert_int_equal(access(wire_path(wire, "configuration.log"), F_OK), -1);
 }

@@ -295,6 +295,14 @@ void stats_hash(const struct wire *wire, char hex[65])
     free(text);
 }
 
+void wire_expect_usage(struct wire *wire, const char *const *args, const char *says)
+{
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(text, says) == NULL) fail_msg("'%s' is not in: %s", says, text);
+    free(text);
+}
+
 struct scanhead *client_open(const char *source)
 {
     struct scanhead *sh;

@@ -87,6 +87,8 @@ pid_t wire_spawn_program(struct wire *wire, const char *program, const char *con
 
 /* Starts the head's program. */
 pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err, int ready_fd);
+/* Runs it, and expects the status of wrong usage and an error that has these words. */
+void wire_expect_usage(struct wire *wire, const char *const *args, const char *says);
 
 /* Waits for the end. Returns the exit status, or 256 + the signal. */
 int wire_wait(struct wire *wire, pid_t pid);
