@@ -35,9 +35,9 @@ static inline int colour_has_limits(enum colour_mode mode)
 /* A figure of these on the ramp. NaN: colour_unknown. */
 void colour_between(double low, double high, double figure, uint8_t rgb[3]);
 
-/* Blue at 0, green at 1/3, yellow at 2/3, red at 1, straight lines between them; below 0 and above 1 as at the ends. Low is
- * blue and high is red everywhere: in recordings, maps, views and reports, and on the page (view_colours.js), whose
- * colours between the two are others. NaN: colour_unknown. */
+/* Blue at 0, green at 1/3, yellow at 2/3, red at 1, straight lines between them; below 0 and above 1 as at the ends.
+ * Low is blue and high is red everywhere: in recordings, maps, views and reports, and on the page (view_colours.js),
+ * whose colours between the two are others. NaN: colour_unknown. */
 void colour_ramp(double part, uint8_t rgb[3]);
 /* Grey: black at -30 dB and below, white at 0 dB and above, even steps of dB between. NaN: colour_unknown. */
 void colour_reflectance(double db, uint8_t rgb[3]);

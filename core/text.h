@@ -40,7 +40,8 @@ struct text {
  * filled. */
 typedef int text_progress(void *ctx, double fraction, struct sh_err *err);
 
-/* Reads the whole file; p is at its first byte, or after UTF-8's byte order mark. progress may be NULL. text_close is due in any case. */
+/* Reads the whole file; p is at its first byte, or after UTF-8's byte order mark. progress may be NULL. text_close is
+ * due in any case. */
 int text_open(struct text *t, const char *path, text_progress *progress, void *ctx, struct sh_err *err);
 void text_close(struct text *t);
 

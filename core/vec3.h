@@ -68,8 +68,8 @@ static inline void vec3_bound(double min[3], double max[3], const double a[3])
     }
 }
 
-/* Whether one of a triangle's corners is the origin. A ray from a corner begins on the surface, and hits it nowhere else.
- * Whatever its direction, the sides of two edges are 0, and the range of the plane is rounding. */
+/* Whether one of a triangle's corners is the origin. A ray from a corner begins on the surface, and hits it nowhere
+ * else. Whatever its direction, the sides of two edges are 0, and the range of the plane is rounding. */
 static inline int vec3_is_any_zero(double corner[3][3])
 {
     for (int i = 0; i < 3; i++)

@@ -11,8 +11,8 @@
 #include "drivers/protocol/protocol.h"
 
 enum {
-    /* sick_tim takes at most 65535 bytes a transfer. The longest telegram: two distances and two signals of each beam as
-     * hexadecimal (5 bytes each), and less than 1000 bytes around them. */
+    /* sick_tim takes at most 65535 bytes a transfer. The longest telegram: two distances and two signals of each beam
+     * as hexadecimal (5 bytes each), and less than 1000 bytes around them. */
     COLA_MAX_UNIT = 4 * 5 * PLANAR_MAX_STEPS + 1000,
     COLA_MAX_NAME = 32,
 };

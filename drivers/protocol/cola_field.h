@@ -63,15 +63,16 @@ struct cola_fields {
 /* The inputs that are active at a device time, a bit each. *next_ns: when they may change next; INT64_MAX: never. */
 uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t *next_ns);
 
-/* The record of a field with a shape, on the grid of the head's beams. In some models the corner of a rectangle is counted
- * from the first beam, in others from 0. */
+/* The record of a field with a shape, on the grid of the head's beams. In some models the corner of a rectangle is
+ * counted from the first beam, in others from 0. */
 void cola_field_describe(const struct cola_field *field, const struct planar_head *head, int from_first,
                          struct cola_record *out);
-/* Reads a record of a request. COLA_INVALID_DATA: radial and dynamic fields, comments, a part that is not its type's. */
+/* Reads a record of a request. COLA_INVALID_DATA: radial and dynamic fields, comments, a part that is not its
+ * type's. */
 enum cola_error cola_record_take(struct cola_args *args, struct cola_record *record);
 void cola_record_put(const struct cola_record *record, struct cola_out *out);
-/* The shape of a record. A record on the head's own grid has the exact directions of beams. COLA_INVALID_DATA: directions
- * that do not ascend, or are more than a turn. */
+/* The shape of a record. A record on the head's own grid has the exact directions of beams. COLA_INVALID_DATA:
+ * directions that do not ascend, or are more than a turn. */
 enum cola_error cola_record_shape(const struct cola_record *record, const struct planar_head *head, int from_first,
                                   struct cola_shape *shape);
 

@@ -7,9 +7,12 @@
  * Polygon: corners in order, of either sense; the last one is joined to the first. It may be concave, may have the head
  * inside and may lie across any angle. A point on an edge or on a corner is in it. Where edges cross, a point is in it
  * if the outline winds about it (nonzero rule).
+ *
  * Sector: from start to stop counter-clockwise, and from the inner to the outer radius; all four limits are in it.
- * Chain: directions in ascending order, a turn at most, each with a nearest and a farthest distance; straight lines join
- * those of neighbours. A beam that looks in one of the directions is compared with its two distances; limits are in it.
+ *
+ * Chain: directions in ascending order, a turn at most, each with a nearest and a farthest distance; straight lines
+ * join those of neighbours. A beam that looks in one of the directions is compared with its two distances; limits are
+ * in it.
  *
  * Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_SHAPE_H
@@ -61,19 +64,19 @@ struct cola_measured {
 /* Range at most COLA_SHAPE_REACH_UM. */
 struct cola_measured cola_measured_at(int32_t step, int32_t steps, int32_t range_um);
 int cola_shape_has(const struct cola_shape *shape, const struct cola_measured *point);
-/* The nearest and the farthest place of a polygon or a sector on a ray from the head, to the nearest micrometre; a head inside has
- * nearest 0. Returns 0 where the ray misses the shape. */
+/* The nearest and the farthest place of a polygon or a sector on a ray from the head, to the nearest micrometre; a head
+ * inside has nearest 0. Returns 0 where the ray misses the shape. */
 int cola_shape_cut(const struct cola_shape *shape, double turns, int32_t *near_um, int32_t *far_um);
 /* The outline of a polygon or a sector as corners, the arcs of a sector in steps. Returns how many, up to
  * COLA_SHAPE_CORNERS; 0: it has none. */
 uint32_t cola_shape_outline(const struct cola_shape *shape, double out_m[COLA_SHAPE_CORNERS][2]);
 /* Adds a corner of a polygon: -1 where it is farther than COLA_SHAPE_REACH_UM, or there are too many. */
 int cola_shape_add(struct cola_shape *shape, double x_um, double y_um);
-/* Adds a link: -1 where its direction isn't beyond the last one's, or is more than a turn beyond the first one's, near is
- * beyond far, or as above. All links of a shape have the same steps. */
+/* Adds a link: -1 where its direction isn't beyond the last one's, or is more than a turn beyond the first one's, near
+ * is beyond far, or as above. All links of a shape have the same steps. */
 int cola_shape_link(struct cola_shape *shape, int32_t step, int32_t steps, int32_t near_um, int32_t far_um);
-/* A rectangle: width to the right and length forward from its corner, then turned counter-clockwise about the corner. -1
- * as above. */
+/* A rectangle: width to the right and length forward from its corner, then turned counter-clockwise about the corner.
+ * -1 as above. */
 int cola_shape_rectangle(struct cola_shape *shape, const double corner_um[2], const double size_um[2], double turns);
 
 #endif

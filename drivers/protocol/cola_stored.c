@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* mEEwriteall: settings of the session that last without power, a line each, as a request in CoLa-A writes them but with
- * decimal numbers. Line rate, step and time server are the head's, and HEAD:STORe keeps them. */
+/* mEEwriteall: settings of the session that last without power, a line each, as a request in CoLa-A writes them but
+ * with decimal numbers. Line rate, step and time server are the head's, and HEAD:STORe keeps them. */
 #include <stdio.h>
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The scanner's clock, and the time server that sets it: both belong to the head, not to this session. COLA.md says where
- * each variable comes from. */
+/* The scanner's clock, and the time server that sets it: both belong to the head, not to this session. COLA.md says
+ * where each variable comes from. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>

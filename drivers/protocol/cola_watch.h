@@ -5,8 +5,9 @@
  * nearer than the head's least range or farther than COLA_SHAPE_REACH_UM. Which echoes of a beam count is the echo
  * filter's choice: the first, the last, or each of them.
  *
- * Response time: a beam counts once it has seen an object in so many scans in a row, the number of scans that is nearest
- * to the time, at least one. It no longer counts with the first scan in which it sees none.
+ * Response time: a beam counts once it has seen an object in so many scans in a row, the number of scans that is
+ * nearest to the time, at least one. It no longer counts with the first scan in which it sees none.
+ *
  * Blanking: neighbouring beams that count are one object, as wide as their number times the step times the least of
  * their ranges. The field is infringed where an object is at least as wide as its blanking size.
  *

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The native protocol for those who read it: bytes of a stream go in, frames, reply lines and their contents
- * come out.
+/* The native protocol for those who read it: bytes of a stream go in, frames, reply lines and their contents come out.
  *
- * PROTOCOL.md and its pages describe the frames byte by byte; the structs here hold the same fields in the same order and
- * units. The end of a line is core's struct line_end. native_encode.h is for those who write. Nothing here
- * does I/O, allocates or keeps global state. All integers are little-endian on the wire. */
+ * PROTOCOL.md and its pages describe the frames byte by byte; the structs here hold the same fields in the same order
+ * and units. The end of a line is core's struct line_end. native_encode.h is for those who write. Nothing here does
+ * I/O, allocates or keeps global state. All integers are little-endian on the wire. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_H
 #define DRIVERS_PROTOCOL_NATIVE_H
 

@@ -48,7 +48,7 @@ enum protocol_pps {
     PROTOCOL_PPS_ERROR, /* they come at other times than the clock's full seconds */
 };
 
-/* Which of its dialects a link speaks. */
+/* The dialect that a link speaks. */
 enum protocol_dialect {
     PROTOCOL_DIALECT_ANY, /* all of them: an answer has that of its request */
     PROTOCOL_COLA_A,
@@ -94,13 +94,13 @@ struct protocol_host {
      * as far as pulses and sentences have set it; else since power-up. May be NULL: locked and UTC, where that is
      * known. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
-    /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has set
-     * it, it is UTC, or the time since power-up. */
+    /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
+     * set it, it is UTC, or the time since power-up. */
     int64_t (*date_ns)(void *ctx, int64_t t_ns);
     /* Keeps this protocol's settings without power, in place of those from before: lines of printable ASCII with their
-     * '\n', at most PROTOCOL_STORED bytes with the NUL; "": none. From then on each new session gets them (spec.stored).
-     * 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps none. Settings
-     * of the head itself, which native commands set, are kept by the command HEAD:STORe. */
+     * '\n', at most PROTOCOL_STORED bytes with the NUL; "": none. From then on each new session gets them
+     * (spec.stored). 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps
+     * none. Settings of the head itself, which native commands set, are kept by the command HEAD:STORe. */
     int (*store)(void *ctx, const char *lines);
     /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
     double (*window_loss_db)(void *ctx);
@@ -171,8 +171,8 @@ struct protocol_ops {
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
     /* Whether the device can be a head: SH_OK, or SH_EINPUT with what it can't have, and what it can. The emitter is of
-     * a kind and a number of beams that are allowed above; beams are those of its payload. NULL: it can be any such head.
-     * Pure. */
+     * a kind and a number of beams that are allowed above; beams are those of its payload. NULL: it can be any such
+     * head. Pure. */
     int (*check_head)(const struct native_descriptor *descriptor, const struct native_emitter *emitter,
                       const uint8_t *beams, struct sh_err *err);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
@@ -189,8 +189,8 @@ struct protocol_ops {
     void (*frame)(void *protocol, const uint8_t *frame, size_t len);
     /* Frames are missing before the next one: the client, or the head, was too slow. May be NULL, as frame. */
     void (*gap)(void *protocol, uint32_t n_frames);
-    /* All frames before device time t_ns have come. Called for each tick, also of those without frames. Where the client
-     * was too slow, time jumps after a gap. */
+    /* All frames before device time t_ns have come. Called for each tick, also of those without frames. Where the
+     * client was too slow, time jumps after a gap. */
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size; from a link of datagrams each call has a whole one. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);

@@ -16,7 +16,8 @@
 struct config;
 struct config_faults;
 
-/* The only list of commands, in the order of `scanhead --help`. scanheadd has those of HEAD, scanhead has all of them. */
+/* The only list of commands, in the order of `scanhead --help`. scanheadd has those of HEAD, scanhead has all of
+ * them. */
 #define APP_COMMANDS(HEAD, STUDIO) \
     HEAD(run)                      \
     STUDIO(record)                 \
@@ -99,7 +100,8 @@ int app_open_new(const char *path, FILE **out, struct sh_err *err);
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 
-/* --ready-fd: one JSON value in a line, written by `put`, to descriptor fd, which is closed then. fd 0: nothing to do. */
+/* --ready-fd: one JSON value in a line, written by `put`, to descriptor fd, which is closed then. fd 0: nothing to
+ * do. */
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err);
 
 #endif

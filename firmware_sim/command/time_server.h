@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `TIME:SHIFt` and `TIME:SERVer`: the clock of a scanner that keeps a date of its own, and the time server that sets it.
+/* `TIME:SHIFt` and `TIME:SERVer`: the clock of a scanner that keeps a date of its own, and the time server that sets
+ * it.
  *
  *   TIME:SHIFt ns                             sets what the clock is ahead of that of power-up
  *   TIME:SERVer role,address,update,zone,interface

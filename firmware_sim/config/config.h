@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The configuration: what load.h makes of a YAML file and --set. One table (keys.c) of key, type, unit, default, range and
- * help gives parsing, defaults, errors and the reference.
+/* The configuration: what load.h makes of a YAML file and --set. One table (keys.c) of key, type, unit, default, range
+ * and help gives parsing, defaults, errors and the reference.
  *
- * Units: as the key's name says (hz, deg, m). Everything is checked. Unknown keys, duplicate keys, trailing text
- * ("30 kHz"), NaN, wrong types and values out of range are errors. Relative paths in a file are relative to that file; in
+ * Units: as the key's name says (hz, deg, m). Everything is checked. Unknown keys, duplicate keys, trailing text ("30
+ * kHz"), NaN, wrong types and values out of range are errors. Relative paths in a file are relative to that file; in
  * --set, to the working directory.
  *
  * The struct is constant once it is loaded. Values that a run measures or chooses are in the site (firmware_sim/site).
- * A file that needs only places, a head profile, limits, loading or the reference includes those headers, not this one. */
+ * A file that needs only places, a head profile, limits, loading or the reference includes those headers, not this
+ * one. */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
 

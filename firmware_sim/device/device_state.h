@@ -145,7 +145,8 @@ void device_carry_out_line(struct device *device, const char *line);
 /* stored.c */
 /* HEAD:STORe: the settings are now those of power-up. */
 void device_keep_settings(struct device *device);
-/* Before the first power-up: carries out what the file has, as commands of the device itself, which the journal gets. */
+/* Before the first power-up: carries out what the file has, as commands of the device itself, which the journal
+ * gets. */
 int device_restore(struct device *device, struct sh_err *err);
 
 /* moves.c */

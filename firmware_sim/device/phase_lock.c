@@ -4,8 +4,8 @@
  *     at a pulse         the speed until the next one is chosen so that the azimuth will be right then
  *     pulses not locked  the rotor runs free: at the speed that is set, with the error of its motor
  *
- * Speeds are whole micro-hertz, so an error of half of one is left after a second: 0.00018 degree. The wire has steps of
- * 0.01. The rotor needs at most half a turn, so one second is enough for any phase. */
+ * Speeds are whole micro-hertz, so an error of half of one is left after a second: 0.00018 degree. The wire has steps
+ * of 0.01. The rotor needs at most half a turn, so one second is enough for any phase. */
 #include <math.h>
 
 #include "firmware_sim/config/profile.h"

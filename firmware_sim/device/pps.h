@@ -6,15 +6,15 @@
  * at a device time.
  *
  * Pulses: absent where none came for more than a second. A pulse agrees when the head's clock has counted whole seconds
- * since the one before, to PPS_TOLERANCE_NS a second; one that doesn't is an error. After PPS_TO_LOCK pulses that agreed,
- * one a second, they are locked.
+ * since the one before, to PPS_TOLERANCE_NS a second; one that doesn't is an error. After PPS_TO_LOCK pulses that
+ * agreed, one a second, they are locked.
  *
  *     power comes -> counts from 0 -> locked pulse: its part of a second becomes 0 -> sentence: its minutes and seconds
  *                    by the head's own clock                                          are taken over
  *
- * While pulses aren't locked neither is used, and the counter goes on by the head's clock. Without sentences its seconds
- * go on as they were.
- * The last PPS_KEPT changes are kept, since sessions ask for past times. Pure; the owner has the lock. */
+ * While pulses aren't locked neither is used, and the counter goes on by the head's clock. Without sentences its
+ * seconds go on as they were. The last PPS_KEPT changes are kept, since sessions ask for past times. Pure; the owner
+ * has the lock. */
 #ifndef FIRMWARE_SIM_DEVICE_PPS_H
 #define FIRMWARE_SIM_DEVICE_PPS_H
 

@@ -103,8 +103,8 @@ static int64_t scan_end_ns(const struct device *device)
     return end_ns < path_end_ns ? end_ns : path_end_ns;
 }
 
-/* Another simulator that steps a live platform gets all pulses of a grant within it. Elsewhere an incomplete packet waits
- * for the next tick: the stream is the same at any pace. */
+/* Another simulator that steps a live platform gets all pulses of a grant within it. Elsewhere an incomplete packet
+ * waits for the next tick: the stream is the same at any pace. */
 static int is_lock_step(const struct device *device)
 {
     const struct config *cfg = device->site->cfg;

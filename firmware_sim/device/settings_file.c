@@ -202,7 +202,8 @@ static int put_image(const void *source, FILE *out, struct sh_err *why)
     return ferror(out) ? sh_fail(why, SH_EIO, "%s", strerror(errno)) : SH_OK;
 }
 
-/* Writes each new image, and the last one before it ends. An image that could not be written is tried once more then. */
+/* Writes each new image, and the last one before it ends. An image that could not be written is tried once more
+ * then. */
 static void *settings_file_main(void *arg)
 {
     struct settings_file *file = arg;

@@ -296,8 +296,8 @@ static int has_room(const struct session *s)
     return unit_queue_room(&s->units) >= s->units.cap / 2;
 }
 
-/* How many bytes the protocol is given at once now. While answers have no room it still goes on once the input buffer is
- * full: a client that sends and never reads loses answers. Datagrams stay whole. */
+/* How many bytes the protocol is given at once now. While answers have no room it still goes on once the input buffer
+ * is full: a client that sends and never reads loses answers. Datagrams stay whole. */
 static uint32_t piece_of(const struct pump *pump, const struct session *s)
 {
     const struct session_commands *c = &s->commands;

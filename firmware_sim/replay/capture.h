@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* A capture of a device's traffic in place of a head: what the device answered, and what it sent unasked.
  *
- * In: a file of tcpdump's, Wireshark's or `record --raw` (.pcap, .pcapng). Out: a talk (drivers/protocol/talk.h) for each
- * port of a device in it. A TCP device is who was connected to, or sent more bytes where the capture begins later. Of
- * two ends of UDP it is the one that sent more datagrams. TCP streams are put together as receivers do; what is missing in them is counted.
+ * In: a file of tcpdump's, Wireshark's or `record --raw` (.pcap, .pcapng). Out: a talk (drivers/protocol/talk.h) for
+ * each port of a device in it. A TCP device is who was connected to, or sent more bytes where the capture begins later.
+ * Of two ends of UDP it is the one that sent more datagrams. TCP streams are put together as receivers do; what is
+ * missing in them is counted.
  *
  * One thread; constant once it is open. */
 #ifndef FIRMWARE_SIM_REPLAY_CAPTURE_H

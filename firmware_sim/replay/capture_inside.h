@@ -58,8 +58,8 @@ struct replay_capture {
 /* capture_read.c: the packets of the file, as flows. */
 int capture_read_flows(struct replay_capture *capture, const char *path, struct sh_err *err);
 
-/* capture_stream.c: the messages of one side of a flow, of the kind, behind those of *said. Bytes go into the store. SH_OK
- * or SH_ENOMEM. */
+/* capture_stream.c: the messages of one side of a flow, of the kind, behind those of *said. Bytes go into the store.
+ * SH_OK or SH_ENOMEM. */
 struct capture_list {
     struct capture_said *said;
     size_t n, room;

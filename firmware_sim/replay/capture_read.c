@@ -74,7 +74,8 @@ static int same_end(const struct ethernet_end *a, const struct ethernet_end *b)
     return a->is_v6 == b->is_v6 && a->port == b->port && memcmp(a->address, b->address, sizeof a->address) == 0;
 }
 
-/* The flow of a packet and the side that sent it; NULL: it begins one. A connection may have the ends of an older one. */
+/* The flow of a packet and the side that sent it; NULL: it begins one. A connection may have the ends of an older
+ * one. */
 static struct capture_flow *find_flow(struct replay_capture *c, const struct ip_packet *p, uint8_t *side)
 {
     const int begins = p->is_tcp && (p->flags & (TCP_SYN | TCP_ACK)) == TCP_SYN;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A recording as a source of the loop (loop/source.h): the same bytes, with the timing that they had.
  *
- * In: a recording, and commands of clients. Out: ticks with its frames. It is played when a client commands SCAN:STARt, or
- * at once; SCAN:STARt begins it anew at any time. Queries are answered from its descriptor, and no setting changes.
+ * In: a recording, and commands of clients. Out: ticks with its frames. It is played when a client commands SCAN:STARt,
+ * or at once; SCAN:STARt begins it anew at any time. Queries are answered from its descriptor, and no setting changes.
  *
  * The first time that it is played, each frame has the bytes that were recorded. Each further time the sequence numbers
  * of frames go back by 2^30; a reader takes that for a head that was started again. All else is as it was recorded,

@@ -11,8 +11,8 @@
 
 /* ---- which device it can be */
 
-/* Names a thing that the stream must have beside its emitter, and lacks. NULL: it lacks none. Amplitudes are not asked for: without them protocols
- * take reflectances. */
+/* Names a thing that the stream must have beside its emitter, and lacks. NULL: it lacks none. Amplitudes are not asked
+ * for: without them protocols take reflectances. */
 static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e)
 {

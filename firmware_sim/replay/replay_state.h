@@ -37,7 +37,8 @@ struct replay {
     uint32_t times;  /* how often it was begun so far */
     uint64_t frames; /* sent */
     uint64_t scans, frames_done;
-    /* The state of the head that was recorded, by the ticks with which it goes out. Number i is at i % REPLAY_CHANGES. */
+    /* The state of the head that was recorded, by the ticks with which it goes out. Number i is at i %
+     * REPLAY_CHANGES. */
     struct replay_change {
         uint64_t tick;
         enum head_state state;

@@ -6,8 +6,8 @@
 
 #include "tests/unit/talk_rig.h"
 
-/* A CoLa connection: an answer after 3 ms and another to the same request, a stream of 10 ms, an event that nobody asked
- * for, and an answer within the stream. */
+/* A CoLa connection: an answer after 3 ms and another to the same request, a stream of 10 ms, an event that nobody
+ * asked for, and an answer within the stream. */
 static void make_cola(struct made *m)
 {
     made_begin(m);
@@ -70,7 +70,8 @@ static void test_loop_and_unknown(void **state)
     make_cola(&m);
     struct replay_capture *capture = made_load(&m);
     client_open(&c, &capture_place(capture, 0)->talk, &again);
-    /* Its mean period is 10 ms: after 3 at 30 ms, 1 comes at 40 ms. The one odd event has no period, and is not repeated. */
+    /* Its mean period is 10 ms: after 3 at 30 ms, 1 comes at 40 ms. The one odd event has no period, and is not
+     * repeated. */
     assert_string_equal(client_ask(&c, "\x02sEN S 1\x03", 52),
                         "2:\x02sEA S 1\x03|10:\x02sSN S 1\x03|15:\x02sSN Odd 7\x03|20:\x02sSN S 2\x03|30:\x02sSN S "
                         "3\x03|40:\x02sSN S 1\x03|50:\x02sSN S 2\x03|");

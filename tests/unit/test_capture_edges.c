@@ -71,8 +71,8 @@ static void test_equal_times(void **state)
     capture_free(capture);
 }
 
-/* The clock is set back by an hour between two requests: delays stay as they were. A packet that comes 1 ms early in the
- * file, as from two processors, is no step. */
+/* The clock is set back by an hour between two requests: delays stay as they were. A packet that comes 1 ms early in
+ * the file, as from two processors, is no step. */
 static void test_clock_steps(void **state)
 {
     (void)state;
@@ -138,8 +138,8 @@ static void test_without_times(void **state)
 
 /* ---- files */
 
-/* A capture is known by its bytes, also where its first block is long. Section header: type, length, magic, version 1.0,
- * section length -1, an option 1 (comment) of 60,000 bytes, end of options, length. */
+/* A capture is known by its bytes, also where its first block is long. Section header: type, length, magic, version
+ * 1.0, section length -1, an option 1 (comment) of 60,000 bytes, end of options, length. */
 static void test_long_front(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Points of software that is not ours: PCD as the Point Cloud Library documents it, and text. The expected bytes follow the
- * library's page "The PCD file format", and for LZF the format of liblzf: both are packed here by hand. */
+/* Points of software that is not ours: PCD as the Point Cloud Library documents it, and text. The expected bytes follow
+ * the library's page "The PCD file format", and for LZF the format of liblzf: both are packed here by hand. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>

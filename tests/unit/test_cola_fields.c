@@ -169,8 +169,8 @@ static void results_follow_the_scan(void **state)
     }
 }
 
-/* Between the beams 300 and 500, which are 200 / 3 degrees apart, the far limit is the chord: at beam 400 it is 2 m times
- * cos(100 / 3 degrees), 1.670976 m, and the near one is 0.417744 m. */
+/* Between the beams 300 and 500, which are 200 / 3 degrees apart, the far limit is the chord: at beam 400 it is 2 m
+ * times cos(100 / 3 degrees), 1.670976 m, and the near one is 0.417744 m. */
 static void chords(void **state)
 {
     (void)state;

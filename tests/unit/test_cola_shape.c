@@ -32,8 +32,8 @@ static int is_on_edge(const struct cola_point *a, const struct cola_point *b, in
     return ax * by == ay * bx && ax * bx + ay * by <= 0;
 }
 
-/* Each edge is seen from the point under an angle. The sum is a whole number of turns; it is rounded from within 1e-10 of
- * one, as 128 angles have errors of 1e-19 turns. */
+/* Each edge is seen from the point under an angle. The sum is a whole number of turns; it is rounded from within 1e-10
+ * of one, as 128 angles have errors of 1e-19 turns. */
 static int winds(const struct cola_shape *s, int32_t x, int32_t y)
 {
     long double sum = 0.0L;
@@ -167,7 +167,8 @@ static void rectangles_turn_about_their_corner(void **state)
     assert_int_equal(cola_shape_add(&s, NAN, 0), -1);
 }
 
-/* A measured point on an axis is exact; others are within 0.71 um of range and angle, as both coordinates are rounded. */
+/* A measured point on an axis is exact; others are within 0.71 um of range and angle, as both coordinates are
+ * rounded. */
 static void points_are_rounded_to_a_micrometre(void **state)
 {
     (void)state;
@@ -181,8 +182,8 @@ static void points_are_rounded_to_a_micrometre(void **state)
     }
 }
 
-/* Links at 30, 60 and 90 degrees, of a grid that is not the beams'. Between the first two the far line is the chord of two
- * points at 2 m, whose middle is at 2 cos 15 degrees = 1.931851653 m. */
+/* Links at 30, 60 and 90 degrees, of a grid that is not the beams'. Between the first two the far line is the chord of
+ * two points at 2 m, whose middle is at 2 cos 15 degrees = 1.931851653 m. */
 static void chains_join_their_links(void **state)
 {
     (void)state;

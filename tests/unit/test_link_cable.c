@@ -66,7 +66,8 @@ static void check_tcp(const char *address, int family)
     struct bench bench = bench_open(&spec);
     const int fd = begin_dial(&bench, family);
     bench_expect(&bench, LINK_OPENED, 0);
-    /* The client confirms late, as it does on a busy connection. The head must not repeat these bytes in the silence. */
+    /* The client confirms late, as it does on a busy connection. The head must not repeat these bytes in the
+     * silence. */
     assert_int_equal(setsockopt(fd, IPPROTO_TCP, TCP_QUICKACK, &(int){0}, sizeof(int)), 0);
     bench_write_all(&bench, 0, "abc", 3);
     assert_int_equal(fault(&bench, LINK_FAULT_CABLE, 0), SH_OK);

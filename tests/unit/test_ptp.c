@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The PTP follower in a device: the clock that its servo makes, to the nanosecond, and its states beside those of ptp4l.
- * The expected clock is computed here in exact integers: with a Sync each second the gains 0.7 and 0.3 are 700 and 300
- * ppt for a nanosecond of offset, so nothing is rounded but the reading, which is a floor. */
+/* The PTP follower in a device: the clock that its servo makes, to the nanosecond, and its states beside those of
+ * ptp4l. The expected clock is computed here in exact integers: with a Sync each second the gains 0.7 and 0.3 are 700
+ * and 300 ppt for a nanosecond of offset, so nothing is rounded but the reading, which is a floor. */
 #include "tests/unit/device_rig.h"
 
 #include <inttypes.h>
 
 __extension__ typedef __int128 i128;
-
 #define SECOND_NS INT64_C(1000000000)
-
 static const i128 PPT = 1000000000000;
 
 /* A rig whose time of day at power-up is a whole second, and which has these faults from power-up on. */
@@ -119,9 +117,9 @@ static int check_edge(const struct model *at, const struct native_event *pps)
     return 1;
 }
 
-/* The clock is 12.3 ppm fast and 50 us ahead. Sync comes from 4 s on, when the second Announce does. While the master is
- * lost, from 9.3 s to 18.2 s, the clock gains 2 ppm more than the servo knows. The port listens from 14 s on, and the
- * Announce messages at 20 and 22 s bring the master back. */
+/* The clock is 12.3 ppm fast and 50 us ahead. Sync comes from 4 s on, when the second Announce does. While the master
+ * is lost, from 9.3 s to 18.2 s, the clock gains 2 ppm more than the servo knows. The port listens from 14 s on, and
+ * the Announce messages at 20 and 22 s bring the master back. */
 static void the_clock_is_as_computed(void **state)
 {
     (void)state;
@@ -183,8 +181,8 @@ static void expect_events(struct rig *rig, const struct said *want, int n_want, 
 }
 
 /* The texts are those that ptp4l 3.1.1 wrote where its link went down and its master was ended, with the servo's states
- * that its lines of offsets have. Announce messages come at even seconds, so a master whose last one came at 30 s is lost
- * at 36 s. */
+ * that its lines of offsets have. Announce messages come at even seconds, so a master whose last one came at 30 s is
+ * lost at 36 s. */
 static void the_states_are_those_of_ptp4l(void **state)
 {
     (void)state;
@@ -263,8 +261,8 @@ static void another_grandmaster_has_another_time(void **state)
     rig_close(rig);
 }
 
-/* A grandmaster that loses its reference keeps its identity: the class changes with the next Announce, the time with the
- * next Sync, and no state does. */
+/* A grandmaster that loses its reference keeps its identity: the class changes with the next Announce, the time with
+ * the next Sync, and no state does. */
 static void the_same_grandmaster_changes(void **state)
 {
     (void)state;
@@ -330,8 +328,8 @@ static void an_asymmetry_is_not_seen(void **state)
     assert_true(llabs(offset_ns[19]) <= 1 && llabs(error_ns[19] - 700) <= 1);
 }
 
-/* A measurement differs from the clock's error by the jitter, which is within its limit, uses both sides, and is the same
- * each time; with another seed it is another one. Twenty draws on one side have the probability 2^-19. */
+/* A measurement differs from the clock's error by the jitter, which is within its limit, uses both sides, and is the
+ * same each time; with another seed it is another one. Twenty draws on one side have the probability 2^-19. */
 static void jitter_is_bounded_and_repeatable(void **state)
 {
     (void)state;

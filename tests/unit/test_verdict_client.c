@@ -99,8 +99,8 @@ static pid_t wait_for_number(void)
     return number;
 }
 
-/* It is in the group that the shell leaves behind, and does not end at SIGTERM. The whole group is waited for, and killed.
- * It says when it has set that up: a signal before that would end it. */
+/* It is in the group that the shell leaves behind, and does not end at SIGTERM. The whole group is waited for, and
+ * killed. It says when it has set that up: a signal before that would end it. */
 static void test_what_the_shell_leaves(void **state)
 {
     (void)state;

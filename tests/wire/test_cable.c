@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A cable that is pulled on request, by the program: what was begun goes on, or is reset, or is hung up; what the head's
- * queue could not hold is announced; the truth has the beginning and the end. And: connections that come while the head
- * has no power are not those that a fault counts. */
+/* A cable that is pulled on request, by the program: what was begun goes on, or is reset, or is hung up; what the
+ * head's queue could not hold is announced; the truth has the beginning and the end. And: connections that come while
+ * the head has no power are not those that a fault counts. */
 #include "tests/wire/fault_head.h"
 #include "tests/wire/unit_faults.h"
 
@@ -188,8 +188,8 @@ static void no_power_no_count(void **state)
         assert_in_range(n, 0, 20); /* until power goes: from 1 s on */
     assert_int_equal(scanhead_reattach(sh, DEADLINE_MS), SCANHEAD_OK);
     assert_string_equal(client_ask(sh, "HEAD:STAT?"), "off");
-    /* The other link's thread may still be on its way: then it cuts this client, and refuses others for a moment. It has
-     * been there once the step is written to this client, or this client is cut. */
+    /* The other link's thread may still be on its way: then it cuts this client, and refuses others for a moment. It
+     * has been there once the step is written to this client, or this client is cut. */
     int fd = raw_connect_again(head_link(&head, 0), "*IDN?\n");
     client_tell(sh, "TIME:STEP 2500 MS");
     close(fd);

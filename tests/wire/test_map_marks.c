@@ -142,7 +142,8 @@ static void test_open_edges(void **state)
     free(err);
 }
 
-/* A rectangle of 1 m by 2 m, 1 m ahead. The first station looks east, so that right is south; a pixel is a centimetre. */
+/* A rectangle of 1 m by 2 m, 1 m ahead. The first station looks east, so that right is south; a pixel is a
+ * centimetre. */
 static void test_fields(void **state)
 {
     struct wire *wire = *state;

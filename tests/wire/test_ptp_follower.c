@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that follows a PTP master, and loses it, over TCP: the answers, events, telemetry, PPS, truth and journal agree
- * with each other and with times worked out by hand.
+/* A head that follows a PTP master, and loses it, over TCP: the answers, events, telemetry, PPS, truth and journal
+ * agree with each other and with times worked out by hand.
  *
- * Announce comes each 0.5 s and Sync each 0.25 s; the boot is over at 0.2 s. So the second Announce is at 1 s, the samples
- * at 1 and 1.25 s give the rate, and the third one locks. The last Announce before the loss at 3.1 s is at 3 s, and is
- * missed three times at 4.5 s. In holdover the clock gains 100 ppm for 2.9 s. The two Announce messages at 6 and 6.5 s
- * bring the master back; 290 us are more than the 100 us of the threshold, so that the servo begins again. */
+ * Announce comes each 0.5 s and Sync each 0.25 s; the boot is over at 0.2 s. So the second Announce is at 1 s, the
+ * samples at 1 and 1.25 s give the rate, and the third one locks. The last Announce before the loss at 3.1 s is at 3 s,
+ * and is missed three times at 4.5 s. In holdover the clock gains 100 ppm for 2.9 s. The two Announce messages at 6 and
+ * 6.5 s bring the master back; 290 us are more than the 100 us of the threshold, so that the servo begins again. */
 #include <inttypes.h>
 
 #include "drivers/protocol/native.h"

@@ -142,7 +142,7 @@ static void a_replay_needs_no_file(void **state)
     assert_string_equal(once, again);
 }
 
-/* What a recording off line gives depends on the configuration alone. */
+/* A recording off line depends on the configuration alone. */
 static void a_recording_off_line_says_that_it_has_none(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A SICK scanner asks a time server, which this test plays, and its scans have the server's time. The expected times are
- * computed here from the request that came and the delay that the scanner reports. */
+/* A SICK scanner asks a time server, which this test plays, and its scans have the server's time. The expected times
+ * are computed here from the request that came and the delay that the scanner reports. */
 #include <arpa/inet.h>
 #include <endian.h>
 #include <math.h>
@@ -125,8 +125,8 @@ static const char *until_state(struct scanhead *sh, const char *state)
 
 /* ---- the tests */
 
-/* Requests of sick_scan_xd, with its interval; the scans' dates before and after the answer, and without a further one. The
- * head's clock gains 500 us a second. */
+/* Requests of sick_scan_xd, with its interval; the scans' dates before and after the answer, and without a further one.
+ * The head's clock gains 500 us a second. */
 static void scans_have_the_servers_time(void **state)
 {
     struct wire *wire = *state;
@@ -167,7 +167,8 @@ static void scans_have_the_servers_time(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Lets it ask again, at most a second after the last request: any change of its settings begins anew with the server. */
+/* Lets it ask again, at most a second after the last request: any change of its settings begins anew with the
+ * server. */
 static double ask_again(struct server *server)
 {
     static int update_s = 60;
@@ -177,7 +178,8 @@ static double ask_again(struct server *server)
     return server_wait(server);
 }
 
-/* A wrong, a silent and a refusing server set nothing; a time zone adds hours. Refused answers leave the clock as it is. */
+/* A wrong, a silent and a refusing server set nothing; a time zone adds hours. Refused answers leave the clock as it
+ * is. */
 static void wrong_servers(void **state)
 {
     struct wire *wire = *state;

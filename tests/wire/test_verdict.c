@@ -49,8 +49,8 @@ static const char *in_folder(const struct wire *wire, const char *name, const ch
     return wire_path(wire, file);
 }
 
-/* A right client needs none of its limits, which are far beyond the time of a busy machine. Where the fault is that nothing
- * happens, the whole limit is waited for. */
+/* A right client needs none of its limits, which are far beyond the time of a busy machine. Where the fault is that
+ * nothing happens, the whole limit is waited for. */
 struct planted {
     const char *faults, *findings, *limit_s, *grace_s;
 };

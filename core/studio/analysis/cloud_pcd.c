@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* PCD 0.7 of the Point Cloud Library: as text, binary, and binary_compressed. In the last one the bytes are LZF, and each
- * field stands for all points before the next one begins. */
+/* PCD 0.7 of the Point Cloud Library: as text, binary, and binary_compressed. In the last one the bytes are LZF, and
+ * each field stands for all points before the next one begins. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -168,8 +168,8 @@ static int take_binary(struct pcd *g, const uint8_t *data, size_t len, bool by_f
     return rc;
 }
 
-/* Returns whether `in` gives exactly out_len bytes. A control byte below 32 says how many bytes follow as they are; another
- * one has the length and distance of bytes that came before. */
+/* Returns whether `in` gives exactly out_len bytes. A control byte below 32 says how many bytes follow as they are;
+ * another one has the length and distance of bytes that came before. */
 static bool unpack_lzf(const uint8_t *in, size_t in_len, uint8_t *out, size_t out_len)
 {
     size_t at = 0, to = 0;

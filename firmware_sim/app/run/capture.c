@@ -23,7 +23,8 @@ static int is_wanted(const struct run_options *o, const struct capture_place *pl
     return o->device_port == 0 || o->device_port == place->port;
 }
 
-/* A link for each port of the capture, in YAML. TCP ports are the system's choice, as that of the device may need a right. */
+/* A link for each port of the capture, in YAML. TCP ports are the system's choice, as that of the device may need a
+ * right. */
 static void default_links(const struct capture_run *run, char *text, size_t cap)
 {
     size_t n = 0;

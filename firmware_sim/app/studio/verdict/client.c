@@ -71,8 +71,8 @@ char *client_fill(const char *text, const struct client_words *words)
 
 /* ---- the process */
 
-/* In the new process, which has only the thread that forked: signals and descriptors as a new program expects them. It ends
- * with this program, however that ends. */
+/* In the new process, which has only the thread that forked: signals and descriptors as a new program expects them. It
+ * ends with this program, however that ends. */
 static void become_client(int in_fd, int log_fd, int out_fd, const char *line)
 {
     sigset_t none;
@@ -158,7 +158,7 @@ static void client_signal(const struct client *client, int number)
     if (!client->has_others) family_any(client_signal_one, &to);
 }
 
-/* What is killed may have started another process just before, so it is looked for again. */
+/* A process that is killed may have started another one just before, so it looks again. */
 static void client_kill(struct client *client)
 {
     static const double KILLED_WITHIN_S = 5.0, AGAIN_S = 0.1; /* a process that the kernel holds is not waited for */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The client's process. In: a command for sh -c. Out: whether it runs, and how it ended. The client is the shell and all that
- * descends from it. Only the shell ends with this program if that is killed: what has left the shell then goes on. */
+/* The client's process. In: a command for sh -c. Out: whether it runs, and how it ended. The client is the shell and
+ * all that descends from it. Only the shell ends with this program if that is killed: what has left the shell then goes
+ * on. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
 
@@ -14,8 +15,8 @@ struct client_words {
     const char *out;      /* a file for points */
 };
 
-/* Puts the values in place of {endpoint}, {host}, {port}, {path} and {out}; other braces stay. Returns what free() takes;
- * NULL: no memory. */
+/* Puts the values in place of {endpoint}, {host}, {port}, {path} and {out}; other braces stay. Returns what free()
+ * takes; NULL: no memory. */
 char *client_fill(const char *text, const struct client_words *words);
 
 struct client {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A connection that the client still has is in the system's table of TCP, unless the head's end was abrupt: then its socket
- * is in no table any more, and only the client's open descriptors show it. */
+/* A connection that the client still has is in the system's table of TCP, unless the head's end was abrupt: then its
+ * socket is in no table any more, and only the client's open descriptors show it. */
 #include <arpa/inet.h>
 #include <dirent.h>
 #include <inttypes.h>
@@ -78,8 +78,8 @@ static int has_dead(void *ctx, pid_t pid)
     return dead;
 }
 
-/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so files are
- * read without it. */
+/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so files
+ * are read without it. */
 static size_t copy_addresses(struct watch *watch, uint64_t *address, size_t cap)
 {
     size_t n = 0;

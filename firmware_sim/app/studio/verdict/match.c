@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Which points of a client's the head had, and how often.
+/* Finds each point of a client among those that the head had, and how often it came.
  *
- * A point of the client's may agree with several of the head's. These are then one group, and counts are compared by group.
- * A client that has each point that it was sent once can't have more points in a group than were sent: each of its points
- * agrees with the one that it comes from, so both are in the same group. Dense points therefore give no false finding. */
+ * A point of the client's may agree with several of the head's. These are then one group, and counts are compared by
+ * group. A client that has each point that it was sent once can't have more points in a group than were sent: each of
+ * its points agrees with the one that it comes from, so both are in the same group. Dense points therefore give no
+ * false finding. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -41,7 +42,8 @@ static struct way *add_way(struct way ways[MAX_WAYS], int *n, const char *frame,
     return way;
 }
 
-/* The stream's own frame is one. A head that stands, in a scene without a CRS, adds its own, and that with x forward. */
+/* The stream's own frame is one. A head that stands, in a scene without a CRS, adds its own, and that with x
+ * forward. */
 static int find_ways(const struct own_stream *stream, struct way ways[MAX_WAYS])
 {
     const struct scanhead_info *info = &stream->info;
@@ -252,8 +254,8 @@ double match_unit_m(const struct cloud *cloud, double limit_m)
     return pow(10.0, -last);
 }
 
-/* Two programs that compute the same coordinate in double precision, by rotation and sum, differ by some units in the last
- * place of the largest one. A nanometre more is less than any link resolves. */
+/* Two programs that compute the same coordinate in double precision, by rotation and sum, differ by some units in the
+ * last place of the largest one. A nanometre more is less than any link resolves. */
 static double rounding_m(double limit_m)
 {
     return fmax(4.0 * DBL_EPSILON * limit_m, 1e-9);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A client's points beside those of the head. In: both, and which of the head's frames each session was sent. Out: how many
- * of the client's no pulse ever had, and how many it has more often than the head sent them. */
+/* A client's points beside those of the head. In: both, and which of the head's frames each session was sent. Out: how
+ * many of the client's no pulse ever had, and how many it has more often than the head sent them. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
 
@@ -32,8 +32,8 @@ struct match_input {
 /* SH_ESTOPPED where report asks to stop. */
 int match_points(const struct match_input *in, struct match *match, struct sh_err *err);
 
-/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, in single
- * precision by the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
+/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, in
+ * single precision by the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
 double match_unit_m(const struct cloud *cloud, double limit_m);
 
 #endif

@@ -205,8 +205,9 @@ static int is_new(const struct run *r)
            now.st_mtim.tv_sec != r->before.st_mtim.tv_sec || now.st_mtim.tv_nsec != r->before.st_mtim.tv_nsec;
 }
 
-/* Returns what a link's own numbers round coordinates to, m: half a millimetre of range, and angles (SCIP, CoLa); for a VLP-16
- * half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream does not. */
+/* Returns what a link's own numbers round coordinates to, m: half a millimetre of range, and angles (SCIP, CoLa); for a
+ * VLP-16 half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream
+ * does not. */
 static double match_of(const struct run *r)
 {
     if (r->options->match_m >= 0.0) return r->options->match_m;

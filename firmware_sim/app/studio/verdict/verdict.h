@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A verdict on somebody else's client, from the head's side alone. In: a configuration with faults, and the command that
- * runs the client. Out: for each check whether it is passed, and figures. Findings have the names of checks. */
+/* A verdict on somebody else's client, from the head's side alone. In: a configuration with faults, and the command
+ * that runs the client. Out: for each check whether it is passed, and figures. Findings have the names of checks. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_VERDICT_H
 

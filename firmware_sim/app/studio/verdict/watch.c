@@ -55,8 +55,8 @@ static int leaves_sessions(enum fault_kind kind)
     return kind == FAULT_STALL || kind == FAULT_CABLE || kind == FAULT_ENDPOINT_STALL || kind == FAULT_SHORT_PACKETS;
 }
 
-/* Whether the fault is why a session ends now. The client has its whole limit from the end on, so it makes no difference
- * on which side of a bound the end falls: what the fault did not cause is the client's own. */
+/* Whether the fault is why a session ends now. The client has its whole limit from the end on, so it makes no
+ * difference on which side of a bound the end falls: what the fault did not cause is the client's own. */
 static int is_caused(const struct watch *w, const struct watch_link *link, int64_t *over_ns)
 {
     const int64_t now_ns = clock_now_ns();
@@ -148,7 +148,7 @@ static int ends_sessions(enum fault_kind kind)
     return fault_is_act(kind) || kind == FAULT_POWER_CYCLE || kind == FAULT_STALL;
 }
 
-/* Which sessions have ended by such a fault is told later, by the thread of their link. */
+/* The thread of a link tells later that such a fault has ended its sessions. */
 static void watch_act(struct watch *w, const struct fault_note *note)
 {
     const int64_t over_ns = clock_now_ns() + (int64_t)(1e6 * note->for_ms);
