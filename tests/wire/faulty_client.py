@@ -2,11 +2,10 @@
 # The same client as faulty_client.c, in Python's standard library alone: HOST PORT FILE FAULTS.
 # FAULTS has these letters, or is `none`: c takes frames with a wrong checksum; s stays away once its connection has
 # ended; t takes a frame that comes twice twice. Offsets are those of PROTOCOL.md, ANCHOR.md and POINTS.md.
-import signal
 import socket
 import struct
-import sys
-import time
+
+import faulty_run
 
 SYNC, HEADER, ANCHOR, POINTS, LOCAL = 0xD5, 28, 2, 3, 2
 
@@ -107,31 +106,4 @@ class Client:
             del data[:at]
 
 
-class Over(Exception):
-    pass
-
-
-def end(*_):
-    raise Over
-
-
-def run(host, port, client):
-    met = False
-    while True:
-        if met and "s" in client.faults:
-            signal.pause()
-        try:
-            with socket.create_connection((host, int(port))) as head:
-                met = True
-                client.follow(head)
-        except OSError:
-            time.sleep(0.02)
-
-
-signal.signal(signal.SIGTERM, end)
-with open(sys.argv[3], "w") as out:
-    out.write("x,y,z\n")
-    try:
-        run(sys.argv[1], sys.argv[2], Client(sys.argv[4], out))
-    except Over:
-        pass
+faulty_run.serve(Client, "x,y,z\n")

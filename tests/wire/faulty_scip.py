@@ -2,21 +2,11 @@
 # A client of a Hokuyo UTM-30LX in plain sockets (SCIP 2.0): HOST PORT FILE FAULTS, with the letters of faulty_client.py.
 # A scan that comes twice has the same time. Sums, values and the reply's lines are those of SCIP.md.
 import math
-import signal
-import socket
-import sys
-import time
+
+import faulty_run
 
 FIRST, LAST, FRONT, STEPS = 0, 1080, 540, 1440
 REQUEST = b"MD%04d%04d00000\n" % (FIRST, LAST)  # each scan, every step, without end
-
-
-class Over(Exception):
-    pass
-
-
-def end(*_):
-    raise Over
 
 
 # The sum doesn't show the upper two bits of a character. Without them it is none that the device sends.
@@ -59,22 +49,4 @@ class Client:
                 self.take_reply(reply.split(b"\n"))
 
 
-def run(host, port, client):
-    met = False
-    while True:
-        if met and "s" in client.faults:
-            signal.pause()
-        try:
-            with socket.create_connection((host, int(port))) as head:
-                met = True
-                client.follow(head)
-        except OSError:
-            time.sleep(0.02)
-
-
-signal.signal(signal.SIGTERM, end)
-with open(sys.argv[3], "w") as out:
-    try:
-        run(sys.argv[1], sys.argv[2], Client(sys.argv[4], out))
-    except Over:
-        pass
+faulty_run.serve(Client)

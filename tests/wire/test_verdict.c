@@ -335,13 +335,13 @@ static void need_python(void)
 static void test_a_client_in_python(void **state)
 {
     need_python();
-    try_cases(*state, "config.yaml", "/usr/bin/python3 tests/wire/faulty_client.py", PLANTED);
+    try_cases(*state, "config.yaml", "/usr/bin/python3 -B tests/wire/faulty_client.py", PLANTED);
 }
 
 static void test_a_client_of_scip(void **state)
 {
     need_python();
-    try_cases(*state, "scip.yaml", "/usr/bin/python3 tests/wire/faulty_scip.py", PLANTED);
+    try_cases(*state, "scip.yaml", "/usr/bin/python3 -B tests/wire/faulty_scip.py", PLANTED);
 }
 
 int main(int argc, char **argv)
