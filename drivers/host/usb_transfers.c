@@ -169,13 +169,27 @@ static int gone_or_reset(struct host_usb *usb)
     return n == sizeof status ? ECONNRESET : ENODEV;
 }
 
+/* Linux may end the transfers of a reset bus as if each had been answered by nothing. It takes new ones, and these
+ * wait for a session that is over. A head that doesn't know the question stalls it. */
+static int session_is_over(struct host_usb *usb)
+{
+    const uint8_t type = (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_IN;
+    uint8_t open = 1;
+    const int n = libusb_control_transfer(usb->head.handle, type, USB_REQUEST_SESSION, 0, usb->head.interface.number,
+                                          &open, sizeof open, USB_CONTROL_MS);
+    return n == sizeof open && !open;
+}
+
 /* The present transfer is used up: submits it again, and goes on to the next. */
 static int usb_transfers_turn(struct host_usb *usb)
 {
     struct in_transfer *in = &usb->in[usb->next];
     int error = in->error;
     if (error == 0 && (error = errno_of_status(in->transfer->status)) == ENODEV) error = gone_or_reset(usb);
-    if (in->transfer->actual_length > 0) usb->in_failing.n = 0;
+    if (in->transfer->actual_length > 0)
+        usb->in_failing.n = 0;
+    else if (error == 0 && session_is_over(usb))
+        error = ECONNRESET;
     if (error == EPROTO) error = recover_reads(usb);
     if (error == ENODEV || error == ECONNRESET) {
         in->error = error;

@@ -66,11 +66,15 @@ static int port_request(struct scanhead_usb *head, int index, const struct usb_c
     }
 }
 
-static int stream_request(struct scanhead_usb *head, int index, const struct usb_ctrlrequest *setup)
+static int stream_request(struct scanhead_usb *head, int index, const struct usb_ctrlrequest *setup, uint8_t *data)
 {
     const unsigned value = le_get16(&setup->wValue);
-    if ((setup->bRequestType & USB_DIR_IN) != 0 || setup->bRequest != SCANHEAD_USB_STREAM) return USB_STALL;
-    if (value > 1 || le_get16(&setup->wLength) != 0) return USB_STALL;
+    const int asks = (setup->bRequestType & USB_DIR_IN) != 0;
+    if (setup->bRequest != SCANHEAD_USB_STREAM || value > !asks || le_get16(&setup->wLength) != asks) return USB_STALL;
+    if (asks) {
+        data[0] = (uint8_t)(head->session[index].open || head->session[index].again);
+        return 1;
+    }
     const int again = value == 1 && head->session[index].open;
     usb_device_set_gone_due(head->device, head->personality->session[index].in, 0);
     set_open(head, index, value == 1 && !again);
@@ -88,7 +92,7 @@ static int on_request(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *d
         if (type == (USB_TYPE_CLASS | USB_RECIP_INTERFACE) && (row->begins & USB_BEGINS_DTR) != 0)
             return port_request(head, i, setup, data);
         if (type == (USB_TYPE_VENDOR | USB_RECIP_INTERFACE) && (row->begins & USB_BEGINS_REQUEST) != 0)
-            return stream_request(head, i, setup);
+            return stream_request(head, i, setup, data);
     }
     return USB_STALL;
 }

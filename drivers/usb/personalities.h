@@ -21,7 +21,7 @@ enum usb_personality_id { USB_PERSONALITY_NATIVE, USB_PERSONALITY_HOKUYO, USB_PE
 enum {
     SCANHEAD_USB_VID = 0x1209, /* pid.codes, and a product id it sets aside for private tests */
     SCANHEAD_USB_PID = 0x0001,
-    SCANHEAD_USB_STREAM = 0x22, /* bRequest; bmRequestType 0x41, wIndex the vendor interface, wLength 0 */
+    SCANHEAD_USB_STREAM = 0x22, /* bRequest; bmRequestType 0x41 opens and closes, 0xc1 asks (USB.md) */
     SCANHEAD_USB_SUBCLASS = 0x53,
     SCANHEAD_USB_PROTOCOL = 0x48,
 };

@@ -27,7 +27,7 @@ if [ $speed = high ]; then # a reset is the same, but without a pause
     head_start "{type: usb, backend: functionfs, speed: high}" --set head.prr_hz=4000 --set loop.tick_hz=100 \
         --scenario faults.yaml --truth truth.json
     wait_for 10 is_plugged
-    scanhead record usb --wait 120 --frames 100 --replug 20 -o faults.ply --stats faults.json 2>faults.err &
+    scanhead record usb --wait 1200 --frames 0 --replug 600 -o faults.ply --stats faults.json 2>faults.err &
     client=$!
     check "$speed: the recorder goes on after it was unplugged twice on request" \
         wait_for 40 sh -c "test \$(grep -c 'is back' faults.err) = 2"
@@ -60,7 +60,7 @@ for file in bConfigurationValue authorized; do
     echo 0 >$device/$file
     check "$speed: $file 0: the head rests" rests
     echo 1 >$device/$file
-    check "$speed: $file 1: records again" scanhead record usb --wait 120 --quiet --stats again.json
+    check "$speed: $file 1: records again" scanhead record usb --wait 1200 --quiet --stats again.json
 done
 note "rested at $(uptime_s) s"
 check_chapter9 "$speed"

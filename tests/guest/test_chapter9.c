@@ -203,6 +203,12 @@ static void test_refused(void **state)
     }
 }
 
+static void expect_open(int open)
+{
+    assert_int_equal(control(0xc1, USB_REQUEST_SESSION, 0, t.interface.number, buf, 1), 1);
+    assert_int_equal(buf[0], open);
+}
+
 static void test_session_request(void **state)
 {
     (void)state;
@@ -213,12 +219,15 @@ static void test_session_request(void **state)
     assert_int_equal(control(0xc1, USB_REQUEST_SESSION, 1, number, buf, 4), STALL);
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION + 1, 1, number, NULL, 0), STALL);
     session(0); /* the session is closed already, so nothing happens */
+    expect_open(0);
     open_session();
     ask();
     open_session(); /* a session that is opened again begins anew */
+    expect_open(1);
     ask();
     session(0);
     session(0);
+    expect_open(0);
 }
 
 int main(void)

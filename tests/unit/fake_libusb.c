@@ -193,12 +193,18 @@ int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t 
         memset(data, 0, 2);
         return 2;
     }
-    assert_int_equal(type, 0x41);
     assert_int_equal(request, 0x22);
     assert_int_equal(index, 2);
+    if (type == 0xc1) { /* whether a session is open */
+        assert_int_equal(length, 1);
+        data[0] = !bus.was_reset;
+        return bus.gone ? LIBUSB_ERROR_NO_DEVICE : bus.no_question ? LIBUSB_ERROR_PIPE : 1;
+    }
+    assert_int_equal(type, 0x41);
     assert_int_equal(length, 0);
     if (bus.gone) return LIBUSB_ERROR_NO_DEVICE;
     bus.sessions += value ? 1 : -1;
+    bus.was_reset = 0;
     return 0;
 }
 

@@ -58,6 +58,7 @@ struct fake_bus {
     int submit_fails;                       /* for so many times; < 0: always */
     int submit_room;                        /* how many reads may be under way; 0: any number */
     int will_not_cancel, hold_writes;
+    int was_reset, no_question; /* sessions are over; the head stalls the question whether they are */
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
     char written[4096]; /* the commands so far */

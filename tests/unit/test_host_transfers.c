@@ -111,15 +111,15 @@ static void test_errors_without_end(void **state)
 
 /* Another program resets the bus. The kernel ends all transfers as if the device had gone, but it still answers. That
  * is not an unplugging: earlier frames are there, and a new session goes on with the same head. */
-static void test_bus_reset(void **state)
+static void bus_resets(enum libusb_transfer_status status)
 {
     struct scanhead_frame frame;
     char reply[64];
-    (void)state;
     struct scanhead *sh = open_head("usb");
     script_events(0, 4);
     for (int i = 0; i < 16; i++)
-        fake_script(FAKE_IN, LIBUSB_TRANSFER_NO_DEVICE, NULL, 0);
+        fake_script(FAKE_IN, status, NULL, 0);
+    bus.was_reset = 1;
     expect_events(sh, 0, 4);
     for (int i = 0; i < 2; i++) {
         assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ERESET);
@@ -134,6 +134,37 @@ static void test_bus_reset(void **state)
     unplug();
     assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ELOST); /* and that is one */
     close_head(sh);
+}
+
+static void test_bus_reset(void **state)
+{
+    (void)state;
+    bus_resets(LIBUSB_TRANSFER_NO_DEVICE);
+}
+
+/* A reader that was not running meanwhile finds transfers that ended without a byte. The kernel takes new ones, which
+ * nobody answers: the session is over. */
+static void test_bus_reset_behind_its_back(void **state)
+{
+    (void)state;
+    bus_resets(LIBUSB_TRANSFER_COMPLETED);
+}
+
+/* Transfers also end without a byte within a session, after a unit of whole packets. */
+static void test_empty_transfers(void **state)
+{
+    (void)state;
+    for (int old = 0; old < 2; old++) {
+        struct scanhead *sh = open_head("usb");
+        bus.no_question = old;
+        bus.n_steps = bus.done = 0;
+        script_events(0, 4);
+        for (int i = 0; i < 20; i++)
+            fake_script(FAKE_IN, LIBUSB_TRANSFER_COMPLETED, NULL, 0);
+        script_events(4, 8);
+        expect_events(sh, 0, 8);
+        close_head(sh);
+    }
 }
 
 /* ---- writing */
@@ -250,6 +281,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_unplug_with_errors, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_errors_without_end, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_bus_reset, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_bus_reset_behind_its_back, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_empty_transfers, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_write_fails, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_seen_by_writing, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_while_writing, rig_begin, rig_end),
