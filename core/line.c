@@ -36,8 +36,34 @@ int line_block_alloc_colours(struct line_block *block, struct sh_err *err)
     return sh_fail(err, SH_ENOMEM, "line: no memory for colours of %u points", block->capacity);
 }
 
+int line_block_alloc_deviations(struct line_block *block, struct sh_err *err)
+{
+    block->deviation = calloc(block->capacity, sizeof *block->deviation);
+    if (block->deviation != NULL) return SH_OK;
+    return sh_fail(err, SH_ENOMEM, "line: no memory for deviations of %u points", block->capacity);
+}
+
+int line_block_alloc_waves(struct line_block *block, uint32_t waves, uint32_t samples, struct sh_err *err)
+{
+    struct line_waves *w = block->waves = calloc(1, sizeof *w);
+    if (w != NULL) {
+        w->wave = calloc(waves, sizeof *w->wave);
+        w->sample = calloc(samples, sizeof *w->sample);
+        w->capacity = waves;
+        w->sample_capacity = samples;
+        if (w->wave != NULL && w->sample != NULL) return SH_OK;
+    }
+    return sh_fail(err, SH_ENOMEM, "line: no memory for waveforms of %u windows, %u samples", waves, samples);
+}
+
 void line_block_free(struct line_block *block)
 {
+    if (block->waves != NULL) {
+        free(block->waves->wave);
+        free(block->waves->sample);
+    }
+    free(block->waves);
+    free(block->deviation);
     free(block->rgb);
     free(block->amplitude_cdb);
     free(block->width_cns);

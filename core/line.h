@@ -28,6 +28,26 @@ enum {
 /* The meaning of a point's three numbers; chosen per stream. */
 enum line_layout { LINE_POLAR, LINE_GEO };
 
+/* A window of a pulse's waveform (waveform.h). */
+struct line_wave {
+    uint32_t pulse; /* after the block's pulse0 */
+    uint32_t dt_ns; /* firing time after t0_ns */
+    uint32_t first; /* number of its first sample on the pulse's grid */
+    uint32_t n;     /* samples */
+    uint32_t at;    /* of its first sample in line_waves.sample */
+    uint32_t a, b,
+        c; /* the beam: polar: 0, mirror counts, pan counts; geo: the change of x, y, z along a metre of range,
+                       * as bit patterns of floats, in the CRS's units (not in scale_m) */
+};
+
+/* The waveforms of a block's pulses, in order of pulse, then of range. */
+struct line_waves {
+    uint32_t n, capacity, n_samples, sample_capacity;
+    struct line_wave *wave;
+    uint16_t *sample;
+    uint32_t n_left_out; /* samples that found no room */
+};
+
 struct line_block {
     /* place in the scan */
     uint32_t frame;     /* frame (pan sweep) number, from 0 */
@@ -49,6 +69,9 @@ struct line_block {
     int16_t *amplitude_cdb; /* 0.01 dB above the detection threshold, with the detector's noise; LINE_AMPLITUDE_NONE */
     uint16_t *width_cns;    /* width of the echo, full at half maximum, 0.01 ns; LINE_WIDTH_NONE, LINE_WIDTH_MOST */
     uint8_t (*rgb)[3];      /* colour, sRGB; NULL: not asked for */
+    uint16_t *deviation;    /* of the echo's shape from the pulse's, 1/1000 of its amplitude; 0: a shot without echo;
+                             * NULL: echoes are not found in waveforms, or attributes are not asked for */
+    struct line_waves *waves; /* NULL: not asked for */
 };
 
 /* The end of a line. */
@@ -74,6 +97,8 @@ int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err 
 /* For a block that has its other arrays. */
 int line_block_alloc_attributes(struct line_block *block, struct sh_err *err);
 int line_block_alloc_colours(struct line_block *block, struct sh_err *err);
+int line_block_alloc_deviations(struct line_block *block, struct sh_err *err);
+int line_block_alloc_waves(struct line_block *block, uint32_t waves, uint32_t samples, struct sh_err *err);
 void line_block_free(struct line_block *block);
 
 #endif
