@@ -74,7 +74,7 @@ struct protocol_host {
      * counts that. */
     int (*send)(void *ctx, const void *unit, size_t len);
     /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
-     * session, which then releases control. reply (cap 480 and more) gets the reply line without its end.
+     * session, which then releases control. reply (cap 500 and more) gets the reply line without its end.
      * Returns 0, or the SCPI error number. */
     int (*command)(void *ctx, const char *line, char *reply, size_t cap);
     /* UTC of a device time, ns since 1970; INT64_MIN: not known. */

@@ -7,6 +7,7 @@
 #include "firmware_sim/command/fault_commands.h"
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
+#include "firmware_sim/command/scan_replay.h"
 #include "firmware_sim/command/setting.h"
 #include "firmware_sim/command/time_server.h"
 
@@ -171,6 +172,7 @@ static int do_act(struct command_call *call)
         return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
                             row->unit == &command_unit_fault                      ? "fault or its number"
                             : row->unit == &command_unit_server                   ? "role, address, s, h and interface"
+                            : row->unit == &command_unit_replay                   ? "time, speed or loop"
                             : row->own                                            ? "station and its place"
                             : row->setting != NULL && row->setting->words != NULL ? "word"
                                                                                   : "number");

@@ -9,7 +9,7 @@
  *             HEAD:PHASe  HEAD:PHASe:LOCK  HEAD:PHASe:EDGE?
  *   scan      SCAN:STARt  SCAN:STOP  SCAN:COUNt?  SCAN:FRAMes  SCAN:ECHoes
  *             SCAN:LINE:STARt  SCAN:LINE:STOP  SCAN:PAN:STARt  SCAN:PAN:STOP
- *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN
+ *             SCAN:STEP  SCAN:STEP:LINE  SCAN:STEP:PAN  SCAN:REPLay
  *   site      SITE:POSE
  *   fault     FAULt:ADD  FAULt:CLEar  FAULt:LIST?  FAULt:INJected?
  *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:PTP?  TIME:STEP  TIME:SHIFt  TIME:SERVer
@@ -41,6 +41,10 @@
  * from then on, and the reply is its number. `FAULt:CLEar 3` or `ALL` takes faults out. `FAULt:INJected?` replies with
  * how often faults struck; with a number, how often that one did. `FAULt:LIST?` lists the faults.
  *
+ * Replays. `SCAN:REPLay 12.5, 2, ON` plays a recording from 12.5 s after its first frame on, at twice its speed, and
+ * anew at its end. Fields may be left empty, and stay as they are then; speed 0 pauses. The query replies with PLAYING
+ * or IDLE, time, length (0: not known), speed and loop; a head replies NONE.
+ *
  * Replies. The value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to
  * 1200000"`. A value outside of the profile is -222. One that another setting or the state forbids is -221.
  * *STB?: 4: errors are queued; 128: the head scans. *CLS, like SYSTem:ERRor?, needs no control.
@@ -57,7 +61,7 @@
 
 enum {
     COMMAND_MAX_LINE = 256, /* of a line without its end; a longer one is -363 and dropped whole */
-    COMMAND_MAX_REPLY = 480,
+    COMMAND_MAX_REPLY = 500,
     COMMAND_QUEUE_LEN = 32, /* errors kept; in a full queue the last one becomes -350 and counts the rest */
 };
 
@@ -144,6 +148,21 @@ struct command_phase {
     int64_t edge_udeg;     /* its azimuth then */
 };
 
+/* The recording that is replayed. Times count from its first frame. */
+struct command_replay {
+    int is_there;            /* 0: a head, or a capture of packets */
+    double position_s;       /* of the frame that was sent last */
+    double length_s;         /* 0: not known */
+    double speed;            /* 0: it is paused */
+    const char *fixed_speed; /* why the speed does not change; NULL: it may */
+    int loop;
+};
+/* Negative values leave what there is. */
+struct command_replay_change {
+    double position_s, speed;
+    int loop;
+};
+
 /* Settings that a recording does not say. */
 #define COMMAND_NOT_RECORDED     INT64_MIN
 #define COMMAND_NOT_RECORDED_U32 UINT32_MAX
@@ -182,10 +201,11 @@ struct command_device {
     double pose_centre_m[3], pose_reach_m; /* the pose must be within pose_reach_m of the centre; scene frame */
     const struct command_place *place;     /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
-    const char *recorded;                    /* a recording is replayed: why no setting changes; NULL: none is */
-    int is_played;                           /* it is playing, whatever its head's state was: SCAN:STOP ends it */
-    const char *fixed;                       /* why no station can be moved; NULL: they can */
-    uint32_t moving;                         /* the station that is being moved; 0: none. Meanwhile no scan starts */
+    struct command_replay replay;
+    const char *recorded; /* a recording is replayed: why no setting changes; NULL: none is */
+    int is_played;        /* it is playing, whatever its head's state was: SCAN:STOP ends it */
+    const char *fixed;    /* why no station can be moved; NULL: they can */
+    uint32_t moving;      /* the station that is being moved; 0: none. Meanwhile no scan starts */
 };
 
 enum command_effect {
@@ -202,6 +222,7 @@ enum command_effect {
     COMMAND_FAULTS,  /* faults were added or taken out */
     COMMAND_CLOCK,   /* the scanner's clock was set */
     COMMAND_SERVER,  /* its time server has changed */
+    COMMAND_REPLAY,  /* a recording goes on elsewhere, or otherwise */
     COMMAND_RELEASE, /* control was given back */
 };
 
@@ -213,6 +234,7 @@ struct command_result {
     uint32_t station; /* that is moved, from 1 */
     int to_first;     /* it goes back to its place at power-up; else to `to` */
     struct command_place place;
+    struct command_replay_change replay;
     int error;                     /* 0, or the number that was queued */
     int took_control;              /* this command gave the session control */
     int changes;                   /* belongs in the journal: effect is not NONE or RELEASE */

@@ -5,6 +5,7 @@
 #include "firmware_sim/command/fault_commands.h"
 #include "firmware_sim/command/help.h"
 #include "firmware_sim/command/row.h"
+#include "firmware_sim/command/scan_replay.h"
 #include "firmware_sim/command/setting.h"
 #include "firmware_sim/command/site_pose.h"
 #include "firmware_sim/command/step.h"
@@ -332,6 +333,7 @@ const struct command_row command_rows[] = {
     CHANGE("SCAN:STARt", act_start, HEAD_EV_START),
     CHANGE("SCAN:STOP", act_stop, HEAD_EV_STOP),
     QUERY("SCAN:COUNt", query_count),
+    {"SCAN:REPLay", command_replay_query, command_replay_change, &command_unit_replay, NULL, 0, 0, 1, 0, 0},
     {"SITE:POSE", command_place_query, command_place_change, &command_unit_place, NULL, 0, 0, 1, 0,
      HEAD_EV_START + 1},
     {"FAULt:ADD", NULL, command_fault_add, &command_unit_fault, NULL, 0, 0, 1, 0, 0},

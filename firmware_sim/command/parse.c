@@ -157,6 +157,17 @@ enum command_fit command_decimal_to_int(const struct command_decimal *decimal, i
     return COMMAND_FIT_EXACT;
 }
 
+const char *command_take_field(const char *text, char field[COMMAND_FIELD_LEN], size_t *len)
+{
+    const char *begin = text + strspn(text, " \t");
+    const size_t all = strcspn(begin, ",");
+    *len = all;
+    while (*len > 0 && (begin[*len - 1] == ' ' || begin[*len - 1] == '\t'))
+        --*len;
+    snprintf(field, COMMAND_FIELD_LEN, "%.*s", (int)(*len < COMMAND_FIELD_LEN ? *len : COMMAND_FIELD_LEN - 1), begin);
+    return begin[all] == ',' ? begin + all + 1 : NULL;
+}
+
 void command_format_fixed(char *buf, size_t len, int64_t value, int decimals)
 {
     uint64_t magnitude = value < 0 ? 0 - (uint64_t)value : (uint64_t)value;

@@ -8,6 +8,7 @@
 
 #include "firmware_sim/command/command.h"
 
+enum { COMMAND_FIELD_LEN = 64 };
 enum { COMMAND_CLIP_LEN = 36 }; /* length of the part of a line that an error quotes, with its NUL */
 
 /* A line in its parts; header and param point into text. */
@@ -21,6 +22,10 @@ struct command_request {
 
 /* Returns 0, or the error number and its reason. A blank line gives header_len 0 and 0. */
 int command_split(const char *line, struct command_request *req, const char **why);
+
+/* Takes the next field of a list, without blanks around it; len is its length, also of one that is cut. Returns what
+ * follows its comma, or NULL at the end. */
+const char *command_take_field(const char *text, char field[COMMAND_FIELD_LEN], size_t *len);
 
 /* Whether a header matches a pattern of SCPI-99 6.2.1: the upper-case part or the whole of each word, in any
  * case. Words in brackets may be left out. */

@@ -22,19 +22,7 @@ static const struct {
 } parts[6] = {{"x", "M", 1e9},           {"y", "M", 1e9},      {"z", "M", 1e9},
               {"heading", "DEG", 360.0}, {"pitch", "DEG", 90}, {"roll", "DEG", 180.0}};
 
-enum { PARTS = 6, FIELD_LEN = 64 };
-
-/* The next field of a list, without blanks around it. Returns what follows its comma, or NULL at the end. */
-static const char *take_field(const char *text, char field[FIELD_LEN], size_t *len)
-{
-    const char *begin = text + strspn(text, " \t");
-    const size_t all = strcspn(begin, ",");
-    *len = all;
-    while (*len > 0 && (begin[*len - 1] == ' ' || begin[*len - 1] == '\t'))
-        --*len;
-    snprintf(field, FIELD_LEN, "%.*s", (int)(*len < FIELD_LEN ? *len : FIELD_LEN - 1), begin);
-    return begin[all] == ',' ? begin + all + 1 : NULL;
-}
+enum { PARTS = 6 };
 
 static int fail_number(struct command_call *call, const char *name, const char *field)
 {
@@ -47,9 +35,9 @@ static int fail_number(struct command_call *call, const char *name, const char *
 static int site_pose_take_number(struct command_call *call, int i, const char *field, size_t len, double *value)
 {
     struct command_decimal decimal;
-    if (len >= FIELD_LEN)
+    if (len >= COMMAND_FIELD_LEN)
         return command_fail(call, CMD_E_RANGE, "%s: %s has %zu characters, allowed up to %d", call->row->header,
-                            parts[i].name, len, FIELD_LEN - 1);
+                            parts[i].name, len, COMMAND_FIELD_LEN - 1);
     const char *unit = command_parse_decimal(field, &decimal);
     if (unit == NULL) return fail_number(call, parts[i].name, field);
     if (*unit != '\0' && strcasecmp(unit, parts[i].unit) != 0) {
@@ -70,7 +58,7 @@ static int take_station(struct command_call *call, const char *field, size_t len
     struct command_decimal decimal;
     int64_t value = 0;
     const uint32_t n = call->dev->limits.n_stations;
-    const char *end = len < FIELD_LEN ? command_parse_decimal(field, &decimal) : NULL;
+    const char *end = len < COMMAND_FIELD_LEN ? command_parse_decimal(field, &decimal) : NULL;
     if (end == NULL || *end != '\0') return fail_number(call, "station", field);
     const int whole = command_decimal_to_int(&decimal, 0, &value) == COMMAND_FIT_EXACT;
     *station = (uint32_t)value;
@@ -102,16 +90,16 @@ static int reply_place(struct command_call *call, const double v[PARTS])
 
 int command_place_query(struct command_call *call)
 {
-    char field[FIELD_LEN], which[FIELD_LEN];
+    char field[COMMAND_FIELD_LEN], which[COMMAND_FIELD_LEN];
     double limit[PARTS];
     size_t len, n;
     uint32_t station;
     enum command_value_kind kind = COMMAND_VALUE_NUMBER;
-    const char *rest = take_field(call->param, field, &len);
+    const char *rest = command_take_field(call->param, field, &len);
     if (len == 0) return command_fail(call, CMD_E_MISSING, "%s? takes a station", call->row->header);
     int fits = 1;
     if (rest != NULL) {
-        rest = take_field(rest, which, &n);
+        rest = command_take_field(rest, which, &n);
         fits = rest == NULL && command_parse_special(which, &kind);
     }
     if (!fits)
@@ -130,15 +118,15 @@ static int take_parameters(struct command_call *call)
 {
     struct command_result *out = call->out;
     enum command_value_kind kind;
-    char field[FIELD_LEN];
+    char field[COMMAND_FIELD_LEN];
     size_t len;
-    const char *rest = take_field(call->param, field, &len);
+    const char *rest = command_take_field(call->param, field, &len);
     if (take_station(call, field, len, &out->station) != 0) return -1;
     for (int i = 0; i < PARTS; i++) {
         if (rest == NULL)
             return command_fail(call, CMD_E_MISSING, "%s takes station, x, y, z, heading, pitch, roll; %s is missing",
                                 call->row->header, parts[i].name);
-        rest = take_field(rest, field, &len);
+        rest = command_take_field(rest, field, &len);
         if (i == 0 && command_parse_special(field, &kind)) {
             if (kind != COMMAND_VALUE_DEF)
                 return command_fail(call, CMD_E_DATA_TYPE, "%s: a place is six numbers or DEF, not '%.10s'",

@@ -57,6 +57,7 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     case COMMAND_CLOCK:
     case COMMAND_STEP:
     case COMMAND_FAULTS:
+    case COMMAND_REPLAY: /* a head refuses it */
     case COMMAND_NONE:
     case COMMAND_TAKE:
         break;

@@ -41,6 +41,43 @@ int recording_open(struct recording *r, const char *path, struct sh_err *err)
     return open_stream(r, err);
 }
 
+/* Takes all that is in the parser. */
+static int take_times(struct native_parser *parser, int64_t *t_ns)
+{
+    int found = 0;
+    for (enum native_item item; (item = native_parser_next(parser)) != NATIVE_MORE;) {
+        if (item != NATIVE_FRAME || (parser->header.flags & NATIVE_LOCAL) != 0) continue;
+        *t_ns = parser->header.t_ns;
+        found = 1;
+    }
+    return found;
+}
+
+int recording_last_ns(const char *path, int64_t *t_ns)
+{
+    enum { TAIL_BYTES = 4 << 20 }; /* it has many of the longest frames */
+    int found = 0;
+    struct native_parser *parser = calloc(1, sizeof *parser);
+    FILE *f = parser != NULL ? fopen(path, "rb") : NULL;
+    if (f != NULL) {
+        size_t n = 1;
+        native_parser_init(parser);
+        if (fseek(f, -(long)TAIL_BYTES, SEEK_END) != 0) rewind(f);
+        while (n > 0) {
+            size_t room;
+            uint8_t *at = native_parser_room(parser, &room);
+            n = fread(at, 1, room, f);
+            native_parser_added(parser, n);
+            found |= take_times(parser, t_ns);
+        }
+        native_parser_finish(parser);
+        found |= take_times(parser, t_ns);
+        fclose(f);
+    }
+    free(parser);
+    return found;
+}
+
 int recording_rewind(struct recording *r, struct sh_err *err)
 {
     scanhead_close(r->stream);

@@ -17,6 +17,7 @@ enum { USUAL_MOST_BYTES = 1 << 17, NATIVE_RATE_BYTES = 2 * NATIVE_POINT_LEN };
 
 struct wishes {
     int over, starts, idle; /* idle: nothing is played, and time need not pass */
+    int paces, paused;      /* paces: another speed holds from now on */
 };
 
 /* is_late: frames of the tick before are still to be sent. A new time of playing, and the run's end, wait for them. */
@@ -25,16 +26,20 @@ static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
     struct wishes wishes;
     pthread_mutex_lock(&r->lock);
     const int stops = r->wants_stop && r->playing, ready = r->n_clients >= (int)r->options.clients;
-    if (r->wants_stop) r->wants_again = 0;
+    if (r->wants_stop) r->wants_again = r->wants_seek = 0;
     r->wants_stop = 0;
-    wishes.starts = !is_late && ((r->wants_start && ready) || r->wants_again);
+    wishes.starts = !is_late && ((r->wants_start && ready) || r->wants_again || r->wants_seek);
     if (wishes.starts) {
-        r->wants_start = r->wants_again = 0;
+        r->begin_s = r->wants_seek ? r->seek_s : r->options.from_s;
+        r->wants_start = r->wants_again = r->wants_seek = 0;
         r->playing = 1;
     }
+    wishes.paces = r->speed_changed && r->playing && !wishes.starts;
+    wishes.paused = r->speed == 0.0;
+    r->speed_changed = 0;
     const int waits = !r->ends_then || r->wants_start, plays = r->playing;
     wishes.over = !is_late && (r->ending || tick >= r->end_tick || (!waits && !plays));
-    wishes.idle = !is_late && waits && !plays && r->end_tick == UINT64_MAX;
+    wishes.idle = !is_late && !wishes.starts && (wishes.paused || (waits && !plays)) && r->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&r->lock);
     if (stops) replay_stop(r, tick, 0);
     return wishes;
@@ -57,7 +62,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     if (wishes.over) return LOOP_SOURCE_OVER;
     if (wishes.idle && may_idle) return LOOP_SOURCE_IDLE;
     if (wishes.starts) replay_begin(r, tick);
-    if (r->playing) {
+    if (wishes.paces && !wishes.paused) replay_pace(r, tick);
+    if (r->playing && !wishes.paused) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
         /* --duration counts such time, and protocols measure it */
@@ -109,7 +115,7 @@ static uint64_t rests_from(void *self)
 {
     struct replay *r = self;
     pthread_mutex_lock(&r->lock);
-    const int plays = r->playing || r->wants_start || r->wants_again;
+    const int plays = r->playing || r->wants_start || r->wants_again || r->wants_seek;
     const uint64_t tick = r->n_changes == 0 ? 0 : r->change[(r->n_changes - 1) % REPLAY_CHANGES].tick + 1;
     pthread_mutex_unlock(&r->lock);
     return plays ? UINT64_MAX : tick;
@@ -237,6 +243,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->n_ticks = (uint64_t)ceil(options->duration_s * cfg->loop.tick_hz);
     r->end_tick = options->duration_s > 0.0 && !options->start ? r->n_ticks : UINT64_MAX;
     r->wants_start = options->start;
+    r->speed = options->speed > 0.0 ? options->speed : 1.0;
+    r->loop = options->loop;
     for (uint32_t i = 0; i < cfg->n_links; i++) /* such a link opens a session for itself */
         r->n_clients -=
             cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL || cfg->link[i].type == LINK_UDP;

@@ -94,11 +94,25 @@ void replay_open_commands(struct replay *r)
     cmd->limits.n_stations = 1;
 }
 
+/* It is played from another time on, or otherwise. */
+static void replay_change(struct replay *r, const struct command_replay_change *to)
+{
+    if (to->position_s >= 0.0) {
+        r->seek_s = to->position_s;
+        r->wants_seek = 1;
+    }
+    if (to->loop >= 0) r->loop = to->loop;
+    if (to->speed < 0.0) return;
+    r->speed_changed |= to->speed != r->speed;
+    r->speed = to->speed;
+}
+
 static void carry_out(struct replay *r, enum command_effect effect)
 {
     if (effect != COMMAND_START && effect != COMMAND_STOP && effect != COMMAND_RESET) return;
     r->wants_start = effect == COMMAND_START;
     r->wants_stop = !r->wants_start;
+    r->wants_seek = 0;
     if (r->wants_start) r->options.clients = 0; /* a client that commands the start does not wait for others */
 }
 
@@ -110,9 +124,14 @@ static void do_command(struct replay *r, uint32_t session, const char *line, uin
     r->cmd.t_ns = (int64_t)released * r->tick_ns;
     r->cmd.frames_done = r->frames_done;
     r->cmd.lost_truth_lines = atomic_load(&r->counters.lost_truth_lines);
-    r->cmd.is_played = r->playing || r->wants_start || r->wants_again;
+    r->cmd.is_played = r->playing || r->wants_start || r->wants_again || r->wants_seek;
+    r->cmd.replay.position_s = 1e-9 * (double)r->position_ns;
+    if (r->wants_seek) r->cmd.replay.position_s = r->seek_s;
+    r->cmd.replay.speed = r->speed;
+    r->cmd.replay.loop = r->loop;
     r->desk.now_ns = r->cmd.t_ns;
     command_execute(&r->cmd, session, line, out);
+    if (out->error == 0 && out->effect == COMMAND_REPLAY) replay_change(r, &out->replay);
     if (out->error == 0) carry_out(r, out->effect);
 }
 

@@ -128,6 +128,18 @@ static int is_device(const struct config *cfg)
     return 0;
 }
 
+/* What SCAN:REPLay reports and allows. Its end is that of the part which is played. */
+static void describe_replay(struct replay *r)
+{
+    int64_t last_ns;
+    double length_s =
+        recording_last_ns(r->options.path, &last_ns) ? 1e-9 * ((double)last_ns - (double)r->first_ns) : 0.0;
+    if (r->options.to_s > 0.0 && (length_s <= 0.0 || r->options.to_s < length_s)) length_s = r->options.to_s;
+    r->cmd.replay = (struct command_replay){.is_there = 1, .length_s = length_s > 0.0 ? length_s : 0.0};
+    if (r->cfg->loop.pace != PACE_REALTIME) r->cmd.replay.fixed_speed = "only the pace realtime has others";
+    if (r->is_device) r->cmd.replay.fixed_speed = "a link's times are those of the device";
+}
+
 int replay_open_recording(struct replay *r, struct sh_err *err)
 {
     struct native_descriptor d;
@@ -163,5 +175,6 @@ int replay_open_recording(struct replay *r, struct sh_err *err)
     if (r->is_device) take_firmware(r->cfg);
     snprintf(r->idn, sizeof r->idn, "%s", d.idn);
     r->cmd.idn = r->idn;
+    describe_replay(r);
     return SH_OK;
 }

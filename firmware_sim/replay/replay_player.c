@@ -37,7 +37,7 @@ static int replay_look(struct replay *r)
         if (got == 0) return 0;
         const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
         /* A device that is asked for scans has booted, so that part of a recording is left out. */
-        const int is_early = since_ns < r->options.from_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
+        const int is_early = since_ns < r->begin_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
         if (!r->in_range && is_early) {
             replay_keep_front(&r->front, r->frame.bytes);
             r->has_skipped = 1;
@@ -68,6 +68,7 @@ static void replay_add(struct replay *r, const uint8_t *frame, uint32_t len, uin
     renumber(r, r->bytes + r->len);
     r->len += len;
     pthread_mutex_lock(&r->lock);
+    r->position_ns = native_since_ns(r->frame.t_ns, r->first_ns);
     replay_note_frame(r, frame, tick);
     pthread_mutex_unlock(&r->lock);
 }
@@ -119,7 +120,7 @@ static uint64_t due_tick(struct replay *r, uint64_t tick)
         r->last = at;
     }
     const double n = (double)(r->last - r->base) + 1.0;
-    const double out = ceil(n / r->options.speed - 1e-9) - 1.0;
+    const double out = ceil(n / r->pace - 1e-9) - 1.0;
     return r->start_tick + (out < 0x1p62 ? (uint64_t)(out > 0.0 ? out : 0.0) : UINT64_C(1) << 62);
 }
 
@@ -127,7 +128,7 @@ void replay_stop(struct replay *r, uint64_t tick, int wants_again)
 {
     pthread_mutex_lock(&r->lock);
     r->playing = 0;
-    r->wants_again = wants_again;
+    r->wants_again = wants_again && r->loop;
     replay_set_state(r, tick, HEAD_IDLE);
     pthread_mutex_unlock(&r->lock);
 }
@@ -145,7 +146,7 @@ void replay_begin(struct replay *r, uint64_t tick)
     const int found = replay_look(r);
     if (found <= 0) {
         replay_stop(r, tick, 0);
-        sh_fail(&err, SH_EINPUT, "%s: it has no frame from %.10g s on", r->options.path, r->options.from_s);
+        sh_fail(&err, SH_EINPUT, "%s: it has no frame from %.10g s on", r->options.path, r->begin_s);
         if (found == 0) replay_fail(r, &err);
         return;
     }
@@ -154,11 +155,21 @@ void replay_begin(struct replay *r, uint64_t tick)
     r->restarts = 1;
     pthread_mutex_lock(&r->lock);
     r->playing = 1;
+    r->pace = r->speed;
     r->times++;
+    r->position_ns = native_since_ns(r->frame.t_ns, r->first_ns);
     set_clock(r);
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
     if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
+}
+
+void replay_pace(struct replay *r, uint64_t tick)
+{
+    pthread_mutex_lock(&r->lock);
+    r->pace = r->speed;
+    pthread_mutex_unlock(&r->lock);
+    if (replay_look(r) == 1) rebase(r, tick);
 }
 
 void replay_fill(struct replay *r, uint64_t tick, int may_skip)
@@ -173,5 +184,5 @@ void replay_fill(struct replay *r, uint64_t tick, int may_skip)
         set_shift(r);
         r->has_frame = 0;
     }
-    replay_stop(r, tick, found == 0 && r->options.loop);
+    replay_stop(r, tick, found == 0);
 }

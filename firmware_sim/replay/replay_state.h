@@ -30,12 +30,16 @@ struct replay {
     /* under the lock */
     pthread_mutex_t lock;
     struct command_device cmd;
-    int wants_start, wants_stop, ending;
-    int wants_again; /* it is to begin anew by itself */
-    int n_clients;   /* without links that are readers themselves */
-    int ends_then;   /* the run ends when it was played */
-    uint32_t times;  /* how often it was begun so far */
-    uint64_t frames; /* sent */
+    int wants_start, wants_stop, wants_seek, ending;
+    double seek_s; /* with wants_seek */
+    double speed;  /* 0: it is paused */
+    int speed_changed, loop;
+    int64_t position_ns; /* of the frame that was sent last, since the first one */
+    int wants_again;     /* it is to begin anew by itself */
+    int n_clients;       /* without links that are readers themselves */
+    int ends_then;       /* the run ends when it was played */
+    uint32_t times;      /* how often it was begun so far */
+    uint64_t frames;     /* sent */
     uint64_t scans, frames_done;
     /* The state of the head that was recorded, by the ticks with which it goes out. Number i is at i %
      * REPLAY_CHANGES. */
@@ -54,12 +58,14 @@ struct replay {
     uint64_t n_ticks,
         end_tick; /* the run's length, and the tick at which it ends; UINT64_MAX: none, or not known yet */
     struct recording recording;
+    double begin_s;   /* where it begins to play, since its first frame */
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;
     int playing;         /* changed under the lock */
     uint64_t start_tick; /* the tick at which it began, or at which counting began anew */
     int64_t base;        /* the tick of the recording at start_tick */
     int64_t last;        /* tick of the recording of the frame sent last */
+    double pace;         /* the speed at which frames are sent since start_tick */
     int64_t shift_ns;    /* of the frames being sent: the run's device time less theirs */
     uint32_t seq_shift;  /* added to sequence numbers */
     int has_seq;         /* a frame was sent since power-up; last_seq is its number as it was sent */
@@ -90,6 +96,8 @@ void replay_report(void *self, int number, const char *text);
 
 /* replay_player.c, by the player's thread. Begins to play with this tick. */
 void replay_begin(struct replay *replay, uint64_t tick);
+/* The speed has changed: the next frame is due with this tick. */
+void replay_pace(struct replay *replay, uint64_t tick);
 /* Fills a tick with its frames. may_skip: time without frames passes at once. */
 void replay_fill(struct replay *replay, uint64_t tick, int may_skip);
 void replay_stop(struct replay *replay, uint64_t tick, int wants_again);

@@ -260,6 +260,11 @@ class Page {
     return [words, ...this.faults, ...this.failed.map(({url, why}) => `${url}: ${why}`)].join('\n');
   }
 
+  /** A page behind another one draws nothing. */
+  toFront() {
+    return this.send('Page.bringToFront');
+  }
+
   close() {
     return this.browser.send('Target.closeTarget', {targetId: this.target});
   }

@@ -6,6 +6,7 @@ import {connect} from 'node:net';
 import {readFileSync} from 'node:fs';
 import {Browser} from './browser.mjs';
 import {Client, end, endpoint, start} from './head.mjs';
+import {testInstrument} from './instrument.mjs';
 import {both, CONFIG, recorded} from './rig.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
@@ -82,11 +83,10 @@ const {head, page, other} = await open(browser, '--journal', `${folder}/journal`
 whenFailed(async () => `head: ${await other.ask('HEAD:STATE?')}, ${await other.ask('TIME?')} ns\n${await page.knows()}`);
 
 await test('without control nothing that the user does reaches the head', async () => {
-  for (const at of ['#start', '#stop', '#knob-head-lines', '#reset']) {
+  for (const at of ['#knob-head-lines', '#reset']) {
     is(await page.eval(`document.querySelector("${at}").disabled`), `${at} is disabled`);
-    await page.click(at);
+    equal(await page.eval(`document.querySelector("${at}").getClientRects().length`), 0, `${at} as it is shown`);
   }
-  await page.fill('#knob-head-lines', 60);
   await page.eval(dragged([1, 1, 1.6]));
   const banner = await page.until('!document.querySelector("#banner").hidden && document.querySelector("#banner").textContent');
   is(banner.startsWith('Station 1 stays where it is'), `the banner says so: ${banner}`);
@@ -245,6 +245,8 @@ await test('a recording: its page has as many points', async () => {
   equal(page.faults.join('\n'), '', 'errors of its scripts');
   await end(view);
 });
+
+await testInstrument(browser);
 
 await browser.end();
 finish();

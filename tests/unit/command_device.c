@@ -73,6 +73,7 @@ struct command_device command_test_device(void)
                      .range_min_nm = NANO,
                      .range_max_nm = 400 * NANO,
                      .sigma_nm = 5 * MICRO},
+        .replay = {.is_there = 1, .speed = 1},
         .state = HEAD_IDLE,
         .frames_done = 7,
         .t_ns = INT64_C(1234567890123),

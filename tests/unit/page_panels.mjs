@@ -51,7 +51,7 @@ for (const [name, colours] of Object.entries(themes)) {
 
 test('nothing inline, nothing from elsewhere', () => {
   equal(/\sstyle=|\son\w+=|<style|https?:\/\//.test(page), false, 'index.html');
-  equal(/<script(?![^>]*\ssrc="main\.js")/.test(page), false, 'scripts');
+  equal(/<script(?![^>]*\ssrc="(main|theme)\.js")/.test(page), false, 'scripts');
   equal(/url\(|@import|https?:/.test(css), false, 'style.css');
 });
 

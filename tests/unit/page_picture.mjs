@@ -4,6 +4,10 @@
 import {Cloud, BLOCK, evenOrder, pointOf} from '../../drivers/link/web/cloud.js';
 import {Camera, FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
+import {SCALES} from '../../drivers/link/web/view_ramps.js';
+import {Keeper} from '../../drivers/link/web/keeper.js';
+import {Parser} from '../../drivers/link/web/native_parser.js';
+import {crc32c} from '../../drivers/link/web/crc32c.js';
 import {nearest} from '../../drivers/link/web/view_pick.js';
 import {Budget, restShares, shares} from '../../drivers/link/web/view_draw.js';
 import {Stations, inScene} from '../../drivers/link/web/view_stations.js';
@@ -278,6 +282,121 @@ test('a station that is grabbed beside its middle does not jump; keys turn it', 
     near(stations.moved.heading_deg, heading, 1e-9, `after ${key}`);
   }
   stations.letGo(); // and no timer is left
+});
+
+// ---- colour scales
+
+const linear = (v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4);
+// CIELAB of sRGB (D65), another measure of lightness and differences than the one by which the scales were made.
+function lab(rgb) {
+  const [r, g, b] = rgb;
+  const f = (t) => (t > 216 / 24389 ? Math.cbrt(t) : (24389 / 27 * t + 16) / 116);
+  const [x, y, z] = [(0.4124564 * r + 0.3575761 * g + 0.1804375 * b) / 0.95047, 0.2126729 * r + 0.7151522 * g + 0.072175 * b,
+    (0.0193339 * r + 0.119192 * g + 0.9503041 * b) / 1.08883].map(f);
+  return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
+}
+// What people see who lack a kind of cones: Machado, Oliveira and Fernandes 2009, severity 1, in linear light.
+const SIGHTS = {
+  all: [1, 0, 0, 0, 1, 0, 0, 0, 1],
+  protan: [0.152286, 1.052583, -0.204868, 0.114503, 0.786281, 0.099216, -0.003882, -0.048116, 1.051998],
+  deutan: [0.367322, 0.860646, -0.227968, 0.280085, 0.672501, 0.047413, -0.01182, 0.04294, 0.968881],
+  tritan: [1.255528, -0.076749, -0.178779, -0.078411, 0.930809, 0.147602, 0.004733, 0.691367, 0.3039],
+};
+const seenBy = (m, rgb) => [0, 3, 6].map((k) => Math.min(1, Math.max(0, m[k] * rgb[0] + m[k + 1] * rgb[1] + m[k + 2] * rgb[2])));
+
+test('the even scales: every step is brighter, also for the colour-blind, and steps are alike', () => {
+  for (const scale of ['even', 'blue', 'grey']) {
+    for (const [sight, m] of Object.entries(SIGHTS)) {
+      const all = Array.from({length: 17}, (_, i) => lab(seenBy(m, rampAt(scale, i / 16).map(linear))));
+      const steps = all.slice(1).map((c, i) => Math.hypot(...c.map((v, k) => v - all[i][k])));
+      const rises = all.slice(1).map((c, i) => c[0] - all[i][0]);
+      same(rises.every((rise) => rise > 1.5), true, `${scale}, ${sight}: lightness rises by ${rises.map((v) => v.toFixed(1))}`);
+      // A difference of 2.3 is just seen (Mahy 1994).
+      same(Math.min(...steps) > 2.3, true, `${scale}, ${sight}: steps of ${steps.map((v) => v.toFixed(1))}`);
+    }
+  }
+  // The usual one of heights fails here: what is its use without red and green?
+  const usual = Array.from({length: 17}, (_, i) => lab(seenBy(SIGHTS.deutan, rampAt('spectrum', i / 16).map(linear)))[0]);
+  same(usual.slice(1).every((v, i) => v > usual[i]), false, 'spectrum');
+});
+
+test('low is blue or dark and high is red or bright on every scale, and none is cut by the gamut', () => {
+  for (const [scale] of SCALES.filter(([name]) => name !== 'usual')) {
+    const [low, high] = [0, 1].map((f) => lab(rampAt(scale, f).map(linear))[0]);
+    same(low < 40 && high > 85, true, `${scale}: lightness ${low} to ${high}`);
+    for (let f = 0.02; f < 0.99; f += 0.02) same(rampAt(scale, f).every((v) => v > 0 && v < 255), true, `${scale} at ${f}`);
+  }
+  const [r, , b] = rampAt('spectrum', 0), [red, , blue] = rampAt('spectrum', 1);
+  same([b > 2 * r, red > 2 * blue], [true, true], 'spectrum');
+  same([rampAt('grey', 0), rampAt('grey', 1)], [[0, 0, 0], [255, 255, 255]], 'grey as of files');
+});
+
+test('limits leave out the share that is asked for', () => {
+  const values = Array.from({length: 1001}, (_, i) => i);
+  for (const [share, lo, hi] of [[0, 0, 1000], [0.01, 10, 990], [0.05, 50, 950]]) { // and 2 % of the rest at each end
+    same(robustLimits(values, 0, share), [lo - 0.02 * (hi - lo), hi + 0.02 * (hi - lo)], `${share}`);
+  }
+});
+
+// ---- times
+
+test('only points within the window of times are found, of scans that began at different times', () => {
+  const cloud = new Cloud();
+  const first = Object.assign(batch(10, (i) => [i, 0, 0]), {began_s: 100});
+  const second = Object.assign(batch(10, (i) => [i, 0, 0.01], {scan: 2, station: 2}), {began_s: 200});
+  for (const b of [first, second]) b.t.forEach((_, i) => { b.t[i] = i; });
+  cloud.add(first);
+  cloud.add(second);
+  near(cloud.latest_s, 209, 1e-9, 'the newest');
+  same(cloud.blocks.map(({span}) => [span.from, span.to]), [[0, 9], [0, 9]], 'spans');
+  const c = camera({target: [5, 0, 0], distance: 10});
+  const at = c.project([5, 0, 0]);
+  const found = (window) => {
+    cloud.window = window;
+    const it = nearest(cloud, c, at.x, at.y, 8);
+    return it && [it.block.station, it.block.t[it.i]];
+  };
+  same(found({from: 104.5, to: 105.5}), [1, 5], 'a second of the first scan');
+  same(found({from: 204.5, to: 205.5}), [2, 5], 'of the second');
+  same(found({from: 206, to: Infinity}), null, 'later ones are elsewhere');
+  same(found({from: 300, to: Infinity}), null, 'none');
+  same(found(null) !== null, true, 'all');
+});
+
+test('a batch of the past does not make the newest point', () => {
+  const cloud = new Cloud();
+  cloud.add(Object.assign(batch(2, () => [0, 0, 0]), {began_s: 100}));
+  cloud.add(Object.assign(batch(2, () => [0, 0, 0], {scan: 2}), {began_s: 50, past: true}));
+  near(cloud.latest_s, 100, 1e-9, 'the newest');
+});
+
+// ---- recording
+
+const frameOf = (type, flags, seq, text) => {
+  const payload = new TextEncoder().encode(text), bytes = new Uint8Array(28 + payload.length), v = new DataView(bytes.buffer);
+  bytes.set([0xd5, type, 1, flags]);
+  bytes.set(payload, 28);
+  v.setUint32(4, payload.length, true);
+  v.setUint32(8, seq, true);
+  v.setUint32(12, crc32c(v, 28, bytes.length), true);
+  v.setUint32(24, crc32c(v, 0, 24), true);
+  return bytes;
+};
+
+test('a recording begins with what its points need, and has every frame from there on', async () => {
+  const keeper = new Keeper();
+  const parser = new Parser({frame: (frame) => keeper.take(frame)});
+  [frameOf(1, 0, 0, 'old'), frameOf(10, 0, 1, 'old emitter'), frameOf(2, 0, 2, 'old anchor'), frameOf(1, 0, 3, 'new'),
+    frameOf(2, 0, 4, 'anchor'), frameOf(3, 0, 5, 'before')].forEach((bytes) => parser.push(bytes));
+  keeper.begin();
+  [frameOf(3, 0, 6, 'points'), frameOf(4, 0, 7, 'line')].forEach((bytes) => parser.push(bytes));
+  const bytes = new Uint8Array(await keeper.end().arrayBuffer()), got = [];
+  parser.push(frameOf(3, 0, 8, 'after'));
+  same(keeper.bytes, bytes.length, 'its length');
+  const reader = new Parser({frame: ({type, flags, seq, payload}) => got.push([type, flags, seq, new TextDecoder().decode(payload)])});
+  reader.push(bytes);
+  same(got, [[1, 3, 0, 'new'], [2, 3, 0, 'anchor'], [3, 0, 6, 'points'], [4, 0, 7, 'line']], 'frames'); // 3: REPEAT, LOCAL
+  same([reader.stats.bad_bytes, reader.stats.lost_frames], [0, 0], 'bad bytes and lost frames');
 });
 
 test('levels of detail: equal shares; the budget follows the time', () => {

@@ -101,6 +101,11 @@ static int is_server(const struct command_row *row)
     return strcmp(row->header, "TIME:SERVer") == 0;
 }
 
+static int is_replay(const struct command_row *row)
+{
+    return strcmp(row->header, "SCAN:REPLay") == 0;
+}
+
 /* Writes a line of the row that is valid by itself. */
 static void fill_line(char line[256], const struct command_row *row, int query)
 {
@@ -109,6 +114,7 @@ static void fill_line(char line[256], const struct command_row *row, int query)
              query               ? "?"
              : is_of_faults(row) ? (strstr(row->header, "ADD") != NULL ? " {kind: drop}" : " ALL")
              : is_server(row)    ? " NONE,127.0.0.1,600,0,ETH"
+             : is_replay(row)    ? " 1"
              : row->own          ? " 1, DEF"
              : row->setting      ? " DEF"
              : row->unit         ? " 1"
@@ -152,6 +158,7 @@ static void columns(char text[256], const struct command_row *row)
     if (row->own) {
         add(text, is_of_faults(row) ? "see *Faults on request*"
                   : is_server(row)  ? "see *Time server*"
+                  : is_replay(row)  ? "see *A recording that is replayed*"
                                     : "see *Moving a station*");
     } else if (row->setting != NULL) {
         add_range(text, row);

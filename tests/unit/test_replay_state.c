@@ -240,6 +240,119 @@ static void a_part_begins_with_the_head(void **state)
     }
 }
 
+/* Plays one tick. Returns the times of its events in ms, one after the other; D is a repeated descriptor. */
+static const char *tick_of_replay(struct replay *r, uint64_t i)
+{
+    static char text[256];
+    struct ring_tick tick;
+    struct native_header h;
+    text[0] = '\0';
+    assert_int_equal(replay_source.next(r, i, 0, 0, &tick), LOOP_SOURCE_TICK);
+    for (uint32_t at = 0; at < tick.len; at += (uint32_t)native_frame_len(tick.bytes + at)) {
+        const size_t len = strlen(text);
+        native_read_header(tick.bytes + at, &h);
+        if (h.type == NATIVE_EVENT)
+            snprintf(text + len, sizeof text - len, "%lld ", (long long)h.t_ns / TICK_NS);
+        else if ((h.flags & NATIVE_LOCAL) != 0)
+            snprintf(text + len, sizeof text - len, "D ");
+    }
+    return text;
+}
+
+static const char *said(struct replay *r, const char *line)
+{
+    static struct command_result result;
+    replay_source.command(r, 1, line, 0, &result);
+    return result.reply;
+}
+
+/* SCAN:REPLay: another time, another speed, a pause, a loop. */
+static void a_command_seeks_paces_and_loops(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t tick;
+        const char *line, *events;
+    } rows[] = {{0, "", "0 "},
+                {1, "", "1 "},
+                {2, "SCAN:REPL 0.012", "D 12 "}, /* a reader needs the descriptor that it was not sent */
+                {3, "SCAN:REPL ,0", ""},
+                {4, "", ""},
+                {5, "SCAN:REPL ,2", "13 14 "},
+                {6, "", "15 16 "},
+                {7, "SCAN:REPL 0.019 , 0.5 , ON", "D "}, /* at half the speed each takes two ticks */
+                {8, "", "19 "},
+                {9, "SCAN:REPL ,1", "0 "}, /* anew, by the loop */
+                {10, "SCAN:REPL ,,OFF", "1 "}};
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct replay *r;
+    struct sh_err err;
+    assert_non_null(cfg);
+    cfg->loop.tick_hz = 1e9 / TICK_NS;
+    FILE *f = begin_file();
+    put_descriptor(f);
+    for (int ms = 0; ms < 20; ms++)
+        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
+    assert_int_equal(fclose(f), 0);
+    const struct replay_options options = {.path = path, .speed = 1, .start = 1};
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.000000,0.019000,1,OFF");
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        if (rows[i].line[0] != '\0') assert_string_equal(said(r, rows[i].line), "OK");
+        const char *events = tick_of_replay(r, rows[i].tick);
+        if (strcmp(events, rows[i].events) != 0)
+            fail_msg("tick %zu, %s: '%s', wanted '%s'", i, rows[i].line, events, rows[i].events);
+    }
+    assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.001000,0.019000,1,OFF");
+    for (uint64_t tick = 11; tick < 30; tick++)
+        tick_of_replay(r, tick);
+    assert_string_equal(said(r, "SCAN:REPL?"), "IDLE,0.019000,0.019000,1,OFF");
+    replay_free(r);
+    free(cfg);
+}
+
+static void what_a_replay_refuses(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *line, *error, *words;
+    } rows[] = {{"SCAN:REPL", "ERR -109", "time, speed or loop"},
+                {"SCAN:REPL 0.0021", "ERR -222", "allowed 0 to 0.002"},
+                {"SCAN:REPL -1", "ERR -222", "allowed 0 to 0.002"},
+                {"SCAN:REPL ,1001", "ERR -222", "allowed 0 to 1000"},
+                {"SCAN:REPL ,0.009", "ERR -222", "0.01 to 1000"},
+                {"SCAN:REPL now", "ERR -104", "'now'"},
+                {"SCAN:REPL 0 S", "ERR -104", "'0 S'"},
+                {"SCAN:REPL 0,1,AGAIN", "ERR -104", "ON or OFF"},
+                {"SCAN:REPL 0,1,ON,1", "ERR -108", "takes a time"},
+                {"SCAN:REPL? 1", "ERR -108", ""}};
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct replay *r;
+    struct sh_err err;
+    assert_non_null(cfg);
+    cfg->loop.tick_hz = 1e9 / TICK_NS;
+    FILE *f = begin_file();
+    put_descriptor(f);
+    for (int ms = 0; ms < 3; ms++)
+        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
+    assert_int_equal(fclose(f), 0);
+    struct replay_options options = {.path = path, .speed = 1};
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const char *reply = said(r, rows[i].line);
+        if (strncmp(reply, rows[i].error, strlen(rows[i].error)) != 0 || strstr(reply, rows[i].words) == NULL)
+            fail_msg("%s: %s", rows[i].line, reply);
+    }
+    assert_string_equal(said(r, "SCAN:REPL?"), "IDLE,0.000000,0.002000,1,OFF");
+    replay_free(r);
+    cfg->loop.pace = PACE_FAST;
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(strncmp(said(r, "SCAN:REPL ,0"), "ERR -221", 8), 0); /* such a pace has one speed */
+    assert_string_equal(said(r, "SCAN:REPL ,1"), "OK");
+    replay_free(r);
+    free(cfg);
+}
+
 /* ---- states */
 
 static const char *state_at(struct replay *r, uint64_t released)
@@ -293,7 +406,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_go_out_with_what_follows), cmocka_unit_test(it_begins_anew_as_it_began),
         cmocka_unit_test(frames_go_out_in_their_ticks),    cmocka_unit_test(each_time_has_its_numbers),
-        cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(a_state_holds_from_its_tick_on),
+        cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(a_command_seeks_paces_and_loops),
+        cmocka_unit_test(what_a_replay_refuses),           cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

@@ -9,12 +9,16 @@ export class Bar {
   #done = 0;
   #share = null; // this part of the scan is done, 0 to 1
   #frame_s = 0;
-  #showSoon = atMostEvery(250, () => say(byId('progress'), this.#progressText(this.#session.scan)));
+  #showSoon = atMostEvery(250, () => this.#showProgress(this.#session.scan));
   #busy = false;
 
   constructor(session, log) {
     this.#session = session;
-    const run = (line) => () => this.#do(() => session.command(line), log);
+    // Start and stop take control where nobody has it.
+    const run = (line) => () => this.#do(async () => {
+      if (!session.mine) await session.take();
+      await session.command(line);
+    }, log);
     byId('start').addEventListener('click', () => run(session.state === 'fault' ? '*RST' : 'SCAN:STARt')());
     byId('stop').addEventListener('click', run('SCAN:STOP'));
     byId('control').addEventListener('click', () =>
@@ -66,6 +70,13 @@ export class Bar {
   #timer = 0;
   #notice = '';
   #kind = '';
+  #recording = '';
+  // Says what is being recorded beside the progress; '': nothing.
+  recording(words) {
+    this.#recording = words;
+    this.show();
+  }
+
   // kind is '' for information, 'warn' or 'bad'.
   notice(text, ms, kind = '') {
     clearTimeout(this.#timer);
@@ -80,21 +91,25 @@ export class Bar {
 
   show() {
     const {link, state, pace, mine, owner, who, scan, since} = this.#session;
-    const open = link === 'open';
+    const open = link === 'open', may = open && !this.#busy && (mine || owner === 0);
     document.body.dataset.link = link;
     document.body.dataset.owner = mine ? 'page' : owner ? 'other' : 'nobody';
     document.body.dataset.state = open ? state ?? '' : '';
     say(byId('state-word'), open ? stateWord(state ?? '…', pace) : link === 'closed' ? 'Not connected' : 'Connecting');
-    say(byId('progress'), this.#progressText(scan));
+    this.#showProgress(scan);
     say(byId('owner'), !open ? '' : mine ? 'You have control' : owner ? `${who} has control` : 'Nobody has control');
+    byId('owner').title = byId('owner').textContent;
     say(byId('control'), mine ? 'Give back control' : 'Take control');
-    byId('control').classList.toggle('main', !mine);
-    byId('control').disabled = !open || this.#busy || (!mine && owner !== 0);
+    byId('control').disabled = !may;
     byId('control').title = !mine && owner ? `${who} has control. It has to give it back first.` : '';
     say(byId('start'), state === 'fault' ? 'Reset' : 'Start');
-    byId('start').disabled = !mine || this.#busy || !['idle', 'fault'].includes(state);
-    byId('stop').disabled = !mine || this.#busy || !['spin-up', 'scanning'].includes(state);
+    byId('start').disabled = !may || !['idle', 'fault'].includes(state);
+    byId('stop').disabled = !may || !['spin-up', 'scanning'].includes(state);
     this.#showBanner(link, since);
+  }
+
+  #showProgress(scan) {
+    say(byId('progress'), [this.#progressText(scan), this.#recording].filter(Boolean).join(' · '));
   }
 
   #progressText(scan) {

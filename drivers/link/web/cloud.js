@@ -57,8 +57,11 @@ class Block {
   amplitude = null;
   rgb = null; // each point has three values
 
-  constructor(first, batch) {
+  #span = {n: 0, from: Infinity, to: -Infinity};
+
+  constructor(first, batch, began_s) {
     this.first = first; // this is the number of its first point since the cloud was cleared
+    this.began_s = began_s; // its scan's start; times of points count from there
     this.scan = batch.scan;
     this.station = batch.station;
     this.pulse0 = batch.n > 0 ? batch.pulse[0] : 0;
@@ -131,6 +134,16 @@ class Block {
     }
   }
 
+  // The first and the last time of its points. It is looked for when somebody asks.
+  get span() {
+    const {n, t} = this, s = this.#span;
+    for (; s.n < n; s.n++) {
+      if (t[s.n] < s.from) s.from = t[s.n];
+      if (t[s.n] > s.to) s.to = t[s.n];
+    }
+    return s;
+  }
+
   bytes() {
     let sum = 0;
     for (const name of ['position', 't', 'range', 'label', 'echo', 'pulse', 'reflectance', 'amplitude', 'rgb']) {
@@ -147,6 +160,8 @@ export class Cloud {
   origin = null;
   blocks = [];
   changed = null; // it is called after each change
+  window = null; // {from, to}: only points of these times are shown and found; times are as `latest_s`
+  latest_s = -Infinity; // the time of the point that came last: device time, or that of a recording
   #scans = new Map(); // it has the newest scan of each station
   #outdated = 0; // the points before this one come from another run of the head
   #gone_lo = [Infinity, Infinity, Infinity];
@@ -167,7 +182,7 @@ export class Cloud {
       let block = this.blocks.at(-1);
       if (!block?.takes(batch, from)) {
         if (block && !block.closed) block.close();
-        block = new Block(this.total, batch);
+        block = new Block(this.total, batch, this.#began(batch));
         block.pulse0 = batch.pulse[from];
         this.blocks.push(block);
       }
@@ -176,8 +191,14 @@ export class Cloud {
       this.total += k;
       if (block.n === BLOCK) block.close();
     }
+    if (!batch.past && batch.t[batch.n - 1] >= 0) this.latest_s = this.blocks.at(-1).began_s + batch.t[batch.n - 1];
     this.#let_go();
     this.changed?.();
+  }
+
+  // All blocks of a scan have one start, so that times of points keep their distances.
+  #began({scan, station, began_s = 0}) {
+    return this.blocks.findLast((block) => block.scan === scan && block.station === station)?.began_s ?? began_s;
   }
 
   // Drops whole blocks, as long as the rest has at least the capacity.
@@ -237,6 +258,7 @@ export class Cloud {
     this.blocks = [];
     this.#outdated = 0;
     this.total = this.gone = 0;
+    this.latest_s = -Infinity;
     this.origin = null;
     this.#gone_lo = [Infinity, Infinity, Infinity];
     this.#gone_hi = [-Infinity, -Infinity, -Infinity];
@@ -260,6 +282,10 @@ export class Cloud {
   get bounds() { return this.#within([Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]); }
   get boundsOfAll() { return this.#within(this.#gone_lo, this.#gone_hi); }
 }
+
+// Whether no point of a block is within a window of times.
+export const isOutside = (window, block) => window !== null &&
+  (block.span.to < window.from - block.began_s || block.span.from > window.to - block.began_s);
 
 // Returns all figures of point i of a block.
 export function pointOf(cloud, block, i) {

@@ -2,6 +2,9 @@
 // This panel sets the look of the picture: colours with their legend, point size, the things drawn besides points, and
 // the viewpoint.
 import {bodyOf, byId, kept, make, say} from './page.js';
+import {ageRow} from './ages.js';
+import {Limits} from './limits.js';
+import {download, drawLegend, fileName} from './picture.js';
 
 const MODES = [['height', 'Height'], ['range', 'Range'], ['reflectance', 'Reflectance'], ['amplitude', 'Amplitude'],
   ['label', 'Surface'], ['echo', 'Echo'], ['station', 'Station'], ['age', 'Age'], ['rgb', 'Colours of the points']];
@@ -14,6 +17,7 @@ export class Display {
   #names;
   #legend = byId('legend');
   #shown = '';
+  #limits;
 
   // names(mode, label) returns the name of a surface or a station for people
   constructor(view, names, isRecording = false) {
@@ -28,15 +32,20 @@ export class Display {
       ...MODES.map(([value, name]) => make('option', {value}, name)));
     const size = make('input', {id: 'size', type: 'range', min: 1, max: 8, step: 0.5, input: () => this.#size(size)});
     this.sizeText = make('output', {for: 'size', class: 'unit'});
-    body.append(
-      make('div', {class: 'row'}, make('label', {for: 'colour'}, 'Colours by'), mode),
+    this.#limits = new Limits(view);
+    const rows = [
+      make('div', {class: 'row'}, make('label', {for: 'colour'}, 'Colours by'), mode), this.#limits.rows,
       make('div', {class: 'row'}, make('label', {for: 'size'}, 'Point size'), size, this.sizeText),
+      isRecording ? null : ageRow(view),
       make('div', {class: 'ticks'}, isRecording ? null : this.#tick('scene', 'Scene'), this.#tick('stations', 'Stations'), this.#tick('legend', 'Legend')),
       make('div', {class: 'actions'}, make('button', {type: 'button', id: 'fit', click: () => view.fit()}, 'Show all'),
         make('button', {type: 'button', id: 'look', title: 'Look from where the head stands',
           click: () => view.lookFrom(this.station?.())}, 'From the head'),
         isRecording ? null : make('button', {type: 'button', id: 'clear', title: 'Forgets the points that are held',
-          click: () => view.cloud.clear()}, 'Clear')));
+          click: () => view.cloud.clear()}, 'Clear'),
+        make('button', {type: 'button', id: 'screenshot', title: 'The picture with its legend, as a PNG file',
+          click: () => this.#save()}, 'Save picture'))];
+    body.append(...rows.filter(Boolean));
     mode.value = MODES.some(([value]) => value === kept.get('colour')) ? kept.get('colour') : 'height';
     size.value = kept.get('size') ?? 2;
     this.#colour(mode.value);
@@ -73,7 +82,19 @@ export class Display {
     kept.set('colour', mode);
     this.mode = mode;
     this.#view.colour(mode);
+    this.#limits.show(mode);
     this.#showLegend();
+  }
+
+  // A PNG of the picture, with the legend where it is shown.
+  async picture() {
+    const canvas = await this.#view.picture(), legend = this.#is('legend') ? this.#view.legend() : null;
+    if (legend) drawLegend(canvas, legend, this.#view.colours.css, (item) => this.#itemName(item), this.#view.ratio);
+    return new Promise((resolve) => canvas.toBlob(resolve, 'image/png'));
+  }
+
+  async #save() {
+    download(await this.picture(), fileName('png'));
   }
 
   #size(field) {

@@ -97,6 +97,11 @@ export class Head extends EventTarget {
     this.#controlled(Number(await this.command('SYSTem:CONTrol?')));
   }
 
+  /** true: the frames from now on are kept. false: they are handed on as a `kept` event, whose detail is a Blob. */
+  keep(on) {
+    this.#wire.post({keep: on});
+  }
+
   /** Ends the connection for good. */
   close() {
     if (this.#isClosed) return;

@@ -279,10 +279,12 @@ export class Knobs extends EventTarget {
     }
   }
 
+  // Settings are there for those who may change them.
   #allow() {
     const common = this.#session.whyNot();
+    byId('panel-knobs').hidden = !this.#session.mine;
     say(this.#note, this.#knobs.size === 0 ? 'The head has not yet said what can be set.'
-      : common ? common.replace('control first', 'control to change settings') : 'Sent on Enter, or when you leave a field.');
+      : common || 'Sent on Enter, or when you leave a field.');
     this.reset.disabled = common !== '';
     this.reset.title = 'Sends *RST: all settings as at power-up. A scan is stopped.';
     for (const knob of this.#knobs.values()) {

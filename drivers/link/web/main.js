@@ -3,7 +3,7 @@
 import {byId, fetchJson, kept, say} from './page.js';
 import {Head} from './head.js';
 import {Cloud} from './cloud.js';
-import {Session, startTheme} from './session.js';
+import {Session, startTheme, why} from './session.js';
 import {Bar} from './bar.js';
 import {Knobs} from './knobs.js';
 import {Figures} from './figures.js';
@@ -13,6 +13,9 @@ import {Stations} from './stations.js';
 import {Display} from './display.js';
 import {Point} from './point.js';
 import {Recording} from './recording.js';
+import {startRecorder} from './recorder.js';
+import {startKeys} from './keys.js';
+import {RecordingPlayer, ReplayPlayer, Timeline} from './timeline.js';
 
 const CAPACITY = 10e6; // so many points are stored
 const WIDE = '(min-width: 47rem)';
@@ -80,6 +83,7 @@ function startHead(cloud, view, names, keepsPast) {
   const session = new Session(head);
   const log = new Log(session);
   const bar = new Bar(session, log);
+  startRecorder(head, bar);
   const knobs = new Knobs(session);
   const stations = new Stations(session, knobs, view);
   const figures = new Figures(head, cloud);
@@ -92,9 +96,16 @@ function startHead(cloud, view, names, keepsPast) {
   const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
   let before = ''; // it says who the head was
   let run = ''; // it says which of the head's runs it was
+  let timeline = null;
+  const refused = (error) => bar.notice(`The head refused: ${why(error)}`, 6000, 'bad');
+  const findReplay = async () => {
+    const player = timeline ? null : await ReplayPlayer.of(session, cloud, refused).catch(() => null);
+    if (player) timeline = new Timeline(player);
+  };
   const learn = async () => {
     const came = cloud.cut();
     countFrames();
+    findReplay();
     const info = await fetchJson('/head');
     if (!info) return;
     const now = [info.config, info.maker, info.model, info.serial].join();
@@ -154,6 +165,8 @@ function startRecording(info, cloud, view, names) {
   const point = new Point(view, names.of, {pulse: 'Number'});
   point.t0_s = info.recording.t0_s ?? 0;
   view?.addEventListener('drawn', ({detail}) => figures.drawn(detail));
+  const times = info.recording.columns?.find(({name}) => name === 't');
+  if (view && times?.max > times?.min) new Timeline(new RecordingPlayer(view, {from_s: times.min, to_s: times.max}));
   return new Recording(info, cloud, view);
 }
 
@@ -162,11 +175,13 @@ async function start() {
   startPanels();
   const cloud = new Cloud({capacity: CAPACITY});
   const view = await makeView(cloud);
+  startKeys(view?.constructor.keys ?? []);
   const names = new Names();
   const info = await fetchJson('/head');
   window.scanhead = {head: null, cloud, view};
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
+  document.body.dataset.ready = ''; // until then the sides are not shown, since they grow
 }
 
 start();

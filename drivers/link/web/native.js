@@ -72,8 +72,8 @@ export class Decoder {
     const to = waits ? this.last.from : c.n, held = waits ? this.last.shots : 0;
     if (batch === null || (to === 0 && this.shots === held)) return;
     const copy = c.copy(0, to, batch.rgb);
-    const {scan, frame, line, station, pulse0} = batch;
-    const out = {n: to, shots: this.shots - held, scan, frame, line, station, pulse0, ...copy};
+    const {scan, frame, line, station, pulse0, began_s} = batch;
+    const out = {n: to, shots: this.shots - held, scan, frame, line, station, pulse0, began_s, ...copy};
     c.drop(to);
     this.shots = held;
     if (waits) {
@@ -172,7 +172,8 @@ export class Decoder {
       c.n + MAX_POINTS <= c.room;
     if (!goesOn) {
       this.flush(true);
-      this.batch = {scan, frame: number, line, station, pulse0, rgb: (content & 2) !== 0};
+      const began_s = (Number(frame.t_ns) - t0_ns) * 1e-9; // the frame's time is that of its first pulse
+      this.batch = {scan, frame: number, line, station, pulse0, began_s, rgb: (content & 2) !== 0};
     }
     this.placer ??= (this.descriptor.layout === 0 ? polarPlacer : geoPlacer)(this.descriptor, this.anchor);
     const from = c.n;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This panel shows the point under the pointer, in figures. Its area stays also without a point, so nothing jumps.
+// This panel shows the point under the pointer, in figures. It lies over the picture, and only while there is a point, so
+// that nothing else moves.
 import {byId, grouped, make, say, NONE} from './page.js';
 
 const CELLS = [['place', 'x, y, z', 'wide'], ['range', 'Range'], ['reflectance', 'Reflectance'],
@@ -13,35 +14,57 @@ export class Point {
   #names;
   #next = null;
   #timer = 0;
+  #isAsked = false;
   t0_s = 0; // times count from this
 
   constructor(view, names, rename = {}) {
     this.#names = names;
     const list = make('dl');
     for (const [key, name, kind] of CELLS) {
-      this.#cells[key] = make('dd', {}, NONE);
-      list.append(make('div', {class: kind}, make('dt', {}, rename[key] ?? name), this.#cells[key]));
+      const cell = make('dd', {}, NONE);
+      const row = make('div', {class: kind}, make('dt', {}, rename[key] ?? name), cell);
+      this.#cells[key] = {row, cell};
+      list.append(row);
     }
     byId('point').append(list);
     view?.addEventListener('pick', ({detail}) => {
       this.#next = detail?.point ?? null;
+      this.#isAsked ||= detail?.isAsked ?? false;
       this.#timer ||= setTimeout(() => this.#show(), 60);
     });
   }
 
+  // A figure that the point does not have takes no room.
   #show() {
     this.#timer = 0;
-    const p = this.#next ?? {};
-    const texts = {
-      place: Number.isFinite(p.x) ? `${[p.x, p.y, p.z].map((v) => fixed(v, 3, '')).join(' ')} m` : NONE, range: fixed(p.range, 4, 'm'),
-      reflectance: fixed(p.reflectance, 2, 'dB'), amplitude: fixed(p.amplitude, 2, 'dB'),
+    const p = this.#next;
+    byId('point').hidden = p === null;
+    const texts = p === null ? {} : this.#texts(p);
+    for (const [key, text] of Object.entries(texts)) {
+      const {row, cell} = this.#cells[key];
+      say(cell, text);
+      row.hidden = text === NONE;
+    }
+    if (this.#isAsked) this.#speak(texts);
+    this.#isAsked = false;
+  }
+
+  // A screen reader reads a point that was asked for by a key, and none of those that the pointer comes by.
+  #speak({place, range, surface}) {
+    say(byId('point-says'), place === undefined ? 'No point in the middle of the picture'
+      : [`x, y, z: ${place}`, range !== NONE && `range ${range}`, surface !== NONE && surface].filter(Boolean).join('; '));
+  }
+
+  #texts(p) {
+    return {
+      place: Number.isFinite(p.x) ? `${[p.x, p.y, p.z].map((v) => fixed(v, 3, '')).join(' ')} m` : NONE, range: fixed(p.range, 3, 'm'),
+      reflectance: fixed(p.reflectance, 1, 'dB'), amplitude: fixed(p.amplitude, 1, 'dB'),
       echo: p.echo ? `${p.echo} of ${p.echoes}` : NONE,
       surface: p.label === undefined || p.label === 0xffff ? NONE : this.#names('label', p.label) ?? String(p.label),
       station: p.station === undefined ? NONE : this.#names('station', p.station) ?? String(p.station),
-      time: fixed(p.t + this.t0_s, 6, 's'),
+      time: fixed(p.t + this.t0_s, 3, 's'),
       pulse: p.pulse === undefined ? NONE : grouped(p.pulse),
       rgb: p.rgb?.length === 3 ? Array.from(p.rgb).join(' ') : NONE,
     };
-    for (const [key, text] of Object.entries(texts)) say(this.#cells[key], text);
   }
 }

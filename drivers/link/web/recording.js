@@ -60,7 +60,8 @@ export class Recording {
       change: () => this.#what === 'sparse' && this.load()});
     p.edgeText = make('output', {for: 'long-edge', class: 'unit'});
     p.density = make('input', {id: 'density', type: 'text', inputmode: 'decimal', value: '100', change: () => this.load()});
-    p.says = make('p', {class: 'note', role: 'status', id: 'loaded'});
+    p.says = make('p', {class: 'note', id: 'loaded'}); // it counts
+    p.done = make('p', {class: 'unseen', role: 'status'}); // a screen reader reads its end alone
     p.bar = make('div');
     p.scanRow = make('div', {class: 'row'}, make('label', {for: 'mesh-scan'}, 'Scan'), p.scan);
     p.edgeRow = make('div', {class: 'row'}, make('label', {for: 'long-edge',
@@ -69,7 +70,7 @@ export class Recording {
     bodyOf('recording').append(make('fieldset', {}, make('legend', {class: 'group'}, 'Shown as'), make('div', {class: 'ticks'},
       this.#radio('points', 'Points', false), this.#radio('mesh', 'Mesh', !r.has_mesh), this.#radio('sparse', 'Sparse points', !r.has_mesh))));
     if (!r.has_mesh) bodyOf('recording').append(make('p', {class: 'note'}, r.why_no_mesh ?? 'This recording has no mesh.'));
-    bodyOf('recording').append(p.scanRow, p.edgeRow, p.densityRow, make('div', {class: 'coverage'}, make('div', {class: 'track'}, p.bar), p.says));
+    bodyOf('recording').append(p.scanRow, p.edgeRow, p.densityRow, make('div', {class: 'coverage'}, make('div', {class: 'track'}, p.bar), p.says, p.done));
     this.#rows();
   }
 
@@ -116,11 +117,14 @@ export class Recording {
       if (this.#what === 'mesh') await this.#loadMesh(signal);
       else if (this.#what === 'sparse') await this.#loadSparse(signal);
       else await this.#loadPoints(signal);
-      if (!signal.aborted) this.#view?.fit();
+      if (signal.aborted) return;
+      this.#view?.fit();
+      say(this.#parts.done, this.#parts.says.textContent);
     } catch (error) {
       if (signal.aborted) return;
       this.#parts.says.className = 'refusal';
       say(this.#parts.says, error.message);
+      say(this.#parts.done, error.message);
     }
   }
 

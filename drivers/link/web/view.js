@@ -11,16 +11,16 @@ import {Painter, progress, shares} from './view_draw.js';
 import {Points} from './view_parts.js';
 import {Solids} from './view_scene.js';
 import {Stations} from './view_stations.js';
+import {Hover} from './view_hover.js';
 import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
-import {programsOf} from './view_gl.js';
+import {drawShaded, programsOf} from './view_gl.js';
 import {searchSlowly} from './view_pick.js';
-import {readTheme} from './view_theme.js';
-import {pointOf} from './cloud.js';
+import {onTheme, readTheme} from './view_theme.js';
+import {copyOf} from './picture.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
 const SHOW_MS = 160; // updates of a growing picture are so far apart, and twice the time of one
-const HOVER_MS = 70;
 const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from the picture, it is drawn again
 const PLAIN = 150_000; // with fewer points per frame, a frame is drawn plain
 const COARSE = 0.5; // this is the scale of such a frame
@@ -48,7 +48,10 @@ export class View extends EventTarget {
   #touched = false;
   #fitted = 0; // there were so many points when the view was fitted
   #pointSize = 2;
-  #hover = {timer: 0, stop: null, point: null};
+  #hover = new Hover(this, (point, isAsked) => {
+    this.#emit('pick', point || isAsked ? {point, isAsked} : null);
+    this.#ask('overlay');
+  });
   #waiting = [];
   #goneDrawn = 0;
   #lastGone = 0;
@@ -60,6 +63,7 @@ export class View extends EventTarget {
   #made = null; // it is {target, camera} of a frame that is not on the page yet
   #grown = false; // more is drawn than on the page
   #showEvery = SHOW_MS;
+  #photo = null; // it takes the next picture on the page
   #seen = this.camera; // it is the camera of the picture on the page
 
   constructor(canvas, cloud) {
@@ -95,15 +99,10 @@ export class View extends EventTarget {
       this.cameraMoved();
     });
     new ResizeObserver(() => this.#ask('resize')).observe(canvas);
-    const themed = () => {
+    onTheme(() => {
       this.colours = null;
       this.#ask('restart');
-    };
-    new MutationObserver(themed).observe(document.documentElement, {attributeFilter: ['data-theme', 'class', 'style']});
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', themed);
-    canvas.setAttribute('role', 'application');
-    canvas.setAttribute('aria-roledescription', 'picture of points in space');
-    if (!canvas.hasAttribute('aria-label')) canvas.setAttribute('aria-label', 'The points in space. Arrow keys turn, plus and minus zoom, Home shows all.');
+    });
   }
 
   // Makes everything on the GPU, also after a lost context.
@@ -112,7 +111,7 @@ export class View extends EventTarget {
     this.programs = programsOf(gl);
     this.#painter = new Painter(gl);
     this.#points = new Points(gl, this.programs, this.cloud);
-    this.#points.setMode(this.#scale.mode);
+    this.#paint();
     this.#solids.attach(gl, this.programs);
     this.empty = gl.createVertexArray();
     this.#bare();
@@ -160,8 +159,18 @@ export class View extends EventTarget {
 
   colour(mode) {
     if (!(mode in MODES)) throw new RangeError(`colour ${mode}: one of ${Object.keys(MODES).join(', ')}`);
-    this.#points.setMode(mode);
     this.#scale.colour(mode);
+    this.#paint();
+  }
+
+  // Of ramps: one of SCALES in view_ramps.js, and the share of the points that may lie beyond each end.
+  ramp({scale = this.#scale.scale, share = this.#scale.share}) {
+    this.#scale.choose(scale, share);
+    this.#paint();
+  }
+
+  #paint() {
+    this.#points.setMode(this.#scale.mode, this.#scale.scale);
     this.#ask('restart');
   }
 
@@ -169,6 +178,13 @@ export class View extends EventTarget {
   limits(lo, hi) {
     this.#scale.fix(lo, hi);
     this.#ask('restart');
+  }
+
+  // Shows only points of these times, {from, to} in seconds as `latest_s` of the cloud; null shows all.
+  times(window) {
+    this.cloud.window = window;
+    this.#want.restart ??= 'later';
+    this.#schedule();
   }
 
   // It returns the legend; see legendOf in view_colours.js.
@@ -209,6 +225,15 @@ export class View extends EventTarget {
     });
   }
 
+  // Resolves with a 2D canvas of the picture and what stands over it, once all present points are on the page.
+  async picture() {
+    await this.screenshotReady();
+    return new Promise((resolve) => {
+      this.#photo = resolve;
+      this.#ask('show');
+    });
+  }
+
   // Resolves once all present points are on the page.
   screenshotReady() {
     this.#ask('show');
@@ -229,29 +254,15 @@ export class View extends EventTarget {
 
   touched() { this.#touched = true; }
 
-  // The pointer is at a place, or nowhere: its point is searched for once it stays.
+  // The pointer is at a place, or nowhere.
   hover(p) {
-    const h = this.#hover;
-    clearTimeout(h.timer);
-    h.stop?.();
-    h.stop = null;
-    if (p === null) return this.#picked(null);
-    const hit = this.#solids.stationsOn ? this.stations.hit(this.camera, p.x, p.y) : null;
-    this.canvas.style.cursor = hit && this.movable ? (hit.what === 'turn' ? 'crosshair' : 'move') : 'default';
-    h.timer = setTimeout(() => {
-      h.stop = searchSlowly(this.cloud, this.camera, p.x, p.y, 8, (found) => {
-        h.stop = null;
-        this.#picked(found && this.cloud.origin ? pointOf(this.cloud, found.block, found.i) : null);
-      });
-    }, HOVER_MS);
+    const hit = p !== null && this.#solids.stationsOn ? this.stations.hit(this.camera, p.x, p.y) : null;
+    if (p !== null) this.canvas.style.cursor = hit && this.movable ? (hit.what === 'turn' ? 'crosshair' : 'move') : 'default';
+    this.#hover.at(p);
   }
 
-  #picked(point) {
-    if (point === null && this.#hover.point === null) return;
-    this.#hover.point = point;
-    this.#emit('pick', point ? {point} : null);
-    this.#ask('overlay');
-  }
+  // Looks for the point in the middle of the picture.
+  pickMiddle() { this.#hover.middle(); }
 
   // ---- drawing
 
@@ -352,26 +363,11 @@ export class View extends EventTarget {
 
   // Draws the shown picture, shaded and with its overlay, into a target that is put onto the page once it is done.
   #present() {
-    const gl = this.#gl;
-    const {shade} = this.programs;
     const {shown} = this.#painter;
     const target = this.#painter.pageTarget();
     target.bind();
-    gl.clearDepth(1);
-    gl.clear(gl.DEPTH_BUFFER_BIT);
-    gl.disable(gl.DEPTH_TEST);
-    gl.useProgram(shade.program);
-    gl.bindVertexArray(this.empty);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, shown.colour);
-    gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, shown.depth);
-    gl.uniform1i(shade.u_picture, 0);
-    gl.uniform1i(shade.u_depth, 1);
-    gl.uniform3fv(shade.u_ground, this.colours.ground);
-    gl.uniform1f(shade.u_strength, this.shading && shown.scale === 1 ? SHADING : 0);
-    gl.uniform1i(shade.u_step, Math.max(1, Math.round(this.ratio)));
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    drawShaded(this.#gl, this.programs.shade, this.empty, shown, {ground: this.colours.ground,
+      strength: this.shading && shown.scale === 1 ? SHADING : 0, step: Math.max(1, Math.round(this.ratio))});
     this.#solids.overlay(this.camera, this.colours, this.stations, shown.depth, shown.scale !== 1);
     this.#made = {target, camera: Object.assign(new Camera(), this.camera), moving: this.#moving};
   }
@@ -389,6 +385,8 @@ export class View extends EventTarget {
     target.toPage(width, height);
     this.#seen = camera;
     this.#over();
+    this.#photo?.(copyOf(this.canvas, this.overlay.canvas)); // a WebGL canvas can be read in the task that drew it
+    this.#photo = null;
     if (moving) {
       if (this.#lastFrame > 0 && now - this.#lastFrame < 1000) {
         const fps = 1000 / Math.max(1, now - this.#lastFrame);

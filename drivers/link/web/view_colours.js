@@ -4,6 +4,9 @@
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
 // `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
+import {rampAt} from './view_ramps.js';
+
+export {rampAt};
 export const NONE = Math.fround(-1e30); // it replaces NaN in shaders, and is exact as a float
 export const GREY = [128, 132, 138];
 
@@ -21,24 +24,9 @@ export const MODES = {
   rgb: {title: 'Colour', unit: '', kind: 'rgb'},
 };
 
-// The stops are evenly spaced. Lightness rises, or stays in the middle, so that each end can be read on dark and on
-// light.
-const RAMPS = {
-  spectrum: ['#3b4cc0', '#2f7fe0', '#1fb2c9', '#35c98b', '#8fd14f', '#e0c93f', '#f39a35', '#e4572e', '#b5213f'],
-  steel: ['#31364a', '#46618c', '#5b8db0', '#86b4bf', '#bfd2c8', '#f2ead2'],
-  ember: ['#2f3b66', '#5b3f86', '#92428b', '#c84c76', '#ef6b52', '#fb9a3f', '#ffd166'],
-};
 const ECHOES = [['only echo', '#5aa9e6'], ['first of several', '#f4a259'], ['between', '#b07bd6'], ['last of several', '#5fbf77']];
 
 const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
-
-export function rampAt(name, f) {
-  const stops = RAMPS[name];
-  const at = Math.min(Math.max(f, 0), 1) * (stops.length - 1);
-  const i = Math.min(Math.floor(at), stops.length - 2);
-  const a = parse(stops[i]), b = parse(stops[i + 1]);
-  return a.map((v, c) => v + (at - i) * (b[c] - v));
-}
 
 // Hues are a golden angle apart, with lightness in four steps, so that neighbouring numbers differ most.
 function listColour(k) {
@@ -49,10 +37,13 @@ function listColour(k) {
   });
 }
 
+// Returns the scale of a mode's ramp: the chosen one, or its own.
+const rampOf = (mode, scale) => (scale === 'usual' ? MODES[mode].ramp : scale);
+
 // Returns 256 colours, four bytes each.
-export function tableOf(mode) {
+export function tableOf(mode, scale = 'usual') {
   const table = new Uint8Array(4 * 256);
-  const {kind, ramp} = MODES[mode];
+  const {kind} = MODES[mode], ramp = rampOf(mode, scale);
   for (let i = 0; i < 256; i++) {
     const c = kind === 'ramp' ? rampAt(ramp, i / 255) : mode === 'echo' ? parse((ECHOES[i] ?? ECHOES[0])[1]) : listColour(i);
     table.set([...c.map(Math.round), 255], 4 * i);
@@ -105,14 +96,13 @@ export function sampleOf(cloud, mode, most = 20000) {
   return all.filter((v) => v !== NONE && v === v);
 }
 
-// Returns limits from the 1st to the 99th percentile, a little wider, so that single far points don't use up all
-// colours. They
-// are at least `least` apart; null without values.
-export function robustLimits(values, least = 0) {
+// Returns limits that leave out a share of the values at each end, a little wider, so that single far points don't use
+// up all colours. They are at least `least` apart; null without values.
+export function robustLimits(values, least = 0, share = 0.01) {
   if (values.length === 0) return null;
   const sorted = Float64Array.from(values).sort();
   const at = (f) => sorted[Math.round(f * (sorted.length - 1))];
-  const lo = at(0.01), hi = at(0.99);
+  const lo = at(share), hi = at(1 - share);
   const margin = Math.max(0.02 * (hi - lo) || Math.max(1e-6, Math.abs(lo) * 1e-6), 0.5 * (least - (hi - lo)));
   return [lo - margin, hi + margin];
 }
@@ -139,8 +129,8 @@ export function ticks([lo, hi], most = 6) {
 // text}]}, a list
 // {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names the item. A colour is
 // [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of their own.
-export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true}) {
-  const {title, unit, kind, ramp} = MODES[mode];
+export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true, scale = 'usual'}) {
+  const {title, unit, kind} = MODES[mode], ramp = rampOf(mode, scale);
   const legend = {mode, title, unit, none: GREY};
   const unknown = {stops: [GREY, GREY], from: 'not known', to: '', ticks: []};
   if (kind === 'rgb') return hasColours ? null : {...legend, ...unknown};

@@ -31,15 +31,17 @@ const POINTS = {
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in float a_value;
 layout(location = 2) in vec4 a_rgb;
+layout(location = 3) in float a_time;
 uniform int u_kind; // 0 ramp, 1 list, 2 rgb
 uniform vec2 u_limits; // lowest, 1 / (highest - lowest)
+uniform vec2 u_times; // points of other times are not shown
 uniform vec3 u_grey;
 uniform float u_size, u_near_w, u_size_most;
 uniform sampler2D u_table;
 flat out vec3 v_colour;
 void main() {
   vec3 s = seen(a_position);
-  gl_Position = placed(s);
+  gl_Position = a_time < u_times.x || a_time > u_times.y ? vec4(0.0, 0.0, 2.0, 1.0) : placed(s);
   gl_PointSize = clamp(u_size * sqrt(u_near_w / max(s.z, NEAR)), u_size, u_size_most);
   if (u_kind == 2) v_colour = a_rgb.rgb;
   else if (a_value < -1e29) v_colour = u_grey;
@@ -206,6 +208,25 @@ export class Target {
     this.gl.deleteTexture(this.colour);
     this.gl.deleteTexture(this.depth);
   }
+}
+
+// Draws a stored picture with its shading over the bound target. `empty` is a vertex array without attributes.
+export function drawShaded(gl, shade, empty, {colour, depth}, {ground, strength, step}) {
+  gl.clearDepth(1);
+  gl.clear(gl.DEPTH_BUFFER_BIT);
+  gl.disable(gl.DEPTH_TEST);
+  gl.useProgram(shade.program);
+  gl.bindVertexArray(empty);
+  gl.activeTexture(gl.TEXTURE0);
+  gl.bindTexture(gl.TEXTURE_2D, colour);
+  gl.activeTexture(gl.TEXTURE1);
+  gl.bindTexture(gl.TEXTURE_2D, depth);
+  gl.uniform1i(shade.u_picture, 0);
+  gl.uniform1i(shade.u_depth, 1);
+  gl.uniform3fv(shade.u_ground, ground);
+  gl.uniform1f(shade.u_strength, strength);
+  gl.uniform1i(shade.u_step, step);
+  gl.drawArrays(gl.TRIANGLES, 0, 3);
 }
 
 // Sets the uniforms by which a program places things. `eye` is relative to the thing's origin, split.

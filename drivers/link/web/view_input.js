@@ -11,7 +11,8 @@ import {grip} from './view_pick.js';
 
 export const KEYS = [
   ['arrows', 'orbit; from inside look round'], ['Shift + arrows', 'shift the view'], ['+ −', 'zoom'],
-  ['Home', 'show all'], ['T', 'from above'], ['N, P', 'select the next, the previous station'],
+  ['Home', 'show all'], ['T', 'from above'], ['I', 'the point in the middle: its figures'],
+  ['C', 'turn about the point in the middle, and go nearer'], ['N, P', 'select the next, the previous station'],
   ['Enter', 'look from the selected station'], ['Esc', 'undo a move; unselect'],
   ['of a selected station: arrows, Page Up, Page Down', '0.1 m; with Shift 1 m'], ['[ ]', 'turn it by 5°; with Shift by 45°'],
 ];
@@ -30,6 +31,8 @@ export class Input {
     this.#view = view;
     const {canvas} = view;
     canvas.style.touchAction = 'none';
+    canvas.setAttribute('role', 'application'); // a screen reader leaves the keys to it
+    canvas.setAttribute('aria-roledescription', 'picture of points in space');
     if (canvas.tabIndex < 0) canvas.tabIndex = 0;
     const on = (type, f, options) => canvas.addEventListener(type, f, options);
     on('pointerdown', (e) => this.#press(e));
@@ -196,6 +199,8 @@ export class Input {
     else if (e.key === '-' || e.key === '_') camera.zoom(1 / 0.85);
     else if (e.key === 'Home') view.fit();
     else if (e.key === 't' || e.key === 'T') camera.orbit(camera.target, -camera.azimuth, -Math.PI - camera.elevation);
+    else if (/^i$/i.test(e.key)) view.pickMiddle();
+    else if (/^c$/i.test(e.key)) view.lookAt({x: 0.5 * camera.width, y: 0.5 * camera.height});
     else if (/^[np]$/i.test(e.key)) stations.next(/n/i.test(e.key) ? 1 : -1);
     else if (e.key === 'Enter' && stations.selected !== null) view.lookFrom(stations.selected);
     else return;

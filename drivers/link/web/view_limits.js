@@ -9,6 +9,8 @@ const AGED = 1.15; // in the mode age the limits follow sooner
 
 export class Scale {
   mode = 'height';
+  scale = 'usual'; // of SCALES in view_ramps.js
+  share = 0.01; // the limits leave out this share of the points at each end
   limits = null; // heights are relative to the cloud's origin
   #cloud;
   #fixed = null; // the user set these, in the scene frame
@@ -36,10 +38,16 @@ export class Scale {
     this.forget();
   }
 
+  choose(scale, share) {
+    if (!(share >= 0 && share < 0.5)) throw new RangeError(`a share of ${share} at each end: from 0 to less than 0.5`);
+    Object.assign(this, {scale, share});
+    this.forget();
+  }
+
   get #offset() { return this.mode === 'height' && this.#cloud.origin ? this.#cloud.origin[2] : 0; }
 
   legend() {
-    this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample,
+    this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample, scale: this.scale,
       hasColours: this.#cloud.blocks.some((block) => block.rgb !== null)});
     return this.#legend;
   }
@@ -55,7 +63,7 @@ export class Scale {
     this.#sample = sampleOf(this.#cloud, this.mode);
     if (MODES[this.mode].kind !== 'ramp') return {first: false, changed: false};
     if (this.mode === 'age') this.limits = [blocks[0]?.first ?? total, total];
-    else this.limits = this.#fixed?.map((v) => v - this.#offset) ?? widened(before, robustLimits(this.#sample, MODES[this.mode].least));
+    else this.limits = this.#fixed?.map((v) => v - this.#offset) ?? widened(before, robustLimits(this.#sample, MODES[this.mode].least, this.share));
     const changed = this.limits !== null && (before === null || before.some((v, i) => v !== this.limits[i]));
     return {first: before === null && changed, changed};
   }

@@ -5,6 +5,7 @@
 import {MODES, GREY, tableOf, valuesOf} from './view_colours.js';
 import {setPlace, tableTexture} from './view_gl.js';
 import {split, sub} from './view_camera.js';
+import {isOutside} from './cloud.js';
 
 const STRIDE_MOST = 21; // 255 bytes of 12
 
@@ -14,6 +15,7 @@ class BlockPart {
   drawn = 0;
   skip = false;
   #held = 0; // it has the positions on the GPU
+  #timed = 0; // it has the times on the GPU
   #valued = 0; // it has the numbers on the GPU, for
   #mode = null;
   #closed = false;
@@ -26,6 +28,25 @@ class BlockPart {
     this.vertices = gl.createVertexArray();
     this.position = gl.createBuffer();
     this.value = gl.createBuffer();
+  }
+
+  // Only points of some times are shown: their times go to the GPU, too, from the first such drawing on.
+  #times(stride) {
+    const {gl, program, cloud: {window}} = this.points, {block} = this;
+    if (window === null) {
+      gl.disableVertexAttribArray(3);
+      return;
+    }
+    this.time ??= gl.createBuffer();
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.time);
+    if (this.#timed === 0) gl.bufferData(gl.ARRAY_BUFFER, 4 * this.#capacity, gl.STATIC_DRAW);
+    if (this.#timed < block.n) {
+      gl.bufferSubData(gl.ARRAY_BUFFER, 4 * this.#timed, block.t, this.#timed, block.n - this.#timed);
+      this.#timed = block.n;
+    }
+    gl.enableVertexAttribArray(3);
+    gl.vertexAttribPointer(3, 1, gl.FLOAT, false, 4 * stride, 0);
+    gl.uniform2f(program.u_times, Math.max(-1e38, window.from - block.began_s), Math.min(1e38, window.to - block.began_s));
   }
 
   get n() { return this.block.n; }
@@ -49,7 +70,7 @@ class BlockPart {
     const {block} = this;
     if (block.closed && !this.#closed) { // they are in another order now
       this.#closed = true;
-      this.#capacity = this.#held = this.#valued = 0;
+      this.#capacity = this.#held = this.#valued = this.#timed = 0;
     }
     if (this.#mode !== mode) this.#valued = 0;
     this.#mode = mode;
@@ -81,11 +102,13 @@ class BlockPart {
     const k = !this.block.closed && from === 0 ? Math.min(STRIDE_MOST, Math.floor(this.n / to)) : 1;
     if (k > 1) {
       this.#layout(k);
+      this.#times(k);
       gl.drawArrays(gl.POINTS, 0, Math.floor(this.n / k));
       this.#layout(1);
       this.thinned = true;
     } else {
       gl.bindVertexArray(this.vertices);
+      this.#times(1);
       gl.drawArrays(gl.POINTS, from, to - from);
     }
   }
@@ -101,6 +124,7 @@ class BlockPart {
     gl.deleteVertexArray(this.vertices);
     gl.deleteBuffer(this.position);
     gl.deleteBuffer(this.value);
+    if (this.time) gl.deleteBuffer(this.time);
   }
 }
 
@@ -120,10 +144,10 @@ export class Points {
     Object.assign(this, {gl, program: programs.points, cloud});
   }
 
-  setMode(mode) {
+  setMode(mode, scale) {
     this.mode = mode;
     if (this.#table) this.gl.deleteTexture(this.#table);
-    this.#table = tableTexture(this.gl, tableOf(mode));
+    this.#table = tableTexture(this.gl, tableOf(mode, scale));
   }
 
   // Takes over the blocks of the cloud. It returns true if drawn blocks are gone.
@@ -153,7 +177,8 @@ export class Points {
   aim(camera) {
     this.camera = camera;
     this.#using = false;
-    for (const part of this.parts) part.skip = !camera.sees(part.block.lo, part.block.hi, this.cloud.origin);
+    const {origin, window} = this.cloud;
+    for (const part of this.parts) part.skip = !camera.sees(part.block.lo, part.block.hi, origin) || isOutside(window, part.block);
   }
 
   use() {
@@ -164,6 +189,7 @@ export class Points {
     setPlace(gl, program, camera, split(sub(camera.eye, this.cloud.origin)));
     gl.uniform1i(program.u_kind, ['ramp', 'list', 'rgb'].indexOf(MODES[this.mode].kind));
     gl.uniform2f(program.u_limits, this.limits[0], 1 / Math.max(1e-30, this.limits[1] - this.limits[0]));
+    gl.uniform2f(program.u_times, -1e38, 1e38);
     gl.uniform3fv(program.u_grey, GREY.map((c) => c / 255));
     const size = Math.max(1, this.size * this.scale);
     gl.uniform1f(program.u_size, size);

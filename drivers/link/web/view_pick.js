@@ -3,6 +3,7 @@
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
+import {isOutside} from './cloud.js';
 import {dot, sub} from './view_camera.js';
 
 // Four pixels beside the pointer count as much as lying a tenth further away.
@@ -34,7 +35,8 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   let best = null;
   let least = Infinity;
   for (const block of [...cloud.blocks]) {
-    if (!meets(block, eye, f, slope)) continue;
+    const {window} = cloud;
+    if (!meets(block, eye, f, slope) || isOutside(window, block)) continue;
     const p = block.position;
     const n = Math.min(block.n, limit);
     for (let i = 0, at = 0; i < n; i++, at += 3) {
@@ -43,6 +45,7 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
       if (w <= 1e-3) continue;
       const off2 = dx * dx + dy * dy + dz * dz - w * w;
       if (off2 > slope2 * w * w) continue;
+      if (window && (block.t[i] < window.from - block.began_s || block.t[i] > window.to - block.began_s)) continue;
       const px = Math.sqrt(Math.max(0, off2)) / w * k;
       const score = px + PIXELS_PER_DEPTH * Math.log(w);
       if (score < least) {

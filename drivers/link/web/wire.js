@@ -10,6 +10,7 @@
 // wait: the bytes would pile up in the browser. So it is always decoded at once, and batches that have no room are
 // dropped here, and counted (dropped_points, dropped_shots).
 import {Decoder, Parser} from './native.js';
+import {Keeper} from './keeper.js';
 import {Past} from './past.js';
 
 const SUBPROTOCOL = 'scanhead-native-1';
@@ -34,6 +35,7 @@ export class Wire {
   #number = 0; // it numbers the connection, so that late events of an older one are ignored
   #past = new Past({give: (batch) => this.#addPast(batch), hasRoom: () => this.#untaken < MAX_UNTAKEN});
   #pastUrl = null;
+  #keeper = new Keeper();
 
   /** post(message, transfer) sends {connection, things, figures} to the owner. */
   constructor(post) {
@@ -41,12 +43,14 @@ export class Wire {
     this.#fresh();
   }
 
-  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true} or {ack: true}.
-   * */
+  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true},
+   * {keep: true or false} or {ack: true}. */
   take(message) {
     if (message.connect !== undefined) this.#connect(message.connect, message.past ?? null);
     if (message.send !== undefined) this.#socket?.send(message.send);
     if (message.close) this.#close();
+    if (message.keep) this.#keeper.begin();
+    if (message.keep === false) this.#addNow('kept', this.#keeper.end());
     if (message.ack) this.#taken();
   }
 
@@ -61,6 +65,7 @@ export class Wire {
       telemetry: handCounted('telemetry'), event: handCounted('event'), poses: hand('poses'),
       refused: hand('refused')});
     this.parser = new Parser({text: hand('text'), frame: (frame) => {
+      this.#keeper.take(frame);
       if (this.#past.takes(frame, this.decoder.canPlace)) this.decoder.take(frame);
     }});
     this.busy_ms = 0;
@@ -219,7 +224,7 @@ export class Wire {
     const {stats: past, unplaced} = this.#past;
     return {...p, ...d, ...this.dropped, ...past, past_hash: this.#past.pointHash,
       unplaced_points: d.unplaced_points + unplaced.points, unplaced_shots: d.unplaced_shots + unplaced.shots,
-      point_hash: this.decoder.pointHash, waiting_points: this.#points,
+      kept_bytes: this.#keeper.bytes, kept_full: this.#keeper.isFull, point_hash: this.decoder.pointHash, waiting_points: this.#points,
       decode_ms: this.busy_ms, decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
   }
 }

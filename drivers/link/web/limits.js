@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+// The rows of the display for colour scales and their limits: by shares of the points, or by hand.
+import {kept, make, say} from './page.js';
+import {MODES} from './view_colours.js';
+import {SCALES} from './view_ramps.js';
+
+const SHARES = [['0.01', '1 % to 99 % of points'], ['0.05', '5 % to 95 % of points'], ['0', 'All points'], ['hand', 'By hand']];
+const numberOf = (field) => (field.value.trim() === '' ? NaN : Number(field.value.trim().replace('−', '-')));
+
+export class Limits {
+  #view;
+  #mode = '';
+  #parts = {};
+
+  constructor(view) {
+    this.#view = view;
+    const select = (id, options, change) => make('select', {id, change}, ...options.map(([value, name]) => make('option', {value}, name)));
+    const field = (id, name) => make('input', {id, type: 'text', inputmode: 'decimal', autocomplete: 'off', 'aria-label': name,
+      'aria-describedby': 'limit-says', change: () => this.#byHand()});
+    const p = this.#parts;
+    p.scale = select('scale', SCALES, () => this.#scale());
+    p.share = select('limits', SHARES, () => this.#chosen());
+    p.low = field('limit-low', 'Lowest');
+    p.high = field('limit-high', 'Highest');
+    p.unit = make('span', {class: 'unit'});
+    p.says = make('p', {class: 'refusal', id: 'limit-says', role: 'status'});
+    p.hand = make('div', {class: 'row limits'}, make('span', {}, 'From, to'), p.low, p.high, p.unit);
+    this.rows = make('div', {class: 'ramp-rows'}, make('div', {class: 'row'}, make('label', {for: 'scale'}, 'Scale'), p.scale),
+      make('div', {class: 'row'}, make('label', {for: 'limits'}, 'Limits'), p.share), p.hand, p.says);
+    p.scale.value = SCALES.some(([name]) => name === kept.get('scale')) ? kept.get('scale') : 'usual';
+    view.ramp({scale: p.scale.value});
+  }
+
+  // Another figure is shown: its limits are those that it had last.
+  show(mode) {
+    const p = this.#parts, {kind, unit} = MODES[mode];
+    this.#mode = mode;
+    this.rows.hidden = kind !== 'ramp';
+    p.share.closest('.row').hidden = mode === 'age'; // all ages are shown
+    const [choice, low = '', high = ''] = (kept.get(`limits.${mode}`) ?? '0.01').split(' ');
+    p.share.value = SHARES.some(([value]) => value === choice) ? choice : '0.01';
+    Object.assign(p.low, {value: low});
+    Object.assign(p.high, {value: high});
+    say(p.unit, unit);
+    this.#apply();
+  }
+
+  #scale() {
+    kept.set('scale', this.#parts.scale.value);
+    this.#view.ramp({scale: this.#parts.scale.value});
+  }
+
+  // By hand begins with the limits that are shown.
+  #chosen() {
+    const p = this.#parts, legend = this.#view.legend();
+    if (p.share.value === 'hand' && typeof legend?.from === 'number') {
+      p.low.value = legend.from.toFixed(2);
+      p.high.value = legend.to.toFixed(2);
+    }
+    this.#apply();
+    this.#keep();
+    if (p.share.value === 'hand') p.low.focus();
+  }
+
+  #byHand() {
+    if (this.#apply()) this.#keep();
+  }
+
+  #keep() {
+    const {share, low, high} = this.#parts;
+    kept.set(`limits.${this.#mode}`, [share.value, low.value.trim(), high.value.trim()].join(' '));
+  }
+
+  // Returns whether the limits hold.
+  #apply() {
+    const p = this.#parts, isByHand = p.share.value === 'hand' && this.#mode !== 'age';
+    const [low, high] = [numberOf(p.low), numberOf(p.high)], isRight = low < high;
+    p.hand.hidden = !isByHand;
+    say(p.says, !isByHand || isRight ? '' : 'Two numbers; the first has to be the lower one.');
+    for (const field of [p.low, p.high]) field.toggleAttribute('aria-invalid', isByHand && !isRight);
+    if (!isByHand) this.#view.ramp({share: Number(p.share.value)});
+    if (!isByHand) this.#view.limits();
+    else if (isRight) this.#view.limits(low, high);
+    return isRight || !isByHand;
+  }
+}
