@@ -76,8 +76,9 @@ export class Limits {
     const p = this.#parts, isByHand = p.share.value === 'hand' && this.#mode !== 'age';
     const [low, high] = [numberOf(p.low), numberOf(p.high)], isRight = low < high;
     p.hand.hidden = !isByHand;
-    say(p.says, !isByHand || isRight ? '' : 'Two numbers; the first has to be the lower one.');
-    for (const field of [p.low, p.high]) field.toggleAttribute('aria-invalid', isByHand && !isRight);
+    const isBegun = p.low.value.trim() !== '' && p.high.value.trim() !== '';
+    say(p.says, !isByHand || isRight || !isBegun ? '' : 'Two numbers; the first has to be the lower one.');
+    for (const field of [p.low, p.high]) field.toggleAttribute('aria-invalid', p.says.textContent !== '');
     if (!isByHand) this.#view.ramp({share: Number(p.share.value)});
     if (!isByHand) this.#view.limits();
     else if (isRight) this.#view.limits(low, high);

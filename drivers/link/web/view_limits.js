@@ -40,8 +40,10 @@ export class Scale {
 
   choose(scale, share) {
     if (!(share >= 0 && share < 0.5)) throw new RangeError(`a share of ${share} at each end: from 0 to less than 0.5`);
+    const isSame = share === this.share;
     Object.assign(this, {scale, share});
-    this.forget();
+    if (isSame) this.#legend = null; // other colours, the same limits
+    else this.forget();
   }
 
   get #offset() { return this.mode === 'height' && this.#cloud.origin ? this.#cloud.origin[2] : 0; }

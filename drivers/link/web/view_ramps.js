@@ -22,8 +22,7 @@ const EVEN = {
 };
 
 // What a user may choose, with its name. `usual` is the mode's own.
-export const SCALES = [['usual', 'Usual'], ['even', 'Violet to yellow, even'], ['blue', 'Blue to yellow, even'],
-  ['grey', 'Grey']];
+export const SCALES = [['usual', 'Usual'], ['even', 'Violet to yellow'], ['blue', 'Blue to yellow'], ['grey', 'Grey']];
 
 const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
