@@ -221,6 +221,35 @@ export async function testInstrument(browser) {
     await page.until('!document.querySelector("#keys").open');
   });
 
+  await test('the waveform of a point: its samples over range, and its echoes', async () => {
+    // The head of this scene has no waveforms. So the page is told that its stream has them, and given one: two windows
+    // of 0.15 m steps, of which the second one ends at the point's range.
+    const got = await page.eval(`(async () => {
+      const {head, view, cloud} = scanhead, block = cloud.blocks[0];
+      const point = {x: 0, y: 0, z: 0, pulse: block.pulse0 + block.pulse[7], range: block.range[7], scan: block.scan, station: block.station};
+      const path = () => [...document.querySelectorAll('#point .samples')].map((e) => e.getAttribute('d'));
+      head.askWaves = (pulse) => (window.asked = pulse);
+      view.dispatchEvent(new CustomEvent('pick', {detail: {point}}));
+      const before = window.asked;
+      head.descriptor.content |= 4;
+      view.dispatchEvent(new CustomEvent('pick', {detail: {point}}));
+      const samples = (...values) => Float32Array.of(...values), last = point.range;
+      const windows = [{rangeM0: 1, stepM: 0.15, samples: samples(0, 2, 0)}, {rangeM0: last - 0.6, stepM: 0.15, samples: samples(0, 0, 4, 1, 0)}];
+      head.dispatchEvent(new CustomEvent('waves', {detail: {pulse: point.pulse + 1, windows}}));
+      const other = path().length;
+      head.dispatchEvent(new CustomEvent('waves', {detail: {pulse: point.pulse, windows}}));
+      const echoes = [...document.querySelectorAll('#point .echo')].map((e) => Number(e.getAttribute('x1')));
+      head.descriptor.content &= ~4;
+      return {before, asked: window.asked === point.pulse, other, paths: path(), echoes, name: document.querySelector('#point .wave').getAttribute('aria-label')};
+    })()`);
+    equal(got.before, undefined, 'nothing is asked of a stream without waveforms');
+    equal(JSON.stringify([got.asked, got.other]), '[true,0]', 'asked for, and that of another pulse is not drawn');
+    // 272 px for 0.3 m and 0.6 m, with 8 px between them; a height of 58 px for 4 thresholds, from 62 up.
+    equal(got.paths.join(' '), 'M0.0 62.0L45.3 33.0L90.7 62.0 M98.7 62.0L144.0 62.0L189.3 4.0L234.7 47.5L280.0 62.0', 'samples');
+    near(got.echoes.at(-1), 280, 0.01, 'the mark of the point itself');
+    is(/2 parts; echoes at .* m; highest 4.0/.test(got.name), `its name: ${got.name}`);
+  });
+
   await test('each thing that takes the focus has a name for screen readers', async () => {
     const {nodes} = await page.send('Accessibility.getFullAXTree');
     const focusable = nodes.filter((node) => !node.ignored && node.properties?.some(({name, value}) => name === 'focusable' && value.value));

@@ -12,6 +12,7 @@ import {Log, showPlan} from './log.js';
 import {Stations} from './stations.js';
 import {Display} from './display.js';
 import {Point} from './point.js';
+import {WavePlot} from './waves.js';
 import {Recording} from './recording.js';
 import {startRecorder} from './recorder.js';
 import {startKeys} from './keys.js';
@@ -92,6 +93,7 @@ function startHead(cloud, view, names, keepsPast) {
   display.station = () => Number(knobs.value('HEAD:STATION')) || 1;
   new Quality(() => session.link === 'open' && byId('panel-quality').open);
   new Point(view, names.of);
+  if (view) new WavePlot(head, view, byId('point'));
 
   const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
   let before = ''; // it says who the head was

@@ -43,11 +43,12 @@ export class Wire {
     this.#fresh();
   }
 
-  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true},
-   * {keep: true or false} or {ack: true}. */
+  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true}, {ack: true},
+   * {keep: true or false}, or {wavesOf: pulse}, which is answered by a thing `waves` {pulse, windows}. */
   take(message) {
     if (message.connect !== undefined) this.#connect(message.connect, message.past ?? null);
     if (message.send !== undefined) this.#socket?.send(message.send);
+    if (message.wavesOf !== undefined) this.#addNow('waves', {pulse: message.wavesOf, windows: this.decoder.wavesOf(message.wavesOf)});
     if (message.close) this.#close();
     if (message.keep) this.#keeper.begin();
     if (message.keep === false) this.#addNow('kept', this.#keeper.end());
