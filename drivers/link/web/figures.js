@@ -120,7 +120,7 @@ export class Figures {
   }
 
   #page() {
-    if (this.cloud) Object.assign(this.#texts, {held: grouped(this.cloud.count), gone: grouped(this.cloud.gone)});
+    if (this.cloud) Object.assign(this.#texts, {held: short(this.cloud.count), gone: short(this.cloud.gone)});
     if (!this.head) return;
     const f = this.head.figures();
     const now = {at: performance.now() / 1e3, points: number(f.points), bytes: number(f.bytes)};
@@ -154,7 +154,7 @@ const mark = (key, bad) => byId(`figure-${key}`)?.classList.toggle('bad', bad);
 // f has a head's figures.
 function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}) {
   if (!points && !gone && !lost) return NONE;
-  return [grouped(number(points)), gone > 0 && `${short(gone)} older ones are gone`,
+  return [short(number(points)), gone > 0 && `${short(gone)} older ones are gone`,
     lost > 0 && `${grouped(lost)} frames not kept`].filter(Boolean).join(', ');
 }
 

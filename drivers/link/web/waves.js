@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // The waveform of the point's pulse, in the point's panel: samples over range, its echoes marked. It is there only where
 // the stream has waveforms, and asks for one pulse at a time.
-import {make, makeSvg, say} from './page.js';
+import {make, makeSvg, say, short} from './page.js';
 
 const HAS_WAVEFORMS = 4; // of a descriptor's content
 const WIDTH = 280, TOP = 4, BASE = 62, GAP = 8; // GAP is between two windows, whose ranges may be far apart
@@ -75,7 +75,7 @@ export class WavePlot {
     for (const x of marks) parts.push(makeSvg('line', {class: 'echo', x1: x, x2: x, y1: TOP, y2: BASE}));
     this.#svg.replaceChildren(...parts);
     this.#svg.setAttribute('aria-label', `Waveform over range, ${windows.length} part${windows.length === 1 ? '' : 's'}; `
-      + `echoes at ${ranges.map((range_m) => `${range_m.toFixed(3)} m`).join(', ')}; highest ${most.toFixed(1)} detection thresholds`);
-    say(this.#title, `Waveform, up to ${most.toFixed(1)} thresholds`);
+      + `echoes at ${ranges.map((range_m) => `${range_m.toFixed(3)} m`).join(', ')}; highest ${short(most)} detection thresholds`);
+    say(this.#title, `Waveform, up to ${short(most)} thresholds`);
   }
 }
