@@ -306,9 +306,10 @@ function plyOf(file) {
 async function testTimeLines(browser, file) {
   await test('the time line of a recording shows the points up to a time', async () => {
     const view = await start(['view', file]);
-    const page = await browser.open(view.ready.endpoints[0].endpoint, {size: SIZE});
+    const page = await browser.open(view.ready.endpoints[0].endpoint, {size: [900, 480], before: `(${watches})()`});
     await page.until('scanhead.recording && scanhead.cloud.total > 0 && !document.querySelector("#timeline").hidden');
     await page.until(`scanhead.cloud.total === ${await page.eval("fetch('/head').then((a) => a.json()).then((h) => h.recording.points)")}`);
+    await shifted(page, 'a recording');
     await page.eval('scanhead.view.show({stations: false}), scanhead.view.pointSize(4)');
     const {from, to, old, young} = await page.eval(pointsAround());
     const seen = async () => JSON.stringify([await page.eval(towards(old)), await page.eval(towards(young))]);

@@ -12,7 +12,7 @@ export function ageRow(view) {
   const follow = () => {
     if (view.cloud.latest_s === latest_s) return;
     latest_s = view.cloud.latest_s;
-    view.times({from: latest_s - Number(select.value), to: Infinity});
+    view.times({from: latest_s - Number(select.value), to: latest_s + 1}); // later ones are of a head that was restarted
   };
   const choose = () => {
     clearInterval(timer);

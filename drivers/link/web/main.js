@@ -183,7 +183,7 @@ async function start() {
   window.scanhead = {head: null, cloud, view};
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
-  document.body.dataset.ready = ''; // until then the sides are not shown, since they grow
+  document.body.dataset.ready = ''; // until then nothing is shown, since parts are filled, or go
 }
 
 start();

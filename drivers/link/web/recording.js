@@ -76,6 +76,7 @@ export class Recording {
 
   #rows() {
     const p = this.#parts;
+    byId('timeline').classList.toggle('off', this.#what !== 'points'); // a mesh has no times
     p.scanRow.hidden = this.#what === 'points' || this.#info.recording.meshes.length < 2;
     p.edgeRow.hidden = this.#what === 'points';
     p.densityRow.hidden = this.#what !== 'sparse';

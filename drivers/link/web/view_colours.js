@@ -129,7 +129,7 @@ export function ticks([lo, hi], most = 6) {
 // text}]}, a list
 // {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names the item. A colour is
 // [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of their own.
-export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true, scale = 'usual'}) {
+export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true, scale = 'usual', oldest_s = NaN}) {
   const {title, unit, kind} = MODES[mode], ramp = rampOf(mode, scale);
   const legend = {mode, title, unit, none: GREY};
   const unknown = {stops: [GREY, GREY], from: 'not known', to: '', ticks: []};
@@ -137,7 +137,7 @@ export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = tr
   if (kind === 'list' && sample.length === 0) return {...legend, ...unknown};
   if (kind === 'list') return {...legend, items: itemsOf(mode, sample)};
   legend.stops = Array.from({length: 17}, (_, i) => rampAt(ramp, i / 16).map(Math.round));
-  if (mode === 'age') return {...legend, from: 'oldest', to: 'newest', ticks: []};
+  if (mode === 'age') return {...legend, from: oldest_s > 0 ? `${oldest_s.toPrecision(3)} s before` : 'oldest', to: 'newest', ticks: []};
   if (limits === null) return {...legend, ...unknown};
   const [from, to] = limits.map((v) => v + offset);
   return {...legend, from, to, ticks: ticks([from, to]).map((t) => ({...t, at: (t.value - from) / (to - from)}))};

@@ -46,10 +46,16 @@ export class Scale {
     else this.forget();
   }
 
+  // The age of the oldest point before the newest one, where the mode shows ages.
+  get #oldest() {
+    const {blocks, latest_s} = this.#cloud;
+    return this.mode === 'age' && blocks.length > 0 ? latest_s - Math.min(...blocks.map(({began_s, span}) => began_s + span.from)) : NaN;
+  }
+
   get #offset() { return this.mode === 'height' && this.#cloud.origin ? this.#cloud.origin[2] : 0; }
 
   legend() {
-    this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample, scale: this.scale,
+    this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample, scale: this.scale, oldest_s: this.#oldest,
       hasColours: this.#cloud.blocks.some((block) => block.rgb !== null)});
     return this.#legend;
   }
