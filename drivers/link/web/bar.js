@@ -14,11 +14,7 @@ export class Bar {
 
   constructor(session, log) {
     this.#session = session;
-    // Start and stop take control where nobody has it.
-    const run = (line) => () => this.#do(async () => {
-      if (!session.mine) await session.take();
-      await session.command(line);
-    }, log);
+    const run = (line) => () => this.#do(() => session.command(line), log); // it takes control where nobody has it
     byId('start').addEventListener('click', () => run(session.state === 'fault' ? '*RST' : 'SCAN:STARt')());
     byId('stop').addEventListener('click', run('SCAN:STOP'));
     byId('control').addEventListener('click', () =>
