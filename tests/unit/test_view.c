@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/colour.h"
 #include "core/studio/view.h"
 
 static const uint8_t white[3] = {255, 255, 255}, red[3] = {255, 0, 0}, blue[3] = {0, 0, 255};
@@ -291,12 +292,40 @@ static void test_marks(void **state)
     view_free(view);
 }
 
+/* Returns the hue of a colour in degrees: 0 is red, 120 green, 240 blue. */
+static double hue_deg(const uint8_t rgb[3])
+{
+    const double r = rgb[0], g = rgb[1], b = rgb[2];
+    return atan2(sqrt(3.0) * (g - b), 2.0 * r - g - b) * 180.0 / M_PI;
+}
+
+/* Views have paler colours than recordings and maps, so that shading is seen. Low and high mean the same: the hue goes
+ * from blue to red. The two are within 60 of the 240 degrees; the other way round they would be that far apart. */
+static void low_and_high_mean_the_same_in_views(void **state)
+{
+    (void)state;
+    for (int i = 0; i <= 20; i++) {
+        uint8_t view[3], map[3];
+        view_ramp(i / 20.0, view);
+        colour_ramp(i / 20.0, map);
+        const double apart_deg = fabs(remainder(hue_deg(view) - hue_deg(map), 360.0));
+        if (apart_deg > 60.0) fail_msg("%d/20: hues %.0f and %.0f", i, hue_deg(view), hue_deg(map));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pinhole),  cmocka_unit_test(test_hidden), cmocka_unit_test(test_counts),
-        cmocka_unit_test(test_shade),    cmocka_unit_test(test_range),  cmocka_unit_test(test_frame),
-        cmocka_unit_test(test_refusals), cmocka_unit_test(test_marks),  cmocka_unit_test(test_stopped),
+        cmocka_unit_test(low_and_high_mean_the_same_in_views),
+        cmocka_unit_test(test_pinhole),
+        cmocka_unit_test(test_hidden),
+        cmocka_unit_test(test_counts),
+        cmocka_unit_test(test_shade),
+        cmocka_unit_test(test_range),
+        cmocka_unit_test(test_frame),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_marks),
+        cmocka_unit_test(test_stopped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
