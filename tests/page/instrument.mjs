@@ -141,7 +141,22 @@ export async function testInstrument(browser) {
     const [pulses, hash] = await page.eval('[scanhead.head.figures().pulses, scanhead.head.figures().point_hash]');
     equal(counts.shots, pulses, 'pulses');
     equal(counts.hash, hash, 'hash over all records');
-    is(run('record', file, '-o', `${folder}/saved/scan.las`, '--quiet') !== null, 'other formats are made of it');
+    is(run('record', file, '-o', `${folder}/scan.las`, '--quiet') !== null, 'other formats are made of it');
+  });
+
+  await test('the points so far in other formats, as the head writes them', async () => {
+    for (const as of ['las', 'ply']) {
+      await choose(page, '#save-as', as);
+      await page.press('#save');
+      const file = await saved(`.${as}`), bytes = readFileSync(file), total = await page.eval('scanhead.cloud.total');
+      // LAS 1.4 has the number of its records at byte 247 (ASPRS, R15); a PLY in words.
+      const n = as === 'las' ? Number(bytes.readBigUInt64LE(247)) : Number(/element vertex (\d+)/.exec(bytes.toString('latin1', 0, 2000))[1]);
+      equal(n, total, `points of ${file}`);
+    }
+    const refused = await page.eval("fetch('/save?as=../x').then(async (answer) => [answer.status, await answer.text()])");
+    equal(refused[0], 400, 'status of another format');
+    is(refused[1].includes('las, ply, e57'), `it says what is allowed: ${refused[1]}`);
+    equal(await page.eval("fetch('/saved?from=1e9').then((answer) => answer.status)"), 400, 'status of a wrong position');
   });
 
   await page.eval('scanhead.view.shading = false, scanhead.view.show({scene: false, stations: false})');

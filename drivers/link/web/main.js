@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module connects the page's modules: a head and its points, or a recording.
-import {byId, fetchJson, kept, say} from './page.js';
+import {bodyOf, byId, fetchJson, kept, say} from './page.js';
 import {Head} from './head.js';
 import {Cloud} from './cloud.js';
 import {Session, startTheme, why} from './session.js';
@@ -15,6 +15,7 @@ import {Point} from './point.js';
 import {WavePlot} from './waves.js';
 import {Recording} from './recording.js';
 import {startRecorder} from './recorder.js';
+import {saveRow} from './save.js';
 import {startKeys} from './keys.js';
 import {RecordingPlayer, ReplayPlayer, Timeline} from './timeline.js';
 
@@ -89,6 +90,7 @@ function startHead(cloud, view, names, keepsPast) {
   const stations = new Stations(session, knobs, view);
   const figures = new Figures(head, cloud);
   const display = new Display(view, names.of);
+  if (keepsPast) bodyOf('display').append(saveRow());
   names.stations = stations;
   display.station = () => Number(knobs.value('HEAD:STATION')) || 1;
   new Quality(() => session.link === 'open' && byId('panel-quality').open);

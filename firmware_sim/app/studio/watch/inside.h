@@ -19,6 +19,7 @@
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/app/studio/report/verdict.h"
 #include "firmware_sim/app/studio/watch/past.h"
+#include "firmware_sim/app/studio/watch/save.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 
 /* Points kept of a scan, at most; points compared at a time; the largest `every`. */
@@ -96,6 +97,7 @@ struct watch {
     uint64_t lost_frames;
 
     struct past *past; /* the observer fills it */
+    struct save *save;
 
     /* made once */
     char *scene_bytes;

@@ -209,7 +209,7 @@ void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t l
 
 /* ---- giving */
 
-static int read_query(const char *query, uint64_t *from, struct sh_err *err)
+int past_read_position(const char *query, uint64_t *from, struct sh_err *err)
 {
     static const char name[] = "from=";
     const size_t named = sizeof name - 1;
@@ -249,7 +249,7 @@ static void put_head(const struct past *past, uint64_t next, uint8_t *to)
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err)
 {
     uint64_t from;
-    int rc = read_query(query, &from, err);
+    int rc = past_read_position(query, &from, err);
     if (rc != SH_OK) return rc;
     pthread_mutex_lock(&past->lock);
     const struct piece *piece = past_find(past, &from);

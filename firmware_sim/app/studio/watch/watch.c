@@ -14,6 +14,8 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
 {
     struct watch *w = ctx;
     if (strcmp(path, "/past") == 0) return past_get(w->past, query, out, err);
+    if (strcmp(path, "/save") == 0) return save_get(w->save, query, out, err);
+    if (strcmp(path, "/saved") == 0) return save_get_piece(w->save, query, out, err);
     if (strcmp(path, "/quality") == 0) return watch_get_quality(w, out, err);
     if (strcmp(path, "/scene") == 0) return watch_get_scene(w, out, err);
     if (strcmp(path, "/head") == 0) return watch_get_head(w, out, err);
@@ -30,7 +32,8 @@ static int watch_make_room(struct watch *w, struct sh_err *err)
         if (config_serves(w->cfg, i)) report_head_of(w->site, i, &w->head[i]);
     const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
     w->past = past_create(&limits);
-    if (w->head != NULL && w->shown_station != NULL && w->past != NULL) return SH_OK;
+    w->save = w->past != NULL ? save_create(w->past) : NULL;
+    if (w->head != NULL && w->shown_station != NULL && w->save != NULL) return SH_OK;
     return sh_fail(err, SH_ENOMEM, "no memory for %u stations", n);
 }
 
@@ -50,6 +53,7 @@ static void close_watch(struct watch *w)
     if (w->link.fd >= 0 && !w->link_given) close(w->link.fd);
     watch_sample_close(w);
     watch_seen_close(&w->seen);
+    save_free(w->save);
     past_free(w->past);
     free(w->head);
     free(w->shown_station);

@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/app/studio/watch/save.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/bytes.h"
+#include "firmware_sim/app/studio/page_json.h"
+#include "firmware_sim/app/studio/record/job.h"
+
+enum { AS_LEN = 9, FOLDER_LEN = 400, PATH_LEN = FOLDER_LEN + 32, LOWEST = 19 };
+enum save_state { SAVE_IDLE, SAVE_WORKING, SAVE_DONE, SAVE_FAILED };
+
+struct save {
+    struct past *past;
+    pthread_t thread;
+    int has_thread;          /* it was begun, and not joined */
+    char folder[FOLDER_LEN]; /* empty: there is none yet */
+    char stream[PATH_LEN], file[PATH_LEN];
+
+    pthread_mutex_t lock;
+    enum save_state state;
+    char as[AS_LEN];
+    uint64_t bytes;
+    struct sh_err failure;
+};
+
+/* ---- the file */
+
+static int make_folder(struct save *s, struct sh_err *err)
+{
+    const char *temporary = getenv("TMPDIR");
+    if (s->folder[0] != '\0') return SH_OK;
+    snprintf(s->folder, sizeof s->folder, "%.300s/scanhead-save-XXXXXX",
+             temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
+    if (mkdtemp(s->folder) != NULL) return SH_OK;
+    const int rc = sh_fail(err, SH_EIO, "%s: %s", s->folder, strerror(errno));
+    s->folder[0] = '\0';
+    return rc;
+}
+
+/* Writes the frames that there are now; those that come meanwhile are left out. */
+static int write_frames(struct save *s, FILE *f, struct sh_err *err)
+{
+    char query[32] = "";
+    for (uint64_t end = 0, next = 0;;) {
+        struct web_body piece;
+        const int rc = past_get(s->past, query, &piece, err);
+        if (rc != SH_OK) return rc;
+        const uint8_t *head = (const uint8_t *)piece.bytes;
+        const size_t len = piece.len - PAST_HEAD_LEN;
+        next = le_get64(head + 16);
+        if (end == 0) end = le_get64(head + 24);
+        const size_t written = fwrite(piece.bytes + PAST_HEAD_LEN, 1, len, f);
+        free(piece.bytes);
+        if (written != len) return sh_fail(err, SH_EIO, "%s: %s", s->stream, strerror(errno));
+        if (next >= end) return SH_OK;
+        snprintf(query, sizeof query, "from=%llu", (unsigned long long)next);
+    }
+}
+
+static int write_stream(struct save *s, struct sh_err *err)
+{
+    FILE *f = fopen(s->stream, "wb");
+    if (f == NULL) return sh_fail(err, SH_EIO, "%s: %s", s->stream, strerror(errno));
+    int rc = write_frames(s, f, err);
+    if (fclose(f) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", s->stream, strerror(errno));
+    return rc;
+}
+
+/* A stream of points alone ends in the middle of a scan, for whoever reads it. */
+static int write_file(struct save *s, struct sh_err *err)
+{
+    struct record_job *job = calloc(1, sizeof *job);
+    if (job == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a file");
+    job->source = s->stream;
+    job->brief = job->no_hash = 1;
+    job->recording.frames = -1;
+    int rc = record_files_add(&job->files, s->file, err);
+    if (rc == SH_OK) rc = record_job_stream(job, err);
+    if (rc == SH_ECLOSED && job->result.points > 0) rc = SH_OK;
+    free(job);
+    return rc;
+}
+
+static void *make(void *self)
+{
+    struct save *s = self;
+    struct sh_err err = {0};
+    struct stat st = {0};
+    setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    int rc = write_stream(s, &err);
+    if (rc == SH_OK) rc = write_file(s, &err);
+    if (rc == SH_OK && stat(s->file, &st) != 0) rc = sh_fail(&err, SH_EIO, "%s: %s", s->file, strerror(errno));
+    unlink(s->stream);
+    pthread_mutex_lock(&s->lock);
+    s->state = rc == SH_OK ? SAVE_DONE : SAVE_FAILED;
+    s->bytes = (uint64_t)st.st_size;
+    s->failure = err;
+    pthread_mutex_unlock(&s->lock);
+    return NULL;
+}
+
+static void save_join(struct save *s)
+{
+    if (s->has_thread) pthread_join(s->thread, NULL);
+    s->has_thread = 0;
+}
+
+/* ---- asking */
+
+static void put_state(struct json *json, const void *ctx)
+{
+    static const char *const words[] = {"idle", "working", "done", "idle"};
+    const struct save *s = ctx;
+    json_open_object(json, NULL);
+    json_string(json, "state", words[s->state]);
+    json_string(json, "as", s->as);
+    json_uint(json, "bytes", s->state == SAVE_DONE ? s->bytes : 0);
+    json_close_object(json);
+}
+
+/* Formats of points that need no other file beside them. */
+static int check_as(const char *as, struct sh_err *err)
+{
+    static const char *const all[] = {"las", "ply", "e57", "ptx", "pcapng"};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        if (strcmp(as, all[i]) == 0) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "as=%.32s: allowed are las, ply, e57, ptx, pcapng", as);
+}
+
+/* With the lock held. */
+static int begin(struct save *s, const char *as, struct sh_err *err)
+{
+    if (s->state == SAVE_WORKING) return sh_fail(err, SH_EINPUT, "a file is being made (%s); ask again later", s->as);
+    int rc = check_as(as, err);
+    if (rc == SH_OK) rc = make_folder(s, err);
+    if (rc != SH_OK) return rc;
+    save_join(s);
+    unlink(s->file);
+    snprintf(s->as, sizeof s->as, "%s", as);
+    snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
+    snprintf(s->file, sizeof s->file, "%s/points.%s", s->folder, as);
+    s->has_thread = pthread_create(&s->thread, NULL, make, s) == 0;
+    s->state = s->has_thread ? SAVE_WORKING : SAVE_IDLE;
+    return s->has_thread ? SH_OK : sh_fail(err, SH_EIO, "no thread for a file");
+}
+
+int save_get(struct save *s, const char *query, struct web_body *out, struct sh_err *err)
+{
+    int rc = SH_OK;
+    pthread_mutex_lock(&s->lock);
+    if (strncmp(query, "as=", 3) == 0)
+        rc = begin(s, query + 3, err);
+    else if (query[0] != '\0')
+        rc = sh_fail(err, SH_EINPUT, "%.64s: allowed is as=ENDING, or nothing", query);
+    else if (s->state == SAVE_FAILED)
+        rc = sh_fail(err, s->failure.code, "%s", s->failure.text);
+    if (s->state == SAVE_FAILED && rc != SH_OK) s->state = SAVE_IDLE;
+    if (rc == SH_OK) rc = page_json(put_state, s, out, err);
+    pthread_mutex_unlock(&s->lock);
+    return rc;
+}
+
+static int read_piece(const char *path, uint64_t from, struct web_body *out, struct sh_err *err)
+{
+    FILE *f = fopen(path, "rb");
+    *out = (struct web_body){"application/octet-stream", malloc(SAVE_PIECE), 0};
+    int rc = f != NULL && out->bytes != NULL ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    if (rc == SH_OK && fseek(f, (long)from, SEEK_SET) == 0) out->len = fread(out->bytes, 1, SAVE_PIECE, f);
+    if (rc == SH_OK && ferror(f)) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    if (f != NULL) fclose(f);
+    if (rc != SH_OK) free(out->bytes);
+    return rc;
+}
+
+int save_get_piece(struct save *s, const char *query, struct web_body *out, struct sh_err *err)
+{
+    uint64_t from;
+    int rc = past_read_position(query, &from, err);
+    if (rc != SH_OK) return rc;
+    pthread_mutex_lock(&s->lock);
+    rc = s->state == SAVE_DONE ? read_piece(s->file, from, out, err) : SH_EINPUT; /* nothing is there */
+    pthread_mutex_unlock(&s->lock);
+    return rc;
+}
+
+/* ---- life */
+
+struct save *save_create(struct past *past)
+{
+    struct save *s = calloc(1, sizeof *s);
+    if (s == NULL) return NULL;
+    s->past = past;
+    pthread_mutex_init(&s->lock, NULL);
+    return s;
+}
+
+void save_free(struct save *s)
+{
+    if (s == NULL) return;
+    save_join(s);
+    if (s->file[0] != '\0') unlink(s->file);
+    if (s->folder[0] != '\0') rmdir(s->folder);
+    pthread_mutex_destroy(&s->lock);
+    free(s);
+}

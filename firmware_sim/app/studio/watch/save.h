@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* The points so far as a file, for a page: in each format that `scanhead record` writes from a stream.
+ *
+ * In: the frames of past.h. Out: a file, in pieces. One file at a time; a thread of its own makes it, at the lowest
+ * priority. The file is in a folder for temporary files until the next one is made, or until save_free.
+ *
+ * Any thread may ask. Answers take some milliseconds at most. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_SAVE_H
+#define FIRMWARE_SIM_APP_STUDIO_WATCH_SAVE_H
+
+#include "drivers/link/web.h"
+#include "firmware_sim/app/studio/watch/past.h"
+
+struct save;
+
+enum { SAVE_PIECE = 4 << 20 }; /* the most bytes of a piece */
+
+/* past must live on until save_free. NULL: no memory. */
+struct save *save_create(struct past *past);
+/* `/save?as=las` begins a file, `/save` asks for it: JSON with `state` (idle, working, done), `as` and `bytes`.
+ * SH_EINPUT: a format that it can't be, or one is being made. A file that could not be made is an error once. */
+int save_get(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
+/* `/saved?from=POSITION`: bytes of the finished file from there on, at its end none. SH_EINPUT: there is no file. */
+int save_get_piece(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
+/* Waits for a file that is being made. save may be NULL. */
+void save_free(struct save *save);
+
+#endif
