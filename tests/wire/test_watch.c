@@ -307,6 +307,50 @@ static void who_is_waited_for_is_not_last(void **state)
     }
 }
 
+/* The points after a PLY's header. */
+static const char *ply_points(const char *file, size_t len, size_t *n)
+{
+    static const char last[] = "end_header\n";
+    const char *at = memmem(file, len, last, sizeof last - 1);
+    assert_non_null(at);
+    at += sizeof last - 1;
+    *n = len - (size_t)(at - file);
+    return at;
+}
+
+/* What a page saves has the bytes of what `record` writes of the same scan. */
+static void the_points_so_far_are_a_file(void **state)
+{
+    struct wire *wire = *state;
+    char config[256], path[352];
+    size_t len, n_saved, n_recorded;
+    prepare(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "whole.ply"));
+    free(command(wire, (const char *const[]){"record", config, "-o", path, "--station", "1", "--quiet", NULL}, NULL,
+                 "out"));
+    char *recorded = wire_read(path, &len);
+    const char *want = ply_points(recorded, len, &n_recorded);
+    struct head head = head_start(wire, config, NULL);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    free(scan_from(&head, sh, 1, 1));
+    free(get(&head, "/save?as=ply", &len));
+    const int64_t until = wire_now_ms() + DEADLINE_MS;
+    for (int done = 0; !done; poll(NULL, 0, done ? 0 : 20)) {
+        char *json = get(&head, "/save", &len);
+        done = strstr(json, "\"state\":\"done\"") != NULL;
+        if (wire_now_ms() > until) fail_msg("no file: %s", json);
+        free(json);
+    }
+    char *saved = get(&head, "/saved?from=0", &len);
+    const char *has = ply_points(saved, len, &n_saved);
+    assert_int_equal(n_saved, n_recorded);
+    assert_memory_equal(has, want, n_saved);
+    free(saved);
+    free(recorded);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 static uint32_t u32_at(const char *bytes)
 {
     uint32_t v;
@@ -364,6 +408,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_scan_whose_end_is_lost_is_over, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(noise_is_expected, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(who_is_waited_for_is_not_last, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(the_points_so_far_are_a_file, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(scene_is_the_scene, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("watch", tests, NULL, NULL);
