@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // A limit of the points' age: only the last seconds before the newest point are shown. Ages count in device time, so a
 // head that rests keeps its last points on the picture.
-import {kept, make} from './page.js';
+import {make} from './page.js';
 
 const AGES_S = [0.1, 0.5, 1, 2, 5, 10, 30, 60];
 const FOLLOW_MS = 200;
@@ -17,14 +17,11 @@ export function ageRow(view) {
   const choose = () => {
     clearInterval(timer);
     latest_s = NaN;
-    kept.set('age-limit', select.value);
     if (select.value === '') return view.times(null);
     timer = setInterval(follow, FOLLOW_MS);
     return follow();
   };
   const select = make('select', {id: 'age-limit', change: choose}, make('option', {value: ''}, 'All points'),
     ...AGES_S.map((s) => make('option', {value: s}, `The last ${s} s`)));
-  select.value = AGES_S.includes(Number(kept.get('age-limit'))) ? kept.get('age-limit') : '';
-  if (select.value !== '') choose();
   return make('div', {class: 'row'}, make('label', {for: 'age-limit'}, 'Age limit'), select);
 }

@@ -97,7 +97,7 @@ export class Bar {
     byId('owner').title = byId('owner').textContent;
     say(byId('control'), mine ? 'Give back control' : 'Take control');
     byId('control').disabled = !may;
-    byId('control').title = !mine && owner ? `${who} has control. It has to give it back first.` : '';
+    for (const id of ['control', 'start', 'stop']) byId(id).title = !mine && owner ? `${who} has control. It has to give it back first.` : '';
     say(byId('start'), state === 'fault' ? 'Reset' : 'Start');
     byId('start').disabled = !may || !['idle', 'fault'].includes(state);
     byId('stop').disabled = !may || !['spin-up', 'scanning'].includes(state);

@@ -10,6 +10,7 @@ const numberOf = (field) => (field.value.trim() === '' ? NaN : Number(field.valu
 export class Limits {
   #view;
   #mode = '';
+  #chosenOf = new Map(); // it maps a mode to {share, low, high} as the fields had them
   #parts = {};
 
   constructor(view) {
@@ -31,16 +32,14 @@ export class Limits {
     view.ramp({scale: p.scale.value});
   }
 
-  // Another figure is shown: its limits are those that it had last.
+  // Another figure is shown: its limits are those that it had last on this page. Another scene has others.
   show(mode) {
     const p = this.#parts, {kind, unit} = MODES[mode];
     this.#mode = mode;
     this.rows.hidden = kind !== 'ramp';
     p.share.closest('.row').hidden = mode === 'age'; // all ages are shown
-    const [choice, low = '', high = ''] = (kept.get(`limits.${mode}`) ?? '0.01').split(' ');
-    p.share.value = SHARES.some(([value]) => value === choice) ? choice : '0.01';
-    Object.assign(p.low, {value: low});
-    Object.assign(p.high, {value: high});
+    const {share, low, high} = this.#chosenOf.get(mode) ?? {share: SHARES[0][0], low: '', high: ''};
+    [p.share.value, p.low.value, p.high.value] = [share, low, high];
     say(p.unit, unit);
     this.#apply();
   }
@@ -68,7 +67,7 @@ export class Limits {
 
   #keep() {
     const {share, low, high} = this.#parts;
-    kept.set(`limits.${this.#mode}`, [share.value, low.value.trim(), high.value.trim()].join(' '));
+    this.#chosenOf.set(this.#mode, {share: share.value, low: low.value, high: high.value});
   }
 
   // Returns whether the limits hold.

@@ -181,7 +181,11 @@ export class ReplayPlayer {
   async #ask() {
     const reply = await this.#session.command('SCAN:REPLay?').catch(() => 'NONE');
     const [state, position, length, speed, loop] = reply.split(',');
-    if (!['PLAYING', 'IDLE'].includes(state)) return false;
+    if (!['PLAYING', 'IDLE'].includes(state)) { // another head is at this place now, or none
+      this.may = false;
+      this.changed();
+      return false;
+    }
     this.#plays = state === 'PLAYING';
     Object.assign(this, {position_s: Number(position), length_s: Number(length), loop: loop === 'ON',
       isPlaying: this.#plays && Number(speed) > 0, speed: Number(speed) > 0 ? Number(speed) : this.#wanted});
