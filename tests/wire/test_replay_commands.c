@@ -210,6 +210,34 @@ static void test_how_it_is_played(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* A client's seek: what it reads goes on there, as another sequence, and nothing counts as lost. */
+static void test_seek(void **state)
+{
+    struct head head;
+    struct scanhead *sh = open_room(*state, &head);
+    struct scanhead_stats stats;
+    uint64_t first_ns, last_ns;
+    starts_with(sh, "SCAN:REPLay?", "IDLE,0.000000,0.", ",1,OFF");
+    client_tell(sh, "SCAN:REPLay 0.3"); /* it is not played yet */
+    grant(sh, 50);
+    assert_true(take_all(sh, &first_ns, &last_ns) > 10);
+    assert_in_range(first_ns, 300000000, 302000000);
+    assert_in_range(last_ns, 345000000, 350000000);
+    starts_with(sh, "SCAN:REPLay?", "PLAYING,0.3", ",1,OFF");
+    client_tell(sh, "SCAN:REPLay 0.25,1,ON");
+    grant(sh, 20);
+    take_all(sh, &first_ns, &last_ns);
+    assert_in_range(first_ns, 250000000, 252000000);
+    starts_with(sh, "SCAN:REPLay?", "PLAYING,0.2", ",1,ON");
+    starts_with(sh, "SCAN:REPLay ,2", "ERR -221", "only the pace realtime");
+    client_tell(sh, "SCAN:STOP");
+    scanhead_get_stats(sh, &stats);
+    assert_int_equal(stats.restarts, 1);
+    assert_int_equal(stats.seq_lost + stats.repeated + stats.late + stats.bad_bytes, 0);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 /* Writes a descriptor and, where e is not NULL, an emitter of the same moment. */
 static const char *write_moment(struct wire *wire, const struct native_emitter *e)
 {
@@ -320,6 +348,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_same_answers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_settings_are_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_how_it_is_played, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_seek, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_loop_is_stopped, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_unknown_echoes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_control_and_steps, wire_setup, wire_teardown),
