@@ -236,6 +236,32 @@ export async function testInstrument(browser) {
     await page.until('!document.querySelector("#keys").open');
   });
 
+  await test('Tab comes to every control that is shown, and each shows that it has the focus', async () => {
+    await page.eval(`(() => {
+      document.activeElement.blur();
+      for (const panel of document.querySelectorAll('.panel')) panel.open = true;
+      window.shown = () => [...document.querySelectorAll('a, button, input, select, summary, [tabindex]')].filter((e) =>
+        e.tabIndex >= 0 && !e.disabled && e.getClientRects().length > 0 && e.checkVisibility() && !e.closest('dialog:not([open])'));
+      window.met = new Set();
+      window.dim = [];
+      window.note = () => {
+        const e = document.activeElement, {outlineStyle, outlineWidth} = getComputedStyle(e);
+        window.met.add(e);
+        if (e !== document.body && (outlineStyle === 'none' || parseFloat(outlineWidth) < 1)) window.dim.push(e.id || e.outerHTML.slice(0, 60));
+        return window.shown().every((one) => window.met.has(one) || one.type === 'radio');
+      };
+    })()`);
+    const n = await page.eval('shown().length');
+    let all = false;
+    for (let k = 0; k < 2 * n && !all; k++) {
+      await page.key('Tab');
+      all = await page.eval('note()');
+    }
+    const missed = await page.eval('shown().filter((e) => !met.has(e)).map((e) => e.id || e.outerHTML.slice(0, 80)).join()');
+    is(all && n > 40, `${n} controls; not come to: ${missed}`);
+    equal(await page.eval('dim.join()'), '', 'without a sign of the focus');
+  });
+
   await test('the waveform of a point: its samples over range, and its echoes', async () => {
     // The head of this scene has no waveforms. So the page is told that its stream has them, and given one: two windows
     // of 0.15 m steps, of which the second one ends at the point's range.
