@@ -4,19 +4,24 @@
 import {make} from './page.js';
 
 const AGES_S = [0.1, 0.5, 1, 2, 5, 10, 30, 60];
-const FOLLOW_MS = 200;
+const FOLLOW_MS = 200, PATIENCE_MS = 1500;
 
 // Returns the row for the display's panel.
 export function ageRow(view) {
-  let timer = 0, latest_s = NaN;
+  let timer = 0, latest_s = NaN, since_ms = 0;
+  // Where drawing takes longer than the pause between two limits, most of a picture is drawn before the next one begins.
   const follow = () => {
-    if (view.cloud.latest_s === latest_s) return;
+    const {drawn, left} = view.state;
+    const isSoon = left > 0.2 * drawn && performance.now() - since_ms < PATIENCE_MS;
+    if (view.cloud.latest_s === latest_s || isSoon) return;
+    since_ms = performance.now();
     latest_s = view.cloud.latest_s;
     view.times({from: latest_s - Number(select.value), to: latest_s + 1}); // later ones are of a head that was restarted
   };
   const choose = () => {
     clearInterval(timer);
     latest_s = NaN;
+    since_ms = 0;
     if (select.value === '') return view.times(null);
     timer = setInterval(follow, FOLLOW_MS);
     return follow();

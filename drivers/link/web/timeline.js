@@ -114,7 +114,7 @@ export class RecordingPlayer {
 
   #show() {
     const isAll = this.position_s >= this.length_s;
-    this.#view.times(isAll ? null : {from: -Infinity, to: this.#from_s + this.position_s});
+    this.#view.times(isAll ? null : {from: -Infinity, to: this.#from_s + this.position_s}, this.isPlaying);
     this.changed();
   }
 }

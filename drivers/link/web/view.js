@@ -180,10 +180,12 @@ export class View extends EventTarget {
     this.#ask('restart');
   }
 
-  // Shows only points of these times, {from, to} in seconds as `latest_s` of the cloud; null shows all.
-  times(window) {
+  // Shows only points of these times, {from, to} in seconds as `latest_s` of the cloud; null shows all. While these change
+  // from picture to picture (isMoving), each has a level of detail, as of a view that moves.
+  times(window, isMoving = false) {
     this.cloud.window = window;
     this.#want.restart ??= 'later';
+    if (isMoving) this.#want.camera = true;
     this.#schedule();
   }
 
