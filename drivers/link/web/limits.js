@@ -4,7 +4,7 @@ import {kept, make, say} from './page.js';
 import {MODES} from './view_colours.js';
 import {SCALES} from './view_ramps.js';
 
-const SHARES = [['0.01', '1 % to 99 % of points'], ['0.05', '5 % to 95 % of points'], ['0', 'All points'], ['hand', 'By hand']];
+const SHARES = [['0.01', '1 % to 99 %'], ['0.05', '5 % to 95 %'], ['0', 'All points'], ['hand', 'By hand']];
 const numberOf = (field) => (field.value.trim() === '' ? NaN : Number(field.value.trim().replace('−', '-')));
 
 export class Limits {
@@ -27,7 +27,7 @@ export class Limits {
     p.says = make('p', {class: 'refusal', id: 'limit-says', role: 'status'});
     p.hand = make('div', {class: 'row limits'}, make('span', {}, 'From, to'), p.low, p.high, p.unit);
     this.rows = make('div', {class: 'ramp-rows'}, make('div', {class: 'row'}, make('label', {for: 'scale'}, 'Scale'), p.scale),
-      make('div', {class: 'row'}, make('label', {for: 'limits'}, 'Limits'), p.share), p.hand, p.says);
+      make('div', {class: 'row'}, make('label', {for: 'limits', title: 'From the lowest to the highest of this share of the points'}, 'Limits'), p.share), p.hand, p.says);
     p.scale.value = SCALES.some(([name]) => name === kept.get('scale')) ? kept.get('scale') : 'usual';
     view.ramp({scale: p.scale.value});
   }
