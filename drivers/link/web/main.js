@@ -13,6 +13,7 @@ import {Stations} from './stations.js';
 import {Display} from './display.js';
 import {Point} from './point.js';
 import {Recording} from './recording.js';
+import {startTools} from './all_tools.js';
 
 const CAPACITY = 10e6; // so many points are stored
 const WIDE = '(min-width: 47rem)';
@@ -165,6 +166,7 @@ async function start() {
   const names = new Names();
   const info = await fetchJson('/head');
   window.scanhead = {head: null, cloud, view};
+  if (view) window.scanhead.tools = startTools(view, names.of);
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
 }

@@ -13,14 +13,13 @@ import {Solids} from './view_scene.js';
 import {Stations} from './view_stations.js';
 import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
-import {programsOf} from './view_gl.js';
+import {Programs} from './view_gl.js';
+import {Hover} from './view_hover.js';
 import {searchSlowly} from './view_pick.js';
 import {readTheme} from './view_theme.js';
-import {pointOf} from './cloud.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
 const SHOW_MS = 160; // updates of a growing picture are so far apart, and twice the time of one
-const HOVER_MS = 70;
 const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from the picture, it is drawn again
 const PLAIN = 150_000; // with fewer points per frame, a frame is drawn plain
 const COARSE = 0.5; // this is the scale of such a frame
@@ -31,6 +30,7 @@ export class View extends EventTarget {
   static modes = MODES;
   movable = true; // stations can be dragged
   camera = new Camera();
+  tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}, each returns whether it has used it
   shading = true;
   #gl;
   #painter;
@@ -48,7 +48,6 @@ export class View extends EventTarget {
   #touched = false;
   #fitted = 0; // there were so many points when the view was fitted
   #pointSize = 2;
-  #hover = {timer: 0, stop: null, point: null};
   #waiting = [];
   #goneDrawn = 0;
   #lastGone = 0;
@@ -70,6 +69,10 @@ export class View extends EventTarget {
     if (!this.#gl) throw new Error('no WebGL 2');
     this.overlay = new Overlay(canvas);
     this.#scale = new Scale(cloud);
+    this.pointed = new Hover(this, (point) => {
+      this.#emit('pick', point ? {point} : null);
+      this.redraw();
+    });
     this.stations = new Stations(() => this.#ask('show'), (detail) => this.#emit('move', detail));
     this.#attach();
     this.#listen();
@@ -109,7 +112,7 @@ export class View extends EventTarget {
   // Makes everything on the GPU, also after a lost context.
   #attach() {
     const gl = this.#gl;
-    this.programs = programsOf(gl);
+    this.programs = new Programs(gl);
     this.#painter = new Painter(gl);
     this.#points = new Points(gl, this.programs, this.cloud);
     this.#points.setMode(this.#scale.mode);
@@ -191,6 +194,9 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
+  // Returns {min, max} of the scene, or of the points without their far ends; null: there is nothing.
+  bounds() { return boxOf(this.cloud, this.stations.list, this.#solids, true); }
+
   fit() {
     const box = boxOf(this.cloud, this.stations.list, this.#solids);
     if (box) this.camera.fit(box);
@@ -201,10 +207,10 @@ export class View extends EventTarget {
   lookAt({x, y}) {
     searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
       if (!found) return;
-      const p = this.camera.at(x, y, found.w);
-      this.camera.inside = false;
-      this.camera.target = p;
-      this.camera.distance = Math.max(0.05, 0.5 * found.w);
+      const {camera} = this;
+      const p = camera.at(x, y, found.w);
+      const {w} = camera.project(p);
+      Object.assign(camera, {inside: false, target: p, distance: Math.max(0.05, 0.5 * w)});
       this.cameraMoved();
     });
   }
@@ -229,29 +235,12 @@ export class View extends EventTarget {
 
   touched() { this.#touched = true; }
 
-  // The pointer is at a place, or nowhere: its point is searched for once it stays.
-  hover(p) {
-    const h = this.#hover;
-    clearTimeout(h.timer);
-    h.stop?.();
-    h.stop = null;
-    if (p === null) return this.#picked(null);
-    const hit = this.#solids.stationsOn ? this.stations.hit(this.camera, p.x, p.y) : null;
-    this.canvas.style.cursor = hit && this.movable ? (hit.what === 'turn' ? 'crosshair' : 'move') : 'default';
-    h.timer = setTimeout(() => {
-      h.stop = searchSlowly(this.cloud, this.camera, p.x, p.y, 8, (found) => {
-        h.stop = null;
-        this.#picked(found && this.cloud.origin ? pointOf(this.cloud, found.block, found.i) : null);
-      });
-    }, HOVER_MS);
-  }
+  hover(p) { this.pointed.at(p); }
 
-  #picked(point) {
-    if (point === null && this.#hover.point === null) return;
-    this.#hover.point = point;
-    this.#emit('pick', point ? {point} : null);
-    this.#ask('overlay');
-  }
+  get showsStations() { return this.#solids.stationsOn; }
+
+  // Only what lies over the picture has changed.
+  redraw() { this.#ask('overlay'); }
 
   // ---- drawing
 
@@ -402,7 +391,7 @@ export class View extends EventTarget {
   #over() {
     this.#want.overlay = false;
     this.overlay.draw({camera: this.#seen, colours: this.colours.css, stations: this.#solids.stationsOn ? this.stations : null,
-      marked: this.#hover.point});
+      marked: this.pointed.point});
   }
 
   #next(parts) {
