@@ -199,8 +199,8 @@ export function flatnessOf(places, corners, origin, eye) {
 
 const NEIGHBOURS = 8;
 
-// Steps towards the mean distance of the points around a place, from the area in which its nearest ones lie; NaN where
-// there are none within 2 m.
+// Steps towards the mean distance of the points around a place, from the area in which its nearest ones lie: that of k
+// points evenly at random has (k - 1) of them in the mean. NaN: there are none within 2 m.
 export function* spacingAround(cloud, place, first_m) {
   const p = sub(place, cloud.origin);
   for (let r = Math.max(1e-4, first_m); r < 6; r *= 3) {
@@ -213,7 +213,7 @@ export function* spacingAround(cloud, place, first_m) {
       }
       yield;
     }
-    if (near.length > NEIGHBOURS) return Math.sqrt(near.sort((a, b) => a - b)[NEIGHBOURS] * Math.PI / (NEIGHBOURS + 1));
+    if (near.length > NEIGHBOURS) return Math.sqrt(near.sort((a, b) => a - b)[NEIGHBOURS] * Math.PI / (NEIGHBOURS - 1));
   }
   return NaN;
 }
@@ -231,7 +231,7 @@ const minus = (text) => text.replace('-', '−');
 
 // Returns a figure in words, rounded by its error: "2.104 m ± 2 mm", "90.02° ± 0.11°"; without a known error "2.104 m".
 export function figureText(unitName, {value, error}) {
-  const isKnown = Number.isFinite(error), decimals = decimalsOf(isKnown ? error : unitName === '°' ? 0.05 : 0.001);
+  const isKnown = Number.isFinite(error), decimals = decimalsOf(isKnown ? error : unitName === '°' ? 0.05 : NaN);
   const gap = unitName === '°' ? '' : '\u00a0';
   const own = `${minus(value.toFixed(decimals))}${gap}${unitName}`;
   if (!isKnown) return own;

@@ -22,6 +22,7 @@ export class Panorama {
   #blocks = []; // [block, whether it was closed]: closing changes the order of its points
   #block; // per pixel: which of the blocks, and which of its points
   #point;
+  #range; // from the head
 
   constructor(cloud, station) {
     this.cloud = cloud;
@@ -67,7 +68,7 @@ export class Panorama {
     }
     if (this.n === 0) return this;
     this.#size(lo, hi);
-    const nearest = new Float32Array(this.width * this.height).fill(Infinity);
+    const nearest = this.#range = new Float32Array(this.width * this.height).fill(Infinity);
     this.#block = new Uint32Array(nearest.length).fill(EMPTY);
     this.#point = new Uint32Array(nearest.length);
     for (const [k, block] of blocks.entries()) {
@@ -124,10 +125,10 @@ export class Panorama {
   colours(mode) {
     const n = this.width * this.height;
     const values = new Float32Array(n).fill(NaN);
-    const all = this.#blocks.map(([block]) => valuesOf(block, mode, 0, block.n));
+    const all = mode === 'range' ? null : this.#blocks.map(([block]) => valuesOf(block, mode, 0, block.n));
     for (let p = 0; p < n; p++) {
       const from = this.#shown(p);
-      if (from !== null) values[p] = all[this.#block[from]][this.#point[from]];
+      if (from !== null) values[p] = all === null ? this.#range[from] : all[this.#block[from]][this.#point[from]];
     }
     const isList = mode === 'label';
     const limits = isList ? null : robustLimits(values.filter((v) => v === v && v !== NONE));

@@ -25,6 +25,7 @@ export class SectionTool {
   #says = make('p', {class: 'refusal', role: 'status'});
   #layer = make('div', {class: 'handles', role: 'group', 'aria-label': 'Handles of the section'});
   #handles = new Map(); // it maps an id to its element
+  #held = null; // this one is dragged: a hidden element would lose the pointer
   #layerOn = (pen, camera) => this.#draw(pen, camera);
 
   constructor(view) {
@@ -129,7 +130,7 @@ export class SectionTool {
     for (const {id, at} of s.handles) {
       const {x, y, w} = camera.project(at);
       const element = this.#handleOf(id);
-      element.hidden = !(w > 0.01 && x > 0 && y > 0 && x < camera.width && y < camera.height);
+      element.hidden = id !== this.#held && !(w > 0.01 && x > 0 && y > 0 && x < camera.width && y < camera.height);
       element.style.translate = `${x.toFixed(1)}px ${y.toFixed(1)}px`;
       const [value, words] = this.#valueOf(s, id);
       element.setAttribute('aria-valuenow', shown(value));
@@ -173,6 +174,7 @@ export class SectionTool {
     if (first === null) return;
     const was = new Section(this.#section);
     element.setPointerCapture(e.pointerId);
+    this.#held = id;
     const move = (event) => {
       const now = measure(...where(event));
       if (now === null) return;
@@ -182,7 +184,10 @@ export class SectionTool {
       else s.heading_deg = degrees((was.heading_deg + headingTo(was.middle, now) - headingTo(was.middle, first)) * Math.PI / 180);
       this.#changed();
     };
-    const end = () => element.removeEventListener('pointermove', move);
+    const end = () => {
+      this.#held = null;
+      element.removeEventListener('pointermove', move);
+    };
     element.addEventListener('pointermove', move);
     for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) element.addEventListener(type, end, {once: true});
     element.focus({preventScroll: true});
