@@ -78,6 +78,10 @@ export async function testTools(browser, url, points) {
       for (let x = 0; x < cut.width - 1; x++) other += before.pixel(x, y).some((v, k) => v !== cut.pixel(x, y)[k]);
     }
     is(all > 1000 && other < 0.01 * all, `below: ${other} of ${all} pixels differ`);
+    await page.eval('scanhead.view.show({points: false, scene: "solid"})');
+    const mesh = await drawn(page);
+    is(rows(mesh, 0, row - 3).n === 0 && rows(mesh, row + 4, Math.floor(mesh.height)).n > 1000, 'a mesh is cut, too');
+    await page.eval('scanhead.view.show({points: true, scene: false})');
     const found = await page.eval(`(async () => {
       const {pointed, camera} = scanhead.view, at = (z) => camera.project([0, 0, z]);
       const find = (z) => new Promise((done) => pointed.find(at(z), 6, done));
@@ -153,6 +157,11 @@ export async function testTools(browser, url, points) {
     }
     equal(file, csv, 'the file');
     equal(csv.split('\r\n').length, 4, 'a head, two points, the last end');
+    await page.eval(`void (scanhead.view.camera.target = [${a.slice(0, 3)}], scanhead.view.cameraMoved(), scanhead.view.canvas.focus())`);
+    await page.key('Enter');
+    const byKey = await page.until(`${TOOLS}.measure.points[2]`), seen = await place(page, [byKey.x, byKey.y, byKey.z]);
+    const middle = await page.eval('[scanhead.view.camera.width / 2, scanhead.view.camera.height / 2]');
+    near(Math.hypot(...seen.map((v, k) => v - middle[k])), 0, 12, 'Enter picks within 12 pixels of the middle');
     await page.key('Escape');
     equal(await page.eval('scanhead.view.tool'), null, 'clicks are those of the picture again');
   });

@@ -141,7 +141,8 @@ static void terms_give_the_same_sigma(void **state)
     const double along = t.ball_factor[0], right = sqrt(3.0) * t.ball_factor[1];
     near_to(sigma_m, sqrt(range_m * range_m + pow(pan * t.angle_sigma_rad[1], 2) +
                           ball_m * ball_m * (along * along + right * right)));
-    near_to(counts_m, sqrt((pow(t.range_step_m, 2) + pow(2.0 * t.place_step_m, 2) + pow(pan * t.angle_step_rad[1], 2)) / 12.0));
+    near_to(counts_m,
+            sqrt((pow(t.range_step_m, 2) + pow(2.0 * t.place_step_m, 2) + pow(pan * t.angle_step_rad[1], 2)) / 12.0));
     assert_true(isnan(t.range_jitter_m) && t.ball_local == 1 && t.angle_sigma_rad[0] == 1e-5);
     head.setup.noise_on = 0; /* by the signal: 3 mm at any, 40 mm at the threshold */
     assert_true(deviation_terms_of(&head, &t));

@@ -92,6 +92,7 @@ export class MeasureTool {
     if (key === 'Enter' && this.#kind === 'flatness' && this.#picked.length >= 3 && this.#atMiddle) this.#endOutline();
     else if (key === 'Enter' || key === ' ') this.tap({x: 0.5 * width, y: 0.5 * height});
     else if (key === 'Backspace') this.#undo();
+    else if (key === 'Escape') this.leave();
     else return false;
     return true;
   }
@@ -195,7 +196,7 @@ export class MeasureTool {
     this.#table.hidden = points.length === 0;
     this.#table.replaceChildren(make('table', {}, make('thead', {}, cells('th', ['Of', 'x, m', 'y, m', 'z, m', 'Surface'])),
       make('tbody', {}, ...points.map((p) => cells('td', [p.of ? `${p.of}, ${p.number}` : String(p.number),
-        ...[p.x, p.y, p.z].map((v) => v.toFixed(3).replace('-', '−')), p.surface])))));
+        ...[p.x, p.y, p.z].map((v) => grouped(v, 3)), p.surface])))));
   }
 
   // ---- the picture

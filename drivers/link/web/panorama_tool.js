@@ -48,6 +48,7 @@ export class PanoramaTool {
   start() {
     this.#box.hidden = false;
     this.#view.addEventListener('pick', this.#marked);
+    this.#markPoint(null);
     this.#fillStations();
     this.#make();
     this.#timer = setInterval(() => {
@@ -85,15 +86,20 @@ export class PanoramaTool {
       this.#stop = null;
       if (panorama.n === 0) return this.#empty(station);
       this.panorama = panorama;
-      Object.assign(this.#canvas, {width: panorama.width, height: panorama.height});
+      this.#size(panorama.width, panorama.height);
       return this.#paint();
     });
     return undefined;
   }
 
+  #size(width, height) {
+    Object.assign(this.#canvas, {width, height});
+    this.#canvas.parentElement.style.setProperty('--aspect', width / height);
+  }
+
   #empty(station) {
     this.panorama = null;
-    Object.assign(this.#canvas, {width: 360, height: 90});
+    this.#size(360, 90);
     this.#cross.hidden = true;
     say(this.#says, station ? 'This station has no points yet.' : 'No station has a known place.');
   }

@@ -30,6 +30,8 @@ export class Tools {
       e.preventDefault();
       this.leave(tool);
     });
+    // A key in the picture, or another button, may have changed what a tool shows as on.
+    for (const type of ['keyup', 'click']) document.addEventListener(type, () => this.show());
     this.show();
   }
 

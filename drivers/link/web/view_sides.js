@@ -8,7 +8,7 @@ export const SIDES = [['top', 'Top', 'T'], ['front', 'Front', 'F'], ['side', 'Si
 
 // The front is seen from the south, the side from the east, or from there in the section's frame.
 export function lookFromSide(camera, side) {
-  camera.before ??= camera.flat ? null : {azimuth: camera.azimuth, elevation: camera.elevation};
+  if (!camera.flat) camera.before = {azimuth: camera.azimuth, elevation: camera.elevation};
   const heading = radians(camera.section?.kind === 'box' ? camera.section.heading_deg : 0);
   const [azimuth, elevation] = {top: [0, -Math.PI / 2], front: [0, 0], side: [-Math.PI / 2, 0]}[side];
   camera.lookFlat(heading + azimuth, elevation);
@@ -16,9 +16,7 @@ export function lookFromSide(camera, side) {
 
 // Returns to perspective, in the direction from before the flat views.
 export function lookDeep(camera) {
-  camera.flat = false;
-  Object.assign(camera, camera.before ?? {});
-  camera.before = null;
+  if (camera.flat) Object.assign(camera, camera.before, {flat: false});
 }
 
 export function lookBy(camera, key) {
