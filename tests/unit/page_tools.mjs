@@ -101,6 +101,8 @@ test('a section: what is in it, turned; heights; faces that are pushed', () => {
   near(cut.to_m, 2, 1e-12, 'a height cut takes the upper third');
   same([isWithin(cut.relativeTo([5, 5, 5]), 1e4, -1e4, -5), isWithin(cut.relativeTo([5, 5, 5]), 0, 0, -2.9)], [true, false], 'relative to an origin');
   same([cut.between(1, 0.5), cut.between(0.5, 1), cut.to_m], [false, true, 1], 'between heights');
+  same(cut.within({min: [-9, -9, -9], max: [9, 9, 9]}), {min: [-9, -9, cut.from_m], max: [9, 9, 1]}, 'what of a box is in a height cut');
+  same(new Section({middle: [1, 1, 1], half: [1, 2, 30]}).within({min: [-9, -9, -9], max: [9, 9, 9]}), {min: [0, -1, -9], max: [2, 3, 9]}, 'and in a box');
   same(s.handles.map((h) => h.id).join(), 'right,left,ahead,back,top,bottom,turn,move', 'handles of a box');
   same(cut.handles.map((h) => h.id).join(), 'top,bottom', 'of a height cut');
 });

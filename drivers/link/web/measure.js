@@ -113,8 +113,13 @@ export function planeThrough(places) {
   const middle = [0, 0, 0], sums = [0, 0, 0, 0, 0, 0];
   for (let i = 0; i < places.length; i += 3) for (let a = 0; a < 3; a++) middle[a] += places[i + a] / n;
   for (let i = 0; i < places.length; i += 3) {
-    const [x, y, z] = [0, 1, 2].map((a) => places[i + a] - middle[a]);
-    [x * x, x * y, x * z, y * y, y * z, z * z].forEach((v, k) => { sums[k] += v; });
+    const x = places[i] - middle[0], y = places[i + 1] - middle[1], z = places[i + 2] - middle[2];
+    sums[0] += x * x;
+    sums[1] += x * y;
+    sums[2] += x * z;
+    sums[3] += y * y;
+    sums[4] += y * z;
+    sums[5] += z * z;
   }
   return {middle, normal: smallestAxis(sums)};
 }
@@ -145,17 +150,18 @@ export function* pointsOnFace(cloud, camera, corners, depth_m) {
   const found = {places: new Float32Array(3000), n: 0, plane, beyond: 0};
   for (const block of [...cloud.blocks]) {
     if ([0, 1, 2].some((a) => block.lo[a] > plane.middle[a] + reach || block.hi[a] < plane.middle[a] - reach)) continue;
-    takeOnFace(block, {plane, polygon, flat, section, depth_m}, found);
+    takeOnFace(block, {plane, polygon, flat, section, depth_m, reach}, found);
     yield;
   }
   return {plane, beyond: found.beyond, places: found.places.subarray(0, 3 * found.n)};
 }
 
-function takeOnFace({position, n}, {plane, polygon, flat, section, depth_m}, found) {
+function takeOnFace({position, n}, {plane, polygon, flat, section, depth_m, reach}, found) {
   const [nx, ny, nz] = plane.normal, [mx, my, mz] = plane.middle;
   for (let i = 0; i < 3 * n; i += 3) {
-    const away = Math.abs((position[i] - mx) * nx + (position[i + 1] - my) * ny + (position[i + 2] - mz) * nz);
-    if (!(away <= FURTHER * depth_m)) continue;
+    const x = position[i] - mx, y = position[i + 1] - my, z = position[i + 2] - mz;
+    const away = Math.abs(x * nx + y * ny + z * nz);
+    if (!(away <= FURTHER * depth_m) || x * x + y * y + z * z > reach * reach) continue;
     const p = position.subarray(i, i + 3);
     if (!isInPolygon(polygon, ...flat(p)) || (section !== null && !isWithin(section, ...p))) continue;
     if (away > depth_m) {

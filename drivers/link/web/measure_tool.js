@@ -174,9 +174,10 @@ export class MeasureTool {
     this.depthRow.hidden = this.buttons.end.hidden = !isOutline;
     this.buttons.end.disabled = n < 3;
     this.buttons.undo.disabled = this.buttons.clear.disabled = this.buttons.csv.disabled = points.length === 0;
-    say(this.#says, isOutline ? `Click the corners of a face, then end the outline: ${n} so far.` : `Click the ${NAMES[n]} point${
-      this.#kind === 'angle' && n === 1 ? ', the angle’s corner' : ''}. Enter takes the point in the middle.`);
-    this.#list.replaceChildren(...this.done.map((m) => make('li', {}, make('h3', {}, m.of), this.#rowsOf(m))));
+    const last = n === 0 ? this.done.at(-1) : null;
+    say(this.#says, (last ? `${this.#rowsOf(last)[0].slice(0, 2).join(' ')}. ` : '') + (isOutline ? `Click the corners of a face, then end the outline: ${n} so far.`
+      : `Click the ${NAMES[n]} point${this.#kind === 'angle' && n === 1 ? ', the angle’s corner' : ''}. Enter takes the point in the middle.`));
+    this.#list.replaceChildren(...this.done.map((m) => make('li', {}, make('h3', {}, m.of), this.#figuresOf(m))));
     this.#showTable(points);
     this.#view.redraw();
   }
@@ -188,7 +189,11 @@ export class MeasureTool {
     if (!isKnown) rows.push(['Expected error', 'not known']);
     if (!m.flat && Number.isFinite(spacing)) rows.push(['Points apart', `${(1e3 * spacing).toPrecision(2)}\u00a0mm`,
       'So far an edge may lie from the picked point']);
-    return make('dl', {class: 'figures'}, ...rows.map(([name, text, title]) => make('div', {title}, make('dt', {}, name), make('dd', {}, text))));
+    return rows;
+  }
+
+  #figuresOf(m) {
+    return make('dl', {class: 'figures'}, ...this.#rowsOf(m).map(([name, text, title]) => make('div', {title}, make('dt', {}, name), make('dd', {}, text))));
   }
 
   #showTable(points) {

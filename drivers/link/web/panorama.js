@@ -45,7 +45,7 @@ export class Panorama {
     for (let i = 0, p = 0; i < n; i++, p += 3) {
       const dx = position[p] + ox, dy = position[p + 1] + oy, dz = position[p + 2] + oz;
       const x = a * dx + b * dy + c * dz, y = d * dx + e * dy + f * dz, z = g * dx + h * dy + k * dz;
-      const flat = Math.hypot(x, y), range = Math.hypot(flat, z);
+      const flat = Math.sqrt(x * x + y * y), range = Math.sqrt(x * x + y * y + z * z);
       if (range === range) take(i, Math.atan2(x, y), Math.atan2(z, flat), range);
     }
   }

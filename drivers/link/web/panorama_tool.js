@@ -7,7 +7,7 @@ import {Panorama} from './panorama.js';
 import {runSlowly} from './view_pick.js';
 import {pointOf} from './cloud.js';
 
-const AGAIN_MS = 1000; // while points come it is made again so often
+const AGAIN_MS = 1000; // while points come it is made again so often, and takes no more than a quarter of the time
 const DEG = 180 / Math.PI;
 
 export class PanoramaTool {
@@ -20,6 +20,8 @@ export class PanoramaTool {
   #names;
   #stop = null;
   #timer = 0;
+  #began = 0;
+  #rests_until = 0;
   #cursor = null; // the pixel of the keys
   #box = byId('panorama');
   #canvas = make('canvas', {tabindex: 0, role: 'application', 'aria-roledescription': 'panorama', 'aria-label':
@@ -53,7 +55,8 @@ export class PanoramaTool {
     this.#make();
     this.#timer = setInterval(() => {
       this.#fillStations();
-      if (!document.hidden && this.#stop === null && (this.panorama === null || this.panorama.isOld)) this.#make();
+      const isDue = !document.hidden && this.#stop === null && performance.now() > this.#rests_until;
+      if (isDue && (this.panorama === null || this.panorama.isOld)) this.#make();
     }, AGAIN_MS);
   }
 
@@ -82,8 +85,10 @@ export class PanoramaTool {
     this.#stop = null;
     const station = this.#view.stations.get(Number(this.#station.value)), {cloud} = this.#view;
     if (!station || cloud.origin === null) return this.#empty(station);
+    this.#began = performance.now();
     this.#stop = runSlowly(new Panorama(cloud, station).make(), (panorama) => {
       this.#stop = null;
+      this.#rests_until = performance.now() + 3 * (performance.now() - this.#began);
       if (panorama.n === 0) return this.#empty(station);
       this.panorama = panorama;
       this.#size(panorama.width, panorama.height);
@@ -160,6 +165,7 @@ export class PanoramaTool {
       const k = e.shiftKey ? 10 : 1;
       this.#cursor = this.#cursor.map((v, a) => Math.min([width, height][a] - 1, Math.max(0, v + k * step[a])));
       this.#point(this.#cursor);
+      if (this.pointAt(this.#cursor) === null) this.#put([(this.#cursor[0] + 0.5) / width, (this.#cursor[1] + 0.5) / height]);
     }
     e.preventDefault();
   }
@@ -167,13 +173,16 @@ export class PanoramaTool {
   // A point was pointed at, here or in the picture.
   #markPoint(point) {
     const {panorama} = this;
-    const share = point && panorama ? panorama.shareOf(panorama.anglesOf([point.x, point.y, point.z])) : null;
-    this.#cross.hidden = share === null || share.some((v) => v < 0 || v > 1);
-    if (!this.#cross.hidden) {
-      this.#cross.style.left = `${(100 * share[0]).toFixed(2)}%`;
-      this.#cross.style.top = `${(100 * share[1]).toFixed(2)}%`;
-    }
+    this.#put(point && panorama ? panorama.shareOf(panorama.anglesOf([point.x, point.y, point.z])) : null);
     this.#tell(point);
+  }
+
+  // Shows the cross at a share of width and height, or hides it.
+  #put(share) {
+    this.#cross.hidden = share === null || share.some((v) => v < 0 || v > 1);
+    if (this.#cross.hidden) return;
+    this.#cross.style.left = `${(100 * share[0]).toFixed(2)}%`;
+    this.#cross.style.top = `${(100 * share[1]).toFixed(2)}%`;
   }
 
   #tell(point) {

@@ -53,6 +53,13 @@ export class Section {
     });
   }
 
+  // Returns the part of {min, max} around what is in it.
+  within({min, max}) {
+    const corners = this.corners, axes = this.kind === 'height' ? [2] : [0, 1, 2];
+    const bound = (v, a, least, most) => (axes.includes(a) ? most(v, least(...corners.map((p) => p[a]))) : v);
+    return {min: min.map((v, a) => bound(v, a, Math.min, Math.max)), max: max.map((v, a) => bound(v, a, Math.max, Math.min))};
+  }
+
   // Returns the eight corners, bit k of the index for axis k. Those of a height cut are where it was made.
   get corners() {
     const axes = this.axes;

@@ -199,7 +199,7 @@ export class View extends EventTarget {
 
   fit() {
     const box = boxOf(this.cloud, this.stations.list, this.#solids);
-    if (box) this.camera.fit(box);
+    if (box) this.camera.fit(this.camera.section?.within(box) ?? box);
     this.cameraMoved();
   }
 
