@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool measures between points that are picked in the picture or the panorama. A click takes the point nearest to
 // it; with keys, Enter takes the one in the middle of the picture.
-import {make, say, grouped} from './page.js';
+import {grouped, make, metres, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
 import {runSlowly} from './view_pick.js';
 
@@ -187,8 +187,8 @@ export class MeasureTool {
     const spacing = Math.max(...m.points.map((p) => p.spacing));
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
-    if (!m.flat && Number.isFinite(spacing)) rows.push(['Points apart', `${(1e3 * spacing).toPrecision(2)}\u00a0mm`,
-      'So far an edge may lie from the picked point']);
+    if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', metres(Number(spacing.toPrecision(2))),
+      'The points are so far apart there: an edge may lie beyond the one that was picked']);
     return rows;
   }
 
