@@ -93,16 +93,18 @@ export async function testTools(browser, url, points) {
   await test('the handles of a section follow pointer and keys', async () => {
     await page.eval(bare(false));
     await page.press('#tool-section');
-    const {scale, to} = await page.eval('({scale: scanhead.view.camera.focal / scanhead.view.camera.distance, to: scanhead.view.camera.section.to_m})');
+    const {scale, from, to} = await page.eval(`(() => {
+      const {focal, distance, section} = scanhead.view.camera;
+      return {scale: focal / distance, from: section.from_m, to: section.to_m};
+    })()`);
     const at = await page.where('#handle-top');
     await page.drag(at, [at[0], at[1] - 30]);
-    const now = await page.eval('scanhead.view.camera.section.to_m');
-    near(now - to, 30 / scale, 1e-3, 'its top, 30 pixels higher');
+    await page.until(`Math.abs(scanhead.view.camera.section.to_m - ${to + 30 / scale}) < 1e-3`, 'its top is 30 pixels higher');
     await page.eval('document.querySelector("#handle-bottom").focus()');
     await page.send('Input.dispatchKeyEvent', {type: 'keyDown', key: 'ArrowUp', windowsVirtualKeyCode: 38});
-    const bottom = await page.eval('[scanhead.view.camera.section.from_m, Number(document.querySelector("#handle-bottom").getAttribute("aria-valuenow"))]');
-    const floor = await page.until('document.querySelector("#section-from").value');
-    near(Number(floor), bottom[0], 5e-4, 'the field has it');
+    await page.until(`Math.abs(scanhead.view.camera.section.from_m - ${from + 0.05}) < 1e-9`, 'its bottom is 5 cm higher');
+    near(Number(await page.eval('document.querySelector("#section-from").value')), from + 0.05, 5e-4, 'the field has it');
+    await page.until(`Math.abs(document.querySelector("#handle-bottom").getAttribute("aria-valuenow") - ${from + 0.05}) < 1e-3`, 'the handle says it');
     await page.click('#section-off');
     equal(await page.eval('scanhead.view.camera.section'), null, 'switched off');
     await page.key('Escape');
