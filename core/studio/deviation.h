@@ -77,6 +77,19 @@ struct deviation_hit {
 };
 /* The expected sigma there, by noise; and what counts add, as if every place within a count were as likely. */
 double deviation_sigma_m(const struct deviation_head *head, const struct deviation_hit *hit, double *counts_m);
+
+/* The same in figures, for a client that calculates with them. Amplitudes count in units of the threshold. */
+struct deviation_terms {
+    double range_sigma_m, range_sigma_per_m; /* sigma of the range, and its part per distance */
+    double range_floor_m, range_jitter_m;    /* by the signal: at any amplitude, and at 1; NaN: range_sigma_m holds */
+    double range_step_m, place_step_m;       /* counts of a polar range, and of coordinates */
+    double angle_sigma_rad[2], angle_step_rad[2]; /* of mirror and pan: noise, and counts */
+    double ball_m, ball_per_m, ball_factor[3];    /* its radius and factors, as in core/detect.h */
+    int ball_local;
+};
+/* 0: nothing is expected, since the instrument has errors. */
+int deviation_terms_of(const struct deviation_head *head, struct deviation_terms *out);
+
 /* INFINITY: there is no bound, as for Gaussian noise. */
 double deviation_bound_m(const struct deviation_head *head, double range_m);
 

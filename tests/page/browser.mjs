@@ -182,7 +182,8 @@ class Page {
   }
 
   mouse(type, [x, y], buttons = 0, more = {}) {
-    const button = type === 'mouseMoved' ? 'none' : 'left';
+    // A move that does not name its button would lose the pointer's capture.
+    const button = type === 'mouseMoved' && buttons === 0 ? 'none' : 'left';
     return this.send('Input.dispatchMouseEvent', {type, x, y, button, buttons, clickCount: 1, pointerType: 'mouse', ...more});
   }
 

@@ -8,6 +8,7 @@ import {Browser} from './browser.mjs';
 import {Client, end, endpoint, start} from './head.mjs';
 import {testInstrument} from './instrument.mjs';
 import {both, CONFIG, recorded} from './rig.mjs';
+import {testTools} from './tools.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
@@ -136,6 +137,8 @@ await test('a page that is opened later, or again, has the same points', async (
   }
   await late.close();
 });
+
+await testTools(browser, endpoint(head, 'web'), wanted.points);
 
 await test('a station dragged in the picture is where the next scan is made', async () => {
   await page.click('#fit');

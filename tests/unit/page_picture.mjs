@@ -2,7 +2,7 @@
 // It tests the pure parts of the page's picture (drivers/link/web): the stored points and their order, the camera,
 // colours and limits, picking, dragging, levels of detail, the scene's bytes. It prints TAP on standard output.
 import {Cloud, BLOCK, evenOrder, pointOf} from '../../drivers/link/web/cloud.js';
-import {Camera, FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
+import {FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
 import {SCALES} from '../../drivers/link/web/view_ramps.js';
 import {Keeper} from '../../drivers/link/web/keeper.js';
@@ -13,43 +13,7 @@ import {Budget, restShares, shares} from '../../drivers/link/web/view_draw.js';
 import {Stations, inScene} from '../../drivers/link/web/view_stations.js';
 import {featureEdges, legsMesh, parseScene} from '../../drivers/link/web/view_mesh.js';
 import {runTests, test} from './page_tap.mjs';
-
-
-function near(ours, theirs, tolerance, what) {
-  if (!(Math.abs(ours - theirs) <= tolerance)) throw new Error(`${what}: ${ours}, and not ${theirs}, by more than ${tolerance}`);
-}
-const same = (ours, theirs, what) => {
-  const [a, b] = [ours, theirs].map((v) => JSON.stringify(v));
-  if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
-};
-
-function throws(run, words) {
-  try {
-    run();
-  } catch (error) {
-    if (!error.message.includes(words)) throw new Error(`"${error.message}" has no "${words}"`);
-    return;
-  }
-  throw new Error(`no error: ${words}`);
-}
-
-// Makes n points; place(i) gives x, y, z.
-function batch(n, place, {scan = 1, station = 1, pulse0 = 0} = {}) {
-  const f64 = () => new Float64Array(n), f32 = () => new Float32Array(n);
-  const b = {n, shots: n, scan, station, frame: 0, line: 0, pulse0, x: f64(), y: f64(), z: f64(), pulse: f64(), t: f32(), range: f32(),
-    reflectance: f32().fill(NaN), amplitude: f32().fill(NaN), label: new Uint16Array(n), echo: new Uint8Array(n).fill(1),
-    echoes: new Uint8Array(n).fill(1), rgb: null};
-  for (let i = 0; i < n; i++) {
-    [b.x[i], b.y[i], b.z[i]] = place(i);
-    b.pulse[i] = pulse0 + i;
-    b.range[i] = i;
-  }
-  return b;
-}
-
-function camera(change = {}) {
-  return Object.assign(new Camera(), {width: 800, height: 600, target: [0, 0, 0], distance: 10, azimuth: 0, elevation: 0}, change);
-}
+import {batch, camera, near, same, throws} from './page_rig.mjs';
 
 test('the oldest points go, whole blocks, and not below the capacity', () => {
   const cloud = new Cloud({capacity: 100_000});

@@ -113,6 +113,46 @@ static void counts_and_bounds(void **state)
     assert_true(isinf(deviation_bound_m(&head, 100.0)));
 }
 
+/* The figures for clients, put into the formulas of core/studio/deviation.h, give what the function gives. */
+static void terms_give_the_same_sigma(void **state)
+{
+    (void)state;
+    struct deviation_head head = ideal_head();
+    struct deviation_terms t;
+    const struct detect_ball ball = {.radius_m = 0.01, .factor = {1, 2, 3}, .per_distance_1_m = 0.01, .local = 1};
+    const struct detect_signal signal = {.floor2 = 9e-6, .jitter2 = 16e-4, .per_distance = 1e-5};
+    const struct cast_detect detect = {.ball = &ball, .signal = &signal, .noise_by_signal = 1};
+    head.setup.detect = &detect;
+    head.setup.noise_on = 1;
+    head.setup.range_sigma_m = 0.003;
+    head.setup.range_sigma_ppm = 10.0;
+    head.setup.layout = LINE_POLAR;
+    head.setup.range_scale_m = 2e-3;
+    head.setup.mirror_counts = head.setup.pan_counts = 2.0 * M_PI * 1e5;
+    head.angle_sigma_rad[0] = 1e-5;
+    head.angle_sigma_rad[1] = 3e-5;
+    head.count_m = 3e-3;
+    head.file_count_m = 4e-3;
+    assert_true(deviation_terms_of(&head, &t));
+    double counts_m, sigma_m = deviation_sigma_m(&head, &TURNED, &counts_m);
+    /* 100 m away on a face that is turned by 60 degrees: cosine 1/2, to the right sqrt(3)/2; the mirror has no effect */
+    const double pan = sqrt(3.0) * 100.0, ball_m = t.ball_m * (1.0 + t.ball_per_m * 100.0) / sqrt(5.0);
+    const double range_m = t.range_sigma_m + t.range_sigma_per_m * 100.0;
+    const double along = t.ball_factor[0], right = sqrt(3.0) * t.ball_factor[1];
+    near_to(sigma_m, sqrt(range_m * range_m + pow(pan * t.angle_sigma_rad[1], 2) +
+                          ball_m * ball_m * (along * along + right * right)));
+    near_to(counts_m,
+            sqrt((pow(t.range_step_m, 2) + pow(2.0 * t.place_step_m, 2) + pow(pan * t.angle_step_rad[1], 2)) / 12.0));
+    assert_true(isnan(t.range_jitter_m) && t.ball_local == 1 && t.angle_sigma_rad[0] == 1e-5);
+    head.setup.noise_on = 0; /* by the signal: 3 mm at any, 40 mm at the threshold */
+    assert_true(deviation_terms_of(&head, &t));
+    near_to(t.range_floor_m, 0.003);
+    near_to(t.range_jitter_m, 0.04);
+    near_to(t.range_sigma_per_m, 1e-5);
+    head.has_instrument_errors = 1;
+    assert_false(deviation_terms_of(&head, &t));
+}
+
 /* A wall is 10 m ahead, and a pane before its right half, 8 m ahead. Points lie on beams to places of the wall (y = 10)
  * or of the pane (y = 8), that much further. */
 static const struct {
@@ -183,6 +223,7 @@ int main(void)
         cmocka_unit_test(sigma_of_angles),
         cmocka_unit_test(sigma_of_a_ball),
         cmocka_unit_test(counts_and_bounds),
+        cmocka_unit_test(terms_give_the_same_sigma),
         cmocka_unit_test_setup_teardown(deviations_along_the_beam, make_folder, remove_folder),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

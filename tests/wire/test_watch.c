@@ -173,6 +173,8 @@ static void check_figures(const char *quality, const char *report)
     assert_true(number(quality, "\"all\"", "rms_m") <= number(report, "\"verdict\"", "bound_m"));
     assert_true(number(quality, "\"all\"", "max_m") <= number(report, "\"verdict\"", "bound_m"));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));
+    same("expected noise", number(quality, "\"expected\"", "range_sigma_m"), 0, 0);
+    assert_true(number(quality, "\"expected\"", "place_step_m") > 0);
     same("lost", number(quality, "{", "lost_frames"), 0, 0);
 }
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The sigma and the bound expected of a point, by noise and counts; formulas in core/studio/deviation.h. */
 #include <math.h>
+#include <string.h>
 
 #include "core/studio/deviation.h"
 #include "core/vec3.h"
@@ -89,6 +90,39 @@ double deviation_sigma_m(const struct deviation_head *head, const struct deviati
     const double range_count_m = setup->layout == LINE_POLAR ? setup->range_scale_m : 0.0;
     *counts_m = sqrt((square(range_count_m) + counts / square(cosine)) / 12.0);
     return sqrt(square(range_sigma_m(setup, range_m, cosine, hit->label)) + noise / square(cosine));
+}
+
+static void signal_terms(const struct cast_detect *detect, struct deviation_terms *out)
+{
+    const struct detect_signal *signal = detect->signal;
+    if (detect->noise_by_signal && signal != NULL) {
+        out->range_floor_m = sqrt(signal->floor2);
+        out->range_jitter_m = sqrt(signal->jitter2);
+        out->range_sigma_per_m = signal->per_distance;
+    }
+    if (detect->ball == NULL) return;
+    out->ball_m = detect->ball->radius_m;
+    out->ball_per_m = detect->ball->per_distance_1_m;
+    memcpy(out->ball_factor, detect->ball->factor, sizeof out->ball_factor);
+    out->ball_local = detect->ball->local;
+}
+
+int deviation_terms_of(const struct deviation_head *head, struct deviation_terms *out)
+{
+    const struct cast_setup *setup = &head->setup;
+    *out = (struct deviation_terms){.range_floor_m = (double)NAN, .range_jitter_m = (double)NAN};
+    if (head->has_instrument_errors) return 0;
+    if (setup->detect != NULL) signal_terms(setup->detect, out);
+    if (setup->noise_on) { /* it comes first, as in range_sigma_m() */
+        out->range_floor_m = out->range_jitter_m = (double)NAN;
+        out->range_sigma_m = setup->range_sigma_m;
+        out->range_sigma_per_m = 1e-6 * setup->range_sigma_ppm;
+    }
+    memcpy(out->angle_sigma_rad, head->angle_sigma_rad, sizeof out->angle_sigma_rad);
+    encoder_steps(setup, out->angle_step_rad);
+    out->range_step_m = setup->layout == LINE_POLAR ? setup->range_scale_m : 0.0;
+    out->place_step_m = hypot(head->count_m, head->file_count_m);
+    return 1;
 }
 
 double deviation_bound_m(const struct deviation_head *head, double range_m)

@@ -18,6 +18,7 @@ import {startRecorder} from './recorder.js';
 import {saveRow} from './save.js';
 import {startKeys} from './keys.js';
 import {RecordingPlayer, ReplayPlayer, Timeline} from './timeline.js';
+import {startTools} from './all_tools.js';
 
 const CAPACITY = 10e6; // so many points are stored
 const WIDE = '(min-width: 47rem)';
@@ -183,6 +184,7 @@ async function start() {
   const names = new Names();
   const info = await fetchJson('/head');
   window.scanhead = {head: null, cloud, view};
+  if (view) window.scanhead.tools = startTools(view, names.of);
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
   document.body.dataset.ready = ''; // until then nothing is shown, since parts are filled, or go

@@ -14,7 +14,7 @@ import {Stations} from './view_stations.js';
 import {Hover} from './view_hover.js';
 import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
-import {drawShaded, programsOf} from './view_gl.js';
+import {drawShaded, Programs} from './view_gl.js';
 import {searchSlowly} from './view_pick.js';
 import {onTheme, readTheme} from './view_theme.js';
 import {copyOf} from './picture.js';
@@ -31,6 +31,7 @@ export class View extends EventTarget {
   static modes = MODES;
   movable = true; // stations can be dragged
   camera = new Camera();
+  tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}, each returns whether it has used it
   shading = true;
   #gl;
   #painter;
@@ -48,10 +49,6 @@ export class View extends EventTarget {
   #touched = false;
   #fitted = 0; // there were so many points when the view was fitted
   #pointSize = 2;
-  #hover = new Hover(this, (point, isAsked) => {
-    this.#emit('pick', point || isAsked ? {point, isAsked} : null);
-    this.#ask('overlay');
-  });
   #waiting = [];
   #goneDrawn = 0;
   #lastGone = 0;
@@ -74,6 +71,10 @@ export class View extends EventTarget {
     if (!this.#gl) throw new Error('no WebGL 2');
     this.overlay = new Overlay(canvas);
     this.#scale = new Scale(cloud);
+    this.pointed = new Hover(this, (point, isAsked) => {
+      this.#emit('pick', point || isAsked ? {point, isAsked} : null);
+      this.redraw();
+    });
     this.stations = new Stations(() => this.#ask('show'), (detail) => this.#emit('move', detail));
     this.#attach();
     this.#listen();
@@ -108,7 +109,7 @@ export class View extends EventTarget {
   // Makes everything on the GPU, also after a lost context.
   #attach() {
     const gl = this.#gl;
-    this.programs = programsOf(gl);
+    this.programs = new Programs(gl);
     this.#painter = new Painter(gl);
     this.#points = new Points(gl, this.programs, this.cloud);
     this.#paint();
@@ -209,9 +210,12 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
+  // Returns {min, max} of the scene, or of the points without their far ends; null: there is nothing.
+  bounds() { return boxOf(this.cloud, this.stations.list, this.#solids, true); }
+
   fit() {
     const box = boxOf(this.cloud, this.stations.list, this.#solids);
-    if (box) this.camera.fit(box);
+    if (box) this.camera.fit(this.camera.section?.within(box) ?? box);
     this.cameraMoved();
   }
 
@@ -219,10 +223,10 @@ export class View extends EventTarget {
   lookAt({x, y}) {
     searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
       if (!found) return;
-      const p = this.camera.at(x, y, found.w);
-      this.camera.inside = false;
-      this.camera.target = p;
-      this.camera.distance = Math.max(0.05, 0.5 * found.w);
+      const {camera} = this;
+      const p = camera.at(x, y, found.w);
+      const {w} = camera.project(p);
+      Object.assign(camera, {inside: false, target: p, distance: Math.max(0.05, 0.5 * w)});
       this.cameraMoved();
     });
   }
@@ -256,15 +260,15 @@ export class View extends EventTarget {
 
   touched() { this.#touched = true; }
 
-  // The pointer is at a place, or nowhere.
-  hover(p) {
-    const hit = p !== null && this.#solids.stationsOn ? this.stations.hit(this.camera, p.x, p.y) : null;
-    if (p !== null) this.canvas.style.cursor = hit && this.movable ? (hit.what === 'turn' ? 'crosshair' : 'move') : 'default';
-    this.#hover.at(p);
-  }
+  hover(p) { this.pointed.at(p); }
 
   // Looks for the point in the middle of the picture.
-  pickMiddle() { this.#hover.middle(); }
+  pickMiddle() { this.pointed.middle(); }
+
+  get showsStations() { return this.#solids.stationsOn; }
+
+  // Only what lies over the picture has changed.
+  redraw() { this.#ask('overlay'); }
 
   // ---- drawing
 
@@ -402,7 +406,7 @@ export class View extends EventTarget {
   #over() {
     this.#want.overlay = false;
     this.overlay.draw({camera: this.#seen, colours: this.colours.css, stations: this.#solids.stationsOn ? this.stations : null,
-      marked: this.#hover.point});
+      marked: this.pointed.point});
   }
 
   #next(parts) {

@@ -5,6 +5,9 @@
 //
 // Depth is logarithmic: from NEAR_M to FAR_M each doubling of the distance has the same share of the 24 bits, so two
 // points 1.2 um apart at 1 m, or 1.2 mm at 1 km, are told apart. Shaders and test have the same formula.
+//
+// A flat (orthographic) view has the scale that a perspective one has at the target. Nothing is behind its eye: its depth
+// has no ends (flatDepthOf), and its lines of sight begin anywhere.
 
 export const NEAR_M = 1e-3;
 export const FAR_M = 1e6;
@@ -22,6 +25,13 @@ export const radians = (deg) => deg * Math.PI / 180;
 // Returns the depth of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
 export const depthOf = (w) => Math.log2(w / NEAR_M) / Math.log2(FAR_M / NEAR_M);
 
+// Returns the depth in a flat view: 0.5 at the target, with the step there that depthOf has at that distance.
+export const FLAT_REACH = 10; // so many distances from the target the depth is 0.25 or 0.75
+export function flatDepthOf(w, distance) {
+  const x = (w - distance) / (FLAT_REACH * distance);
+  return 0.5 + 0.5 * x / (1 + Math.abs(x));
+}
+
 // Returns a double as the sum of two floats; the difference to a float coordinate, hi first, is exact near the eye.
 export function split(v) {
   const hi = v.map(Math.fround);
@@ -35,6 +45,9 @@ export class Camera {
   elevation = radians(-25);
   fov = radians(50); // it is the angle across the shorter side
   inside = false; // the eye stays, as in a head: turning looks round
+  flat = false; // it is orthographic
+  before = null; // it has the direction from before the flat views (view_sides.js)
+  section = null; // only what is in this Section (section.js) is seen
   width = 1;
   height = 1;
 
@@ -55,21 +68,28 @@ export class Camera {
   // Its rows are right, up and forward.
   get rotation() { return [this.right, this.up, this.forward]; }
 
-  // Returns {x, y, w}: w is the distance along the line of sight; a place behind the eye has at most 0.
+  // Returns {x, y, w}: focal / w is the pixels of a metre there. w is the distance along the line of sight, which is at
+  // most 0 behind the eye; in a flat view it is that of the target everywhere.
   project(p) {
     const d = sub(p, this.eye);
-    const w = dot(d, this.forward);
+    const w = this.flat ? this.distance : dot(d, this.forward);
     const k = this.focal / w;
     return {x: 0.5 * this.width + k * dot(d, this.right), y: 0.5 * this.height - k * dot(d, this.up), w};
   }
 
-  // Returns the direction of the ray through a place of the screen, with a length of 1 along the line of sight.
-  ray(x, y) {
-    const {focal} = this;
-    return add(add(this.forward, this.right, (x - 0.5 * this.width) / focal), this.up, (0.5 * this.height - y) / focal);
+  // Returns `from`, moved across the line of sight by so many pixels at the distance w.
+  #across(from, x, y, w) {
+    const k = w / this.focal;
+    return add(add(from, this.right, (x - 0.5 * this.width) * k), this.up, (0.5 * this.height - y) * k);
   }
 
-  at(x, y, w) { return add(this.eye, this.ray(x, y), w); }
+  // Returns the direction of the ray through a place of the screen, with a length of 1 along the line of sight.
+  ray(x, y) { return this.flat ? this.forward : this.#across(this.forward, x, y, 1); }
+
+  // Returns the place where that ray begins.
+  from(x, y) { return this.flat ? this.#across(this.eye, x, y, this.distance) : this.eye; }
+
+  at(x, y, w) { return add(this.from(x, y), this.ray(x, y), w); }
 
   turn(dAzimuth, dElevation) {
     const {eye} = this;
@@ -110,6 +130,12 @@ export class Camera {
     this.distance = distance;
   }
 
+  // Looks in a direction without perspective; the scale at the target stays.
+  lookFlat(azimuth, elevation) {
+    if (this.inside) this.distance = Math.max(this.distance, 10);
+    Object.assign(this, {inside: false, flat: true, fov: radians(50), azimuth, elevation});
+  }
+
   // Brings all of a box into sight.
   fit({min, max}) {
     if (this.inside) this.elevation = radians(-25);
@@ -121,13 +147,14 @@ export class Camera {
     const across = 0.5 * FILLED * this.width / this.focal, along = 0.5 * FILLED * this.height / this.focal;
     for (let k = 0; k < 8; k++) { // a corner is in sight from far enough
       const d = [0, 1, 2].map((a) => (k >> a & 1 ? max : min)[a] - this.target[a]);
-      const least = Math.max(Math.abs(dot(d, right)) / across, Math.abs(dot(d, up)) / along) - dot(d, forward);
+      const least = Math.max(Math.abs(dot(d, right)) / across, Math.abs(dot(d, up)) / along) - (this.flat ? 0 : dot(d, forward));
       this.distance = Math.max(this.distance, least);
     }
   }
 
   lookFrom(eye, heading, elevation = 0) {
     this.inside = true;
+    this.flat = false;
     this.fov = radians(80);
     this.azimuth = heading;
     this.elevation = elevation;
@@ -141,10 +168,11 @@ export class Camera {
     const eye = sub(this.eye, origin);
     const [right, up, forward] = this.rotation;
     const tx = 0.5 * this.width / this.focal, ty = 0.5 * this.height / this.focal;
-    const planes = [forward, add(right, forward, tx), add(right.map((c) => -c), forward, tx),
-      add(up, forward, ty), add(up.map((c) => -c), forward, ty)];
-    return planes.every((n) => {
-      let most = 0;
+    const [ahead, k] = this.flat ? [[0, 0, 0], this.distance] : [forward, 0]; // a flat view's sides are parallel
+    const planes = [ahead, add(right, ahead, tx), add(right.map((c) => -c), ahead, tx),
+      add(up, ahead, ty), add(up.map((c) => -c), ahead, ty)];
+    return planes.every((n, i) => {
+      let most = k * [0, tx, tx, ty, ty][i];
       for (let a = 0; a < 3; a++) most += n[a] * ((n[a] > 0 ? hi[a] : lo[a]) - eye[a]);
       return most >= -1e-3;
     });
@@ -154,11 +182,12 @@ export class Camera {
 // Returns the place where the ray through a place of the screen hits the plane z = height. Beyond `reach` from the
 // eye, or without a hit, it is the place at that reach in the ray's direction, on the plane.
 export function onPlane(camera, x, y, height, reach) {
-  const {eye} = camera;
+  const eye = camera.from(x, y);
   const ray = camera.ray(x, y);
   const t = (height - eye[2]) / ray[2];
   const along = Math.hypot(ray[0], ray[1]);
-  const d = t > 0 && t * along < reach ? t * along : reach;
+  const isHit = (t > 0 || camera.flat) && Math.abs(t) * along < reach;
+  const d = isHit ? t * along : reach;
   if (along < 1e-12) return [eye[0], eye[1], height];
   return [eye[0] + d * ray[0] / along, eye[1] + d * ray[1] / along, height];
 }

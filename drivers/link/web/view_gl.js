@@ -4,21 +4,50 @@
 // All positions are relative to an origin of their own; the eye relative to it comes as the sum of two floats. Depth is
 // logarithmic (view_camera.js), and stands in the target's texture, where shading and hiding read it.
 
-import {FAR_M, NEAR_M} from './view_camera.js';
+import {FAR_M, FLAT_REACH, NEAR_M, split, sub} from './view_camera.js';
 
 const OCTAVES = Math.log2(FAR_M / NEAR_M);
 
 const PLACE = `
 uniform vec3 u_eye_hi, u_eye_lo;
 uniform mat3 u_axes; // columns: right, up, forward
-uniform vec2 u_lens; // clip units per slope
-const float NEAR = ${NEAR_M};
-const float OCTAVES = ${OCTAVES};
+uniform vec2 u_lens; // clip units per slope, or per metre in a flat view
 vec3 seen(vec3 p) { return ((p - u_eye_hi) - u_eye_lo) * u_axes; }
-float depth_of(float w) { return log2(max(w, NEAR) / NEAR) / OCTAVES; }
+#ifdef FLAT
+vec4 placed(vec3 s) { return vec4(s.xy * u_lens, 2.0 * depth_of(s.z, 1.0) - 1.0, 1.0); }
+#else
 vec4 placed(vec3 s) {
-  return s.z <= NEAR ? vec4(0.0, 0.0, 2.0, 1.0) : vec4(s.xy * u_lens, (2.0 * depth_of(s.z) - 1.0) * s.z, s.z);
+  return s.z <= NEAR ? OUT : vec4(s.xy * u_lens, (2.0 * depth_of(s.z, 1.0) - 1.0) * s.z, s.z);
 }
+#endif
+`;
+
+// Depth at a distance along the line of sight, pushed away by a factor. The formulas are those of view_camera.js.
+const DEPTH = `
+const float NEAR = ${NEAR_M};
+const vec4 OUT = vec4(0.0, 0.0, 2.0, 1.0);
+#ifdef FLAT
+uniform float u_distance;
+float depth_of(float w, float push) {
+  float x = (w + (push - 2.0) * u_distance) / (${FLAT_REACH}.0 * u_distance);
+  return 0.5 + 0.5 * x / (1.0 + abs(x));
+}
+#else
+float depth_of(float w, float push) { return log2(max(w * push, NEAR) / NEAR) / ${OCTAVES}; }
+#endif
+`;
+
+// A section (section.js) leaves out what is beyond it.
+const CUT = `
+#ifdef CUT
+uniform vec3 u_cut_middle, u_cut_half;
+uniform vec2 u_cut_turn; // cos, sin of its heading
+bool is_cut(vec3 p) {
+  vec3 d = p - u_cut_middle;
+  d.xy = vec2(u_cut_turn.x * d.x - u_cut_turn.y * d.y, u_cut_turn.y * d.x + u_cut_turn.x * d.y);
+  return any(greaterThan(abs(d), u_cut_half));
+}
+#endif
 `;
 
 const HEAD = `#version 300 es
@@ -27,7 +56,7 @@ precision highp int;
 `;
 
 const POINTS = {
-  vertex: `${HEAD}${PLACE}
+  vertex: `${HEAD}${DEPTH}${PLACE}${CUT}
 layout(location = 0) in vec3 a_position;
 layout(location = 1) in float a_value;
 layout(location = 2) in vec4 a_rgb;
@@ -42,7 +71,14 @@ flat out vec3 v_colour;
 void main() {
   vec3 s = seen(a_position);
   gl_Position = a_time < u_times.x || a_time > u_times.y ? vec4(0.0, 0.0, 2.0, 1.0) : placed(s);
+#ifdef CUT
+  if (is_cut(a_position)) gl_Position = OUT;
+#endif
+#ifdef FLAT
+  gl_PointSize = u_size;
+#else
   gl_PointSize = clamp(u_size * sqrt(u_near_w / max(s.z, NEAR)), u_size, u_size_most);
+#endif
   if (u_kind == 2) v_colour = a_rgb.rgb;
   else if (a_value < -1e29) v_colour = u_grey;
   else if (u_kind == 1) v_colour = texelFetch(u_table, ivec2(int(a_value + 0.5) & 255, 0), 0).rgb;
@@ -57,20 +93,31 @@ void main() { colour = vec4(v_colour, 1.0); }`,
 // These draw triangles and lines. Hidden ones are left out, or faint, by the depth texture of the earlier drawing
 // (u_behind).
 const MESH = {
-  vertex: `${HEAD}${PLACE}
+  vertex: `${HEAD}${DEPTH}${PLACE}
 layout(location = 0) in vec3 a_position;
 uniform vec3 u_shift;
 uniform vec2 u_turn; // cos, sin of the heading
 out vec3 v_seen;
+#ifdef CUT
+out vec3 v_place;
+#endif
 void main() {
   vec3 p = vec3(u_turn.x * a_position.x + u_turn.y * a_position.y, u_turn.x * a_position.y - u_turn.y * a_position.x, a_position.z);
   v_seen = seen(p + u_shift);
-  gl_Position = vec4(v_seen.xy * u_lens, v_seen.z - 2.0 * NEAR, v_seen.z); // depth is the fragment's
+#ifdef CUT
+  v_place = p + u_shift;
+#endif
+#ifdef FLAT
+  gl_Position = vec4(v_seen.xy * u_lens, 0.0, 1.0); // depth is the fragment's
+#else
+  gl_Position = vec4(v_seen.xy * u_lens, v_seen.z - 2.0 * NEAR, v_seen.z);
+#endif
 }`,
-  fragment: `${HEAD}
-const float NEAR = ${NEAR_M};
-const float OCTAVES = ${OCTAVES};
+  fragment: `${HEAD}${DEPTH}${CUT}
 in vec3 v_seen;
+#ifdef CUT
+in vec3 v_place;
+#endif
 uniform vec4 u_colour;
 uniform float u_edge;   // more alpha where seen at a grazing angle
 uniform float u_push;   // > 1: a little behind, so that points on it stay visible
@@ -79,12 +126,19 @@ uniform bool u_flat, u_tests;
 uniform sampler2D u_behind;
 out vec4 colour;
 void main() {
-  float depth = log2(max(v_seen.z * u_push, NEAR) / NEAR) / OCTAVES;
+#ifdef CUT
+  if (is_cut(v_place)) discard;
+#endif
+  float depth = depth_of(v_seen.z, u_push);
   gl_FragDepth = depth;
   float light = 1.0, alpha = u_colour.a;
   if (!u_flat) {
     vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
+#ifdef FLAT
+    float facing = abs(n.z);
+#else
     float facing = abs(dot(n, normalize(v_seen)));
+#endif
     light = 0.45 + 0.42 * facing + 0.13 * abs(n.y);
     alpha = min(1.0, alpha + u_edge * pow(1.0 - facing, 3.0));
   }
@@ -149,7 +203,43 @@ function link(gl, {vertex, fragment}) {
   return out;
 }
 
-export const programsOf = (gl) => ({points: link(gl, POINTS), mesh: link(gl, MESH), shade: link(gl, SHADE)});
+// These are the programs of a context. A flat view and a section have variants of their own, which are compiled when
+// they are first needed; so a plain view costs nothing more.
+export class Programs {
+  #gl;
+  #made = new Map();
+
+  constructor(gl) {
+    this.#gl = gl;
+    this.shade = link(gl, SHADE);
+    for (const kind of ['points', 'mesh']) this.#of(kind, []);
+  }
+
+  #of(kind, defines) {
+    const key = [kind, ...defines].join();
+    if (!this.#made.has(key)) {
+      const words = defines.map((name) => `#define ${name}\n`).join('');
+      const {vertex, fragment} = {points: POINTS, mesh: MESH}[kind];
+      this.#made.set(key, link(this.#gl, {vertex: vertex.replace('\n', `\n${words}`), fragment: fragment.replace('\n', `\n${words}`)}));
+    }
+    return this.#made.get(key);
+  }
+
+  // Makes a program current that draws with this camera, things relative to `origin`, and returns it.
+  use(kind, camera, origin, section = camera.section) {
+    const gl = this.#gl;
+    const program = this.#of(kind, [camera.flat && 'FLAT', section && 'CUT'].filter(Boolean));
+    gl.useProgram(program.program);
+    setPlace(gl, program, camera, origin);
+    if (section) {
+      const {middle, half, turn} = section.relativeTo(origin);
+      gl.uniform3fv(program.u_cut_middle, middle);
+      gl.uniform3fv(program.u_cut_half, half);
+      gl.uniform2fv(program.u_cut_turn, turn);
+    }
+    return program;
+  }
+}
 
 function texture(gl, internal, format, type, width, height, data = null) {
   const t = gl.createTexture();
@@ -229,11 +319,14 @@ export function drawShaded(gl, shade, empty, {colour, depth}, {ground, strength,
   gl.drawArrays(gl.TRIANGLES, 0, 3);
 }
 
-// Sets the uniforms by which a program places things. `eye` is relative to the thing's origin, split.
-export function setPlace(gl, program, camera, eye) {
+// Sets the uniforms by which a program places things; the eye relative to their origin is split.
+function setPlace(gl, program, camera, origin) {
   const [right, up, forward] = camera.rotation;
+  const eye = split(sub(camera.eye, origin));
+  const k = 2 * camera.focal / (camera.flat ? camera.distance : 1);
   gl.uniform3fv(program.u_eye_hi, eye.hi);
   gl.uniform3fv(program.u_eye_lo, eye.lo);
   gl.uniformMatrix3fv(program.u_axes, false, [...right, ...up, ...forward]);
-  gl.uniform2f(program.u_lens, 2 * camera.focal / camera.width, 2 * camera.focal / camera.height);
+  gl.uniform2f(program.u_lens, k / camera.width, k / camera.height);
+  if (camera.flat) gl.uniform1f(program.u_distance, camera.distance);
 }

@@ -1,35 +1,48 @@
 /* SPDX-License-Identifier: MIT */
-// The point under the pointer, or under the middle of the picture for those who have none: it is searched for once the
-// pointer stays, in slices of a few milliseconds.
-import {pointOf} from './cloud.js';
+// This module finds the point under the pointer, once the pointer stays, and marks a point that another part of the page
+// points at.
+
 import {searchSlowly} from './view_pick.js';
+import {pointOf} from './cloud.js';
 
 const HOVER_MS = 70, RADIUS_PX = 8, MIDDLE_PX = 40; // nobody aims well with the middle of a picture
 
 export class Hover {
-  point = null;
+  point = null; // its figures, as pointOf() returns them
   #view;
-  #picked;
+  #told;
   #timer = 0;
   #stop = null;
 
-  // picked(point or null, isAsked) says what is found; isAsked: by a key.
-  constructor(view, picked) {
+  // told(point or null, isAsked) is called with each other point; isAsked: a key has asked for it
+  constructor(view, told) {
     this.#view = view;
-    this.#picked = picked;
+    this.#told = told;
   }
 
-  // The pointer is at a place of the canvas, or nowhere.
+  // The pointer is at a place, or nowhere.
   at(p) {
     this.#end();
-    if (p === null) return this.#found(null, false);
-    this.#timer = setTimeout(() => this.#search(p, RADIUS_PX, false), HOVER_MS);
+    if (p === null) return this.mark(null);
+    const {stations, camera, canvas, movable, tool} = this.#view;
+    const hit = this.#view.showsStations && !tool ? stations.hit(camera, p.x, p.y) : null;
+    canvas.style.cursor = tool ? 'crosshair' : hit && movable ? (hit.what === 'turn' ? 'crosshair' : 'move') : 'default';
+    this.#timer = setTimeout(() => {
+      this.#stop = this.find(p, RADIUS_PX, (point) => {
+        this.#stop = null;
+        this.mark(point);
+      });
+    }, HOVER_MS);
   }
 
+  // The middle of the picture is for those who have no pointer.
   middle() {
     this.#end();
     const {width, height} = this.#view.camera;
-    this.#search({x: 0.5 * width, y: 0.5 * height}, MIDDLE_PX, true);
+    this.#stop = this.find({x: 0.5 * width, y: 0.5 * height}, MIDDLE_PX, (point) => {
+      this.#stop = null;
+      this.mark(point, true);
+    });
   }
 
   #end() {
@@ -38,17 +51,16 @@ export class Hover {
     this.#stop = null;
   }
 
-  #search(p, radius_px, isAsked) {
+  // Calls then(point) with the point at a place of the canvas, or with null. The function returned stops it.
+  find(p, radius_px, then) {
     const {cloud, camera} = this.#view;
-    this.#stop = searchSlowly(cloud, camera, p.x, p.y, radius_px, (found) => {
-      this.#stop = null;
-      this.#found(found && cloud.origin ? pointOf(cloud, found.block, found.i) : null, isAsked);
-    });
+    return searchSlowly(cloud, camera, p.x, p.y, radius_px, (found) =>
+      then(found && cloud.origin ? pointOf(cloud, found.block, found.i) : null));
   }
 
-  #found(point, isAsked) {
+  mark(point, isAsked = false) {
     if (point === null && this.point === null && !isAsked) return;
     this.point = point;
-    this.#picked(point, isAsked);
+    this.#told(point, isAsked);
   }
 }

@@ -8,10 +8,12 @@
 //   a station                 drag it; its handle turns it
 
 import {grip} from './view_pick.js';
+import {lookBy} from './view_sides.js';
 
 export const KEYS = [
   ['arrows', 'orbit; from inside look round'], ['Shift + arrows', 'shift the view'], ['+ −', 'zoom'],
-  ['Home', 'show all'], ['T', 'from above'], ['I', 'the point in the middle: its figures'],
+  ['Home', 'show all'], ['T, F, S', 'from the top, the front, the side, without perspective'], ['O', 'perspective again'],
+  ['I', 'the point in the middle: its figures'],
   ['C', 'turn about the point in the middle, and go nearer'], ['N, P', 'select the next, the previous station'],
   ['Enter', 'look from the selected station'], ['Esc', 'undo a move; unselect'],
   ['of a selected station: arrows, Page Up, Page Down', '0.1 m; with Shift 1 m'], ['[ ]', 'turn it by 5°; with Shift by 45°'],
@@ -62,7 +64,7 @@ export class Input {
     view.touched();
     if (this.#down.size === 1) {
       this.#moved = 0;
-      const hit = e.button === 0 ? view.stations.hit(view.camera, p.x, p.y) : null;
+      const hit = e.button === 0 && !view.tool ? view.stations.hit(view.camera, p.x, p.y) : null;
       if (hit && view.movable) {
         view.stations.grab(view.camera, hit, p.x, p.y);
         this.#gesture = {kind: 'station'};
@@ -156,6 +158,7 @@ export class Input {
     const now = performance.now();
     const twice = now - this.#tap.time < 350 && Math.hypot(p.x - this.#tap.x, p.y - this.#tap.y) < 20;
     this.#tap = {time: twice ? 0 : now, ...p};
+    if (view.tool?.tap(p)) return;
     if (twice) view.lookAt(p);
     else if (kind !== 'station' && view.stations.hit(view.camera, p.x, p.y) === null) view.stations.select(null);
     view.hover(p);
@@ -188,6 +191,7 @@ export class Input {
       e.preventDefault();
       view.touched();
     };
+    if (view.tool?.key(e)) return used();
     if ((view.movable || e.key === 'Escape') && stations.key(camera, e.key, e.shiftKey)) return used();
     const arrow = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]}[e.key];
     if (arrow) {
@@ -198,9 +202,9 @@ export class Input {
     } else if (e.key === '+' || e.key === '=') camera.zoom(0.85);
     else if (e.key === '-' || e.key === '_') camera.zoom(1 / 0.85);
     else if (e.key === 'Home') view.fit();
-    else if (e.key === 't' || e.key === 'T') camera.orbit(camera.target, -camera.azimuth, -Math.PI - camera.elevation);
     else if (/^i$/i.test(e.key)) view.pickMiddle();
     else if (/^c$/i.test(e.key)) view.lookAt({x: 0.5 * camera.width, y: 0.5 * camera.height});
+    else if (/^[tfso]$/i.test(e.key)) lookBy(camera, e.key);
     else if (/^[np]$/i.test(e.key)) stations.next(/n/i.test(e.key) ? 1 : -1);
     else if (e.key === 'Enter' && stations.selected !== null) view.lookFrom(stations.selected);
     else return;

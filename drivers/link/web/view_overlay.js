@@ -31,6 +31,8 @@ export class Overlay {
     canvas.after(this.canvas);
     this.over = canvas;
     this.context = this.canvas.getContext('2d');
+    this.layers = new Set(); // tools draw here: layer(pen, camera)
+    this.pen = {line: (...all) => this.#line(...all), text: (...all) => this.#text(...all), dot: (...all) => this.#dot(...all)};
   }
 
   resize(width, height, ratio) {
@@ -53,6 +55,8 @@ export class Overlay {
     c.lineJoin = c.lineCap = 'round';
     this.colours = colours;
     if (stations) this.#stations(camera, stations);
+    this.pen.colours = colours;
+    for (const layer of this.layers) layer(this.pen, camera);
     if (marked) this.#mark(camera, marked);
     if (camera.inside) this.#looking(camera);
     else this.#scale(camera);

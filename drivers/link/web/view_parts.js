@@ -3,8 +3,7 @@
 // on the GPU, and meshes.
 
 import {MODES, GREY, tableOf, valuesOf} from './view_colours.js';
-import {setPlace, tableTexture} from './view_gl.js';
-import {split, sub} from './view_camera.js';
+import {tableTexture} from './view_gl.js';
 import {isOutside} from './cloud.js';
 
 const STRIDE_MOST = 21; // 255 bytes of 12
@@ -32,7 +31,7 @@ class BlockPart {
 
   // Only points of some times are shown: their times go to the GPU, too, from the first such drawing on.
   #times(stride) {
-    const {gl, program, cloud: {window}} = this.points, {block} = this;
+    const {gl, cloud: {window}} = this.points, {block} = this;
     if (window === null) {
       gl.disableVertexAttribArray(3);
       return;
@@ -46,7 +45,7 @@ class BlockPart {
     }
     gl.enableVertexAttribArray(3);
     gl.vertexAttribPointer(3, 1, gl.FLOAT, false, 4 * stride, 0);
-    gl.uniform2f(program.u_times, Math.max(-1e38, window.from - block.began_s), Math.min(1e38, window.to - block.began_s));
+    gl.uniform2f(this.points.program.u_times, Math.max(-1e38, window.from - block.began_s), Math.min(1e38, window.to - block.began_s));
   }
 
   get n() { return this.block.n; }
@@ -136,12 +135,12 @@ export class Points {
   base = 0; // the point of this number counts as 0 in the mode age
   size = 2; // pixels
   scale = 1; // it is the ratio of the target's pixels to those of the page
-  #using = false;
+  #using = null; // it is the program
   #table = null;
   #known = new Map();
 
   constructor(gl, programs, cloud) {
-    Object.assign(this, {gl, program: programs.points, cloud});
+    Object.assign(this, {gl, programs, cloud});
   }
 
   setMode(mode, scale) {
@@ -176,17 +175,18 @@ export class Points {
   // Takes the camera before each step; parts out of sight are left out.
   aim(camera) {
     this.camera = camera;
-    this.#using = false;
-    const {origin, window} = this.cloud;
-    for (const part of this.parts) part.skip = !camera.sees(part.block.lo, part.block.hi, origin) || isOutside(window, part.block);
+    this.#using = null;
+    const {origin, window} = this.cloud, {section} = camera;
+    for (const part of this.parts) {
+      const {lo, hi} = part.block;
+      part.skip = !camera.sees(lo, hi, origin) || (section !== null && !section.meets(lo, hi, origin)) || isOutside(window, part.block);
+    }
   }
 
   use() {
-    const {gl, program, camera} = this;
-    if (this.#using && gl.getParameter(gl.CURRENT_PROGRAM) === program.program) return;
-    this.#using = true;
-    gl.useProgram(program.program);
-    setPlace(gl, program, camera, split(sub(camera.eye, this.cloud.origin)));
+    const {gl, camera} = this;
+    if (this.#using && gl.getParameter(gl.CURRENT_PROGRAM) === this.#using.program) return;
+    const program = this.program = this.#using = this.programs.use('points', camera, this.cloud.origin);
     gl.uniform1i(program.u_kind, ['ramp', 'list', 'rgb'].indexOf(MODES[this.mode].kind));
     gl.uniform2f(program.u_limits, this.limits[0], 1 / Math.max(1e-30, this.limits[1] - this.limits[0]));
     gl.uniform2f(program.u_times, -1e38, 1e38);
@@ -201,11 +201,10 @@ export class Points {
   }
 }
 
-// These uniforms of the mesh program have a usual value.
-export function useMesh(gl, program, camera, origin, {colour, edge = 0, push = 1, faint = 1, flat = false, behind = null,
-  shift = [0, 0, 0], heading = 0}) {
-  gl.useProgram(program.program);
-  setPlace(gl, program, camera, split(sub(camera.eye, origin)));
+// These uniforms of the mesh program have a usual value. A section does not cut what has `section: null`.
+export function useMesh(gl, programs, camera, origin, {colour, edge = 0, push = 1, faint = 1, flat = false, behind = null,
+  shift = [0, 0, 0], heading = 0, section}) {
+  const program = programs.use('mesh', camera, origin, section);
   gl.uniform3fv(program.u_shift, shift);
   gl.uniform2f(program.u_turn, Math.cos(heading), Math.sin(heading));
   gl.uniform4fv(program.u_colour, colour);
@@ -228,8 +227,8 @@ export class Mesh {
   skip = false;
   n = 0; // so many triangles are drawn, from the first on
 
-  constructor(gl, program, {origin, positions, triangles, lines = null, drawTriangles = null}) {
-    Object.assign(this, {gl, program, origin});
+  constructor(gl, programs, {origin, positions, triangles, lines = null, drawTriangles = null}) {
+    Object.assign(this, {gl, programs, origin});
     this.all = Math.floor(triangles.length / 3);
     this.n = Math.min(this.all, drawTriangles ?? this.all);
     this.buffers = [];
@@ -260,7 +259,7 @@ export class Mesh {
 
   // Returns it as a part of the stored picture; `look` and `camera` are set before.
   draw(from, to) {
-    useMesh(this.gl, this.program, this.camera, this.origin, this.look);
+    useMesh(this.gl, this.programs, this.camera, this.origin, this.look);
     this.triangles(from, to);
   }
 

@@ -5,26 +5,28 @@
 
 import {isOutside} from './cloud.js';
 import {dot, sub} from './view_camera.js';
+import {isWithin} from './section.js';
 
 // Four pixels beside the pointer count as much as lying a tenth further away.
 const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
 
-// Returns whether a box may have a place at most `slope` from the ray, per length along it. It tests the sphere around
-// the box, so it may be true without such a place. centre and half are relative to the eye.
-function meets(block, eye, forward, slope) {
+// Returns whether a box may have a place at most `slope` from the ray, per length along it, plus `beside_m`. It tests
+// the sphere around the box, so it may be true without such a place. The box and the ray's begin have one origin.
+function meets(block, eye, forward, slope, beside_m) {
   const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
   const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));
   const along = dot(c, forward);
-  if (along < -r) return false;
+  if (slope > 0 && along < -r) return false;
   const square = dot(c, c);
   const across = Math.sqrt(Math.max(0, square - along * along));
-  return across <= r * Math.hypot(1, slope) + Math.max(0, along) * slope;
+  return across <= r * Math.hypot(1, slope) + Math.max(0, along) * slope + beside_m;
 }
 
 // Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null.
 // limit is the number of points of each block that it tests.
 export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   if (cloud.origin === null) return null;
+  if (camera.flat) return yield* searchFlat(cloud, camera, x, y, radius_px, limit);
   const eye = sub(camera.eye, cloud.origin);
   const ray = camera.ray(x, y);
   const length = Math.hypot(...ray);
@@ -32,11 +34,12 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   const k = camera.focal * length; // these are pixels per slope, near the ray
   const slope = radius_px / k;
   const slope2 = slope * slope;
+  const section = camera.section?.relativeTo(cloud.origin) ?? null;
   let best = null;
   let least = Infinity;
   for (const block of [...cloud.blocks]) {
     const {window} = cloud;
-    if (!meets(block, eye, f, slope) || isOutside(window, block)) continue;
+    if (!meets(block, eye, f, slope, 0) || isOutside(window, block)) continue;
     const p = block.position;
     const n = Math.min(block.n, limit);
     for (let i = 0, at = 0; i < n; i++, at += 3) {
@@ -46,11 +49,44 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
       const off2 = dx * dx + dy * dy + dz * dz - w * w;
       if (off2 > slope2 * w * w) continue;
       if (window && (block.t[i] < window.from - block.began_s || block.t[i] > window.to - block.began_s)) continue;
+      if (section !== null && !isWithin(section, p[at], p[at + 1], p[at + 2])) continue;
       const px = Math.sqrt(Math.max(0, off2)) / w * k;
       const score = px + PIXELS_PER_DEPTH * Math.log(w);
       if (score < least) {
         least = score;
         best = {block, i, w: w / length, px};
+      }
+    }
+    yield;
+  }
+  return best;
+}
+
+// Does the same in a flat view, whose rays are parallel: w may be less than 0. A tenth of the target's distance in
+// depth counts as much as a tenth in a view with perspective.
+function* searchFlat(cloud, camera, x, y, radius_px, limit) {
+  const from = sub(camera.from(x, y), cloud.origin);
+  const f = camera.forward;
+  const k = camera.focal / camera.distance;
+  const radius_m = radius_px / k, per_m = PIXELS_PER_DEPTH / camera.distance;
+  const section = camera.section?.relativeTo(cloud.origin) ?? null;
+  let best = null;
+  let least = Infinity;
+  for (const block of [...cloud.blocks]) {
+    if (!meets(block, from, f, 0, radius_m)) continue;
+    const p = block.position;
+    const n = Math.min(block.n, limit);
+    for (let i = 0, at = 0; i < n; i++, at += 3) {
+      const dx = p[at] - from[0], dy = p[at + 1] - from[1], dz = p[at + 2] - from[2];
+      const w = dx * f[0] + dy * f[1] + dz * f[2];
+      const off2 = dx * dx + dy * dy + dz * dz - w * w;
+      if (off2 > radius_m * radius_m) continue;
+      if (section !== null && !isWithin(section, p[at], p[at + 1], p[at + 2])) continue;
+      const px = Math.sqrt(Math.max(0, off2)) * k;
+      const score = px + per_m * w;
+      if (score < least) {
+        least = score;
+        best = {block, i, w, px};
       }
     }
     yield;
@@ -72,10 +108,12 @@ export function grip(cloud, camera, x, y) {
   return camera.at(x, y, found ? found.w : camera.distance);
 }
 
-// Does the same in slices of a few milliseconds, so that the page goes on. The callback gets the result; the
-// function returned stops it.
-export function searchSlowly(cloud, camera, x, y, radius_px, then, slice_ms = 6) {
-  const steps = search(cloud, camera, x, y, radius_px);
+// Does the same in slices, so that the page goes on.
+export const searchSlowly = (cloud, camera, x, y, radius_px, then) => runSlowly(search(cloud, camera, x, y, radius_px), then);
+
+// Takes the steps of a generator in slices of a few milliseconds. The callback gets its result; the function returned
+// stops it.
+export function runSlowly(steps, then, slice_ms = 6) {
   let timer = 0;
   const slice = () => {
     const end = performance.now() + slice_ms;

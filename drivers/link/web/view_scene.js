@@ -19,10 +19,10 @@ export class Solids {
 
   attach(gl, programs) {
     this.gl = gl;
-    this.program = programs.mesh;
+    this.programs = programs;
     this.#shapes.clear();
-    this.sceneMesh = this.scene && new Mesh(gl, this.program, this.scene);
-    this.meshPart = this.mesh && new Mesh(gl, this.program, this.mesh);
+    this.sceneMesh = this.scene && new Mesh(gl, this.programs, this.scene);
+    this.meshPart = this.mesh && new Mesh(gl, this.programs, this.mesh);
   }
 
   // It takes the bytes of /scene; null: there is none.
@@ -30,7 +30,7 @@ export class Solids {
     this.scene = bytes === null || bytes === undefined ? null : parseScene(bytes);
     if (this.scene) this.scene.lines = featureEdges(this.scene.positions, this.scene.triangles);
     this.sceneMesh?.free();
-    this.sceneMesh = this.scene && new Mesh(this.gl, this.program, this.scene);
+    this.sceneMesh = this.scene && new Mesh(this.gl, this.programs, this.scene);
   }
 
   // It takes {origin, positions, triangles, drawTriangles}; the same arrays again with another drawTriangles take no
@@ -41,7 +41,7 @@ export class Solids {
     if (same) this.meshPart.n = Math.min(this.meshPart.all, mesh.drawTriangles ?? this.meshPart.all);
     else {
       this.meshPart?.free();
-      this.meshPart = mesh && new Mesh(this.gl, this.program, mesh);
+      this.meshPart = mesh && new Mesh(this.gl, this.programs, mesh);
     }
   }
 
@@ -91,13 +91,13 @@ export class Solids {
     const {gl, sceneMesh: mesh} = this;
     const face = {colour: [...colours.scene, 0.07], edge: 0.25, push: 1.002, faint: 0, behind};
     if (!plain) {
-      useMesh(gl, this.program, camera, mesh.origin, face);
+      useMesh(gl, this.programs, camera, mesh.origin, face);
       gl.colorMask(false, false, false, false);
       mesh.triangles();
       gl.colorMask(true, true, true, true);
       mesh.triangles();
     }
-    useMesh(gl, this.program, camera, mesh.origin, {...face, colour: [...colours.scene, 0.4], flat: true, push: 0.9995, faint: 0.3});
+    useMesh(gl, this.programs, camera, mesh.origin, {...face, colour: [...colours.scene, 0.4], flat: true, push: 0.9995, faint: 0.3});
     mesh.lines(plain ? EDGES_MOVING : EDGES);
   }
 
@@ -105,7 +105,7 @@ export class Solids {
     const key = tripod ? [tripod.leg_m, tripod.foot_radius_m, tripod.head_above_m].join() : '';
     if (!this.#shapes.has(key)) {
       const mesh = tripod ? legsMesh(tripod) : stationMesh();
-      this.#shapes.set(key, new Mesh(this.gl, this.program, {origin: [0, 0, 0], ...mesh}));
+      this.#shapes.set(key, new Mesh(this.gl, this.programs, {origin: [0, 0, 0], ...mesh}));
     }
     return this.#shapes.get(key);
   }
@@ -118,7 +118,7 @@ export class Solids {
     if (Math.hypot(...at.map((c, a) => c - eye[a])) < 0.4) return; // the eye is in this station
     const colour = station.number === stations.selected || ghost ? colours.accent : colours.ink;
     const drawOne = (shape, place, heading, alpha) => {
-      useMesh(gl, this.program, camera, place, {colour: [...colour, alpha], faint: 0.22, behind, heading: radians(heading)});
+      useMesh(gl, this.programs, camera, place, {colour: [...colour, alpha], faint: 0.22, behind, heading: radians(heading), section: null});
       shape.triangles();
     };
     const draw = (place, heading, alpha) => { // a tripod doesn't turn with its head

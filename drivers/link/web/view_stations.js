@@ -2,23 +2,29 @@
 // This module has the stations in the picture: tripods, the selected one, and its moves. It is dragged along the plane
 // at its height, and turned by its handle or by keys. During a move a ghost stays at its old place.
 
-import {arrowStep, degrees, headingTo, onPlane, radians} from './view_camera.js';
+import {add, arrowStep, degrees, headingTo, onPlane, radians} from './view_camera.js';
 import {feetBelow} from './view_mesh.js';
 import {toSegment} from './view_pick.js';
 
 const GRAB_PX = 18;
 const KEYS_END_MS = 700; // after so long without a key the station is let go
 
+// Returns the directions right, forward and up of a head. It is turned by its heading, then pitch, then roll.
+export function headAxes({heading_deg, pitch_deg, roll_deg}) {
+  const [h, p, r] = [heading_deg, pitch_deg, roll_deg].map((deg) => radians(deg ?? 0));
+  return [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(([x, y, z]) => {
+    const across = x * Math.cos(r) + z * Math.sin(r), sunk = z * Math.cos(r) - x * Math.sin(r);
+    const ahead = y * Math.cos(p) - sunk * Math.sin(p), up = y * Math.sin(p) + sunk * Math.cos(p);
+    return [across * Math.cos(h) + ahead * Math.sin(h), ahead * Math.cos(h) - across * Math.sin(h), up];
+  });
+}
+
 // Returns corners of the head's frame (x right, y forward: x0, y0, x1, y1 ...) as places in the scene. The station has
-// pitch_deg and roll_deg; place is what placeOf() returns. The head is turned by its heading, then pitch, then roll.
+// pitch_deg and roll_deg; place is what placeOf() returns.
 export function inScene(place, station, corners) {
-  const h = radians(place.heading_deg), p = radians(station.pitch_deg ?? 0), r = radians(station.roll_deg ?? 0);
+  const [right, forward] = headAxes({...station, heading_deg: place.heading_deg});
   const places = [];
-  for (let i = 0; i + 1 < corners.length; i += 2) {
-    const x = corners[i] * Math.cos(r), sunk = -corners[i] * Math.sin(r);
-    const y = corners[i + 1] * Math.cos(p) - sunk * Math.sin(p), z = corners[i + 1] * Math.sin(p) + sunk * Math.cos(p);
-    places.push([place.at[0] + x * Math.cos(h) + y * Math.sin(h), place.at[1] - x * Math.sin(h) + y * Math.cos(h), place.at[2] + z]);
-  }
+  for (let i = 0; i + 1 < corners.length; i += 2) places.push(add(add(place.at, right, corners[i]), forward, corners[i + 1]));
   return places;
 }
 

@@ -52,6 +52,8 @@ struct watch_scan {
     double density_cell_m;
     struct figures_histogram histogram; /* of deviations along the beam, or of distances where there are none */
     struct report_verdict verdict;
+    struct deviation_terms expected;
+    int expects; /* 0: expected is not known */
     uint32_t cells_seen;
     double seen_share;
 };

@@ -64,10 +64,43 @@ static void put_counts(struct json *json, const struct watch_scan *s)
     json_double(json, "empty_share", s->shots > 0 ? (double)s->empty / (double)s->shots : (double)NAN);
 }
 
+static void put_pair(struct json *json, const char *key, const double v[2])
+{
+    json_open_array(json, key);
+    json_double(json, NULL, v[0]);
+    json_double(json, NULL, v[1]);
+    json_close_array(json);
+}
+
+/* The noise and the counts from which the error of a point follows. */
+static void put_expected(struct json *json, const struct watch_scan *s)
+{
+    const struct deviation_terms *t = &s->expected;
+    if (!s->expects) {
+        json_string(json, "expected", NULL);
+        return;
+    }
+    json_open_object(json, "expected");
+    json_double(json, "range_sigma_m", t->range_sigma_m);
+    json_double(json, "range_sigma_per_m", t->range_sigma_per_m);
+    json_double(json, "range_floor_m", t->range_floor_m);
+    json_double(json, "range_jitter_m", t->range_jitter_m);
+    json_double(json, "range_step_m", t->range_step_m);
+    json_double(json, "place_step_m", t->place_step_m);
+    put_pair(json, "angle_sigma_rad", t->angle_sigma_rad);
+    put_pair(json, "angle_step_rad", t->angle_step_rad);
+    json_double(json, "ball_m", t->ball_m);
+    json_double(json, "ball_per_m", t->ball_per_m);
+    page_put_vector(json, "ball_factor", t->ball_factor);
+    json_bool(json, "ball_local", t->ball_local);
+    json_close_object(json);
+}
+
 /* Members of an open object, as `report` has them of a file. */
 static void put_scan(struct json *json, const struct watch_scan *s)
 {
     put_counts(json, s);
+    put_expected(json, s);
     if (s->sampled_points == 0) {
         json_string(json, "all", NULL);
         json_string(json, "verdict", NULL);

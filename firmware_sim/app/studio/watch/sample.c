@@ -198,6 +198,7 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
     else
         figures_histogram_of(s->distance_m, s->n, SHOWN, &w->at.histogram);
     sample_judge(w);
+    w->at.expects = !w->site->moving && deviation_terms_of(&w->now, &w->at.expected);
     w->at.every = s->every;
     w->at.sampled_points = s->n;
     return SH_OK;

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+// This module has the tools of the picture, in the order of their buttons, and what they share.
+import {fetchJson} from './page.js';
+import {MeasureTool} from './measure_tool.js';
+import {PanoramaTool} from './panorama_tool.js';
+import {SectionTool} from './section_tool.js';
+import {SidesTool} from './sides_tool.js';
+import {Tools} from './tools.js';
+
+// These are the errors that the head expects of its points. A recording and an older head report none.
+class Expected {
+  #stations = [];
+
+  async ask() {
+    this.#stations = (await fetchJson('/quality'))?.stations ?? [];
+  }
+
+  // Returns what is expected of the last scan of a station; null: not known.
+  of(station) {
+    return this.#stations.find(({number}) => number === station)?.expected ?? null;
+  }
+}
+
+// Returns the tools by their names. names(mode, label) is as Display has it.
+export function startTools(view, names) {
+  const tools = {sides: new SidesTool(view), section: new SectionTool(view), measure: new MeasureTool(view, names, new Expected()),
+    panorama: new PanoramaTool(view, names)};
+  new Tools(Object.values(tools));
+  return tools;
+}

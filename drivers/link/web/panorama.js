@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: MIT */
+// A panorama has the points of one station as its head sees them: azimuth from its forward direction to the right,
+// elevation upward, the nearest point of each pixel. It is pure.
+
+import {dot, sub} from './view_camera.js';
+import {headAxes} from './view_stations.js';
+import {GREY, NONE, robustLimits, tableOf, valuesOf} from './view_colours.js';
+
+const TURN = 2 * Math.PI;
+const PER_PIXEL = 2.5; // points, so that few pixels have none
+const WIDEST = 2048;
+const EMPTY = 0xffffffff;
+
+// A station is {number, x_m, y_m, z_m, heading_deg, pitch_deg, roll_deg}.
+export class Panorama {
+  width = 0;
+  height = 0;
+  n = 0; // points
+  from = [0, 0]; // azimuth and elevation of the lower left corner, radians
+  span = [TURN, 0];
+  #axes;
+  #blocks = []; // [block, whether it was closed]: closing changes the order of its points
+  #block; // per pixel: which of the blocks, and which of its points
+  #point;
+  #range; // from the head
+
+  constructor(cloud, station) {
+    this.cloud = cloud;
+    this.station = station;
+    this.#axes = headAxes(station);
+    this.at = [station.x_m, station.y_m, station.z_m];
+  }
+
+  // Returns [azimuth, elevation, range] of a place.
+  anglesOf(place) {
+    const d = sub(place, this.at);
+    const [x, y, z] = this.#axes.map((axis) => dot(axis, d));
+    return [Math.atan2(x, y), Math.atan2(z, Math.hypot(x, y)), Math.hypot(x, y, z)];
+  }
+
+  // Calls take(i, azimuth, elevation, range) for each point of a block.
+  #each({position, n}, take) {
+    const [[a, b, c], [d, e, f], [g, h, k]] = this.#axes;
+    const [ox, oy, oz] = sub(this.cloud.origin, this.at);
+    for (let i = 0, p = 0; i < n; i++, p += 3) {
+      const dx = position[p] + ox, dy = position[p + 1] + oy, dz = position[p + 2] + oz;
+      const x = a * dx + b * dy + c * dz, y = d * dx + e * dy + f * dz, z = g * dx + h * dy + k * dz;
+      const flat = Math.sqrt(x * x + y * y), range = Math.sqrt(x * x + y * y + z * z);
+      if (range === range) take(i, Math.atan2(x, y), Math.atan2(z, flat), range);
+    }
+  }
+
+  // Steps through the points of the station: first for the limits of the angles, then for the pixels. The last value is
+  // the panorama; n is 0 without points.
+  * make() {
+    const blocks = this.cloud.blocks.filter((block) => block.station === this.station.number);
+    this.#blocks = blocks.map((block) => [block, block.closed]);
+    const lo = [Infinity, Infinity], hi = [-Infinity, -Infinity];
+    for (const block of blocks) {
+      this.#each(block, (_, azimuth, elevation) => {
+        lo[0] = Math.min(lo[0], azimuth);
+        hi[0] = Math.max(hi[0], azimuth);
+        lo[1] = Math.min(lo[1], elevation);
+        hi[1] = Math.max(hi[1], elevation);
+      });
+      this.n += block.n;
+      yield;
+    }
+    if (this.n === 0) return this;
+    this.#size(lo, hi);
+    const nearest = this.#range = new Float32Array(this.width * this.height).fill(Infinity);
+    this.#block = new Uint32Array(nearest.length).fill(EMPTY);
+    this.#point = new Uint32Array(nearest.length);
+    for (const [k, block] of blocks.entries()) {
+      this.#each(block, (i, azimuth, elevation, range) => {
+        const pixel = this.#pixel(azimuth, elevation);
+        if (pixel === null || !(range < nearest[pixel])) return;
+        nearest[pixel] = range;
+        this.#block[pixel] = k;
+        this.#point[pixel] = i;
+      });
+      yield;
+    }
+    return this;
+  }
+
+  #size(lo, hi) {
+    this.from = lo;
+    this.span = lo.map((v, k) => Math.max(0.01, hi[k] - v));
+    const pixels = this.n / PER_PIXEL, aspect = this.span[0] / this.span[1];
+    this.width = Math.round(Math.min(WIDEST, Math.max(60, Math.sqrt(pixels * aspect))));
+    this.height = Math.max(1, Math.round(this.width / aspect));
+  }
+
+  // Returns the column and row of angles, as shares of the width and the height.
+  shareOf([azimuth, elevation]) {
+    return [(azimuth - this.from[0]) / this.span[0], 1 - (elevation - this.from[1]) / this.span[1]];
+  }
+
+  #pixel(azimuth, elevation) {
+    const [x, y] = this.shareOf([azimuth, elevation]);
+    if (!(x >= 0 && x <= 1 && y >= 0 && y <= 1)) return null;
+    return Math.min(this.height - 1, Math.floor(y * this.height)) * this.width + Math.min(this.width - 1, Math.floor(x * this.width));
+  }
+
+  // Returns the pixel that a pixel without a point takes its colour from: itself, or the one beside it where both have one.
+  #shown(pixel) {
+    if (this.#block[pixel] !== EMPTY) return pixel;
+    for (const step of [1, this.width]) {
+      if (this.#block[pixel - step] !== EMPTY && this.#block[pixel + step] !== EMPTY && pixel >= step && pixel + step < this.#block.length) return pixel - step;
+    }
+    return null;
+  }
+
+  // Returns {block, i} of the point of a pixel, or null. It is null, too, once the block was closed: make it again.
+  pointAt(x, y) {
+    if (this.n === 0 || x < 0 || y < 0 || x >= this.width || y >= this.height) return null;
+    const pixel = this.#shown(y * this.width + x);
+    if (pixel === null) return null;
+    const [block, wasClosed] = this.#blocks[this.#block[pixel]];
+    return block.closed === wasClosed ? {block, i: this.#point[pixel]} : null;
+  }
+
+  // Returns {pixels: RGBA of each, limits}: mode as in view_colours.js. Pixels without a point are transparent.
+  colours(mode) {
+    const n = this.width * this.height;
+    const values = new Float32Array(n).fill(NaN);
+    const all = mode === 'range' ? null : this.#blocks.map(([block]) => valuesOf(block, mode, 0, block.n));
+    for (let p = 0; p < n; p++) {
+      const from = this.#shown(p);
+      if (from !== null) values[p] = all === null ? this.#range[from] : all[this.#block[from]][this.#point[from]];
+    }
+    const isList = mode === 'label';
+    const limits = isList ? null : robustLimits(values.filter((v) => v === v && v !== NONE));
+    const table = tableOf(mode), pixels = new Uint8ClampedArray(4 * n);
+    for (let p = 0; p < n; p++) {
+      const v = values[p];
+      if (v !== v) continue;
+      if (v === NONE) pixels.set([...GREY, 255], 4 * p);
+      else {
+        const at = isList ? v & 255 : Math.round(255 * Math.min(1, Math.max(0, (v - limits[0]) / (limits[1] - limits[0]))));
+        for (let c = 0; c < 4; c++) pixels[4 * p + c] = table[4 * at + c];
+      }
+    }
+    return {pixels, limits};
+  }
+
+  // Returns whether points came or went since it was made.
+  get isOld() {
+    const now = this.cloud.blocks.filter((block) => block.station === this.station.number);
+    return now.length !== this.#blocks.length || now.reduce((sum, block) => sum + block.n, 0) !== this.n
+      || now.some((block, k) => block !== this.#blocks[k][0] || block.closed !== this.#blocks[k][1]);
+  }
+}

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+// This module looks from the top, the front and the side without perspective, and back. A section that is turned gives
+// the directions. It is pure.
+
+import {radians} from './view_camera.js';
+
+export const SIDES = [['top', 'Top', 'T'], ['front', 'Front', 'F'], ['side', 'Side', 'S']];
+
+// The front is seen from the south, the side from the east, or from there in the section's frame.
+export function lookFromSide(camera, side) {
+  if (!camera.flat) camera.before = {azimuth: camera.azimuth, elevation: camera.elevation};
+  const heading = radians(camera.section?.kind === 'box' ? camera.section.heading_deg : 0);
+  const [azimuth, elevation] = {top: [0, -Math.PI / 2], front: [0, 0], side: [-Math.PI / 2, 0]}[side];
+  camera.lookFlat(heading + azimuth, elevation);
+}
+
+// Returns to perspective, in the direction from before the flat views.
+export function lookDeep(camera) {
+  if (camera.flat) Object.assign(camera, camera.before, {flat: false});
+}
+
+export function lookBy(camera, key) {
+  const side = SIDES.find(([, , letter]) => letter === key.toUpperCase());
+  if (side) lookFromSide(camera, side[0]);
+  else lookDeep(camera);
+}
