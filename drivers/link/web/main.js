@@ -12,6 +12,7 @@ import {Log, showPlan} from './log.js';
 import {Stations} from './stations.js';
 import {Display} from './display.js';
 import {Point} from './point.js';
+import {TrialPanel} from './trial_panel.js';
 import {Recording} from './recording.js';
 
 const CAPACITY = 10e6; // so many points are stored
@@ -88,6 +89,7 @@ function startHead(cloud, view, names, keepsPast) {
   display.station = () => Number(knobs.value('HEAD:STATION')) || 1;
   new Quality(() => session.link === 'open' && byId('panel-quality').open);
   new Point(view, names.of);
+  const trials = new TrialPanel(session, stations, view);
 
   const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
   let before = ''; // it says who the head was
@@ -110,6 +112,7 @@ function startHead(cloud, view, names, keepsPast) {
     bar.name(info);
     session.paced(info.pace);
     if (view) view.stations.fields = info.fields ?? [];
+    trials.offer(info.previews === true);
     stations.reload(info.stations ?? []).catch(() => {}); // it is gone again
     showPlan();
     display.setScene(await fetchScene());

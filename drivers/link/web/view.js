@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The view draws the picture of a cloud: WebGL 2 points, the scene, the stations, and the point under the pointer. See
-// README.md for what
-// it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once it rests the rest is
-// added, a slice at a time; points that come are added to what is there.
+// The view draws the picture of a cloud: WebGL 2 points, the scene, the stations, and the point under the pointer.
+// README.md says what it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once
+// it rests the rest is added, a slice at a time; points that come are added to what is there.
 
 import {Camera, radians} from './view_camera.js';
 import {MODES} from './view_colours.js';
@@ -14,8 +13,9 @@ import {Stations} from './view_stations.js';
 import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
 import {programsOf} from './view_gl.js';
-import {searchSlowly} from './view_pick.js';
+import {lookAt, searchSlowly} from './view_pick.js';
 import {readTheme} from './view_theme.js';
+import {listenTo} from './view_events.js';
 import {pointOf} from './cloud.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
@@ -81,29 +81,23 @@ export class View extends EventTarget {
   #emit(type, detail) { this.dispatchEvent(new CustomEvent(type, {detail})); }
 
   #listen() {
-    const {canvas} = this;
-    canvas.addEventListener('webglcontextlost', (e) => {
-      e.preventDefault();
-      this.#lost = true;
-      this.#made = null;
-      this.#painter.forget();
+    listenTo(this.canvas, {
+      lost: () => {
+        [this.#lost, this.#made] = [true, null];
+        this.#painter.forget();
+      },
+      restored: () => {
+        this.#lost = false;
+        this.#attach();
+        this.#want.resize = true;
+        this.cameraMoved();
+      },
+      resized: () => this.#ask('resize'),
+      themed: () => {
+        this.colours = null;
+        this.#ask('restart');
+      },
     });
-    canvas.addEventListener('webglcontextrestored', () => {
-      this.#lost = false;
-      this.#attach();
-      this.#want.resize = true;
-      this.cameraMoved();
-    });
-    new ResizeObserver(() => this.#ask('resize')).observe(canvas);
-    const themed = () => {
-      this.colours = null;
-      this.#ask('restart');
-    };
-    new MutationObserver(themed).observe(document.documentElement, {attributeFilter: ['data-theme', 'class', 'style']});
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', themed);
-    canvas.setAttribute('role', 'application');
-    canvas.setAttribute('aria-roledescription', 'picture of points in space');
-    if (!canvas.hasAttribute('aria-label')) canvas.setAttribute('aria-label', 'The points in space. Arrow keys turn, plus and minus zoom, Home shows all.');
   }
 
   // Makes everything on the GPU, also after a lost context.
@@ -144,6 +138,21 @@ export class View extends EventTarget {
   setMesh(mesh) {
     this.#solids.setMesh(mesh);
     this.#fitUntouched();
+    this.#ask('restart');
+  }
+
+  // Shows the points of another cloud from now on. The one before keeps its own.
+  useCloud(cloud) {
+    this.cloud.changed = null;
+    this.cloud = this.#points.cloud = this.#scale.cloud = cloud;
+    this.#scale.forget();
+    cloud.changed = () => this.#schedule();
+    this.#ask('restart');
+  }
+
+  // cells is as parseCells() in previews.js returns it, or null; seen is {counts, isTurned, showsUnseen}.
+  paint(cells, seen) {
+    this.#solids.paint(cells, seen);
     this.#ask('restart');
   }
 
@@ -198,16 +207,7 @@ export class View extends EventTarget {
   }
 
   // Turns about the point at a place of the canvas from now on, and goes half the distance to it.
-  lookAt({x, y}) {
-    searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
-      if (!found) return;
-      const p = this.camera.at(x, y, found.w);
-      this.camera.inside = false;
-      this.camera.target = p;
-      this.camera.distance = Math.max(0.05, 0.5 * found.w);
-      this.cameraMoved();
-    });
-  }
+  lookAt(p) { lookAt(this, p); }
 
   // Resolves once all present points are on the page.
   screenshotReady() {

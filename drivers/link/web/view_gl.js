@@ -8,7 +8,7 @@ import {FAR_M, NEAR_M} from './view_camera.js';
 
 const OCTAVES = Math.log2(FAR_M / NEAR_M);
 
-const PLACE = `
+export const PLACE = `
 uniform vec3 u_eye_hi, u_eye_lo;
 uniform mat3 u_axes; // columns: right, up, forward
 uniform vec2 u_lens; // clip units per slope
@@ -21,7 +21,7 @@ vec4 placed(vec3 s) {
 }
 `;
 
-const HEAD = `#version 300 es
+export const HEAD = `#version 300 es
 precision highp float;
 precision highp int;
 `;
@@ -130,7 +130,7 @@ function compile(gl, type, text) {
 }
 
 // Returns {program, <uniform's name>: location}.
-function link(gl, {vertex, fragment}) {
+export function link(gl, {vertex, fragment}) {
   const program = gl.createProgram();
   const shaders = [compile(gl, gl.VERTEX_SHADER, vertex), compile(gl, gl.FRAGMENT_SHADER, fragment)];
   for (const shader of shaders) gl.attachShader(program, shader);

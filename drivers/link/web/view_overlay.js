@@ -136,6 +136,7 @@ export class Overlay {
   #stations(camera, stations) {
     for (const station of stations.list) {
       if (station.served !== false) for (const field of stations.fields) this.#field(camera, stations, station, field);
+      if (station.hides_m > 0) this.#hidden(camera, stations.placeOf(station).at, station);
       const ring = stations.ring(camera, station);
       if (ring === null) continue;
       const head = camera.project(ring.at);
@@ -162,6 +163,13 @@ export class Overlay {
     const from = camera.project(ring.at), to = camera.project(ring.handle);
     this.#line([[from.x, from.y], [to.x, to.y]], 1.5, this.colours.accent);
     this.#dot(to.x, to.y, 7, this.colours.accent);
+  }
+
+  // Draws what the tripod hides on the ground around it.
+  #hidden(camera, at, {hides_m, above_m}) {
+    const points = Array.from({length: 49}, (_, k) => camera.project([at[0] + hides_m * Math.sin(k * Math.PI / 24),
+      at[1] + hides_m * Math.cos(k * Math.PI / 24), at[2] - above_m]));
+    if (points.every(({w}) => w > 0.01)) this.#line(points.map(({x, y}) => [x, y]), 1.25, this.colours.ink, [3, 5]);
   }
 
   #dot(x, y, r, colour) {

@@ -5,6 +5,7 @@
 import {Mesh, useMesh} from './view_parts.js';
 import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
 import {radians} from './view_camera.js';
+import {CellsPart} from './view_paint.js';
 
 // Lines cost 1 us each where there is no GPU, as much as a point.
 const EDGES = 16_000, EDGES_MOVING = 3_000;
@@ -15,6 +16,7 @@ export class Solids {
   sceneMode = 'glass'; // it is 'off', 'glass' or 'solid'
   meshOn = true;
   stationsOn = true;
+  #painted = null; // it is {cells, seen} of the painted surface
   #shapes = new Map(); // it has the body, and legs by the tripod's measures
 
   attach(gl, programs) {
@@ -23,6 +25,21 @@ export class Solids {
     this.#shapes.clear();
     this.sceneMesh = this.scene && new Mesh(gl, this.program, this.scene);
     this.meshPart = this.mesh && new Mesh(gl, this.program, this.mesh);
+    this.cellsPart = null;
+    if (this.#painted) this.paint(this.#painted.cells, this.#painted.seen);
+  }
+
+  // See View. The same cells again take no time.
+  paint(cells, seen) {
+    if (this.cellsPart && this.#painted?.cells !== cells) {
+      this.cellsPart.free();
+      this.cellsPart = null;
+    }
+    this.#painted = cells && {cells, seen};
+    if (!cells) return;
+    this.cellsPart ??= new CellsPart(this.gl, cells);
+    this.cellsPart.count(seen.counts);
+    Object.assign(this.cellsPart, {isTurned: seen.isTurned, showsUnseen: seen.showsUnseen});
   }
 
   // It takes the bytes of /scene; null: there is none.
@@ -66,6 +83,7 @@ export class Solids {
       parts.push(Object.assign(this.sceneMesh, {camera, look: {colour: [...colours.solid, 1], push: 1.0015}}));
     }
     if (this.meshPart && this.meshOn) parts.push(Object.assign(this.meshPart, {camera, look: {colour: [...colours.mesh, 1], push: 1.0005}}));
+    if (this.cellsPart) parts.push(Object.assign(this.cellsPart, {camera}));
     return parts;
   }
 
@@ -116,7 +134,7 @@ export class Solids {
     const {at, heading_deg, ghost} = stations.placeOf(station);
     const eye = camera.eye;
     if (Math.hypot(...at.map((c, a) => c - eye[a])) < 0.4) return; // the eye is in this station
-    const colour = station.number === stations.selected || ghost ? colours.accent : colours.ink;
+    const colour = station.number === stations.selected || ghost || station.suggested ? colours.accent : station.colour ?? colours.ink;
     const drawOne = (shape, place, heading, alpha) => {
       useMesh(gl, this.program, camera, place, {colour: [...colour, alpha], faint: 0.22, behind, heading: radians(heading)});
       shape.triangles();
@@ -125,7 +143,7 @@ export class Solids {
       drawOne(this.#shape(null), place, heading, alpha);
       if (tripod) drawOne(this.#shape(tripod), place, tripod.legs_heading_deg, alpha);
     };
-    draw(at, heading_deg, station.served === false ? 0.65 : 1);
+    draw(at, heading_deg, station.suggested ? 0.45 : station.served === false ? 0.65 : 1);
     if (ghost) draw([station.x_m, station.y_m, station.z_m], station.heading_deg, 0.3);
   }
 }

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+// This module paints the surface by how many stations see each of its cells. A face is painted on the side that faces
+// the stations, and left out from behind, so that one looks into a house through its roof and its near walls.
+
+import {HEAD, PLACE, link, setPlace} from './view_gl.js';
+import {FAR_M, NEAR_M, split, sub} from './view_camera.js';
+
+const WIDE = 1024; // cells in a row of the texture
+
+// These can be told apart by people who are blind to red or green, and by lightness alone (Okabe and Ito 2002).
+export const SEEN_COLOURS = [[213, 94, 0], [240, 228, 66], [0, 158, 115]];
+
+const CELLS = {
+  vertex: `${HEAD}${PLACE}
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in uint a_cell;
+uniform sampler2D u_counts;
+uniform vec3 u_colours[3];
+out vec3 v_seen;
+flat out vec4 v_colour; // alpha 0: seen by none
+void main() {
+  v_seen = seen(a_position);
+  gl_Position = vec4(v_seen.xy * u_lens, v_seen.z - 2.0 * NEAR, v_seen.z);
+  int n = int(texelFetch(u_counts, ivec2(a_cell % ${WIDE}u, a_cell / ${WIDE}u), 0).r * 255.0 + 0.5);
+  v_colour = vec4(u_colours[min(n, 2)], n == 0 ? 0.0 : 1.0);
+}`,
+  fragment: `${HEAD}
+const float NEAR = ${NEAR_M};
+const float OCTAVES = ${Math.log2(FAR_M / NEAR_M)};
+in vec3 v_seen;
+flat in vec4 v_colour;
+uniform bool u_turned, u_unseen;
+out vec4 colour;
+void main() {
+  gl_FragDepth = log2(max(v_seen.z * 1.001, NEAR) / NEAR) / OCTAVES;
+  if (gl_FrontFacing == u_turned) discard;
+  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1; // of what nobody sees every other pixel is left out
+  if (v_colour.a == 0.0 && (!u_unseen || odd)) discard;
+  vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
+  colour = vec4(v_colour.rgb * (0.6 + 0.4 * abs(dot(n, normalize(v_seen)))), 1.0);
+}`,
+};
+
+// This is a part of the stored picture (view_draw.js). cells is as parseCells() in previews.js returns it.
+export class CellsPart {
+  weight = 2;
+  drawn = 0;
+  skip = false;
+  isTurned = false; // the stations see the backs of the faces
+  showsUnseen = false;
+  #counts;
+
+  constructor(gl, cells) {
+    this.gl = gl;
+    this.origin = cells.origin;
+    this.n = 2 * cells.pieces;
+    this.all = cells.n;
+    this.program = link(gl, CELLS);
+    this.vertices = gl.createVertexArray();
+    gl.bindVertexArray(this.vertices);
+    this.buffers = [cells.corners, cells.cell.reduce((to, cell, i) => to.fill(cell, 4 * i, 4 * i + 4), new Uint32Array(4 * cells.pieces))]
+      .map((data) => {
+        const buffer = gl.createBuffer();
+        gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+        gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
+        return buffer;
+      });
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[0]);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[1]);
+    gl.enableVertexAttribArray(1);
+    gl.vertexAttribIPointer(1, 1, gl.UNSIGNED_INT, 4, 0);
+    const corners = new Uint32Array(6 * cells.pieces);
+    for (let i = 0; i < cells.pieces; i++) corners.set([0, 1, 2, 0, 2, 3].map((k) => 4 * i + k), 6 * i);
+    this.buffers.push(gl.createBuffer());
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[2]);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    this.#counts = gl.createTexture();
+    this.count(new Uint8Array(cells.n));
+  }
+
+  // counts: by how many stations each cell is seen.
+  count(counts) {
+    const {gl} = this;
+    const rows = Math.max(1, Math.ceil(this.all / WIDE));
+    const texels = new Uint8Array(WIDE * rows);
+    texels.set(counts);
+    gl.bindTexture(gl.TEXTURE_2D, this.#counts);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R8, WIDE, rows, 0, gl.RED, gl.UNSIGNED_BYTE, texels);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+  }
+
+  draw(from, to) {
+    const {gl, program} = this;
+    gl.useProgram(program.program);
+    setPlace(gl, program, this.camera, split(sub(this.camera.eye, this.origin)));
+    gl.uniform3fv(program['u_colours[0]'], SEEN_COLOURS.flat().map((c) => c / 255));
+    gl.uniform1i(program.u_turned, this.isTurned ? 1 : 0);
+    gl.uniform1i(program.u_unseen, this.showsUnseen ? 1 : 0);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.#counts);
+    gl.uniform1i(program.u_counts, 0);
+    gl.bindVertexArray(this.vertices);
+    gl.drawElements(gl.TRIANGLES, 3 * (to - from), gl.UNSIGNED_INT, 12 * from);
+    gl.bindVertexArray(null);
+  }
+
+  free() {
+    const {gl} = this;
+    for (const buffer of this.buffers) gl.deleteBuffer(buffer);
+    gl.deleteVertexArray(this.vertices);
+    gl.deleteTexture(this.#counts);
+    gl.deleteProgram(this.program.program);
+  }
+}
