@@ -11,7 +11,7 @@ function* chunks(png) {
 }
 
 // Undoes the filter of each row (PNG specification, 9.2).
-function pixelsOf(png) {
+export function pixelsOf(png) {
   const all = [...chunks(png)], head = all[0].bytes, width = head.readUInt32BE(0), height = head.readUInt32BE(4);
   const size = {2: 3, 6: 4}[head[9]];
   const raw = zlib.inflateSync(Buffer.concat(all.filter(({type}) => type === 'IDAT').map(({bytes}) => bytes)));

@@ -7,6 +7,7 @@ import {readFileSync} from 'node:fs';
 import {Browser} from './browser.mjs';
 import {Client, end, endpoint, start} from './head.mjs';
 import {both, CONFIG, recorded} from './rig.mjs';
+import {trialTests} from './trial.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
@@ -95,6 +96,8 @@ await test('without control nothing that the user does reaches the head', async 
   equal(await other.ask('SYST:CONT?'), '0', 'the session in control');
   equal(await other.ask('SYST:ERR:COUN?'), '0', 'refused commands');
 });
+
+await trialTests(page, other, SIZE);
 
 const wanted = recorded('first', ['head.lines_hz=60']);
 

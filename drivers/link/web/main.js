@@ -167,7 +167,7 @@ async function start() {
   const view = await makeView(cloud);
   const names = new Names();
   const info = await fetchJson('/head');
-  window.scanhead = {head: null, cloud, view};
+  window.scanhead = {head: null, cloud, view, trial: null};
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
 }

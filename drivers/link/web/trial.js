@@ -5,7 +5,9 @@
 
 import {ask, batchOf, countSeen, parseCells, parsePreview, pathOf} from './previews.js';
 
-const COVER_STEP_DEG = 0.5; // cells are seen by pulses that are nearer to each other than those that are shown
+// Cells are seen by pulses that are nearer to each other than those that are shown, and once more by finer ones, which
+// grazing surfaces need.
+const COVER_STEPS_DEG = [0.5, 0.25];
 const MOST_OF = 16; // stations that a suggestion may be about
 
 // These are settings of a station that a preview takes; null: as at power-up.
@@ -38,7 +40,7 @@ export class Trial extends EventTarget {
   }
 
   #put(station) {
-    Object.assign(station, {served: true, seen: null, answer: 0, wanted: 0, isBusy: false, points: 0, error: '',
+    Object.assign(station, {served: true, seen: null, answer: 0, wanted: 0, shown: 0, isBusy: false, points: 0, error: '',
       ...Object.fromEntries(SETTINGS.map((key) => [key, station[key] ?? null]))});
     this.stations.push(station);
     this.renew(station);
@@ -105,8 +107,7 @@ export class Trial extends EventTarget {
       await this.#look(station, of);
     }
     station.isBusy = false;
-    if (!this.#has(station)) return;
-    this.#count();
+    if (this.#has(station)) this.#count();
   }
 
   #has(station) { return this.#on && this.stations.includes(station); }
@@ -121,19 +122,28 @@ export class Trial extends EventTarget {
     try {
       const shown = await this.#ask(station, {step_deg: station.step_deg ?? this.step_deg});
       if (!this.#has(station)) return;
-      this.#take(station, shown);
-      if (of !== station.wanted) return;
-      const seen = await this.#ask(station, {step_deg: COVER_STEP_DEG, points: 0});
-      Object.assign(station, {seen: seen.seen, answer: seen.number, hits: seen.hits, front: seen.front, error: ''});
+      this.#take(station, shown, of);
     } catch (error) {
       Object.assign(station, {seen: null, error: error.message});
+      return;
+    }
+    for (const step_deg of COVER_STEPS_DEG) {
+      if (of !== station.wanted || !this.#has(station)) return;
+      try {
+        const {seen, number, hits, front} = await this.#ask(station, {step_deg, points: 0});
+        Object.assign(station, {seen, answer: number, hits, front, error: ''});
+      } catch (error) {
+        if (step_deg === COVER_STEPS_DEG[0]) station.error = error.message;
+        return; // so fine a scan may have more pulses than the head computes for a page
+      }
+      if (this.#has(station)) this.#count();
     }
   }
 
-  #take(station, shown) {
+  #take(station, shown, of) {
     const scan = ++this.#scans;
     const {above_m, hides_m, feet_m, n} = shown;
-    Object.assign(station, {above_m, hides_m, points: n});
+    Object.assign(station, {above_m, hides_m, points: n, shown: of});
     if (station.tripod) station.tripod = {...station.tripod, foot_radius_m: feet_m};
     this.#cloud.replace({station: station.number, scan});
     this.#cloud.add(batchOf(shown, station.number, scan));

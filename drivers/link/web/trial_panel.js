@@ -102,6 +102,7 @@ export class TrialPanel {
     view.useCloud(this.#cloud);
     this.#trial = new Trial(this.#cloud, list, Number(this.step.value));
     this.#stations.setTrial(this);
+    window.scanhead.trial = this.#trial;
     this.#items.clear();
     view.stations.dragged = ({number, x, y, z, heading_deg}) => this.#trial.change(number, {x_m: x, y_m: y, z_m: z, heading_deg});
     this.#trial.addEventListener('change', () => this.#show());
@@ -120,12 +121,13 @@ export class TrialPanel {
     const view = this.#view;
     clearTimeout(this.#timer);
     this.#trial.end();
-    this.#trial = this.#cloud = null;
+    this.#trial = this.#cloud = window.scanhead.trial = null;
     view.stations.dragged = null;
     view.paint(null);
     view.useCloud(this.before);
     this.#stations.setTrial(null);
     this.#body.classList.remove('trying');
+    this.list.replaceChildren();
     this.#box.hidden = true;
     this.#open.hidden = false;
     this.#open.focus();

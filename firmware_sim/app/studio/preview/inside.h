@@ -13,7 +13,7 @@
 #include "firmware_sim/app/studio/preview/preview.h"
 #include "firmware_sim/config/config.h"
 
-enum { PREVIEW_MOST_PULSES = 600000, PREVIEW_MOST_OF = 16, PREVIEW_MOST_PIECES = 400000 };
+enum { PREVIEW_MOST_PULSES = 1500000, PREVIEW_MOST_OF = 16, PREVIEW_MOST_PIECES = 400000 };
 
 enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_CELLS };
 

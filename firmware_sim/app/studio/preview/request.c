@@ -6,7 +6,7 @@
 #include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/preview/inside.h"
 
-static const double FAR_AWAY_M = 1e9, LEAST_STEP_DEG = 0.2, MOST_STEP_DEG = 30.0, STEP_DEG = 2.0, NEXT_STEP_DEG = 0.5;
+static const double FAR_AWAY_M = 1e9, LEAST_STEP_DEG = 0.1, MOST_STEP_DEG = 30.0, STEP_DEG = 2.0, NEXT_STEP_DEG = 0.5;
 static const double HEIGHT_M = 1.6;
 
 static double n_stations(const struct preview_options *o)
