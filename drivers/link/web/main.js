@@ -112,8 +112,7 @@ function startHead(cloud, view, names, keepsPast) {
     bar.name(info);
     session.paced(info.pace);
     if (view) view.stations.fields = info.fields ?? [];
-    trials.offer(info.previews === true);
-    stations.reload(info.stations ?? []).catch(() => {}); // it is gone again
+    stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true)).catch(() => {}); // it is gone again
     showPlan();
     display.setScene(await fetchScene());
   };
