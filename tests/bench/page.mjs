@@ -176,7 +176,8 @@ async function memory() {
 }
 
 // ---- 5
-// Lets go of a tried station at a place. Returns the times until all its points are on the page, and until all its cells are known.
+// Lets go of a tried station at a place. Returns the times until all its points are on the page, until all its cells are known, and
+// until these are painted.
 const letGo = (number, [x, y, z]) => `(async () => {
   const {trial, view} = scanhead, station = trial.get(${number}), t0 = performance.now();
   const soon = () => new Promise((done) => setTimeout(done, 1));
@@ -185,7 +186,16 @@ const letGo = (number, [x, y, z]) => `(async () => {
   await view.screenshotReady();
   const points = performance.now() - t0;
   while (trial.isBusy) await soon();
-  return [points, performance.now() - t0];
+  const cells = performance.now() - t0;
+  await view.screenshotReady();
+  return [points, cells, performance.now() - t0];
+})()`;
+// Painting restarts the picture, so points are timed without it.
+const painted = (what) => `(() => {
+  const select = document.querySelector('#trial-paint');
+  select.value = '${what}';
+  select.dispatchEvent(new Event('change'));
+  return scanhead.view.screenshotReady().then(() => 0);
 })()`;
 
 async function dropAround(config, number, middle, size, drops) {
@@ -196,16 +206,20 @@ async function dropAround(config, number, middle, size, drops) {
   await page.until('scanhead.head.isOpen && !document.querySelector("#try").hidden');
   await page.click('#try');
   await page.until('scanhead.trial && !scanhead.trial.isBusy && scanhead.trial.sum');
-  const took = [];
-  for (let k = 0; k < drops.n; k++) {
-    const place = [middle[0] + size * Math.cos(k), middle[1] + size * Math.sin(k), middle[2]];
-    took.push(await page.eval(letGo(number, place.map((v) => v.toFixed(3)))));
+  const took = {off: [], seen: []};
+  for (const paint of ['off', 'seen']) {
+    await page.eval(painted(paint));
+    for (let k = 0; k < drops.n; k++) {
+      const turn = k + (paint === 'seen' ? 0.5 : 0); // the head keeps its answers
+      const place = [middle[0] + size * Math.cos(turn), middle[1] + size * Math.sin(turn), middle[2]];
+      took[paint].push(await page.eval(letGo(number, place.map((v) => v.toFixed(3)))));
+    }
   }
   const points = await page.eval(`scanhead.trial.get(${number}).points`);
   await end(head);
   await browser.end();
-  const sorted = (i) => took.map((t) => t[i]).sort((a, b) => a - b), [shown, seen] = [sorted(0), sorted(1)];
-  return {row: [grouped(points), ...[shown, seen].flatMap((t) => [t[t.length >> 1], t.at(-1)].map(grouped))], stats: JSON.parse(readFileSync(stats, 'utf8'))};
+  const sorted = (paint, i) => took[paint].map((t) => t[i]).sort((a, b) => a - b);
+  return {row: [grouped(points), ...[sorted('off', 0), sorted('off', 1), sorted('seen', 2)].flatMap((t) => [t[t.length >> 1], t.at(-1)].map(grouped))], stats: JSON.parse(readFileSync(stats, 'utf8'))};
 }
 
 async function trials() {
@@ -213,7 +227,7 @@ async function trials() {
   console.log(`5. Stations that are tried, ms, of ${n} times`);
   const house = await dropAround(resolve(ROOT, 'config/demo.yaml'), 3, [5.5, 2.2, 1.6], 0.8, {n, nice: 0, more: ['--set', `links.0.path=${folder}/pty`]});
   const busy = await dropAround(write('busy.yaml', room(2200000, "[{type: web}]")), 1, [0, 0, 1.6], 1.5, {n, nice: 10, more: ['--start']});
-  table([['', 'points', 'on the page, median', 'most', 'all cells, median', 'most'], ['house of the demo, head idle', ...house.row],
+  table([['', 'points', 'on the page, median', 'most', 'all cells, median', 'most', 'painted, median', 'most'], ['house of the demo, head idle', ...house.row],
     ['room, 2,200,000 pulses/s', ...busy.row]]);
   console.log(`  Pulses lost by the head meanwhile: ${grouped(busy.stats.lost_pulses)} of ${grouped(busy.stats.pulses)}\n`);
 }

@@ -8,6 +8,7 @@ import {ask, batchOf, countSeen, parseCells, parsePreview, pathOf} from './previ
 // Cells are seen by pulses that are nearer to each other than those that are shown, and once more by finer ones, which
 // grazing surfaces need.
 const COVER_STEPS_DEG = [0.5, 0.25];
+const REST_MS = 300; // a station rests so long before the finer ones
 const MOST_OF = 16; // stations that a suggestion may be about
 
 // These are settings of a station that a preview takes; null: as at power-up.
@@ -128,6 +129,7 @@ export class Trial extends EventTarget {
       return;
     }
     for (const step_deg of COVER_STEPS_DEG) {
+      if (step_deg !== COVER_STEPS_DEG[0]) await new Promise((done) => setTimeout(done, REST_MS));
       if (of !== station.wanted || !this.#has(station)) return;
       try {
         const {seen, number, hits, front} = await this.#ask(station, {step_deg, points: 0});

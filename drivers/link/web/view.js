@@ -152,8 +152,8 @@ export class View extends EventTarget {
 
   // cells is as parseCells() in previews.js returns it, or null; seen is {counts, isTurned, showsUnseen}.
   paint(cells, seen) {
+    if (cells || this.#solids.isPainted) this.#ask('restart');
     this.#solids.paint(cells, seen);
-    this.#ask('restart');
   }
 
   // Each of {points, scene, mesh, stations} is true or false; scene also 'glass' or 'solid'. Members that are not

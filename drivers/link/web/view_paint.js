@@ -29,13 +29,13 @@ const float NEAR = ${NEAR_M};
 const float OCTAVES = ${Math.log2(FAR_M / NEAR_M)};
 in vec3 v_seen;
 flat in vec4 v_colour;
-uniform bool u_turned, u_unseen;
+uniform bool u_turned;
 out vec4 colour;
 void main() {
   gl_FragDepth = log2(max(v_seen.z * 1.001, NEAR) / NEAR) / OCTAVES;
   if (gl_FrontFacing == u_turned) discard;
   bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1; // of what nobody sees every other pixel is left out
-  if (v_colour.a == 0.0 && (!u_unseen || odd)) discard;
+  if (v_colour.a == 0.0 && odd) discard;
   vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
   colour = vec4(v_colour.rgb * (0.6 + 0.4 * abs(dot(n, normalize(v_seen)))), 1.0);
 }`,
@@ -46,15 +46,14 @@ export class CellsPart {
   weight = 2;
   drawn = 0;
   skip = false;
-  isTurned = false; // the stations see the backs of the faces
-  showsUnseen = false;
+  n = 0; // triangles
   #counts;
 
   constructor(gl, cells) {
     this.gl = gl;
     this.origin = cells.origin;
-    this.n = 2 * cells.pieces;
     this.all = cells.n;
+    this.cell = cells.cell;
     this.program = link(gl, CELLS);
     this.vertices = gl.createVertexArray();
     gl.bindVertexArray(this.vertices);
@@ -71,19 +70,32 @@ export class CellsPart {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[1]);
     gl.enableVertexAttribArray(1);
     gl.vertexAttribIPointer(1, 1, gl.UNSIGNED_INT, 4, 0);
-    const corners = new Uint32Array(6 * cells.pieces);
-    for (let i = 0; i < cells.pieces; i++) corners.set([0, 1, 2, 0, 2, 3].map((k) => 4 * i + k), 6 * i);
     this.buffers.push(gl.createBuffer());
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[2]);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
     this.#counts = gl.createTexture();
-    this.count(new Uint8Array(cells.n));
   }
 
-  // counts: by how many stations each cell is seen.
-  count(counts) {
+  // Draws these pieces alone: where there is no GPU, each triangle costs as much as two points.
+  #choose(isDrawn) {
+    const {gl, cell} = this;
+    const corners = new Uint32Array(6 * cell.length);
+    let n = 0;
+    for (let i = 0; i < cell.length; i++) {
+      if (!isDrawn(cell[i])) continue;
+      for (const k of [0, 1, 2, 0, 2, 3]) corners[n++] = 4 * i + k;
+    }
+    gl.bindVertexArray(this.vertices);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners.subarray(0, n), gl.DYNAMIC_DRAW);
+    gl.bindVertexArray(null);
+    this.n = n / 3;
+  }
+
+  // counts: by how many stations each cell is seen. isTurned: they see the backs of the faces.
+  show({counts, isTurned, showsUnseen}) {
     const {gl} = this;
+    Object.assign(this, {isTurned, showsUnseen});
+    this.#choose((cell) => showsUnseen || counts[cell] > 0);
     const rows = Math.max(1, Math.ceil(this.all / WIDE));
     const texels = new Uint8Array(WIDE * rows);
     texels.set(counts);
@@ -99,7 +111,6 @@ export class CellsPart {
     setPlace(gl, program, this.camera, split(sub(this.camera.eye, this.origin)));
     gl.uniform3fv(program['u_colours[0]'], SEEN_COLOURS.flat().map((c) => c / 255));
     gl.uniform1i(program.u_turned, this.isTurned ? 1 : 0);
-    gl.uniform1i(program.u_unseen, this.showsUnseen ? 1 : 0);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.#counts);
     gl.uniform1i(program.u_counts, 0);

@@ -29,6 +29,8 @@ export class Solids {
     if (this.#painted) this.paint(this.#painted.cells, this.#painted.seen);
   }
 
+  get isPainted() { return this.#painted !== null; }
+
   // See View. The same cells again take no time.
   paint(cells, seen) {
     if (this.cellsPart && this.#painted?.cells !== cells) {
@@ -38,8 +40,7 @@ export class Solids {
     this.#painted = cells && {cells, seen};
     if (!cells) return;
     this.cellsPart ??= new CellsPart(this.gl, cells);
-    this.cellsPart.count(seen.counts);
-    Object.assign(this.cellsPart, {isTurned: seen.isTurned, showsUnseen: seen.showsUnseen});
+    this.cellsPart.show(seen);
   }
 
   // It takes the bytes of /scene; null: there is none.
