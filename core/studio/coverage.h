@@ -20,6 +20,7 @@
 #ifndef CORE_STUDIO_COVERAGE_H
 #define CORE_STUDIO_COVERAGE_H
 
+#include <stdatomic.h>
 #include <stdint.h>
 
 #include "core/bvh.h"
@@ -159,6 +160,7 @@ struct coverage_gain {
 struct coverage_places {
     uint32_t n;
     const double (*place_m)[3]; /* [n] */
+    _Atomic uint64_t *cells;    /* gets a bit for each cell that a ray hits, seen before or not; NULL: not asked for */
 };
 /* gain: [places->n] */
 int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,

@@ -183,6 +183,32 @@ static void test_cells(void **state)
     close_room(&r);
 }
 
+/* Nothing of a closed room is out of sight from all its places, but where few can stand before: near walls the ground and
+ * the ceiling lie within the cones that heads can't scan. A body in it is hidden within. */
+static void test_reach(void **state)
+{
+    (void)state;
+    struct room r = open_room("");
+    struct web_body cells = need(&r, "/cells", "");
+    struct web_body leg = need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    char query[64];
+    snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
+    struct web_body reach = need(&r, "/reach", query);
+    const uint32_t n = le_get32(reach.bytes + 8);
+    double hidden_m2 = 0.0;
+    assert_memory_equal(reach.bytes, "SHRE", 4);
+    assert_int_equal(reach.len, 16 + 8 * (((size_t)n + 63) / 64));
+    assert_true(le_get32(reach.bytes + 12) > 50);
+    for (uint32_t i = 0; i < n; i++)
+        if ((le_get64(reach.bytes + 16 + 8 * (i / 64)) >> i % 64 & 1) == 0)
+            hidden_m2 += (double)le_get_float(cells.bytes + 48 + 4 * i);
+    assert_true(hidden_m2 < 0.01 * AREA_M2);
+    free(cells.bytes);
+    free(leg.bytes);
+    free(reach.bytes);
+    close_room(&r);
+}
+
 static double number_of(const char *json, const char *key)
 {
     const char *at = strstr(json, key);
@@ -197,6 +223,7 @@ static void test_next(void **state)
     (void)state;
     struct room r = open_room("");
     struct web_body leg = need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body none;
     char query[64];
     snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
     struct web_body next = need(&r, "/next", query);
@@ -206,7 +233,7 @@ static void test_next(void **state)
     assert_true(x_m > 0.0 && x_m < 2.0 && y_m > 0.0 && y_m < 5.0 && z_m == 1.2);
     assert_true(number_of(json, "gain_m2") > 3.0 * HEIGHT_M * 2.0); /* the walls of the upper leg */
     assert_true(number_of(json, "none_m2") < 0.1 * AREA_M2);
-    assert_int_equal(ask(&r, "/next", "station=1&p1=999", &next), SH_EINPUT);
+    assert_int_equal(ask(&r, "/next", "station=1&p1=999", &none), SH_EINPUT);
     assert_non_null(strstr(err.text, "preview 999 is kept no more"));
     free(leg.bytes);
     free(next.bytes);
@@ -262,8 +289,9 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points), cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_next),   cmocka_unit_test(test_tripod),   cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),   cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_next),     cmocka_unit_test(test_reach),    cmocka_unit_test(test_tripod),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

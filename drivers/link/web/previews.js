@@ -57,6 +57,13 @@ export function parseCells(bytes) {
     corners: new Float32Array(bytes, 48 + 4 * n + 4 * pieces, 12 * pieces)};
 }
 
+// Returns a bit for each cell that can be seen from anywhere, 32 in a word, of the bytes of /reach.
+export function parseReach(bytes) {
+  const words = 2 * Math.ceil(begin(bytes, 'SHRE', 16).getUint32(8, true) / 64);
+  if (bytes.byteLength !== 16 + 4 * words) throw new Error(`reach of ${bytes.byteLength} bytes: ${16 + 4 * words} expected`);
+  return new Uint32Array(bytes, 16, words);
+}
+
 // Returns the points of a preview as a batch of a cloud.
 export function batchOf(preview, station, scan) {
   const {n, xyz} = preview;
@@ -67,13 +74,20 @@ export function batchOf(preview, station, scan) {
     pulse: Float64Array.from({length: n}, (_, i) => i)};
 }
 
-// Returns by how many of the stations each cell is seen, and the area seen by none, by one and by several.
-export function countSeen(cells, seen) {
+export const hasBit = (bits, i) => ((bits[i >>> 5] >>> (i & 31)) & 1) === 1;
+
+// Returns by how many of the stations each cell is seen, and the area seen by none, by one and by several. hidden_m2 of
+// what none sees can't be seen from anywhere; reach says what can, null: not known.
+export function countSeen(cells, seen, reach = null) {
   const counts = new Uint8Array(cells.n);
   for (const bits of seen) {
     for (let i = 0; i < cells.n; i++) counts[i] += (bits[i >>> 5] >>> (i & 31)) & 1;
   }
   const area = [0, 0, 0];
-  for (let i = 0; i < cells.n; i++) area[Math.min(2, counts[i])] += cells.area[i];
-  return {counts, none_m2: area[0], one_m2: area[1], several_m2: area[2]};
+  let hidden_m2 = 0;
+  for (let i = 0; i < cells.n; i++) {
+    area[Math.min(2, counts[i])] += cells.area[i];
+    if (reach !== null && counts[i] === 0 && !hasBit(reach, i)) hidden_m2 += cells.area[i];
+  }
+  return {counts, none_m2: area[0], one_m2: area[1], several_m2: area[2], hidden_m2};
 }

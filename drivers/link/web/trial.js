@@ -3,7 +3,7 @@
 // scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a trial
 // needs no control.
 
-import {ask, batchOf, countSeen, parseCells, parsePreview, pathOf} from './previews.js';
+import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from './previews.js';
 
 // Cells are seen by pulses that are nearer to each other than those that are shown, and once more by finer ones, which
 // grazing surfaces need.
@@ -23,13 +23,15 @@ const turned = (deg) => ((deg + 180) % 360 + 360) % 360 - 180;
 export class Trial extends EventTarget {
   stations = [];
   cells = null; // null: not there yet, or there are none
-  sum = null;   // it has counts, none_m2, one_m2, several_m2 of all stations
+  reach = null; // the cells that can be seen from anywhere; null: not known yet
+  sum = null;   // it has counts, none_m2, one_m2, several_m2, hidden_m2 of all stations
   step_deg; // of stations without a step of their own
   error = '';
   next = null;  // the suggestion: {x_m, y_m, z_m, heading_deg, gain_m2, none_m2}
   #cloud;
   #scans = 0;
   #on = true;
+  #asksReach = false;
 
   // cloud gets the points; list has the stations as /head has them.
   constructor(cloud, list, step_deg = 2) {
@@ -153,9 +155,28 @@ export class Trial extends EventTarget {
   }
 
   #count() {
-    if (this.cells) this.sum = countSeen(this.cells, this.stations.filter((s) => s.seen).map((s) => s.seen));
+    const seen = this.stations.filter((s) => s.seen);
+    if (this.cells) this.sum = countSeen(this.cells, seen.map((s) => s.seen), this.reach);
+    if (seen.length > 0 && this.cells && !this.isBusy) this.#learnReach();
     this.#tell('seen');
     this.#tell('change');
+  }
+
+  // Asks once what can be seen at all.
+  async #learnReach() {
+    if (this.#asksReach) return;
+    this.#asksReach = true;
+    try {
+      this.reach = parseReach(await ask(this.#about('reach')));
+      if (this.#on) this.#count();
+    } catch { /* shares are then of all surfaces */ }
+  }
+
+  // Returns the path of a question about what the stations see.
+  #about(name) {
+    const like = this.stations[0], seen = this.stations.filter((s) => s.seen).slice(0, MOST_OF);
+    const height_m = like.above_m > 0 ? round(like.above_m) : null;
+    return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer]))});
   }
 
   // Whether the stations see the backs of most faces, so that these are turned the other way than they are looked at.
@@ -166,14 +187,10 @@ export class Trial extends EventTarget {
 
   // Asks where one more station would add most; the result is in `next`.
   async suggest() {
-    const all = this.stations.filter((s) => s.seen).slice(0, MOST_OF);
-    const like = this.stations[0];
-    if (!like || this.isBusy) return;
-    const before = this.#stamp();
-    const height_m = like.above_m > 0 ? round(like.above_m) : null;
-    const of = Object.fromEntries(all.map((s, i) => [`p${i + 1}`, s.answer]));
+    if (this.stations.length === 0 || this.isBusy) return;
+    const all = this.stations.filter((s) => s.seen), before = this.#stamp();
     try {
-      const found = JSON.parse(new TextDecoder().decode(await ask(pathOf('next', {station: like.of, height_m, ...of}))));
+      const found = JSON.parse(new TextDecoder().decode(await ask(this.#about('next'))));
       if (!this.#on || before !== this.#stamp()) return; // something has moved meanwhile
       this.next = found.place ? {...found.place, pitch_deg: 0, roll_deg: 0, gain_m2: found.gain_m2, none_m2: found.none_m2} : null;
       this.error = found.place ? '' : 'No place would add anything.';

@@ -6,11 +6,12 @@ import {bodyOf, grouped, kept, make, percent, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
+import {hasBit} from './previews.js';
 import {SEEN_COLOURS} from './view_paint.js';
 import {tableOf} from './view_colours.js';
 
 const STEPS = [4, 2, 1, 0.5];
-const PAINTS = [['seen', 'What is seen'], ['all', 'Also what nobody sees'], ['off', 'Nothing']];
+const PAINTS = [['seen', 'What is seen'], ['all', 'Also what is left to see'], ['off', 'Nothing']];
 const SEEN = ['Seen by no station', 'By one', 'By several'];
 const PLACE = [['x_m', 'East x, m'], ['y_m', 'North y, m'], ['z_m', 'Height z, m'], ['heading_deg', 'Heading, °'],
   ['pitch_deg', 'Pitch, °'], ['roll_deg', 'Roll, °']];
@@ -217,13 +218,25 @@ export class TrialPanel {
   }
 
   #sums() {
-    const {sum, cells, stations} = this.#trial;
-    const all = sum ? sum.none_m2 + sum.one_m2 + sum.several_m2 : 0;
-    const parts = sum ? [sum.none_m2, sum.one_m2, sum.several_m2].map((m2) => m2 / all) : [];
+    const {sum, cells, stations, reach} = this.#trial;
+    const parts = this.#shares(), of = `${stations.length} ${stations.length === 1 ? 'station' : 'stations'}`;
     this.shares.forEach((dd, i) => say(dd, percent(parts[i])));
     this.covered.style.width = sum ? `${(100 * (1 - parts[0])).toFixed(2)}%` : '0';
-    say(this.coverage, sum ? `${percent(1 - parts[0])} of ${grouped(all)}\u00a0m² seen from ${stations.length} ${stations.length === 1 ? 'station' : 'stations'}`
+    say(this.coverage, sum ? `${of}: ${percent(1 - parts[0])} of ${grouped(this.#all())}\u00a0m²${reach ? ' that can be seen' : ''}`
       : this.#trial.error || (cells ? '' : 'The surface is being cut into cells.'));
+    this.coverage.title = reach ? `Seen from anywhere that a tripod can stand, or by a station; ${grouped(sum.hidden_m2)} m² more can't be seen`
+      : 'All surfaces, also those within walls';
+  }
+
+  // The area that can be seen, or all of it as long as that is not known.
+  #all() {
+    const {sum} = this.#trial;
+    return sum ? sum.none_m2 + sum.one_m2 + sum.several_m2 - sum.hidden_m2 : 0;
+  }
+
+  #shares() {
+    const {sum} = this.#trial;
+    return sum ? [sum.none_m2 - sum.hidden_m2, sum.one_m2, sum.several_m2].map((m2) => m2 / this.#all()) : [];
   }
 
   #painted() {
@@ -231,7 +244,10 @@ export class TrialPanel {
     if (!trial?.cells) return;
     const paints = this.paint.value;
     if (paints === 'off' || !trial.sum) this.#view.paint(null);
-    else this.#view.paint(trial.cells, {counts: trial.sum.counts, isTurned: trial.seesBacks, showsUnseen: paints === 'all'});
+    else {
+      const showsUnseen = paints === 'all' && ((cell) => trial.reach === null || hasBit(trial.reach, cell));
+      this.#view.paint(trial.cells, {counts: trial.sum.counts, isTurned: trial.seesBacks, showsUnseen});
+    }
   }
 
   #allow() {
@@ -241,8 +257,7 @@ export class TrialPanel {
     this.apply.disabled = not !== '' || moved.length === 0;
     this.apply.title = not || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
     this.take.disabled = !next;
-    const all = sum ? sum.none_m2 + sum.one_m2 + sum.several_m2 : 0;
-    say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / all)} more, ${percent(1 - next.none_m2 / all)} in all.`
+    say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
       : this.suggests.checked ? error || 'Looking for it.' : 'It can be clicked in the picture.');
   }
 

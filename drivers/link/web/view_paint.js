@@ -91,11 +91,12 @@ export class CellsPart {
     this.n = n / 3;
   }
 
-  // counts: by how many stations each cell is seen. isTurned: they see the backs of the faces.
+  // counts: by how many stations each cell is seen. isTurned: they see the backs of the faces. showsUnseen(cell) says of
+  // a cell that none sees whether it is painted; false: none is.
   show({counts, isTurned, showsUnseen}) {
     const {gl} = this;
-    Object.assign(this, {isTurned, showsUnseen});
-    this.#choose((cell) => showsUnseen || counts[cell] > 0);
+    this.isTurned = isTurned;
+    this.#choose((cell) => counts[cell] > 0 || (showsUnseen && showsUnseen(cell)));
     const rows = Math.max(1, Math.ceil(this.all / WIDE));
     const texels = new Uint8Array(WIDE * rows);
     texels.set(counts);

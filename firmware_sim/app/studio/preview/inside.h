@@ -4,7 +4,7 @@
  *   preview.c  requests that wait, answers that are kept, the thread
  *   request.c  path and query to a request
  *   place.c    /preview: the scan from a place
- *   next.c     /next: the place that adds most
+ *   next.c     /next: the place that adds most; /reach: what can be seen from any place
  *   cells.c    /cells: the surface as cells, to be painted */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_INSIDE_H
 #define FIRMWARE_SIM_APP_STUDIO_PREVIEW_INSIDE_H
@@ -15,7 +15,7 @@
 
 enum { PREVIEW_MOST_PULSES = 1500000, PREVIEW_MOST_OF = 16, PREVIEW_MOST_PIECES = 400000 };
 
-enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_CELLS };
+enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_REACH, PREVIEW_CELLS };
 
 /* Angles and lengths of a member that is INFINITY are those of the scanner at power-up. */
 struct preview_request {
@@ -24,7 +24,7 @@ struct preview_request {
     struct site_place place;
     double step_deg, far_m, line_deg[2], pan_deg[2];
     int points; /* 0: only the cells are wanted */
-    /* of PREVIEW_NEXT */
+    /* of PREVIEW_NEXT and PREVIEW_REACH */
     uint32_t n_of, of[PREVIEW_MOST_OF]; /* numbers of previews, whose cells are seen already */
     double height_m;                    /* of the head above the floor */
 };
@@ -66,6 +66,8 @@ enum { PREVIEW_HEAD_BYTES = 72, PREVIEW_CELLS_AT = 72, PREVIEW_HITS_AT = 24, PRE
 /* seen[request->n_of]. */
 int preview_next(const struct preview_work *work, const struct preview_request *request,
                  const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
+int preview_reach(const struct preview_work *work, const struct preview_request *request,
+                  const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
 int preview_cells(const struct preview_work *work, struct web_body *out, struct sh_err *err);
 
 #endif

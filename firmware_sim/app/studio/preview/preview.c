@@ -123,6 +123,7 @@ static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *se
     return sh_fail(err, SH_EINPUT, "preview %u is kept no more; ask for its place again", number);
 }
 
+/* What follows from what previews saw. */
 static int suggest(struct preview *p, const struct preview_request *request, struct web_body *out, struct sh_err *err)
 {
     struct preview_seen seen[PREVIEW_MOST_OF] = {{.cells = NULL}};
@@ -131,7 +132,10 @@ static int suggest(struct preview *p, const struct preview_request *request, str
     for (uint32_t i = 0; i < request->n_of && rc == SH_OK; i++)
         rc = copy_seen(p, request->of[i], &seen[i], err);
     pthread_mutex_unlock(&p->lock);
-    if (rc == SH_OK) rc = preview_next(&p->work, request, seen, out, err);
+    int (*const answer)(const struct preview_work *, const struct preview_request *, const struct preview_seen *,
+                        struct web_body *, struct sh_err *) =
+        request->kind == PREVIEW_NEXT ? preview_next : preview_reach;
+    if (rc == SH_OK) rc = answer(&p->work, request, seen, out, err);
     for (uint32_t i = 0; i < request->n_of; i++)
         free(seen[i].cells);
     return rc;
@@ -140,7 +144,7 @@ static int suggest(struct preview *p, const struct preview_request *request, str
 static int work_on(struct preview *p, const struct preview_request *request, uint32_t number, struct web_body *out,
                    struct sh_err *err)
 {
-    if (request->kind == PREVIEW_NEXT) return suggest(p, request, out, err);
+    if (request->kind == PREVIEW_NEXT || request->kind == PREVIEW_REACH) return suggest(p, request, out, err);
     if (request->kind == PREVIEW_CELLS) return preview_cells(&p->work, out, err);
     return preview_look(&p->work, request, number, out, err);
 }

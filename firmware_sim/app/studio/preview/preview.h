@@ -26,7 +26,7 @@ struct preview_options {
 
 /* Sets up the scene's other scanners, if there are any. SH_ENOMEM, SH_ESTOPPED. */
 int preview_create(const struct preview_options *options, struct preview **out, struct sh_err *err);
-/* /preview, /next and /cells; as web_source's get. Any thread. */
+/* /preview, /next, /reach and /cells; as web_source's get. Any thread. */
 int preview_get(struct preview *preview, const char *path, const char *query, struct web_body *out, struct sh_err *err);
 void preview_free(struct preview *preview);
 

@@ -46,7 +46,8 @@ static int read_place(const struct preview_options *o, const char *query, struct
     return SH_OK;
 }
 
-static int read_next(const struct preview_options *o, const char *query, struct preview_request *r, struct sh_err *err)
+static int read_next(const struct preview_options *o, enum preview_kind kind, const char *query,
+                     struct preview_request *r, struct sh_err *err)
 {
     enum { STATION, HEIGHT, OF };
     static const char *const names[PREVIEW_MOST_OF] = {"p1", "p2",  "p3",  "p4",  "p5",  "p6",  "p7",  "p8",
@@ -57,7 +58,7 @@ static int read_next(const struct preview_options *o, const char *query, struct 
         w[OF + i] = (struct page_word){names[i], 1, UINT32_MAX, 1, 0};
     const int rc = page_read_query(w, query, err);
     if (rc != SH_OK) return rc;
-    *r = (struct preview_request){.kind = PREVIEW_NEXT,
+    *r = (struct preview_request){.kind = kind,
                                   .station = (uint32_t)w[STATION].value - 1,
                                   .height_m = w[HEIGHT].value,
                                   .step_deg = NEXT_STEP_DEG,
@@ -75,6 +76,7 @@ int preview_read_request(const struct preview_options *o, const char *path, cons
     struct page_word none[] = {{.name = NULL}};
     *out = (struct preview_request){.kind = PREVIEW_CELLS};
     if (strcmp(path, "/preview") == 0) return read_place(o, query, out, err);
-    if (strcmp(path, "/next") == 0) return read_next(o, query, out, err);
+    if (strcmp(path, "/next") == 0) return read_next(o, PREVIEW_NEXT, query, out, err);
+    if (strcmp(path, "/reach") == 0) return read_next(o, PREVIEW_REACH, query, out, err);
     return strcmp(path, "/cells") == 0 ? page_read_query(none, query, err) : SH_EINPUT;
 }
