@@ -161,6 +161,30 @@ export async function trialTests(page, other, SIZE) {
     await page.eval(`document.querySelector('#trial .as-text').open = false`);
   });
 
+  await test('a target is seen by the stations whose points lie there', async () => {
+    await page.press('#trial-target');
+    await page.where('#picture');
+    await page.eval('scanhead.view.screenshotReady()');
+    // A point of the first station that the camera sees, since nothing nearer lies there: those on the floor, from above.
+    const [x, y, number, at] = await page.eval(`(() => {
+      const {left, top, width, height} = document.querySelector('#picture').getBoundingClientRect(), {view, trial} = scanhead;
+      const block = view.cloud.blocks.find((b) => b.station === 1), o = view.cloud.origin;
+      for (let i = 0; i < block.n; i++) {
+        const at = [0, 1, 2].map((a) => block.position[3 * i + a] + o[a]), p = view.camera.project(at);
+        if (Math.abs(at[2]) > 1e-4 || p.x < 20 || p.y < 90 || p.x > width - 60 || p.y > height - 60) continue;
+        return [left + p.x, top + p.y, block.station, at];
+      }
+    })()`);
+    await page.clickAt([x, y]);
+    const text = await page.until(`document.querySelector('.targets li span')?.textContent`);
+    is(new RegExp(`^T1: seen by .*\\b${number}\\b`).test(text), `at ${at}: ${text}`);
+    equal(await page.eval(`document.querySelector('#trial-targets').textContent`), 'No two stations see 3 of them both.', 'what is said');
+    const drawn = await page.eval(`scanhead.view.overlay.targets.map((t) => t.name).join()`);
+    equal(drawn, 'T1', 'marks in the picture');
+    await page.eval(`document.querySelector('.targets li button').click()`);
+    equal(await page.eval('scanhead.view.overlay.targets.length'), 0, 'marks after it is removed');
+  });
+
   await test('at the end of a trial the page shows the head again', async () => {
     await page.click('#trial-end');
     equal(await page.eval('scanhead.view.cloud === scanhead.cloud && scanhead.trial === null'), true, 'the points of the scans are back');

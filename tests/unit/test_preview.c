@@ -258,6 +258,23 @@ static void test_tripod(void **state)
     close_room(&r);
 }
 
+/* A station of another scanner is previewed with that one: a VLP-16 fires 16 beams 1809 times in a turn at 10 Hz, whatever
+ * the step (55.296 us a sequence). */
+static void test_scanners(void **state)
+{
+    (void)state;
+    struct room r = open_room(
+        "}\n  - {position_m: [1, 3, 1.2], heading_deg: 0, scanner: {head: {profile: velodyne-vlp16, lines_hz: 10}}");
+    struct web_body coarse = need(&r, "/preview", "station=2&x_m=4&y_m=1&z_m=1.2&heading_deg=0&step_deg=4");
+    struct web_body fine = need(&r, "/preview", "station=2&x_m=4&y_m=1&z_m=1.2&heading_deg=0&step_deg=1");
+    const uint32_t pulses = le_get32(fine.bytes + 20);
+    assert_true(pulses >= 16 * 1808 && pulses <= 16 * 1809);
+    assert_int_equal(le_get32(coarse.bytes + 20), pulses);
+    free(coarse.bytes);
+    free(fine.bytes);
+    close_room(&r);
+}
+
 static void test_refusals(void **state)
 {
     (void)state;
@@ -291,7 +308,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_points),   cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
         cmocka_unit_test(test_next),     cmocka_unit_test(test_reach),    cmocka_unit_test(test_tripod),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_scanners), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

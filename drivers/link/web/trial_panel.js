@@ -7,6 +7,7 @@ import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
 import {hasBit} from './previews.js';
+import {TargetList} from './trial_targets.js';
 import {SEEN_COLOURS} from './view_paint.js';
 import {tableOf} from './view_colours.js';
 
@@ -40,12 +41,14 @@ export class TrialPanel {
     title: 'Moves stations in this page alone, and shows at once what they see'}, 'Try places');
   #items = new Map(); // it maps a number to {item, fields, place, says, head}
   #timer = 0;
+  #targets;
   #colours = tableOf('station');
 
   constructor(session, stations, view) {
     this.#session = session;
     this.#stations = stations;
     this.#view = view;
+    this.#targets = new TargetList(view);
     this.#box.hidden = true;
     this.#body.prepend(make('div', {class: 'actions'}, this.#open), this.#box);
     this.#make();
@@ -86,7 +89,7 @@ export class TrialPanel {
       this.list,
       make('div', {class: 'actions'}, button('trial-add', 'Add a station', () => this.#add())),
       make('label', {class: 'tick'}, this.suggests, 'Show the best next place'), this.says,
-      make('div', {class: 'actions'}, this.take),
+      make('div', {class: 'actions'}, this.take), this.#targets.element,
       make('details', {class: 'as-text', toggle: (e) => e.target.open && this.#write()}, make('summary', {}, 'As a configuration'), this.text),
       make('div', {class: 'actions'}, this.apply, button('trial-end', 'End', () => this.end(), {class: 'main'})));
     this.step.value = '2';
@@ -103,12 +106,14 @@ export class TrialPanel {
     view.useCloud(this.#cloud);
     this.#trial = new Trial(this.#cloud, list, Number(this.step.value));
     this.#stations.setTrial(this);
+    this.#targets.begin(this.#trial);
     window.scanhead.trial = this.#trial;
     this.#items.clear();
     view.stations.dragged = ({number, x, y, z, heading_deg}) => this.#trial.change(number, {x_m: x, y_m: y, z_m: z, heading_deg});
     this.#trial.addEventListener('change', () => this.#show());
     this.#trial.addEventListener('seen', () => {
       this.#painted();
+      this.#targets.show();
       this.#suggestSoon();
     });
     this.#body.classList.add('trying');
@@ -122,6 +127,7 @@ export class TrialPanel {
     const view = this.#view;
     clearTimeout(this.#timer);
     this.#trial.end();
+    this.#targets.begin(null);
     this.#trial = this.#cloud = window.scanhead.trial = null;
     view.stations.dragged = null;
     view.paint(null);

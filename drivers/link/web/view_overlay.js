@@ -22,6 +22,7 @@ function scaleBar(camera, most = 150) {
 }
 
 export class Overlay {
+  targets = []; // {at, name, isSeen: by two stations or more}
   constructor(canvas) {
     const parent = canvas.parentElement;
     if (getComputedStyle(parent).position === 'static') parent.style.position = 'relative';
@@ -53,6 +54,7 @@ export class Overlay {
     c.lineJoin = c.lineCap = 'round';
     this.colours = colours;
     if (stations) this.#stations(camera, stations);
+    for (const target of this.targets) this.#target(camera, target);
     if (marked) this.#mark(camera, marked);
     if (camera.inside) this.#looking(camera);
     else this.#scale(camera);
@@ -170,6 +172,19 @@ export class Overlay {
     const points = Array.from({length: 49}, (_, k) => camera.project([at[0] + hides_m * Math.sin(k * Math.PI / 24),
       at[1] + hides_m * Math.cos(k * Math.PI / 24), at[2] - above_m]));
     if (points.every(({w}) => w > 0.01)) this.#line(points.map(({x, y}) => [x, y]), 1.25, this.colours.ink, [3, 5]);
+  }
+
+  // Draws a square mark on its corner, filled where two scans have it in common.
+  #target(camera, {at, name, isSeen}) {
+    const {x, y, w} = camera.project(at);
+    if (w <= 0.05) return;
+    const c = this.context, mark = [[x, y - 7], [x + 7, y], [x, y + 7], [x - 7, y]];
+    this.#line([...mark, mark[0]], 1.75, this.colours.accent);
+    if (isSeen) {
+      c.fillStyle = this.colours.accent;
+      c.fill();
+    }
+    this.#text(name, x + 12, y, {align: 'left', bold: true, colour: this.colours.accent});
   }
 
   #dot(x, y, r, colour) {

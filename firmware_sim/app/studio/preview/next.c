@@ -138,7 +138,9 @@ int preview_reach(const struct preview_work *work, const struct preview_request 
     const size_t words = preview_words(work->options->coverage);
     uint64_t *reach = calloc(words + 1, sizeof *reach);
     int n = stand_open(work, r, seen, &s, err);
-    if (n == SH_OK) n = reach != NULL ? mark_reach(work, &s, reach, err) : sh_fail(err, SH_ENOMEM, "no memory for what can be seen");
+    if (n == SH_OK)
+        n = reach != NULL ? mark_reach(work, &s, reach, err)
+                          : sh_fail(err, SH_ENOMEM, "no memory for what can be seen");
     stand_close(work, &s);
     *out = (struct web_body){"application/octet-stream", n >= 0 ? malloc(REACH_HEAD_BYTES + 8 * words) : NULL,
                              REACH_HEAD_BYTES + 8 * words};
