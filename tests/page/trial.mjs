@@ -133,6 +133,7 @@ export async function trialTests(page, other, SIZE) {
     await page.until(RESTS);
     const at = await page.eval(`(() => { const s = scanhead.trial.get(1); return [s.x_m, s.y_m, s.z_m].map((v) => Math.round(v * 1e4) / 1e4); })()`);
     console.log(`# from letting go of a station to all its points on the page: ${took.toFixed(0)} ms, ${await page.eval('scanhead.trial.get(1).points')} points`);
+    is(await page.eval('scanhead.trial.get(1).wanted') > 3, 'its points were asked for while it was dragged');
     is(Math.hypot(at[0] - 1.5, at[1] - 2) < 0.05 && at[2] === 1.6, `it is where it was let go: ${at}`);
     await page.fill('#trial-2-pan1_deg', 180);
     await page.until(`scanhead.trial.get(2).pan1_deg === 180 && ${RESTS}`);
@@ -190,5 +191,21 @@ export async function trialTests(page, other, SIZE) {
     equal(await page.eval('scanhead.view.cloud === scanhead.cloud && scanhead.trial === null'), true, 'the points of the scans are back');
     equal(await page.eval(`scanhead.view.stations.list.map((s) => [s.number, s.x_m, s.y_m].join()).join(' ')`), '1,0,0 2,-3,5', 'the stations');
     is(await page.eval(`document.querySelector('#trial').hidden && !scanhead.view.movable`), 'its tools are gone');
+  });
+}
+
+// The page has control. Afterwards station 2 stands elsewhere.
+export async function appliedTest(page, other) {
+  await test('with control, the places that were tried can be sent to the head', async () => {
+    await page.press('#try');
+    await page.until(RESTS);
+    equal(await page.eval(`document.querySelector('#trial-apply').disabled`), true, 'nothing has moved yet');
+    await page.fill('#trial-2-x_m', -2.5);
+    await page.until(RESTS);
+    await page.press('#trial-apply');
+    await other.until('SITE:POSE? 2', (reply) => reply.startsWith('-2.5,'));
+    await page.until(`document.querySelector('#trial-apply').disabled`);
+    await page.press('#trial-end');
+    await page.until('scanhead.view.stations.get(2).x_m === -2.5');
   });
 }

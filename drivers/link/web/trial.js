@@ -79,7 +79,7 @@ export class Trial extends EventTarget {
   add(place, like = this.stations[0]) {
     const number = Math.max(0, ...this.stations.map((s) => s.number)) + 1;
     const {of, tripod} = like;
-    return this.#put({...pick({...like, ...place}, [...PLACE, ...SETTINGS]), number, of, tripod, name: `Station ${number}`,
+    return this.#put({...pick({...like, ...place}, [...PLACE, ...SETTINGS]), number, of, tripod, name: '',
       isAdded: true, was: null}).number;
   }
 

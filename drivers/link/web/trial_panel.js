@@ -195,7 +195,7 @@ export class TrialPanel {
     const badge = make('span', {class: 'number'}, String(number));
     badge.style.boxShadow = `inset 0 -0.25rem ${css(colour)}`;
     const item = make('li', {}, make('details', {name: 'trial-station'},
-      make('summary', {}, badge, make('span', {class: 'name'}, name ?? ''), place), form));
+      make('summary', {}, badge, make('span', {class: 'name'}, isAdded ? 'added' : name ?? ''), place), form));
     return {item, fields, place, says};
   }
 
