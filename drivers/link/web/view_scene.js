@@ -96,8 +96,9 @@ export class Solids {
     gl.depthFunc(gl.LEQUAL);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    if (this.sceneMesh && this.sceneMode === 'glass') this.#glass(camera, colours, behind, plain);
+    // The glass comes last, so that stations are seen through it: its nearest faces hide what is drawn later.
     if (this.stationsOn) for (const station of stations.list) this.#station(camera, colours, stations, station, behind);
+    if (this.sceneMesh && this.sceneMode === 'glass') this.#glass(camera, colours, behind, plain);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, null);
