@@ -22,12 +22,25 @@ struct room {
     struct preview *preview;
 };
 
-/* The head scans everything but a cone of 50 degrees below. */
+/* A closed body in the right leg, no wall of which goes through a place of the grid, from the ground to 0.1 m below the ceiling, wide enough to stand in. */
+static const char BODY[] = "o body\nv 3.1 0.2 0.01\nv 5.1 0.2 0.01\nv 5.1 1.8 0.01\nv 3.1 1.8 0.01\n"
+                           "v 3.1 0.2 2.3\nv 5.1 0.2 2.3\nv 5.1 1.8 2.3\nv 3.1 1.8 2.3\n"
+                           "f 13 16 15 14\nf 17 18 19 20\nf 13 14 18 17\nf 14 15 19 18\nf 15 16 20 19\nf 16 13 17 20\n";
+
+static struct room open_with(const char *tripod, const char *body);
+
+/* The head scans everything but cones of 50 degrees below and 30 degrees above. */
 static struct room open_room(const char *tripod)
 {
+    return open_with(tripod, "");
+}
+
+static struct room open_with(const char *tripod, const char *body)
+{
     struct room r;
-    char text[1024];
-    write_in("room.obj", ROOM);
+    char text[1024], mesh[1024];
+    snprintf(mesh, sizeof mesh, "%s%s", ROOM, body);
+    write_in("room.obj", mesh);
     snprintf(
         text, sizeof text,
         "head: {profile: full-sweep, prr_hz: 100000, lines_hz: 100, pan_deg_s: 100, frames: 1}\n"
@@ -209,6 +222,37 @@ static void test_reach(void **state)
     close_room(&r);
 }
 
+/* The bottom of a closed body lies on the ground: only who stands within the body sees it, and nobody does. */
+static void test_bodies(void **state)
+{
+    (void)state;
+    struct room r = open_with("", BODY);
+    struct web_body cells = need(&r, "/cells", "");
+    struct web_body leg = need(&r, "/preview", "station=1&x_m=1&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    char query[64];
+    snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
+    struct web_body reach = need(&r, "/reach", query);
+    const uint32_t n = le_get32(cells.bytes + 8), pieces = le_get32(cells.bytes + 12);
+    const char *of = cells.bytes + 48 + 4 * (size_t)n, *corner = of + 4 * (size_t)pieces;
+    uint32_t bottom = 0, seen = 0;
+    for (uint32_t i = 0; i < pieces; i++) {
+        const uint32_t cell = le_get32(of + 4 * i);
+        double off = 0.0;
+        for (int k = 0; k < 4; k++)
+            off = fmax(
+                off, fabs((double)le_get_float(corner + 48 * i + 12 * k + 8) + le_get_double(cells.bytes + 32) - 0.01));
+        if (off > 1e-6) continue;
+        bottom++;
+        seen += (le_get64(reach.bytes + 16 + 8 * (cell / 64)) >> cell % 64 & 1) != 0;
+    }
+    assert_true(bottom > 50);
+    assert_int_equal(seen, 0);
+    free(cells.bytes);
+    free(leg.bytes);
+    free(reach.bytes);
+    close_room(&r);
+}
+
 static double number_of(const char *json, const char *key)
 {
     const char *at = strstr(json, key);
@@ -306,9 +350,9 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),   cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_next),     cmocka_unit_test(test_reach),    cmocka_unit_test(test_tripod),
-        cmocka_unit_test(test_scanners), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points), cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_next),   cmocka_unit_test(test_reach),    cmocka_unit_test(test_bodies),
+        cmocka_unit_test(test_tripod), cmocka_unit_test(test_scanners), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }
