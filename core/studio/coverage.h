@@ -20,6 +20,7 @@
 #ifndef CORE_STUDIO_COVERAGE_H
 #define CORE_STUDIO_COVERAGE_H
 
+#include <stdatomic.h>
 #include <stdint.h>
 
 #include "core/bvh.h"
@@ -50,6 +51,9 @@ struct coverage_scan {
     /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
+    /* Also gets the scan's hits, those on bodies among them, from the threads that cast; NULL: nobody wants them. */
+    void (*take)(void *take_ctx, const struct cast_hit *hit, uint32_t n);
+    void *take_ctx;
 };
 
 struct coverage_pulses {
@@ -65,6 +69,13 @@ void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *
 /* Makes the waiting scan that of the next station, counted from 1 in this order. */
 void coverage_keep(struct coverage *coverage);
 void coverage_drop(struct coverage *coverage);
+
+/* For stations that are tried and changed one by one. cells[(coverage_cells + 63) / 64]: a bit for each cell that the
+ * waiting scan sees. A scan that was written down so can be kept again later; its pulses then count as none. */
+void coverage_waiting_cells(const struct coverage *coverage, uint64_t *cells);
+void coverage_keep_cells(struct coverage *coverage, const uint64_t *cells);
+/* Forgets all stations, and the scan that waits. */
+void coverage_forget(struct coverage *coverage);
 
 /* ---- figures */
 
@@ -149,6 +160,7 @@ struct coverage_gain {
 struct coverage_places {
     uint32_t n;
     const double (*place_m)[3]; /* [n] */
+    _Atomic uint64_t *cells;    /* gets a bit for each cell that a ray hits, seen before or not; NULL: not asked for */
 };
 /* gain: [places->n] */
 int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,

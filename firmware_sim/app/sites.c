@@ -49,6 +49,14 @@ int sites_load_written_out(const struct config *cfg, const struct sh_report *rep
     return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
 }
 
+int sites_load_beside(const struct config *cfg, const struct site *first, const struct sh_report *report,
+                      struct sites *sites, struct sh_err *err)
+{
+    sites->first = (struct site *)(uintptr_t)first;
+    sites->first_is_lent = 1;
+    return load_others(cfg, report, sites, err);
+}
+
 struct site *sites_of(const struct sites *sites, uint32_t station)
 {
     const struct config *cfg = sites->first->cfg;
@@ -65,5 +73,5 @@ void sites_free(struct sites *sites)
         free(sites->other[k].cfg);
     }
     scanner_warnings_free(&sites->warnings);
-    site_free(sites->first);
+    if (!sites->first_is_lent) site_free(sites->first);
 }

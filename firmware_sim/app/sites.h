@@ -16,6 +16,7 @@ struct sites {
         struct scanner_report report;
     } other[CONFIG_MAX_STATIONS];
     uint32_t n;
+    int first_is_lent;
     struct scanner_warnings warnings;
 };
 
@@ -23,6 +24,9 @@ struct sites {
 int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err);
 int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
                            struct sh_err *err);
+/* The same beside the first site of a head that runs, which stays the caller's. */
+int sites_load_beside(const struct config *cfg, const struct site *first, const struct sh_report *report,
+                      struct sites *sites, struct sh_err *err);
 /* That of the scanner at a station, from 0. */
 struct site *sites_of(const struct sites *sites, uint32_t station);
 void sites_free(struct sites *sites);

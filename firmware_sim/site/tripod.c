@@ -226,6 +226,24 @@ int site_set_up_tripods(struct site *site, const struct sh_report *report, struc
     return rc;
 }
 
+int site_tripod_at(const struct site *site, uint32_t station, const double position_m[3], struct site_tripod *out,
+                   struct sh_err *err)
+{
+    struct site_station s;
+    struct bvh_work *work;
+    memcpy(&s, &site->station[station], sizeof s);
+    memcpy(s.at.position_m, position_m, sizeof s.at.position_m);
+    s.tripod = (struct site_tripod){.from = s.tripod.from};
+    *out = s.tripod;
+    if (s.tripod.from == NULL) return SH_OK;
+    int rc = bvh_work_create(&work, err);
+    if (rc != SH_OK) return rc;
+    rc = tripod_set_up(site, &s, station, work, NULL, err);
+    bvh_work_free(work);
+    *out = s.tripod;
+    return rc;
+}
+
 void site_free_tripod(struct site_tripod *t)
 {
     bvh_free(t->bvh);

@@ -4,7 +4,8 @@
 //   2. pictures a second of 2, 5 and 10 million points, drawn in software
 //   3. decoding, ns a point, in the page and in node
 //   4. memory of the tab while points come and go, --minutes of it
-//   node tests/bench/page.mjs [--seconds S] [--minutes M] [--only 1,2,3,4]
+//   5. how soon a station that is tried has its points and cells, also beside a head at its limit
+//   node tests/bench/page.mjs [--seconds S] [--minutes M] [--only 1,2,3,4,5]
 import {readFileSync} from 'node:fs';
 import {cpus, loadavg} from 'node:os';
 import {resolve} from 'node:path';
@@ -15,7 +16,7 @@ import {folder, write} from '../page/work.mjs';
 
 const ROOT = new URL('../..', import.meta.url).pathname;
 const {values} = parseArgs({options: {seconds: {type: 'string', default: '20'}, minutes: {type: 'string', default: '1'},
-  only: {type: 'string', default: '1,2,3,4'}}});
+  only: {type: 'string', default: '1,2,3,4,5'}}});
 const seconds = Number(values.seconds), minutes = Number(values.minutes), wanted = values.only.split(',');
 if (!(seconds >= 1 && minutes > 0)) {
   console.error('--seconds: a number from 1 on; --minutes: a number above 0');
@@ -174,6 +175,63 @@ async function memory() {
   table(rows);
 }
 
+// ---- 5
+// Lets go of a tried station at a place. Returns the times until all its points are on the page, until all its cells are known, and
+// until these are painted.
+const letGo = (number, [x, y, z]) => `(async () => {
+  const {trial, view} = scanhead, station = trial.get(${number}), t0 = performance.now();
+  const soon = () => new Promise((done) => setTimeout(done, 1));
+  view.dispatchEvent(new CustomEvent('move', {detail: {station: ${number}, x: ${x}, y: ${y}, z: ${z}, heading_deg: 0}}));
+  while (station.shown !== station.wanted) await soon();
+  await view.screenshotReady();
+  const points = performance.now() - t0;
+  while (trial.isBusy) await soon();
+  const cells = performance.now() - t0;
+  await view.screenshotReady();
+  return [points, cells, performance.now() - t0];
+})()`;
+// Painting restarts the picture, so points are timed without it.
+const painted = (what) => `(() => {
+  const select = document.querySelector('#trial-paint');
+  select.value = '${what}';
+  select.dispatchEvent(new Event('change'));
+  return scanhead.view.screenshotReady().then(() => 0);
+})()`;
+
+async function dropAround(config, number, middle, size, drops) {
+  const stats = `${folder}/stats.json`;
+  const browser = new Browser({nice: drops.nice});
+  const head = await start(['run', config, '--quiet', '--no-hash', '--view', '--stats', stats, ...drops.more]);
+  const page = await browser.open(endpoint(head, 'web'));
+  await page.until('scanhead.head.isOpen && !document.querySelector("#try").hidden');
+  await page.click('#try');
+  await page.until('scanhead.trial && !scanhead.trial.isBusy && scanhead.trial.sum');
+  const took = {off: [], seen: []};
+  for (const paint of ['off', 'seen']) {
+    await page.eval(painted(paint));
+    for (let k = 0; k < drops.n; k++) {
+      const turn = k + (paint === 'seen' ? 0.5 : 0); // the head keeps its answers
+      const place = [middle[0] + size * Math.cos(turn), middle[1] + size * Math.sin(turn), middle[2]];
+      took[paint].push(await page.eval(letGo(number, place.map((v) => v.toFixed(3)))));
+    }
+  }
+  const points = await page.eval(`scanhead.trial.get(${number}).points`);
+  await end(head);
+  await browser.end();
+  const sorted = (paint, i) => took[paint].map((t) => t[i]).sort((a, b) => a - b);
+  return {row: [grouped(points), ...[sorted('off', 0), sorted('off', 1), sorted('seen', 2)].flatMap((t) => [t[t.length >> 1], t.at(-1)].map(grouped))], stats: JSON.parse(readFileSync(stats, 'utf8'))};
+}
+
+async function trials() {
+  const n = 15;
+  console.log(`5. Stations that are tried, ms, of ${n} times`);
+  const house = await dropAround(resolve(ROOT, 'config/demo.yaml'), 3, [5.5, 2.2, 1.6], 0.8, {n, nice: 0, more: ['--set', `links.0.path=${folder}/pty`]});
+  const busy = await dropAround(write('busy.yaml', room(2200000, "[{type: web}]")), 1, [0, 0, 1.6], 1.5, {n, nice: 10, more: ['--start']});
+  table([['', 'points', 'on the page, median', 'most', 'all cells, median', 'most', 'painted, median', 'most'], ['house of the demo, head idle', ...house.row],
+    ['room, 2,200,000 pulses/s', ...busy.row]]);
+  console.log(`  Pulses lost by the head meanwhile: ${grouped(busy.stats.lost_pulses)} of ${grouped(busy.stats.pulses)}\n`);
+}
+
 console.log(`${cpus()[0].model.replace(/\s+/g, ' ')}, ${cpus().length} processors, load ${loadavg()[0].toFixed(1)} before; ${browserVersion()}, node ${process.version}\n`);
-for (const [number, measure] of Object.entries({1: load, 2: drawing, 3: decoding, 4: memory})) if (wanted.includes(number)) await measure();
+for (const [number, measure] of Object.entries({1: load, 2: drawing, 3: decoding, 4: memory, 5: trials})) if (wanted.includes(number)) await measure();
 process.exit(0);

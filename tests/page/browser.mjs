@@ -243,9 +243,14 @@ class Page {
     return this.send('Emulation.setEmulatedMedia', {features: [{name: 'prefers-color-scheme', value: is ? 'dark' : 'light'}]});
   }
 
-  async shot(file) {
+  /** Returns the page as it is shown, as the bytes of a PNG. */
+  async picture() {
     const {data} = await this.send('Page.captureScreenshot', {format: 'png'});
-    writeFileSync(file, Buffer.from(data, 'base64'));
+    return Buffer.from(data, 'base64');
+  }
+
+  async shot(file) {
+    writeFileSync(file, await this.picture());
   }
 
   /** Returns the page's knowledge of its head, the newest events first, and its errors. A failed test shows this. */

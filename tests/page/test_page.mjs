@@ -9,6 +9,7 @@ import {Client, end, endpoint, start} from './head.mjs';
 import {testInstrument} from './instrument.mjs';
 import {both, CONFIG, recorded} from './rig.mjs';
 import {testTools} from './tools.mjs';
+import {appliedTest, trialTests} from './trial.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
 
 const SIZE = [600, 480], SMALL = [360, 300]; // drawing in software takes most of the time
@@ -97,6 +98,8 @@ await test('without control nothing that the user does reaches the head', async 
   equal(await other.ask('SYST:ERR:COUN?'), '0', 'refused commands');
 });
 
+await trialTests(page, other, SIZE);
+
 const wanted = recorded('first', ['head.lines_hz=60']);
 
 await test('its user takes control by a button, and a knob changes the setting of the head', async () => {
@@ -173,6 +176,8 @@ await test('the fields have the place of a station as soon as it is let go, and 
   equal(await page.eval(fields), '0.25,-0.5', `the place that holds; at first it was ${was}`);
 });
 
+await appliedTest(page, other);
+
 await test('the picture is never black: not before the first one, and not when its size changes', async () => {
   const other = await browser.open(endpoint(head, 'web'), {size: SMALL, before: `(${seesBlack})()`});
   await other.until('scanhead.view.state.drawn > 0');
@@ -235,8 +240,8 @@ await test('when the head goes, the page says so; it finds the next one at that 
 
 await test('nothing but what was done by hand had an effect on the head', () => {
   const commands = readFileSync(`${folder}/journal`, 'latin1').split('\n').filter((line) => /^\d/.test(line))
-    .map((line) => line.split(' ').slice(3).join(' ').toUpperCase().replace(/(SITE:POSE 1),.*/, '$1'));
-  const wanted = ['HEAD:LINES 60', 'SCAN:START', 'SITE:POSE 1', 'SCAN:START', 'SITE:POSE 1', 'HEAD:LIN 70', 'END'];
+    .map((line) => line.split(' ').slice(3).join(' ').toUpperCase().replace(/(SITE:POSE \d),.*/, '$1'));
+  const wanted = ['HEAD:LINES 60', 'SCAN:START', 'SITE:POSE 1', 'SCAN:START', 'SITE:POSE 1', 'SITE:POSE 2', 'HEAD:LIN 70', 'END'];
   equal(commands.join('; '), wanted.join('; '), 'the journal');
 });
 

@@ -9,6 +9,8 @@ import {ptpText} from '../../drivers/link/web/figures.js';
 import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
+import {batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from '../../drivers/link/web/previews.js';
+import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
 import {runTests, test} from './page_tap.mjs';
 
 const web = new URL('../../drivers/link/web/', import.meta.url);
@@ -192,6 +194,77 @@ test('what is no mesh is refused', () => {
     words = error.message;
   }
   equal(words, 'not a mesh of version 1');
+});
+
+// ---- stations that are tried
+
+// Writes little-endian values, each as [type, value ...], after a text.
+function bytesOf(magic, ...parts) {
+  const sizes = {Uint32: 4, Float32: 4, Float64: 8, Uint16: 2};
+  const length = magic.length + parts.reduce((sum, [type, ...values]) => sum + sizes[type] * values.length, 0);
+  const view = new DataView(new ArrayBuffer(length));
+  [...magic].forEach((c, i) => view.setUint8(i, c.charCodeAt(0)));
+  let at = magic.length;
+  for (const [type, ...values] of parts) for (const value of values) view[`set${type}`](at, value, true), at += sizes[type];
+  return view.buffer;
+}
+
+// Two squares of 1 m: a floor at z = 0 with cell 0, a wall at x = 1 with cell 1. The origin is (10, 0, 0).
+const SQUARES = bytesOf('SHCE', ['Uint32', 1, 2, 2], ['Float64', 10, 0, 0, 1], ['Float32', 1, 1], ['Uint32', 0, 1],
+  ['Float32', 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1]);
+const PREVIEW = bytesOf('SHPV', ['Uint32', 1, 7, 2, 2, 9, 8, 6], ['Float64', 10, 20, 1.5], ['Float32', 1.5, 0.5, 0.7], ['Uint32', 0, 2, 0],
+  ['Float32', 3, 0, 0, 0, 4, -1], ['Float32', 3, 4.123], ['Uint16', 5, 65535]);
+
+test('previews: bytes by hand become points, and cells that are seen', () => {
+  const p = parsePreview(PREVIEW);
+  equal([p.number, p.cells, p.n, p.pulses, p.hits, p.front], [7, 2, 2, 9, 8, 6]);
+  equal([p.above_m, p.hides_m, Math.fround(0.7) === p.feet_m, p.origin], [1.5, 0.5, true, [10, 20, 1.5]]);
+  const b = batchOf(p, 3, 4);
+  equal([b.n, b.shots, b.station, b.scan], [2, 9, 3, 4]);
+  equal([[...b.x], [...b.y], [...b.z], [...b.label]], [[13, 10], [20, 24], [1.5, 0.5], [5, 65535]]);
+  equal([...p.seen], [2, 0], 'cell 1');
+});
+
+test('previews: damage is refused in words', () => {
+  for (const [read, bytes, words] of [[parsePreview, PREVIEW.slice(0, -2), 'expected'], [parsePreview, SQUARES, 'SHPV'],
+    [parseCells, SQUARES.slice(0, 40), 'SHCE'], [parseReach, bytesOf('SHRE', ['Uint32', 2, 1, 1]), 'version 2']]) {
+    let said = '';
+    try {
+      read(bytes);
+    } catch (error) {
+      said = error.message;
+    }
+    equal(said.includes(words), true, said);
+  }
+  const beyond = SQUARES.slice(0);
+  new DataView(beyond).setUint32(60, 2, true);
+  let said = '';
+  try {
+    parseCells(beyond);
+  } catch (error) {
+    said = error.message;
+  }
+  equal(said, 'a piece beyond the 2 cells');
+});
+
+test('previews: areas seen by none, one and several; what nobody can see counts apart', () => {
+  const cells = parseCells(SQUARES), none = new Uint32Array(2), wall = Uint32Array.of(2, 0), both = Uint32Array.of(3, 0);
+  const sums = (seen, reach) => (({none_m2, one_m2, several_m2, hidden_m2}) => [none_m2, one_m2, several_m2, hidden_m2])(countSeen(cells, seen, reach));
+  equal(sums([]), [2, 0, 0, 0]);
+  equal(sums([wall, none]), [1, 1, 0, 0]);
+  equal(sums([wall, both]), [0, 1, 1, 0]);
+  equal(sums([none], wall), [2, 0, 0, 1]);
+  equal([...parseReach(bytesOf('SHRE', ['Uint32', 1, 33, 4, 5, 1]))], [5, 1]);
+  equal(pathOf('preview', {station: 1, far_m: null, x_m: -2.5}), '/preview?station=1&x_m=-2.5');
+});
+
+test('targets: the cell of a place, the stations that see it, and what pairs have in common', () => {
+  const cells = parseCells(SQUARES);
+  equal([cellAt(cells, [10.5, 0.5, 0]), cellAt(cells, [11, 0.5, 0.5]), cellAt(cells, [10.95, 0.5, 0]), cellAt(cells, [11, 0.5, 0.05]),
+    cellAt(cells, [20, 0, 0])], [0, 1, 0, 1, null]);
+  const stations = [{number: 1, seen: Uint32Array.of(1, 0)}, {number: 4, seen: Uint32Array.of(3, 0)}, {number: 6, seen: null}];
+  equal([seenBy(stations, 0), seenBy(stations, 1)], [[1, 4], [4]]);
+  equal(pairsOf(stations, [[1, 4], [4], [1, 4]]), [[1, 4, 2], [1, 6, 0], [4, 6, 0]]);
 });
 
 await runTests();

@@ -342,6 +342,67 @@ static void test_twins(void **state)
     cover_close(c);
 }
 
+struct counted {
+    atomic_uint hits, beside; /* beside: not on a wall, or at another range */
+};
+
+static void take_hits(void *ctx, const struct cast_hit *hit, uint32_t n)
+{
+    struct counted *c = ctx;
+    for (uint32_t i = 0; i < n; i++) {
+        double least_m = INFINITY, to2 = 0.0;
+        for (int a = 0; a < 3; a++) {
+            least_m = fmin(least_m, fmin(fabs(hit[i].p_m[a] - LO[a]), fabs(hit[i].p_m[a] - HI[a])));
+            to2 += (hit[i].p_m[a] - WITHIN[a]) * (hit[i].p_m[a] - WITHIN[a]);
+        }
+        atomic_fetch_add(&c->beside, least_m > 1e-9 || fabs(sqrt(to2) - hit[i].range_m) > 1e-9);
+    }
+    atomic_fetch_add(&c->hits, n);
+}
+
+/* Scans that were written down as cells give the same areas when they are kept again, in another order; and a scan's
+ * hits can be had. */
+static void test_written_down(void **state)
+{
+    (void)state;
+    static const double places[2][3] = {{1.0, 1.0, 1.0}, {0.5, 0.7, 1.2}};
+    struct cover *c = cover_open(cover_box(LO, HI), 0.2, 2);
+    struct cover_sweep sweep = cover_everywhere;
+    struct coverage_sums kept, again;
+    struct coverage_pulses pulses;
+    struct counted counted = {0, 0};
+    uint64_t cells[2][1024];
+    assert_true(coverage_cells(c->coverage) <= 64 * 1024);
+    sweep.range_max_m = 1.5;
+    sweep.step_deg = 2.0;
+    for (int i = 0; i < 2; i++) {
+        struct coverage_scan scan;
+        struct sh_err err;
+        cover_scan(c, i == 0 ? places[0] : places[1], &sweep, &scan);
+        assert_int_equal(coverage_look(c->coverage, &scan, "a scan", NULL, &pulses, &err), SH_OK);
+        coverage_waiting_cells(c->coverage, cells[i]);
+        coverage_keep(c->coverage);
+    }
+    sums_of(c, &kept);
+    coverage_forget(c->coverage);
+    sums_of(c, &again);
+    assert_true(again.none_m2 == again.area_m2 && again.stations == 0);
+    coverage_keep_cells(c->coverage, cells[1]);
+    coverage_keep_cells(c->coverage, cells[0]);
+    sums_of(c, &again);
+    assert_true(kept.one_m2 > 0.0 && kept.several_m2 > 0.0 && again.stations == 2);
+    assert_true(again.none_m2 == kept.none_m2 && again.one_m2 == kept.one_m2 && again.several_m2 == kept.several_m2);
+    struct coverage_scan scan;
+    struct sh_err err;
+    cover_scan(c, WITHIN, &cover_everywhere, &scan);
+    scan.take = take_hits;
+    scan.take_ctx = &counted;
+    assert_int_equal(coverage_look(c->coverage, &scan, "a scan", NULL, &pulses, &err), SH_OK);
+    assert_int_equal(counted.hits, pulses.hits);
+    assert_int_equal(counted.beside, 0);
+    cover_close(c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -357,6 +418,7 @@ int main(void)
         cmocka_unit_test(test_figures_of_a_cell),
         cmocka_unit_test(test_too_small),
         cmocka_unit_test(test_twins),
+        cmocka_unit_test(test_written_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -129,7 +129,7 @@ static void gains_of(const struct cover *c, const struct rays *rays, const doubl
 {
     const struct coverage_directions d = {rays->n, rays->dir, rays->sr, 0.0, 1000.0};
     struct sh_err err;
-    if (coverage_gains(c->coverage, &d, &(struct coverage_places){n, place_m}, NULL, gain, &err) != 0)
+    if (coverage_gains(c->coverage, &d, &(struct coverage_places){n, place_m, NULL}, NULL, gain, &err) != 0)
         fail_msg("%s", err.text);
 }
 

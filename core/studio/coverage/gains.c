@@ -54,7 +54,9 @@ static void take_ray(struct gain_worker *w, const double from_m[3], uint32_t i, 
     for (int k = 0; k < 3; k++)
         p_m[k] = from_m[k] + range_m * dir[k];
     const uint32_t cell = coverage_cell_at(w->g->c, w->triangle[i], p_m);
-    if (cell == NO_CELL || w->g->c->cell[cell].stations != 0) return;
+    if (cell == NO_CELL) return;
+    if (w->g->places->cells != NULL) atomic_fetch_or(&w->g->places->cells[cell / 64], 1ULL << cell % 64);
+    if (w->g->c->cell[cell].stations != 0) return;
     claim(w, cell, range_m * range_m * sr / fmax(w->cosine[i], LEAST_COSINE));
 }
 

@@ -66,7 +66,9 @@ static void cast_line(struct worker *w, const struct schedule_line *line, uint64
         schedule_get_run(&scan->segment, line, first, (uint32_t)(end - first < BVH_CHUNK ? end - first : BVH_CHUNK),
                          &run);
         if (scan->enter != NULL) scan->enter(scan->ctx, run.t0_ns, &w->setup);
-        add_hits(w, caster_meet(w->caster, &w->setup, &run, w->hit));
+        const uint32_t n = caster_meet(w->caster, &w->setup, &run, w->hit);
+        add_hits(w, n);
+        if (scan->take != NULL) scan->take(scan->take_ctx, w->hit, n);
         atomic_fetch_add(&w->look->cast, run.n);
         first += run.n;
     }
@@ -155,4 +157,29 @@ void coverage_keep(struct coverage *coverage)
 void coverage_drop(struct coverage *coverage)
 {
     memset(coverage->met, 0, coverage->n_cells * sizeof *coverage->met);
+}
+
+void coverage_waiting_cells(const struct coverage *coverage, uint64_t *cells)
+{
+    memset(cells, 0, ((size_t)coverage->n_cells + 63) / 64 * sizeof *cells);
+    for (uint32_t i = 0; i < coverage->n_cells; i++)
+        if (coverage->met[i].pulses != 0) cells[i / 64] |= 1ULL << i % 64;
+}
+
+void coverage_keep_cells(struct coverage *coverage, const uint64_t *cells)
+{
+    const uint16_t station = (uint16_t)++coverage->n_stations;
+    for (uint32_t i = 0; i < coverage->n_cells; i++)
+        if ((cells[i / 64] >> i % 64 & 1) != 0 && coverage->cell[i].stations++ == 0)
+            coverage->cell[i].first_station = station;
+}
+
+void coverage_forget(struct coverage *coverage)
+{
+    for (uint32_t i = 0; i < coverage->n_cells; i++) {
+        const struct cell *cell = &coverage->cell[i];
+        coverage->cell[i] = (struct cell){.area_m2 = cell->area_m2, .label = cell->label};
+    }
+    coverage->n_stations = 0;
+    coverage_drop(coverage);
 }

@@ -13,6 +13,7 @@ import {Stations} from './stations.js';
 import {Display} from './display.js';
 import {Point} from './point.js';
 import {WavePlot} from './waves.js';
+import {TrialPanel} from './trial_panel.js';
 import {Recording} from './recording.js';
 import {startRecorder} from './recorder.js';
 import {saveRow} from './save.js';
@@ -97,6 +98,7 @@ function startHead(cloud, view, names, keepsPast) {
   new Quality(() => session.link === 'open' && byId('panel-quality').open);
   new Point(view, names.of);
   if (view) new WavePlot(head, view, byId('point'));
+  const trials = new TrialPanel(session, stations, view);
 
   const countFrames = () => session.command('SCAN:COUNt?').then((done) => bar.progress({done: Number(done)}), () => {});
   let before = ''; // it says who the head was
@@ -126,7 +128,7 @@ function startHead(cloud, view, names, keepsPast) {
     bar.name(info);
     session.paced(info.pace);
     if (view) view.stations.fields = info.fields ?? [];
-    stations.reload(info.stations ?? []).catch(() => {}); // it is gone again
+    stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true)).catch(() => {}); // it is gone again
     showPlan();
     display.setScene(await fetchScene());
   };
@@ -183,7 +185,7 @@ async function start() {
   startKeys(view?.constructor.keys ?? []);
   const names = new Names();
   const info = await fetchJson('/head');
-  window.scanhead = {head: null, cloud, view};
+  window.scanhead = {head: null, cloud, view, trial: null};
   if (view) window.scanhead.tools = startTools(view, names.of);
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));

@@ -13,6 +13,7 @@ const shown = (value) => (value === null ? '' : String(Math.round(value * 1e6) /
 
 export class Stations extends EventTarget {
   list = [];
+  trial = null; // while stations are tried, it has them in the picture: {moved(move), name(number)}
   #session;
   #knobs;
   #view;
@@ -46,7 +47,18 @@ export class Stations extends EventTarget {
       this.#ol.replaceChildren(...list.map((station) => this.#make(station)));
     }
     for (const station of list) this.#fill(station);
-    this.#view?.setStations(list.filter((s) => s.x_m !== null));
+    this.#place();
+    this.#allow();
+  }
+
+  #place() {
+    if (!this.trial) this.#view?.setStations(this.list.filter((s) => s.x_m !== null));
+  }
+
+  // Stations are tried from now on, or, with null, no longer.
+  setTrial(trial) {
+    this.trial = trial;
+    this.#place();
     this.#allow();
   }
 
@@ -64,6 +76,7 @@ export class Stations extends EventTarget {
   }
 
   name(number) {
+    if (this.trial) return this.trial.name(number);
     const station = this.list.find((s) => s.number === number);
     return station?.name ? `${number} ${station.name}` : String(number);
   }
@@ -129,7 +142,7 @@ export class Stations extends EventTarget {
       this.#fill(this.#of(number), true);
     } catch (error) {
       entry.error = `Refused: ${why(error)}`;
-      this.#view?.setStations(this.list);
+      this.#place();
     }
     clearInterval(ticks);
     entry.busy = false;
@@ -150,7 +163,9 @@ export class Stations extends EventTarget {
   }
 
   // A station was dragged or turned in the picture.
-  async #moved({station: number, x, y, z, heading_deg}) {
+  async #moved(move) {
+    if (this.trial) return this.trial.moved(move);
+    const {station: number, x, y, z, heading_deg} = move;
     const station = this.#of(number);
     const not = this.#session ? this.#session.whyNot('idle') : 'A recording’s stations stay where they were.';
     if (!station || not) {
@@ -183,7 +198,7 @@ export class Stations extends EventTarget {
     const not = this.#session ? this.#session.whyNot('idle') : '';
     say(this.#note, !this.#session ? 'Places are those of the recording.'
       : not ? `${not.replace('control first', 'control to move stations')}${not.startsWith('Not') ? ' Stations are moved while it is idle.' : ''}` : 'Edit the numbers and press Move, or drag a station in the picture.');
-    if (this.#view) this.#view.movable = this.#session !== null && not === '';
+    if (this.#view) this.#view.movable = this.trial !== null || (this.#session !== null && not === '');
     const now = Number(this.#knobs?.value('HEAD:STATION'));
     for (const [number, {item, fields, says, time, buttons, error, busy, began}] of this.#items) {
       const changed = fields.some(({field}) => field.value !== field.dataset.holds);

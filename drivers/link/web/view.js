@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The view draws the picture of a cloud: WebGL 2 points, the scene, the stations, and the point under the pointer. See
-// README.md for what
-// it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once it rests the rest is
-// added, a slice at a time; points that come are added to what is there.
+// The view draws the picture of a cloud: WebGL 2 points, the scene, the stations, and the point under the pointer.
+// README.md says what it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once
+// it rests the rest is added, a slice at a time; points that come are added to what is there.
 
 import {Camera, radians} from './view_camera.js';
 import {MODES} from './view_colours.js';
@@ -15,9 +14,10 @@ import {Hover} from './view_hover.js';
 import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
 import {drawShaded, Programs} from './view_gl.js';
-import {searchSlowly} from './view_pick.js';
-import {onTheme, readTheme} from './view_theme.js';
+import {lookAt} from './view_pick.js';
+import {readTheme} from './view_theme.js';
 import {copyOf} from './picture.js';
+import {listenTo} from './view_events.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
 const SHOW_MS = 160; // updates of a growing picture are so far apart, and twice the time of one
@@ -86,23 +86,22 @@ export class View extends EventTarget {
   #emit(type, detail) { this.dispatchEvent(new CustomEvent(type, {detail})); }
 
   #listen() {
-    const {canvas} = this;
-    canvas.addEventListener('webglcontextlost', (e) => {
-      e.preventDefault();
-      this.#lost = true;
-      this.#made = null;
-      this.#painter.forget();
-    });
-    canvas.addEventListener('webglcontextrestored', () => {
-      this.#lost = false;
-      this.#attach();
-      this.#want.resize = true;
-      this.cameraMoved();
-    });
-    new ResizeObserver(() => this.#ask('resize')).observe(canvas);
-    onTheme(() => {
-      this.colours = null;
-      this.#ask('restart');
+    listenTo(this.canvas, {
+      lost: () => {
+        [this.#lost, this.#made] = [true, null];
+        this.#painter.forget();
+      },
+      restored: () => {
+        this.#lost = false;
+        this.#attach();
+        this.#want.resize = true;
+        this.cameraMoved();
+      },
+      resized: () => this.#ask('resize'),
+      themed: () => {
+        this.colours = null;
+        this.#ask('restart');
+      },
     });
   }
 
@@ -145,6 +144,21 @@ export class View extends EventTarget {
     this.#solids.setMesh(mesh);
     this.#fitUntouched();
     this.#ask('restart');
+  }
+
+  // Shows the points of another cloud from now on. The one before keeps its own.
+  useCloud(cloud) {
+    this.cloud.changed = null;
+    this.cloud = this.#points.cloud = this.#scale.cloud = cloud;
+    this.#scale.forget();
+    cloud.changed = () => this.#schedule();
+    this.#ask('restart');
+  }
+
+  // cells is as parseCells() in previews.js returns it, or null; seen is {counts, isTurned, showsUnseen}.
+  paint(cells, seen) {
+    if (cells || this.#solids.isPainted) this.#ask('restart');
+    this.#solids.paint(cells, seen);
   }
 
   // Each of {points, scene, mesh, stations} is true or false; scene also 'glass' or 'solid'. Members that are not
@@ -220,16 +234,7 @@ export class View extends EventTarget {
   }
 
   // Turns about the point at a place of the canvas from now on, and goes half the distance to it.
-  lookAt({x, y}) {
-    searchSlowly(this.cloud, this.camera, x, y, 12, (found) => {
-      if (!found) return;
-      const {camera} = this;
-      const p = camera.at(x, y, found.w);
-      const {w} = camera.project(p);
-      Object.assign(camera, {inside: false, target: p, distance: Math.max(0.05, 0.5 * w)});
-      this.cameraMoved();
-    });
-  }
+  lookAt(p) { lookAt(this, p); }
 
   // Resolves with a 2D canvas of the picture and what stands over it, once all present points are on the page.
   async picture() {

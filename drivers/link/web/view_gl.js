@@ -8,7 +8,7 @@ import {FAR_M, FLAT_REACH, NEAR_M, split, sub} from './view_camera.js';
 
 const OCTAVES = Math.log2(FAR_M / NEAR_M);
 
-const PLACE = `
+export const PLACE = `
 uniform vec3 u_eye_hi, u_eye_lo;
 uniform mat3 u_axes; // columns: right, up, forward
 uniform vec2 u_lens; // clip units per slope, or per metre in a flat view
@@ -23,7 +23,7 @@ vec4 placed(vec3 s) {
 `;
 
 // Depth at a distance along the line of sight, pushed away by a factor. The formulas are those of view_camera.js.
-const DEPTH = `
+export const DEPTH = `
 const float NEAR = ${NEAR_M};
 const vec4 OUT = vec4(0.0, 0.0, 2.0, 1.0);
 #ifdef FLAT
@@ -38,7 +38,7 @@ float depth_of(float w, float push) { return log2(max(w * push, NEAR) / NEAR) / 
 `;
 
 // A section (section.js) leaves out what is beyond it.
-const CUT = `
+export const CUT = `
 #ifdef CUT
 uniform vec3 u_cut_middle, u_cut_half;
 uniform vec2 u_cut_turn; // cos, sin of its heading
@@ -50,7 +50,7 @@ bool is_cut(vec3 p) {
 #endif
 `;
 
-const HEAD = `#version 300 es
+export const HEAD = `#version 300 es
 precision highp float;
 precision highp int;
 `;
@@ -186,7 +186,7 @@ function compile(gl, type, text) {
 }
 
 // Returns {program, <uniform's name>: location}.
-function link(gl, {vertex, fragment}) {
+export function link(gl, {vertex, fragment}) {
   const program = gl.createProgram();
   const shaders = [compile(gl, gl.VERTEX_SHADER, vertex), compile(gl, gl.FRAGMENT_SHADER, fragment)];
   for (const shader of shaders) gl.attachShader(program, shader);
@@ -208,6 +208,7 @@ function link(gl, {vertex, fragment}) {
 export class Programs {
   #gl;
   #made = new Map();
+  #sources = {points: POINTS, mesh: MESH};
 
   constructor(gl) {
     this.#gl = gl;
@@ -215,11 +216,14 @@ export class Programs {
     for (const kind of ['points', 'mesh']) this.#of(kind, []);
   }
 
+  // A kind that is made when it is used.
+  add(kind, source) { this.#sources[kind] = source; }
+
   #of(kind, defines) {
     const key = [kind, ...defines].join();
     if (!this.#made.has(key)) {
       const words = defines.map((name) => `#define ${name}\n`).join('');
-      const {vertex, fragment} = {points: POINTS, mesh: MESH}[kind];
+      const {vertex, fragment} = this.#sources[kind];
       this.#made.set(key, link(this.#gl, {vertex: vertex.replace('\n', `\n${words}`), fragment: fragment.replace('\n', `\n${words}`)}));
     }
     return this.#made.get(key);

@@ -33,8 +33,6 @@ export class Input {
     this.#view = view;
     const {canvas} = view;
     canvas.style.touchAction = 'none';
-    canvas.setAttribute('role', 'application'); // a screen reader leaves the keys to it
-    canvas.setAttribute('aria-roledescription', 'picture of points in space');
     if (canvas.tabIndex < 0) canvas.tabIndex = 0;
     const on = (type, f, options) => canvas.addEventListener(type, f, options);
     on('pointerdown', (e) => this.#press(e));

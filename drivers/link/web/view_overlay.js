@@ -22,6 +22,7 @@ function scaleBar(camera, most = 150) {
 }
 
 export class Overlay {
+  targets = []; // {at, name, isSeen: by two stations or more}
   constructor(canvas) {
     const parent = canvas.parentElement;
     if (getComputedStyle(parent).position === 'static') parent.style.position = 'relative';
@@ -57,6 +58,7 @@ export class Overlay {
     if (stations) this.#stations(camera, stations);
     this.pen.colours = colours;
     for (const layer of this.layers) layer(this.pen, camera);
+    for (const target of this.targets) this.#target(camera, target);
     if (marked) this.#mark(camera, marked);
     if (camera.inside) this.#looking(camera);
     else this.#scale(camera);
@@ -140,6 +142,7 @@ export class Overlay {
   #stations(camera, stations) {
     for (const station of stations.list) {
       if (station.served !== false) for (const field of stations.fields) this.#field(camera, stations, station, field);
+      if (station.hides_m > 0) this.#hidden(camera, stations.placeOf(station).at, station);
       const ring = stations.ring(camera, station);
       if (ring === null) continue;
       const head = camera.project(ring.at);
@@ -166,6 +169,26 @@ export class Overlay {
     const from = camera.project(ring.at), to = camera.project(ring.handle);
     this.#line([[from.x, from.y], [to.x, to.y]], 1.5, this.colours.accent);
     this.#dot(to.x, to.y, 7, this.colours.accent);
+  }
+
+  // Draws what the tripod hides on the ground around it.
+  #hidden(camera, at, {hides_m, above_m}) {
+    const points = Array.from({length: 49}, (_, k) => camera.project([at[0] + hides_m * Math.sin(k * Math.PI / 24),
+      at[1] + hides_m * Math.cos(k * Math.PI / 24), at[2] - above_m]));
+    if (points.every(({w}) => w > 0.01)) this.#line(points.map(({x, y}) => [x, y]), 1.25, this.colours.ink, [3, 5]);
+  }
+
+  // Draws a square mark on its corner, filled where two scans have it in common.
+  #target(camera, {at, name, isSeen}) {
+    const {x, y, w} = camera.project(at);
+    if (w <= 0.05) return;
+    const c = this.context, mark = [[x, y - 7], [x + 7, y], [x, y + 7], [x - 7, y]];
+    this.#line([...mark, mark[0]], 1.75, this.colours.accent);
+    if (isSeen) {
+      c.fillStyle = this.colours.accent;
+      c.fill();
+    }
+    this.#text(name, x + 12, y, {align: 'left', bold: true, colour: this.colours.accent});
   }
 
   #dot(x, y, r, colour) {

@@ -136,3 +136,14 @@ export function toSegment(x, y, a, b) {
   const t = Math.min(1, Math.max(0, ((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy || 1)));
   return Math.hypot(a.x + t * dx - x, a.y + t * dy - y);
 }
+
+// Makes a view turn about the point at a place of its canvas, and go half the distance to it.
+export function lookAt(view, {x, y}) {
+  const {cloud, camera} = view;
+  searchSlowly(cloud, camera, x, y, 12, (found) => {
+    if (!found) return;
+    const target = camera.at(x, y, found.w), {w} = camera.project(target);
+    Object.assign(camera, {inside: false, target, distance: Math.max(0.05, 0.5 * w)});
+    view.cameraMoved();
+  });
+}

@@ -5,6 +5,7 @@
 import {Mesh, useMesh} from './view_parts.js';
 import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
 import {radians} from './view_camera.js';
+import {CellsPart} from './view_paint.js';
 
 // Lines cost 1 us each where there is no GPU, as much as a point.
 const EDGES = 16_000, EDGES_MOVING = 3_000;
@@ -15,6 +16,7 @@ export class Solids {
   sceneMode = 'glass'; // it is 'off', 'glass' or 'solid'
   meshOn = true;
   stationsOn = true;
+  #painted = null; // it is {cells, seen} of the painted surface
   #shapes = new Map(); // it has the body, and legs by the tripod's measures
 
   attach(gl, programs) {
@@ -23,6 +25,22 @@ export class Solids {
     this.#shapes.clear();
     this.sceneMesh = this.scene && new Mesh(gl, this.programs, this.scene);
     this.meshPart = this.mesh && new Mesh(gl, this.programs, this.mesh);
+    this.cellsPart = null;
+    if (this.#painted) this.paint(this.#painted.cells, this.#painted.seen);
+  }
+
+  get isPainted() { return this.#painted !== null; }
+
+  // See View. The same cells again take no time.
+  paint(cells, seen) {
+    if (this.cellsPart && this.#painted?.cells !== cells) {
+      this.cellsPart.free();
+      this.cellsPart = null;
+    }
+    this.#painted = cells && {cells, seen};
+    if (!cells) return;
+    this.cellsPart ??= new CellsPart(this.gl, this.programs, cells);
+    this.cellsPart.show(seen);
   }
 
   // It takes the bytes of /scene; null: there is none.
@@ -66,6 +84,7 @@ export class Solids {
       parts.push(Object.assign(this.sceneMesh, {camera, look: {colour: [...colours.solid, 1], push: 1.0015}}));
     }
     if (this.meshPart && this.meshOn) parts.push(Object.assign(this.meshPart, {camera, look: {colour: [...colours.mesh, 1], push: 1.0005}}));
+    if (this.cellsPart) parts.push(Object.assign(this.cellsPart, {camera}));
     return parts;
   }
 
@@ -77,8 +96,9 @@ export class Solids {
     gl.depthFunc(gl.LEQUAL);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    if (this.sceneMesh && this.sceneMode === 'glass') this.#glass(camera, colours, behind, plain);
+    // The glass comes last, so that stations are seen through it: its nearest faces hide what is drawn later.
     if (this.stationsOn) for (const station of stations.list) this.#station(camera, colours, stations, station, behind);
+    if (this.sceneMesh && this.sceneMode === 'glass') this.#glass(camera, colours, behind, plain);
     gl.bindVertexArray(null);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, null);
@@ -116,7 +136,7 @@ export class Solids {
     const {at, heading_deg, ghost} = stations.placeOf(station);
     const eye = camera.eye;
     if (Math.hypot(...at.map((c, a) => c - eye[a])) < 0.4) return; // the eye is in this station
-    const colour = station.number === stations.selected || ghost ? colours.accent : colours.ink;
+    const colour = station.number === stations.selected || ghost || station.suggested ? colours.accent : station.colour ?? colours.ink;
     const drawOne = (shape, place, heading, alpha) => {
       useMesh(gl, this.programs, camera, place, {colour: [...colour, alpha], faint: 0.22, behind, heading: radians(heading), section: null});
       shape.triangles();
@@ -125,7 +145,7 @@ export class Solids {
       drawOne(this.#shape(null), place, heading, alpha);
       if (tripod) drawOne(this.#shape(tripod), place, tripod.legs_heading_deg, alpha);
     };
-    draw(at, heading_deg, station.served === false ? 0.65 : 1);
+    draw(at, heading_deg, station.suggested ? 0.45 : station.served === false ? 0.65 : 1);
     if (ghost) draw([station.x_m, station.y_m, station.z_m], station.heading_deg, 0.3);
   }
 }

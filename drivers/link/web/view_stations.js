@@ -33,6 +33,7 @@ export class Stations {
   fields = []; // the head's monitored fields are {number, name, outline_m}
   selected = null; // number
   moved = null; // {number, x, y, z, heading_deg, what} is the place to which it is being moved
+  dragged = null; // it is called with the place of a station while this is dragged
   pending = false; // it was let go, but setStations() has not confirmed it yet
   #changed;
   #tell;
@@ -132,7 +133,7 @@ export class Stations {
 
   drag(camera, x, y) {
     const hold = this.#hold;
-    if (hold === null || !this.get(hold.number)) return;
+    if (hold === null || !this.get(hold.number) || this.get(hold.number).suggested) return;
     if (!hold.began) {
       if (Math.hypot(x - hold.x, y - hold.y) < 4) return; // it was a click
       this.#begin(hold.number);
@@ -158,12 +159,15 @@ export class Stations {
       m.y += side * camera.right[1];
       hold.x = x;
     }
+    this.dragged?.(m);
     this.#changed();
   }
 
   drop(cancelled = false) {
-    const began = this.#hold?.began;
+    const {began, number} = this.#hold ?? {};
+    const suggested = this.get(number)?.suggested;
     this.#hold = null;
+    if (suggested && !cancelled) this.#tell({station: number, taken: true}); // a click takes it
     if (!began) return;
     if (cancelled) this.cancel();
     else this.letGo();
@@ -183,7 +187,7 @@ export class Stations {
       else this.select(null);
       return true;
     }
-    if (!arrow && !(key in moves) && !(key in turns)) return false;
+    if (this.get(this.selected).suggested || (!arrow && !(key in moves) && !(key in turns))) return false;
     this.#begin(this.selected);
     const m = this.moved;
     if (arrow) {

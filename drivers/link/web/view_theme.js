@@ -26,9 +26,3 @@ export function readTheme(element) {
     scene: dark ? [0.62, 0.72, 0.82] : [0.25, 0.33, 0.42], solid: dark ? [0.36, 0.4, 0.44] : [0.74, 0.77, 0.8],
     mesh: dark ? [0.62, 0.65, 0.68] : [0.8, 0.81, 0.82]};
 }
-
-// Calls then() when the page's colours have changed.
-export function onTheme(then) {
-  new MutationObserver(then).observe(document.documentElement, {attributeFilter: ['data-theme', 'class', 'style']});
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', then);
-}

@@ -44,7 +44,7 @@ static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], 
         next_turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
     const struct coverage_directions directions = {c->f->n_dir, (const double(*)[3])turned, c->f->each_sr,
                                                    profile->range_min_m, profile->range_max_m};
-    const struct coverage_places places = {c->n_open, (const double(*)[3])c->open_m};
+    const struct coverage_places places = {c->n_open, (const double(*)[3])c->open_m, NULL};
     return coverage_gains(c->coverage, &directions, &places, c->f->report, c->gain, err);
 }
 

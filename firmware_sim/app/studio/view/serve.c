@@ -5,80 +5,30 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/view/encode.h"
 #include "firmware_sim/app/studio/view/spread.h"
 
-/* A value that a query may have, NAME=NUMBER. */
-struct word {
-    const char *name;
-    double min, max;
-    int whole;
-    double value; /* at first the default; NaN: it is needed */
-};
-
 enum { MAX_WORDS = 6 };
 static const double RECORD_LONG_EDGE = 10; /* the default of scanhead record */
-
-static int fail_word(const struct word *w, const char *text, int len, struct sh_err *err)
-{
-    return sh_fail(err, SH_EINPUT, "%s=%.*s: allowed %s from %.10g to %.10g", w->name, len, text,
-                   w->whole ? "whole numbers" : "numbers", w->min, w->max);
-}
-
-static int read_word(struct word *words, const char *text, size_t len, struct sh_err *err)
-{
-    char known[128] = "", *end;
-    const char *equals = memchr(text, '=', len);
-    const size_t name_len = equals != NULL ? (size_t)(equals - text) : len;
-    for (struct word *w = words; w->name != NULL; w++) {
-        strncat(known, " ", sizeof known - strlen(known) - 1);
-        strncat(known, w->name, sizeof known - strlen(known) - 1);
-        if (strlen(w->name) != name_len || memcmp(w->name, text, name_len) != 0) continue;
-        const int value_len = equals != NULL ? (int)(len - name_len - 1) : 0;
-        if (value_len == 0) return fail_word(w, "", 0, err);
-        w->value = strtod(equals + 1, &end);
-        if (end != text + len || !(w->value >= w->min && w->value <= w->max) ||
-            (w->whole && w->value != floor(w->value)))
-            return fail_word(w, equals + 1, value_len < 64 ? value_len : 64, err);
-        return SH_OK;
-    }
-    return sh_fail(err, SH_EINPUT, "%.*s: unknown; allowed%s%s", (int)(name_len < 64 ? name_len : 64), text, known,
-                   words->name == NULL ? " nothing after ?" : "");
-}
-
-/* A query of NAME=NUMBER with & between them; words end with one without a name. */
-static int read_query(struct word *words, const char *query, struct sh_err *err)
-{
-    int rc = SH_OK;
-    while (*query != '\0' && rc == SH_OK) {
-        const size_t len = strcspn(query, "&");
-        if (len > 0) rc = read_word(words, query, len, err);
-        query += len + (query[len] == '&');
-    }
-    for (; words->name != NULL && rc == SH_OK; words++)
-        if (isnan(words->value))
-            rc = sh_fail(err, SH_EINPUT, "%s is needed: %s from %.10g to %.10g", words->name,
-                         words->whole ? "whole numbers" : "numbers", words->min, words->max);
-    return rc;
-}
 
 /* ---- resources */
 
 static int get_head(struct view_serve *s, const char *query, struct web_body *out, struct sh_err *err)
 {
-    struct word words[] = {{.name = NULL}};
-    int rc = read_query(words, query, err);
+    struct page_word words[] = {{.name = NULL}};
+    int rc = page_read_query(words, query, err);
     return rc == SH_OK ? view_encode_head(s->viewed, out, err) : rc;
 }
 
 static int get_cloud(struct view_serve *s, const char *query, struct web_body *out, struct sh_err *err)
 {
     const struct viewed *v = s->viewed;
-    struct word words[] = {{"first", 0, UINT32_MAX, 1, 0},
-                           {"count", 1, UINT32_MAX, 1, VIEW_MAX_POINTS},
-                           {"every", 1, UINT32_MAX, 1, 1},
-                           {.name = NULL}};
-    const int rc = read_query(words, query, err);
+    struct page_word words[] = {{"first", 0, UINT32_MAX, 1, 0},
+                                {"count", 1, UINT32_MAX, 1, VIEW_MAX_POINTS},
+                                {"every", 1, UINT32_MAX, 1, 1},
+                                {.name = NULL}};
+    const int rc = page_read_query(words, query, err);
     if (rc != SH_OK) return rc;
     const struct view_part part = {(uint32_t)words[0].value, (uint32_t)words[2].value, (uint32_t)words[1].value};
     return view_encode_points(&v->points, v->origin_m, v->t0_s, &part, out, err);
@@ -92,12 +42,12 @@ static int need_mesh(const struct viewed *v, struct sh_err *err)
 static int get_mesh(struct view_serve *s, const char *query, struct web_body *out, struct sh_err *err)
 {
     const struct viewed *v = s->viewed;
-    struct word words[] = {{"scan", 1, (double)v->n_meshes, 1, (double)NAN},
-                           {"first", 0, UINT32_MAX, 1, 0},
-                           {"count", 1, UINT32_MAX, 1, VIEW_MAX_TRIANGLES},
-                           {.name = NULL}};
+    struct page_word words[] = {{"scan", 1, (double)v->n_meshes, 1, (double)NAN},
+                                {"first", 0, UINT32_MAX, 1, 0},
+                                {"count", 1, UINT32_MAX, 1, VIEW_MAX_TRIANGLES},
+                                {.name = NULL}};
     int rc = need_mesh(v, err);
-    if (rc == SH_OK) rc = read_query(words, query, err);
+    if (rc == SH_OK) rc = page_read_query(words, query, err);
     return rc == SH_OK ? view_encode_mesh(&v->mesh[(size_t)words[0].value - 1], (uint32_t)words[1].value,
                                           (uint32_t)words[2].value, out, err)
                        : rc;
@@ -124,12 +74,12 @@ static int make_sparse(struct view_serve *s, const struct view_spread *wish, str
 static int get_sparse(struct view_serve *s, const char *query, struct web_body *out, struct sh_err *err)
 {
     const struct viewed *v = s->viewed;
-    struct word words[MAX_WORDS + 1] = {
+    struct page_word words[MAX_WORDS + 1] = {
         {"per_m2", 1e-6, 1e9, 0, (double)NAN},  {"long_edge", 0, 1e9, 0, RECORD_LONG_EDGE},
         {"scan", 0, (double)v->n_meshes, 1, 0}, {"seed", 0, 1e9, 1, 1},
         {"first", 0, UINT32_MAX, 1, 0},         {"count", 1, UINT32_MAX, 1, VIEW_MAX_POINTS}};
     int rc = need_mesh(v, err);
-    if (rc == SH_OK) rc = read_query(words, query, err);
+    if (rc == SH_OK) rc = page_read_query(words, query, err);
     if (rc != SH_OK) return rc;
     const struct view_spread wish = {words[0].value, words[1].value, (uint64_t)words[3].value,
                                      (uint64_t)words[2].value};

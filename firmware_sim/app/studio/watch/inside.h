@@ -17,6 +17,7 @@
 #include "core/studio/deviation.h"
 #include "core/studio/figures.h"
 #include "drivers/host/scanhead.h"
+#include "firmware_sim/app/studio/preview/preview.h"
 #include "firmware_sim/app/studio/report/verdict.h"
 #include "firmware_sim/app/studio/watch/past.h"
 #include "firmware_sim/app/studio/watch/save.h"
@@ -98,8 +99,9 @@ struct watch {
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;
     uint64_t lost_frames;
 
-    struct past *past; /* the observer fills it */
+    struct past *past;       /* the observer fills it */
     struct save *save;
+    struct preview *preview; /* has a thread of its own; NULL: there are none */
 
     /* made once */
     char *scene_bytes;

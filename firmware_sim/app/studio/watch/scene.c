@@ -186,6 +186,7 @@ static void put_head(struct json *json, const void *ctx)
     json_string(json, "serial", cfg->head.serial);
     json_string(json, "config", basename(cfg->file));
     json_string(json, "pace", paces[cfg->loop.pace]);
+    json_bool(json, "previews", w->preview != NULL);
     json_open_array(json, "stations");
     for (uint32_t i = 0; i < w->site->n_stations; i++)
         put_station(json, w, i);

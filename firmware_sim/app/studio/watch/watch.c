@@ -20,7 +20,7 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
     if (strcmp(path, "/scene") == 0) return watch_get_scene(w, out, err);
     if (strcmp(path, "/head") == 0) return watch_get_head(w, out, err);
     if (strcmp(path, "/plan") == 0) return watch_get_plan(w, out, err);
-    return SH_EINPUT;
+    return w->preview != NULL ? preview_get(w->preview, path, query, out, err) : SH_EINPUT;
 }
 
 static int watch_make_room(struct watch *w, struct sh_err *err)
@@ -49,6 +49,7 @@ static void close_watch(struct watch *w)
     atomic_store(&w->ending, 1);
     if (w->fd >= 0) shutdown(w->fd, SHUT_RDWR);
     join(w);
+    preview_free(w->preview);
     scanhead_close(w->sh);
     if (w->link.fd >= 0 && !w->link_given) close(w->link.fd);
     watch_sample_close(w);
@@ -60,6 +61,18 @@ static void close_watch(struct watch *w)
     free(w->scene_bytes);
     pthread_mutex_destroy(&w->lock);
     free(w);
+}
+
+/* Stations that can be moved can be tried at other places, where there are cells to count. */
+static int open_preview(struct watch *w, struct sh_err *err)
+{
+    const struct preview_options options = {.cfg = w->cfg,
+                                            .site = w->site,
+                                            .coverage = w->seen.coverage,
+                                            .cell_m = w->seen.cell_m,
+                                            .report = w->options.report};
+    if (options.coverage == NULL || site_why_fixed(w->site) != NULL) return SH_OK;
+    return preview_create(&options, &w->preview, err);
 }
 
 static int open_watch(const struct config *cfg, const struct site *site, const struct watch_options *options,
@@ -78,6 +91,7 @@ static int open_watch(const struct config *cfg, const struct site *site, const s
     if (rc == SH_OK) rc = watch_make_scene(w, err);
     if (rc == SH_OK) rc = watch_sample_open(w, err);
     if (rc == SH_OK) rc = watch_seen_open(w, err);
+    if (rc == SH_OK) rc = open_preview(w, err);
     w->link.waits = options->waits ? LINK_WAITS_YES : LINK_WAITS_NO;
     if (rc == SH_OK) w->fd = offline_connect("the observer", &w->link, &w->sh, err);
     if (rc == SH_OK && w->fd < 0) rc = w->fd;

@@ -1,0 +1,312 @@
+/* SPDX-License-Identifier: MIT */
+// This part of the stations' panel is for trying places: stations that are moved, added and set in this page alone, what
+// they see together, and the best next place. It takes the place of the list of stations while it is open.
+
+import {bodyOf, grouped, kept, make, percent, say} from './page.js';
+import {why} from './session.js';
+import {Cloud} from './cloud.js';
+import {SETTINGS, Trial} from './trial.js';
+import {hasBit} from './previews.js';
+import {TargetList} from './trial_targets.js';
+import {SEEN_COLOURS} from './view_paint.js';
+import {tableOf} from './view_colours.js';
+
+const STEPS = [4, 2, 1, 0.5];
+const PAINTS = [['seen', 'What is seen'], ['all', 'Also what is left to see'], ['off', 'Nothing']];
+const SEEN = ['Seen by no station', 'By one', 'By several'];
+const PLACE = [['x_m', 'East x, m'], ['y_m', 'North y, m'], ['z_m', 'Height z, m'], ['heading_deg', 'Heading, °'],
+  ['pitch_deg', 'Pitch, °'], ['roll_deg', 'Roll, °']];
+const NAMES = {step_deg: 'Step, °', far_m: 'Farthest, m', line0_deg: 'Line from, °', line1_deg: 'Line to, °',
+  pan0_deg: 'Pan from, °', pan1_deg: 'Pan to, °'};
+const GHOST = 'next'; // the number of the suggested station in the picture
+const SUGGEST_MS = 250; // a suggestion waits so long for another change
+
+const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
+const shown = (value) => (value === null ? '' : String(Math.round(value * 1e4) / 1e4));
+const patch = (colour) => {
+  const i = make('i', {class: 'patch'});
+  i.style.background = css(colour);
+  return i;
+};
+
+export class TrialPanel {
+  #session;
+  #stations;
+  #view;
+  #trial = null;
+  #cloud = null;
+  #body = bodyOf('stations');
+  #box = make('div', {id: 'trial', class: 'trial'});
+  #open = make('button', {type: 'button', id: 'try', hidden: true, click: () => this.begin(),
+    title: 'Moves stations in this page alone, and shows at once what they see'}, 'Try places');
+  #items = new Map(); // it maps a number to {item, fields, place, says, head}
+  #timer = 0;
+  #targets;
+  #colours = tableOf('station');
+
+  constructor(session, stations, view) {
+    this.#session = session;
+    this.#stations = stations;
+    this.#view = view;
+    this.#targets = new TargetList(view);
+    this.#box.hidden = true;
+    this.#body.prepend(make('div', {class: 'actions'}, this.#open), this.#box);
+    this.#make();
+    session.addEventListener('change', () => this.#trial && this.#allow());
+  }
+
+  // A head that has no previews offers no trial.
+  offer(hasPreviews) {
+    this.#open.hidden = !hasPreviews || this.#view === null || this.#trial !== null;
+  }
+
+  // ---- what there is, made once
+
+  #make() {
+    const button = (id, name, click, more = {}) => make('button', {type: 'button', id, click, ...more}, name);
+    const option = (value, name) => make('option', {value}, name);
+    this.note = make('p', {class: 'note'}, 'Stations move in this page alone; the head stays as it is. Drag them in the picture, or edit their numbers.');
+    this.covered = make('div');
+    this.coverage = make('p', {class: 'figure-line', id: 'trial-coverage', role: 'status'});
+    this.shares = SEEN.map((_, i) => make('dd', {id: `trial-seen-${i}`}, '–'));
+    this.step = make('select', {id: 'trial-step', change: () => this.#trial.setStep(Number(this.step.value))},
+      ...STEPS.map((deg) => option(deg, `${deg}°`)));
+    this.paint = make('select', {id: 'trial-paint', change: () => {
+      kept.set('trial-paint', this.paint.value);
+      this.#painted();
+    }}, ...PAINTS.map(([value, name]) => option(value, name)));
+    this.suggests = make('input', {type: 'checkbox', id: 'trial-suggest', change: () => this.#suggestSoon()});
+    this.list = make('ol', {class: 'stations'});
+    this.says = make('p', {class: 'note', role: 'status', id: 'trial-says'});
+    this.take = button('trial-take', 'Add it', () => this.#takeNext());
+    this.apply = button('trial-apply', 'Move the head’s stations', () => this.#apply());
+    this.text = make('textarea', {id: 'trial-text', readonly: true, rows: 6, 'aria-label': 'Stations for a configuration', spellcheck: 'false'});
+    this.#box.append(this.note,
+      make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.covered), this.coverage),
+      make('dl', {class: 'figures'}, ...SEEN.map((name, i) => make('div', {}, make('dt', {}, patch(SEEN_COLOURS[i]), name), this.shares[i]))),
+      make('div', {class: 'row'}, make('label', {for: 'trial-paint'}, 'Painted'), this.paint),
+      make('div', {class: 'row'}, make('label', {for: 'trial-step'}, 'Points every'), this.step),
+      this.list,
+      make('div', {class: 'actions'}, button('trial-add', 'Add a station', () => this.#add())),
+      make('label', {class: 'tick'}, this.suggests, 'Show the best next place'), this.says,
+      make('div', {class: 'actions'}, this.take), this.#targets.element,
+      make('details', {class: 'as-text', toggle: (e) => e.target.open && this.#write()}, make('summary', {}, 'As a configuration'), this.text),
+      make('div', {class: 'actions'}, this.apply, button('trial-end', 'End', () => this.end(), {class: 'main'})));
+    this.step.value = '2';
+    this.paint.value = PAINTS.some(([value]) => value === kept.get('trial-paint')) ? kept.get('trial-paint') : 'seen';
+  }
+
+  // ---- begin and end
+
+  begin() {
+    const view = this.#view;
+    const list = this.#stations.list.filter((s) => s.x_m !== null);
+    this.#cloud = new Cloud({capacity: 4e6});
+    this.before = view.cloud;
+    view.useCloud(this.#cloud);
+    this.#trial = new Trial(this.#cloud, list, Number(this.step.value));
+    this.#stations.setTrial(this);
+    this.#targets.begin(this.#trial);
+    window.scanhead.trial = this.#trial;
+    this.#items.clear();
+    view.stations.dragged = ({number, x, y, z, heading_deg}) => this.#trial.change(number, {x_m: x, y_m: y, z_m: z, heading_deg});
+    this.#trial.addEventListener('change', () => this.#show());
+    this.#trial.addEventListener('seen', () => {
+      this.#painted();
+      this.#targets.show();
+      this.#suggestSoon();
+    });
+    this.#body.classList.add('trying');
+    this.#box.hidden = false;
+    this.#open.hidden = true;
+    this.#show();
+    this.#box.querySelector('#trial-add').focus();
+  }
+
+  end() {
+    const view = this.#view;
+    clearTimeout(this.#timer);
+    this.#trial.end();
+    this.#targets.begin(null);
+    this.#trial = this.#cloud = window.scanhead.trial = null;
+    view.stations.dragged = null;
+    view.paint(null);
+    view.useCloud(this.before);
+    this.#stations.setTrial(null);
+    this.#body.classList.remove('trying');
+    this.list.replaceChildren();
+    this.#box.hidden = true;
+    this.#open.hidden = false;
+    this.#open.focus();
+  }
+
+  // ---- for the stations' panel
+
+  name(number) {
+    const station = this.#trial.get(number);
+    return station?.name ? `${number} ${station.name}` : String(number);
+  }
+
+  // A station was dragged, turned or moved by keys, or the suggestion was clicked.
+  moved({station, taken, x, y, z, heading_deg}) {
+    if (taken) return this.#takeNext();
+    return this.#trial.change(station, {x_m: x, y_m: y, z_m: z, heading_deg});
+  }
+
+  // ---- what is shown
+
+  #show() {
+    const trial = this.#trial;
+    if (!trial) return;
+    const colour = (number) => [...this.#colours.subarray(4 * (number & 255), 4 * (number & 255) + 3)];
+    if (trial.stations.map((s) => s.number).join() !== [...this.#items.keys()].join()) this.#relist(colour);
+    for (const station of trial.stations) this.#fill(station);
+    const ghost = trial.next ? [{...trial.next, number: GHOST, name: 'Best next place', suggested: true}] : [];
+    // While one is moved, the picture keeps its list, and has the newest place itself.
+    const {dragging, moved, pending} = this.#view.stations;
+    if (!dragging && (!moved || pending)) {
+      this.#view.setStations([...trial.stations.map((s) => ({...s, colour: colour(s.number).map((c) => c / 255)})), ...ghost]);
+    }
+    this.#sums();
+    this.#allow();
+  }
+
+  #relist(colour) {
+    for (const number of [...this.#items.keys()]) if (!this.#trial.get(number)) this.#items.delete(number);
+    for (const station of this.#trial.stations) {
+      if (!this.#items.has(station.number)) this.#items.set(station.number, this.#item(station, colour(station.number)));
+    }
+    this.list.replaceChildren(...[...this.#items.values()].map(({item}) => item));
+  }
+
+  #item({number, name, isAdded}, colour) {
+    const field = (key, label) => {
+      const id = `trial-${number}-${key}`;
+      const input = make('input', {id, type: 'text', inputmode: 'decimal', autocomplete: 'off', spellcheck: 'false',
+        change: () => this.#edit(number, key, input), placeholder: key in NAMES ? 'as set' : ''});
+      return {key, input, box: make('div', {}, make('label', {for: id}, label), input)};
+    };
+    const fields = [...PLACE, ...SETTINGS.map((key) => [key, NAMES[key]])].map(([key, label]) => field(key, label));
+    const place = make('span', {class: 'place'}), says = make('p', {class: 'refusal', role: 'status'});
+    const actions = make('div', {class: 'actions'},
+      make('button', {type: 'button', click: () => this.#view.lookFrom(number)}, 'Look from here'),
+      make('button', {type: 'button', click: () => this.#back(number)}, isAdded ? 'Remove' : 'As it was'));
+    const form = make('form', {submit: (e) => e.preventDefault()}, make('div', {class: 'place-fields'}, ...fields.map(({box}) => box)), says, actions);
+    const badge = make('span', {class: 'number'}, String(number));
+    badge.style.boxShadow = `inset 0 -0.25rem ${css(colour)}`;
+    const item = make('li', {}, make('details', {name: 'trial-station'},
+      make('summary', {}, badge, make('span', {class: 'name'}, isAdded ? 'added' : name ?? ''), place), form));
+    return {item, fields, place, says};
+  }
+
+  #fill(station) {
+    const {fields, place, says} = this.#items.get(station.number);
+    say(place, [station.x_m, station.y_m, station.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−'));
+    for (const {key, input} of fields) {
+      if (document.activeElement !== input) input.value = shown(station[key]);
+    }
+    says.hidden = station.error === '';
+    say(says, station.error);
+  }
+
+  #edit(number, key, input) {
+    const text = input.value.trim().replace('−', '-');
+    const value = text === '' && SETTINGS.includes(key) ? null : Number(text);
+    const isNumber = value === null || (text !== '' && Number.isFinite(value));
+    input.toggleAttribute('aria-invalid', !isNumber);
+    if (isNumber) this.#trial.change(number, {[key]: value});
+  }
+
+  #back(number) {
+    const {isAdded, was} = this.#trial.get(number);
+    if (isAdded) this.#trial.remove(number);
+    else this.#trial.change(number, {...was, ...Object.fromEntries(SETTINGS.map((key) => [key, null]))});
+  }
+
+  #sums() {
+    const {sum, cells, stations, reach} = this.#trial;
+    const parts = this.#shares(), of = `${stations.length} ${stations.length === 1 ? 'station' : 'stations'}`;
+    this.shares.forEach((dd, i) => say(dd, percent(parts[i])));
+    this.covered.style.width = sum ? `${(100 * (1 - parts[0])).toFixed(2)}%` : '0';
+    say(this.coverage, sum ? `${of}: ${percent(1 - parts[0])} of ${grouped(this.#all())}\u00a0m²${reach ? ' that can be seen' : ''}`
+      : this.#trial.error || (cells ? '' : 'The surface is being cut into cells.'));
+    this.coverage.title = reach ? `Seen from anywhere that a tripod can stand, or by a station; ${grouped(sum.hidden_m2)} m² more can't be seen`
+      : 'All surfaces, also those within walls';
+  }
+
+  // The area that can be seen, or all of it as long as that is not known.
+  #all() {
+    const {sum} = this.#trial;
+    return sum ? sum.none_m2 + sum.one_m2 + sum.several_m2 - sum.hidden_m2 : 0;
+  }
+
+  #shares() {
+    const {sum} = this.#trial;
+    return sum ? [sum.none_m2 - sum.hidden_m2, sum.one_m2, sum.several_m2].map((m2) => m2 / this.#all()) : [];
+  }
+
+  #painted() {
+    const trial = this.#trial;
+    if (!trial?.cells) return;
+    const paints = this.paint.value;
+    if (paints === 'off' || !trial.sum) this.#view.paint(null);
+    else {
+      const showsUnseen = paints === 'all' && ((cell) => trial.reach === null || hasBit(trial.reach, cell));
+      this.#view.paint(trial.cells, {counts: trial.sum.counts, isTurned: trial.seesBacks, showsUnseen});
+    }
+  }
+
+  #allow() {
+    const {next, stations, error, sum} = this.#trial;
+    const moved = stations.filter((s) => !s.isAdded && PLACE.some(([key]) => Math.abs(s[key] - s.was[key]) > 1e-9));
+    const not = this.#session.whyNot('idle');
+    this.apply.disabled = not !== '' || moved.length === 0;
+    this.apply.title = not || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
+    this.take.disabled = !next;
+    say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
+      : this.suggests.checked ? error || 'Looking for it.' : 'It can be clicked in the picture.');
+  }
+
+  // ---- what is done
+
+  #suggestSoon() {
+    clearTimeout(this.#timer);
+    if (!this.suggests.checked) {
+      this.#trial.next = null;
+      return this.#show();
+    }
+    this.#allow();
+    this.#timer = setTimeout(() => this.#trial?.suggest(), SUGGEST_MS);
+  }
+
+  #takeNext() {
+    const {next} = this.#trial;
+    if (next) this.#trial.add(next);
+  }
+
+  #add() {
+    const last = this.#trial.stations.at(-1);
+    const number = this.#trial.add(this.#trial.next ?? {x_m: last.x_m + 1}, last);
+    this.#view.select(number);
+  }
+
+  #write() {
+    this.text.value = this.#trial.text;
+    this.text.select();
+  }
+
+  // Sends the head what was tried. Its stations then stand there for everybody.
+  async #apply() {
+    for (const s of this.#trial.stations.filter((s) => !s.isAdded)) {
+      const place = PLACE.map(([key]) => Math.round(s[key] * 1e4) / 1e4);
+      if (PLACE.every(([key]) => Math.abs(s[key] - s.was[key]) <= 1e-9)) continue;
+      try {
+        await this.#session.command(`SITE:POSE ${[s.of, ...place].join(', ')}`, {timeout_s: 120});
+        s.was = Object.fromEntries(PLACE.map(([key]) => [key, s[key]]));
+      } catch (error) {
+        s.error = `Refused: ${why(error)}`;
+      }
+    }
+    if (this.#trial) this.#show();
+  }
+}

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: MIT */
+// These are targets of a trial: places on surfaces, such as a mark on a wall, by which scans are put together later. A
+// target is seen by a station that sees its cell of the surface. Two scans need three targets that both see.
+
+import {make, say} from './page.js';
+import {hasBit} from './previews.js';
+import {searchSlowly} from './view_pick.js';
+
+const NEEDED = 3;
+const TAP_PX = 6;
+
+// Returns the cell that a place lies on, by the nearest piece; one in another plane counts as farther away. null: none
+// is near.
+export function cellAt(cells, [x, y, z]) {
+  const {corners, origin, cell, pieces, cell_m} = cells;
+  const p = [x - origin[0], y - origin[1], z - origin[2]];
+  let best = null, least = 2.5 * cell_m;
+  for (let i = 0; i < pieces; i++) {
+    const at = 12 * i, d = [0, 0, 0];
+    for (let a = 0; a < 3; a++) d[a] = p[a] - 0.25 * (corners[at + a] + corners[at + 3 + a] + corners[at + 6 + a] + corners[at + 9 + a]);
+    const far = Math.hypot(...d);
+    if (far >= least) continue;
+    const [u, v] = [0, 1].map((k) => [0, 1, 2].map((a) => corners[at + 3 * (k + 1) + a] - corners[at + a]));
+    const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    const off = Math.abs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / (Math.hypot(...n) || 1);
+    if (far + 10 * off >= least) continue;
+    least = far + 10 * off;
+    best = cell[i];
+  }
+  return best;
+}
+
+// Returns the numbers of the stations that see a cell.
+export const seenBy = (stations, cell) => stations.filter((s) => s.seen && hasBit(s.seen, cell)).map((s) => s.number);
+
+// Returns [a, b, n] for each pair of stations, which see n targets both. sights has the stations that see each target.
+export function pairsOf(stations, sights) {
+  return stations.flatMap((a, i) => stations.slice(i + 1).map((b) =>
+    [a.number, b.number, sights.filter((s) => s.includes(a.number) && s.includes(b.number)).length]));
+}
+
+export class TargetList {
+  element = make('div', {class: 'targets'});
+  #view;
+  #trial = null;
+  #targets = []; // {number, at, cell}
+  #list = make('ul');
+  #says = make('p', {class: 'note', role: 'status', id: 'trial-targets'});
+  #put = make('button', {type: 'button', id: 'trial-target', 'aria-pressed': 'false', click: () => this.#arm(!this.#armed),
+    title: 'Then click a point of the picture, or press Enter in it for the point in its middle'}, 'Put a target');
+  #armed = false;
+
+  constructor(view) {
+    this.#view = view;
+    this.element.append(make('div', {class: 'actions'}, this.#put), this.#list, this.#says);
+    let from = [0, 0];
+    view?.canvas.addEventListener('pointerdown', ({offsetX, offsetY}) => {
+      from = [offsetX, offsetY];
+    });
+    view?.canvas.addEventListener('click', ({offsetX, offsetY}) => {
+      if (this.#armed && Math.hypot(offsetX - from[0], offsetY - from[1]) < TAP_PX) this.#at(offsetX, offsetY); // else it was a drag
+    });
+    view?.canvas.addEventListener('keydown', (e) => {
+      if (!this.#armed || (e.key !== 'Enter' && e.key !== 'Escape')) return;
+      e.stopImmediatePropagation();
+      if (e.key === 'Enter') this.#at(view.camera.width / 2, view.camera.height / 2);
+      else this.#arm(false);
+    }, {capture: true});
+  }
+
+  // trial: that of the targets from now on; null: there is none any more.
+  begin(trial) {
+    this.#trial = trial;
+    this.#targets = [];
+    this.#arm(false);
+    this.#list.replaceChildren();
+    if (trial) this.show();
+    else this.#view.overlay.targets = [];
+  }
+
+  #arm(on) {
+    this.#armed = on;
+    this.#put.setAttribute('aria-pressed', String(on));
+    if (this.#trial) this.show();
+  }
+
+  #at(x, y) {
+    const {cloud, camera} = this.#view, trial = this.#trial;
+    searchSlowly(cloud, camera, x, y, 16, (found) => {
+      if (trial !== this.#trial || !trial?.cells) return;
+      const at = found && camera.at(x, y, found.w), cell = at && cellAt(trial.cells, at);
+      this.#arm(false);
+      if (cell === null) return say(this.#says, 'There is no point of a surface.');
+      this.#targets.push({number: 1 + (this.#targets.at(-1)?.number ?? 0), at, cell});
+      this.#relist();
+    });
+  }
+
+  #relist() {
+    this.#list.replaceChildren(...this.#targets.map((target) => {
+      target.says = make('span');
+      return make('li', {}, target.says, make('button', {type: 'button', class: 'quiet', 'aria-label': `Remove target ${target.number}`,
+        click: () => {
+          this.#targets = this.#targets.filter((other) => other !== target);
+          this.#relist();
+          this.#put.focus();
+        }}, 'Remove'));
+    }));
+    this.show();
+  }
+
+  // Shows which stations see them now.
+  show() {
+    const {stations} = this.#trial;
+    const sights = this.#targets.map(({cell}) => seenBy(stations, cell));
+    this.#targets.forEach(({number, says}, i) => say(says, `T${number}: ${sights[i].length > 0 ? `seen by ${sights[i].join(', ')}` : 'seen by none'}`));
+    this.#view.overlay.targets = this.#targets.map(({number, at}, i) => ({at, name: `T${number}`, isSeen: sights[i].length > 1}));
+    this.#view.select(this.#view.stations.selected); // the marks are drawn again
+    const pairs = pairsOf(stations, sights), enough = pairs.filter(([, , n]) => n >= NEEDED).map(([a, b]) => `${a} and ${b}`);
+    say(this.#says, this.#armed ? 'Click a point of the picture; Esc leaves it.'
+      : this.#targets.length === 0 ? `Two scans are put together by ${NEEDED} targets that both see.`
+        : enough.length > 0 ? `Enough for ${enough.join('; ')}.` : `No two stations see ${NEEDED} of them both.`);
+  }
+}

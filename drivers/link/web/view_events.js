@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+// This module tells the view what happens to its canvas: a lost context, another size, another theme.
+
+// on: {lost(), restored(), resized(), themed()}
+export function listenTo(canvas, on) {
+  canvas.addEventListener('webglcontextlost', (e) => {
+    e.preventDefault();
+    on.lost();
+  });
+  canvas.addEventListener('webglcontextrestored', () => on.restored());
+  new ResizeObserver(() => on.resized()).observe(canvas);
+  new MutationObserver(() => on.themed()).observe(document.documentElement, {attributeFilter: ['data-theme', 'class', 'style']});
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => on.themed());
+  canvas.setAttribute('role', 'application');
+  canvas.setAttribute('aria-roledescription', 'picture of points in space');
+  if (!canvas.hasAttribute('aria-label')) canvas.setAttribute('aria-label', 'The points in space. Arrow keys turn, plus and minus zoom, Home shows all.');
+}

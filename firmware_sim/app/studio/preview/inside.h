@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to this folder: requests, and the work that answers them.
+ *
+ *   preview.c  requests that wait, answers that are kept, the thread
+ *   request.c  path and query to a request
+ *   place.c    /preview: the scan from a place
+ *   next.c     /next: the place that adds most; /reach: what can be seen from any place
+ *   cells.c    /cells: the surface as cells, to be painted */
+#ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_INSIDE_H
+#define FIRMWARE_SIM_APP_STUDIO_PREVIEW_INSIDE_H
+
+#include "firmware_sim/app/sites.h"
+#include "firmware_sim/app/studio/preview/preview.h"
+#include "firmware_sim/config/config.h"
+
+enum { PREVIEW_MOST_PULSES = 1500000, PREVIEW_MOST_OF = 16, PREVIEW_MOST_PIECES = 400000 };
+
+enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_REACH, PREVIEW_CELLS };
+
+/* Angles and lengths of a member that is INFINITY are those of the scanner at power-up. */
+struct preview_request {
+    enum preview_kind kind;
+    uint32_t station; /* from 0; whose scanner and tripod it is */
+    struct site_place place;
+    double step_deg, far_m, line_deg[2], pan_deg[2];
+    int points; /* 0: only the cells are wanted */
+    /* of PREVIEW_NEXT and PREVIEW_REACH */
+    uint32_t n_of, of[PREVIEW_MOST_OF]; /* numbers of previews, whose cells are seen already */
+    double height_m;                    /* of the head above the floor */
+};
+
+/* SH_EINPUT with an empty text: nothing is at that path. */
+int preview_read_request(const struct preview_options *options, const char *path, const char *query,
+                         struct preview_request *out, struct sh_err *err);
+
+/* What an answered preview saw. */
+struct preview_seen {
+    uint64_t *cells; /* [preview_words] */
+    uint64_t hits, front;
+};
+
+/* The work; the preview's own thread alone. */
+struct preview_work {
+    const struct preview_options *options;
+    const struct sites *sites; /* a scanner that could not be set up has no site */
+    struct sh_report stop;     /* of long work */
+};
+static inline size_t preview_words(const struct coverage *coverage)
+{
+    return ((size_t)coverage_cells(coverage) + 63) / 64;
+}
+
+/* A site with the scanner's settings as a request has them, and room for a place; it shares all else. Large. */
+struct preview_site {
+    struct site site;
+    struct config cfg;
+};
+int preview_site_open(const struct preview_work *work, const struct preview_request *request, struct preview_site **out,
+                      struct sh_err *err);
+
+/* Bodies; README.md has their formats. number: the preview's. */
+int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
+                 struct web_body *out, struct sh_err *err);
+/* The cells of such a body, which stay there, and its hits. */
+enum { PREVIEW_HEAD_BYTES = 72, PREVIEW_CELLS_AT = 72, PREVIEW_HITS_AT = 24, PREVIEW_FRONT_AT = 28 };
+/* seen[request->n_of]. */
+int preview_next(const struct preview_work *work, const struct preview_request *request,
+                 const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
+int preview_reach(const struct preview_work *work, const struct preview_request *request,
+                  const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
+int preview_cells(const struct preview_work *work, struct web_body *out, struct sh_err *err);
+
+#endif

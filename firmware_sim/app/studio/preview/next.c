@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: MIT */
+/* /next: the place that adds most to what stations of a trial see (`scanhead coverage --next`, with coarse scans).
+ * /reach: what can be seen from any of its places. */
+#include "firmware_sim/app/studio/coverage/next.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/bytes.h"
+#include "firmware_sim/app/studio/page_json.h"
+#include "firmware_sim/app/studio/preview/inside.h"
+#include "firmware_sim/config/profile.h"
+
+/* Places of the grid, about; the ray step they are compared by; how many of the best are scanned. */
+static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
+enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };
+
+static void put_next(struct json *json, const void *ctx)
+{
+    const struct coverage_next *next = ctx;
+    json_open_object(json, NULL);
+    json_uint(json, "places", next->n - next->within);
+    if (next->n_rounds == 0)
+        json_string(json, "place", NULL);
+    else {
+        const struct coverage_next_round *round = &next->round[0];
+        const struct coverage_next_place *place = &next->place[round->place];
+        json_open_object(json, "place");
+        json_double(json, "x_m", place->position_m[0]);
+        json_double(json, "y_m", place->position_m[1]);
+        json_double(json, "z_m", place->position_m[2]);
+        json_double(json, "heading_deg", place->heading_deg);
+        json_close_object(json);
+        json_double(json, "gain_m2", round->gain_m2[0]);
+        json_double(json, "none_m2", round->none_m2);
+    }
+    json_close_object(json);
+}
+
+static double grid_of(const struct scene *scene)
+{
+    const double area_m2 = (scene->max_m[0] - scene->min_m[0]) * (scene->max_m[1] - scene->min_m[1]);
+    return fmax(LEAST_GRID_M, sqrt(area_m2 / PLACES));
+}
+
+/* The hits of all previews stand for those of the stations. */
+static void keep_seen(struct coverage *coverage, const struct preview_seen *seen, uint32_t n,
+                      struct coverage_pulses *sum)
+{
+    coverage_forget(coverage);
+    for (uint32_t i = 0; i < n; i++) {
+        coverage_keep_cells(coverage, seen[i].cells);
+        sum->hits += seen[i].hits;
+        sum->front += seen[i].front;
+    }
+}
+
+/* Places to stand on, and what they are compared by. */
+struct stand {
+    struct preview_site *of;
+    struct coverage_next_options options;
+    struct coverage_result result;
+    struct coverage_next next;
+    struct coverage_finder finder;
+};
+
+static int stand_open(const struct preview_work *work, const struct preview_request *r, const struct preview_seen *seen,
+                      struct stand *s, struct sh_err *err)
+{
+    *s = (struct stand){.options = {.stations = 1, .height_m = r->height_m, .step_deg = RAYS_DEG, .scans = SCANS},
+                        .result = {.base = r->station, .cell_m = work->options->cell_m}};
+    int rc = preview_site_open(work, r, &s->of, err);
+    if (rc != SH_OK) return rc;
+    for (int i = 0; i < 3; i++)
+        s->options.area_m[0][i] = s->options.area_m[1][i] = (double)NAN;
+    s->options.grid_m = grid_of(s->of->site.scene);
+    s->result.site = &s->of->site;
+    s->result.station = calloc(s->of->site.n_stations, sizeof *s->result.station);
+    if (s->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
+    keep_seen(work->options->coverage, seen, r->n_of, &s->result.station[0].pulses);
+    return coverage_next_open(&s->options, &s->result, &work->stop, &s->next, &s->finder, err);
+}
+
+static void stand_close(const struct preview_work *work, struct stand *s)
+{
+    coverage_forget(work->options->coverage);
+    coverage_next_free(&s->next, &s->finder);
+    free(s->result.station);
+    free(s->of);
+}
+
+int preview_next(const struct preview_work *work, const struct preview_request *r, const struct preview_seen *seen,
+                 struct web_body *out, struct sh_err *err)
+{
+    struct stand s;
+    int rc = stand_open(work, r, seen, &s, err);
+    if (rc == SH_OK) rc = coverage_next_find(&s.finder, work->options->coverage, err);
+    if (rc == SH_OK) rc = page_json(put_next, &s.next, out, err);
+    stand_close(work, &s);
+    return rc;
+}
+
+/* ---- what can be seen at all */
+
+/* Adds what each place sees. Where the previews see fronts, a place that sees backs lies within a body, and is left out.
+ * Returns the places that count, or an error. */
+static int mark_reach(const struct preview_work *work, const struct stand *s, uint64_t *reach, struct sh_err *err)
+{
+    const struct coverage *coverage = work->options->coverage;
+    const struct coverage_finder *f = &s->finder;
+    const struct config_profile *profile = site_profile(f->site);
+    const struct coverage_pulses *sum = &s->result.station[0].pulses;
+    const struct coverage_directions directions = {f->n_dir, (const double(*)[3])f->dir, f->each_sr,
+                                                   profile->range_min_m, profile->range_max_m};
+    const size_t words = preview_words(coverage);
+    _Atomic uint64_t *cells = malloc((words + 1) * sizeof *cells);
+    int rc = cells != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the cells of places"), n = 0;
+    for (uint32_t i = 0; i < s->next.n && rc == SH_OK; i++) {
+        const struct coverage_places place = {1, &s->next.place[i].position_m, cells};
+        struct coverage_gain gain;
+        for (size_t k = 0; k < words; k++)
+            atomic_init(&cells[k], 0);
+        rc = coverage_gains(coverage, &directions, &place, &work->stop, &gain, err);
+        if (rc != SH_OK || (2 * sum->front >= sum->hits && !(gain.front >= 0.5))) continue;
+        n++;
+        for (size_t k = 0; k < words; k++)
+            reach[k] |= atomic_load_explicit(&cells[k], memory_order_relaxed);
+    }
+    free(cells);
+    return rc == SH_OK ? n : rc;
+}
+
+int preview_reach(const struct preview_work *work, const struct preview_request *r, const struct preview_seen *seen,
+                  struct web_body *out, struct sh_err *err)
+{
+    struct stand s;
+    const size_t words = preview_words(work->options->coverage);
+    uint64_t *reach = calloc(words + 1, sizeof *reach);
+    int n = stand_open(work, r, seen, &s, err);
+    if (n == SH_OK)
+        n = reach != NULL ? mark_reach(work, &s, reach, err)
+                          : sh_fail(err, SH_ENOMEM, "no memory for what can be seen");
+    stand_close(work, &s);
+    *out = (struct web_body){"application/octet-stream", n >= 0 ? malloc(REACH_HEAD_BYTES + 8 * words) : NULL,
+                             REACH_HEAD_BYTES + 8 * words};
+    if (out->bytes != NULL) {
+        memcpy(out->bytes, "SHRE", 4);
+        le_put32(out->bytes + 4, REACH_VERSION);
+        le_put32(out->bytes + 8, coverage_cells(work->options->coverage));
+        le_put32(out->bytes + 12, (uint32_t)n);
+        for (size_t k = 0; k < words; k++)
+            le_put64(out->bytes + REACH_HEAD_BYTES + 8 * k, reach[k]);
+    }
+    free(reach);
+    if (n < 0) return n;
+    return out->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for what can be seen");
+}

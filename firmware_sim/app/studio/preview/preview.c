@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: MIT */
+/* Requests that wait, answers that are kept, and the thread that does the work.
+ *
+ *     free --asked--> waiting --taken--> working --> done --asked--> its body, again and again
+ *
+ * A request is known by its text. The newest one is worked on first: while a station is dragged, older ones are about
+ * places that it has left. One that nobody asked for lately gives its slot away, and so do the oldest answers. */
+#include "firmware_sim/app/studio/preview/preview.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "core/bytes.h"
+#include "firmware_sim/app/studio/preview/inside.h"
+#include "firmware_sim/base/clock.h"
+
+enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20 };
+static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
+
+enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
+
+struct job {
+    enum job_state state;
+    char *text; /* path?query */
+    struct preview_request request;
+    uint32_t number; /* from 1, never used again */
+    int64_t asked_ns;
+    struct web_body body;
+    int rc;
+    struct sh_err err;
+};
+
+struct preview {
+    struct preview_options options;
+    struct sites sites;
+    struct preview_work work;
+    atomic_int ending;
+    pthread_t thread;
+    int running;
+    pthread_mutex_t lock;
+    pthread_cond_t wake;
+    struct job job[JOBS];
+    uint32_t numbers;
+    size_t bytes; /* of all bodies */
+};
+
+/* ---- slots; the lock is held */
+
+static void forget_job(struct preview *p, struct job *job)
+{
+    p->bytes -= job->body.len;
+    free(job->text);
+    free(job->body.bytes);
+    *job = (struct job){.state = JOB_FREE};
+}
+
+static struct job *find_job(struct preview *p, const char *text)
+{
+    for (int i = 0; i < JOBS; i++)
+        if (p->job[i].state != JOB_FREE && strcmp(p->job[i].text, text) == 0) return &p->job[i];
+    return NULL;
+}
+
+/* The one asked for longest ago of a state; NULL: none. */
+static struct job *oldest_of(struct preview *p, enum job_state state)
+{
+    struct job *oldest = NULL;
+    for (int i = 0; i < JOBS; i++)
+        if (p->job[i].state == state && (oldest == NULL || p->job[i].asked_ns < oldest->asked_ns)) oldest = &p->job[i];
+    return oldest;
+}
+
+static struct job *free_slot(struct preview *p)
+{
+    struct job *job = oldest_of(p, JOB_FREE);
+    if (job == NULL) {
+        job = oldest_of(p, JOB_WAITING);
+        if (job != NULL && clock_now_ns() - job->asked_ns < FORGOTTEN_NS) job = NULL;
+    }
+    if (job == NULL) job = oldest_of(p, JOB_DONE);
+    if (job != NULL && job->state != JOB_FREE) forget_job(p, job);
+    return job;
+}
+
+static struct job *newest_waiting(struct preview *p)
+{
+    struct job *newest = NULL;
+    for (int i = 0; i < JOBS; i++)
+        if (p->job[i].state == JOB_WAITING && (newest == NULL || p->job[i].number > newest->number))
+            newest = &p->job[i];
+    return newest;
+}
+
+/* ---- the work */
+
+static int is_ending(void *ctx)
+{
+    const struct preview *p = ctx;
+    return atomic_load_explicit(&p->ending, memory_order_relaxed);
+}
+
+/* Copies what a preview saw out of its answer. The lock is held. */
+static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *seen, struct sh_err *err)
+{
+    const size_t words = preview_words(p->options.coverage);
+    seen->cells = malloc((words + 1) * sizeof *seen->cells);
+    if (seen->cells == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a suggestion");
+    for (int i = 0; i < JOBS; i++) {
+        const struct job *job = &p->job[i];
+        if (job->number != number || job->state != JOB_DONE || job->rc != SH_OK || job->request.kind != PREVIEW_PLACE)
+            continue;
+        for (size_t k = 0; k < words; k++)
+            seen->cells[k] = le_get64(job->body.bytes + PREVIEW_CELLS_AT + 8 * k);
+        seen->hits = le_get32(job->body.bytes + PREVIEW_HITS_AT);
+        seen->front = le_get32(job->body.bytes + PREVIEW_FRONT_AT);
+        return SH_OK;
+    }
+    return sh_fail(err, SH_EINPUT, "preview %u is kept no more; ask for its place again", number);
+}
+
+/* What follows from what previews saw. */
+static int suggest(struct preview *p, const struct preview_request *request, struct web_body *out, struct sh_err *err)
+{
+    struct preview_seen seen[PREVIEW_MOST_OF] = {{.cells = NULL}};
+    int rc = SH_OK;
+    pthread_mutex_lock(&p->lock);
+    for (uint32_t i = 0; i < request->n_of && rc == SH_OK; i++)
+        rc = copy_seen(p, request->of[i], &seen[i], err);
+    pthread_mutex_unlock(&p->lock);
+    int (*const answer)(const struct preview_work *, const struct preview_request *, const struct preview_seen *,
+                        struct web_body *, struct sh_err *) =
+        request->kind == PREVIEW_NEXT ? preview_next : preview_reach;
+    if (rc == SH_OK) rc = answer(&p->work, request, seen, out, err);
+    for (uint32_t i = 0; i < request->n_of; i++)
+        free(seen[i].cells);
+    return rc;
+}
+
+static int work_on(struct preview *p, const struct preview_request *request, uint32_t number, struct web_body *out,
+                   struct sh_err *err)
+{
+    if (request->kind == PREVIEW_NEXT || request->kind == PREVIEW_REACH) return suggest(p, request, out, err);
+    if (request->kind == PREVIEW_CELLS) return preview_cells(&p->work, out, err);
+    return preview_look(&p->work, request, number, out, err);
+}
+
+/* The lock is held before and after, and not meanwhile. A job that is worked on keeps its slot. */
+static void preview_do(struct preview *p, struct job *job)
+{
+    struct web_body body = {NULL, NULL, 0};
+    struct sh_err err = {0, ""};
+    job->state = JOB_WORKING;
+    pthread_mutex_unlock(&p->lock);
+    const int rc = work_on(p, &job->request, job->number, &body, &err);
+    pthread_mutex_lock(&p->lock);
+    if (rc != SH_OK) {
+        free(body.bytes);
+        body = (struct web_body){NULL, NULL, 0};
+    }
+    job->state = JOB_DONE;
+    job->rc = rc;
+    job->err = err;
+    job->body = body;
+    p->bytes += body.len;
+    while (p->bytes > MOST_BYTES) {
+        struct job *old = oldest_of(p, JOB_DONE);
+        if (old == NULL || old == job) break;
+        forget_job(p, old);
+    }
+}
+
+static void *preview_run(void *ctx)
+{
+    struct preview *p = ctx;
+    setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    pthread_mutex_lock(&p->lock);
+    while (!atomic_load(&p->ending)) {
+        struct job *job = newest_waiting(p);
+        if (job == NULL)
+            pthread_cond_wait(&p->wake, &p->lock);
+        else if (clock_now_ns() - job->asked_ns > FORGOTTEN_NS)
+            forget_job(p, job);
+        else
+            preview_do(p, job);
+    }
+    pthread_mutex_unlock(&p->lock);
+    return NULL;
+}
+
+/* ---- asked by the page */
+
+static int add_job(struct preview *p, char *text, const struct preview_request *request, struct job **out,
+                   struct sh_err *err)
+{
+    struct job *job = *out = free_slot(p);
+    if (!p->running) p->running = pthread_create(&p->thread, NULL, preview_run, p) == 0;
+    if (job == NULL || !p->running) {
+        free(text);
+        return sh_fail(err, SH_ESTATE,
+                       job == NULL ? "too many previews wait already; ask again" : "no thread for previews");
+    }
+    *job = (struct job){.state = JOB_WAITING, .text = text, .request = *request, .number = ++p->numbers};
+    pthread_cond_signal(&p->wake);
+    return SH_OK;
+}
+
+static int give(const struct job *job, struct web_body *out, struct sh_err *err)
+{
+    const int is_done = job->state == JOB_DONE;
+    if (is_done && job->rc != SH_OK) return sh_fail(err, job->rc, "%s", job->err.text);
+    *out = (struct web_body){is_done ? job->body.type : "application/octet-stream", NULL, is_done ? job->body.len : 0};
+    out->bytes = malloc(out->len + 1);
+    if (out->bytes == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a preview");
+    if (out->len > 0) memcpy(out->bytes, job->body.bytes, out->len);
+    return SH_OK;
+}
+
+int preview_get(struct preview *p, const char *path, const char *query, struct web_body *out, struct sh_err *err)
+{
+    struct preview_request request;
+    int rc = preview_read_request(&p->options, path, query, &request, err);
+    if (rc != SH_OK) return rc;
+    const size_t len = strlen(path) + strlen(query) + 2;
+    char *text = malloc(len);
+    if (text == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a request");
+    snprintf(text, len, "%s?%s", path, query);
+    pthread_mutex_lock(&p->lock);
+    struct job *job = find_job(p, text);
+    if (job != NULL)
+        free(text);
+    else
+        rc = add_job(p, text, &request, &job, err);
+    if (rc == SH_OK) {
+        job->asked_ns = clock_now_ns();
+        rc = give(job, out, err);
+    }
+    pthread_mutex_unlock(&p->lock);
+    return rc;
+}
+
+/* ---- as a whole */
+
+int preview_create(const struct preview_options *options, struct preview **out, struct sh_err *err)
+{
+    struct preview *p = *out = calloc(1, sizeof *p);
+    struct sh_err why = {0, ""};
+    struct sh_report quiet = {0};
+    if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
+    p->options = *options;
+    atomic_init(&p->ending, 0);
+    pthread_mutex_init(&p->lock, NULL);
+    pthread_cond_init(&p->wake, NULL);
+    if (options->report != NULL) quiet = *options->report;
+    quiet.warn = NULL; /* of scanners that this run does not serve */
+    int rc = sites_load_beside(options->cfg, options->site, &quiet, &p->sites, &why);
+    p->work = (struct preview_work){.options = &p->options, .sites = &p->sites, .stop = {.ctx = p, .stop = is_ending}};
+    if (rc == SH_OK) return SH_OK;
+    if (rc == SH_EINPUT) {
+        sh_warn(options->report, "the page previews the scanner of this run alone: %s", why.text);
+        return SH_OK;
+    }
+    preview_free(p);
+    *out = NULL;
+    return sh_fail(err, rc, "%s", why.text);
+}
+
+void preview_free(struct preview *p)
+{
+    if (p == NULL) return;
+    pthread_mutex_lock(&p->lock);
+    atomic_store(&p->ending, 1);
+    pthread_cond_signal(&p->wake);
+    pthread_mutex_unlock(&p->lock);
+    if (p->running) pthread_join(p->thread, NULL);
+    for (int i = 0; i < JOBS; i++)
+        forget_job(p, &p->job[i]);
+    sites_free(&p->sites);
+    pthread_cond_destroy(&p->wake);
+    pthread_mutex_destroy(&p->lock);
+    free(p);
+}

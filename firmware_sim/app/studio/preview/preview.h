@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/* Previews: what a station would see from another place, or with other settings, for a page on which stations are
+ * tried. Nothing of the head moves or changes, so nobody needs control of it.
+ *
+ * In: requests of a page, as path and query (README.md has them and their answers). Out: bodies. A request that is not
+ * answered yet gets an empty body at once, and the page asks again. One thread at the lowest priority does the work,
+ * and is made with the first request. Bounded are the pulses of a preview, the requests that wait, and the bytes of
+ * the answers that are kept. */
+#ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
+#define FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
+
+#include "core/studio/coverage.h"
+#include "drivers/link/web.h"
+#include "firmware_sim/site/site.h"
+
+struct preview;
+
+struct preview_options {
+    const struct config *cfg;
+    const struct site *site; /* of the head that runs, copies written out; it and cfg outlive the preview */
+    /* Of that site. Its scans and stations are the preview's; others may only ask it for cells of places. */
+    struct coverage *coverage;
+    double cell_m;
+    const struct sh_report *report; /* hears why a scanner of the scene can't be previewed */
+};
+
+/* Sets up the scene's other scanners, if there are any. SH_ENOMEM, SH_ESTOPPED. */
+int preview_create(const struct preview_options *options, struct preview **out, struct sh_err *err);
+/* /preview, /next, /reach and /cells; as web_source's get. Any thread. */
+int preview_get(struct preview *preview, const char *path, const char *query, struct web_body *out, struct sh_err *err);
+void preview_free(struct preview *preview);
+
+#endif
