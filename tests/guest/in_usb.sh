@@ -113,6 +113,13 @@ has_points() {
     grep -q 'recording: 0\.[0-9]*[1-9]' "$1"
 }
 
+# Waits until a recorder's points come. Where they don't, it shows the last words of the recorder and of the head.
+points_come() {
+    wait_for 20 has_points "$1" && return 0
+    tail -n 5 "$1" /tmp/head.err | sed 's/^/#   /' >&3
+    return 1
+}
+
 # The head is back, and more points have come than before it went.
 goes_on() {
     awk '/recording: / { if (!back) before = $3; else if ($3 != before) more = 1 } /is back/ { back = 1 }
@@ -126,13 +133,13 @@ goes_on() {
 # for the head. This needs a head in real time, plug.sh and unplug.sh.
 check_cut_records() {
     scanhead record usb --wait 1200 --frames 0 -o cut.ply 2>killed.err &
-    wait_for 20 has_points killed.err
+    points_come killed.err
     kill -9 $!
     wait $! 2>/dev/null
     scanhead record --repair cut.ply || rm -f cut.ply.part # the recorder may have written too little within a second
     scanhead record usb --wait 1200 --listen -o cut.ply 2>cut.err &
     client=$!
-    check "$1: another recorder after one was killed" wait_for 20 has_points cut.err
+    check "$1: another recorder after one was killed" points_come cut.err
     sh unplug.sh
     wait $client
     check "$1: exit status 1 when unplugged" test $? = 1
@@ -141,7 +148,7 @@ check_cut_records() {
     sh plug.sh
     scanhead record usb --wait 1200 --listen --replug 600 -o again.ply --stats again.json 2>again.err &
     client=$!
-    wait_for 20 has_points again.err
+    points_come again.err
     sh unplug.sh
     wait_for 5 is_unplugged
     sh plug.sh
@@ -158,7 +165,7 @@ check_cut_records() {
 check_reset() {
     scanhead record usb --wait 1200 --frames 0 --replug 600 -o reset.ply --stats reset.json 2>reset.err &
     client=$!
-    wait_for 20 has_points reset.err
+    points_come reset.err
     check "$1: reset" usbreset 1209:0001
     check "$1: the recorder goes on after a reset" wait_for 60 goes_on reset.err
     goes_on reset.err || tail -n 20 reset.err /tmp/head.err | sed 's/^/#   /' >&3

@@ -22,6 +22,8 @@ const struct bad bad[] = {
     {PRR, "  prr_hz: 99999999999999999999999999999999999999999\n", 3, "head.prr_hz", "out of range"},
     {PRR, "  prr_hz: \"500000\"\n", 3, "head.prr_hz", "in quotes"},
     {PRR, "  prr_hz:\n", 3, "head.prr_hz", "here stands nothing"},
+    {PRR, "  prr_hz: ~\n", 3, "head.prr_hz", "here stands nothing"},
+    {PRR, PRR "  settings_file: ~\n", 4, "head.settings_file", "here stands nothing"},
     {PRR, "  prr_hz: [1]\n", 3, "head.prr_hz", "here stands a list"},
     {PRR, "  prr_hz: {a: 1}\n", 3, "head.prr_hz", "here stands a section"},
     {PRR, "  prr_hz: !!int 5\n", 3, "head.prr_hz", "tag"},

@@ -142,6 +142,26 @@ test('the keeper may be slower than the connection', async () => {
   await page.shows(0, 20, 'all');
 });
 
+test('the keeper may be later than anyone waits in patience, on a busy machine', async () => {
+  const stream = new Stream(), {now} = performance;
+  let later_ms = 0;
+  performance.now = () => now.call(performance) + later_ms;
+  try {
+    stream.places();
+    stream.shots(0, 20);
+    stream.keeps = 8;
+    const page = new Page(stream);
+    page.take(stream.telemetry());
+    await page.shows(0, 5, 'what is kept so far');
+    later_ms = 3600000;
+    await page.shows(0, 6, 'the last that is kept, which waits for its attributes until then');
+    stream.keeps = undefined;
+    await page.shows(0, 20, 'all');
+  } finally {
+    performance.now = now;
+  }
+});
+
 test('what /past had already does not count again when it comes live', async () => {
   const stream = new Stream();
   const places = stream.places();

@@ -281,22 +281,35 @@ static void without_memory_a_tick_is_empty(void **state)
 }
 
 static _Atomic int claimed;
+static _Atomic int64_t begun_ns; /* processor time of the thread when it began its claim */
+
+static int64_t ran_ns(clockid_t processor)
+{
+    struct timespec t;
+    assert_int_equal(clock_gettime(processor, &t), 0);
+    return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
 
 static void *claim_one(void *arg)
 {
+    atomic_store(&begun_ns, ran_ns(CLOCK_THREAD_CPUTIME_ID));
     struct ring_slot *slot = ring_claim(&ring, *(uint64_t *)arg);
     atomic_store(&claimed, slot != NULL ? 1 : -1);
     return NULL;
 }
 
-/* Starts the claim, lets it run a thousand times as long as it needs, and sees that it waits. Then it releases the
- * hold. */
+/* Starts the claim, lets it have a hundred times the processor time that it needs, and sees that it waits. Then it
+ * releases the hold. */
 static void check_claim_waits(uint64_t tick, _Atomic uint64_t *hazard, _Atomic int *busy)
 {
+    enum { ENOUGH_NS = 100000 };
     pthread_t thread;
+    clockid_t processor;
     atomic_store(&claimed, 0);
+    atomic_store(&begun_ns, 0);
     assert_int_equal(pthread_create(&thread, NULL, claim_one, &tick), 0);
-    for (int i = 0; i < 20000; i++)
+    assert_int_equal(pthread_getcpuclockid(thread, &processor), 0);
+    while (begun_ns == 0 || (claimed == 0 && ran_ns(processor) < begun_ns + ENOUGH_NS))
         sched_yield();
     int early = atomic_load(&claimed);
     if (hazard != NULL) atomic_store(hazard, 0);

@@ -10,7 +10,8 @@ import {BESIDE_POINTS, Decoder, isBefore, LOCAL, Parser, POINTS} from './native.
 
 const HEAD = 56, VERSION = 1;
 const REST_MS = 20; // it waits so long between two pieces, since a scanning head has other work
-const AGAIN_MS = 100, PATIENCE_MS = 10000; // the head's observer reads the stream a little later than this page
+// The head's observer reads the stream a little later than this page, or much later on a busy machine.
+const AGAIN_MS = 100, SELDOM_MS = 1000, PATIENCE_MS = 10000;
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
@@ -149,8 +150,10 @@ export class Past {
       this.#push(bytes, head);
       const isAtEnd = head.next === head.end, misses = this.#need !== null && !isBefore(this.#need, head.next_seq);
       if (!isAtEnd) until_ms = performance.now() + PATIENCE_MS;
-      else if (!misses || performance.now() > until_ms) return this.decoder.flush(true);
-      await sleep(isAtEnd ? AGAIN_MS : REST_MS);
+      else if (!misses) return this.decoder.flush(true);
+      const isLate = performance.now() > until_ms;
+      if (isLate) this.decoder.flush(true);
+      await sleep(!isAtEnd ? REST_MS : isLate ? SELDOM_MS : AGAIN_MS);
       while (goesOn() && !this.#hasRoom()) await sleep(REST_MS);
       if (!goesOn()) return;
     }

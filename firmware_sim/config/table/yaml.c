@@ -34,11 +34,18 @@ static const char *text_of(const yaml_node_t *node)
     return (const char *)node->data.scalar.value;
 }
 
+/* "null" is the name of a link, and so a value like others. */
+static int is_nothing(const yaml_node_t *node)
+{
+    return node->type == YAML_SCALAR_NODE && node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE &&
+           (node->data.scalar.length == 0 || strcmp(text_of(node), "~") == 0);
+}
+
 static const char *kind_of(const yaml_node_t *node)
 {
     switch (node->type) {
     case YAML_SCALAR_NODE:
-        return node->data.scalar.length == 0 ? "nothing" : "a single value";
+        return is_nothing(node) ? "nothing" : "a single value";
     case YAML_SEQUENCE_NODE:
         return "a list";
     default:
@@ -65,9 +72,8 @@ static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t 
 static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
-    if (node->type != YAML_SCALAR_NODE) return wrong_kind(w, key, item, node);
-    int plain = node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
-    if (plain && node->data.scalar.length == 0) return wrong_kind(w, key, item, node);
+    if (node->type != YAML_SCALAR_NODE || is_nothing(node)) return wrong_kind(w, key, item, node);
+    const int plain = node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
     const char *why = NULL;
     int is_text = key->type == CFG_TEXT || key->type == CFG_PATH || key->type == CFG_ENUM;
     if (strlen(text_of(node)) != node->data.scalar.length) why = "text with control characters";

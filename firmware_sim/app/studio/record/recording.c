@@ -12,9 +12,9 @@
 #include "firmware_sim/command/head.h"
 
 enum {
-    REPLY_MS = 5000,
+    REPLY_MS = 20000, /* a head that shares a busy machine has taken more than 5 s */
     NEXT_MS = 250,
-    END_MS = 5000,
+    END_MS = 20000,
     LAST_MS = 60000,
     BOOT_MS = 30000,
     REPLUG_MS = 1000,
