@@ -147,6 +147,11 @@ export async function trialTests(page, other, SIZE) {
     const next = await page.until('scanhead.view.stations.list.some((s) => s.suggested) && scanhead.trial.next');
     is(next.gain_m2 > 0 && next.none_m2 < before, `it adds ${next.gain_m2} m2`);
     await page.where('#picture');
+    await page.eval(`(() => { // it comes into the middle, where no button lies over it
+      const {view, trial: {next}} = scanhead;
+      view.camera.target = [next.x_m, next.y_m, next.z_m];
+      view.cameraMoved();
+    })()`);
     await page.eval('scanhead.view.screenshotReady()');
     await page.clickAt(await page.eval(`(() => {
       const {left, top} = document.querySelector('#picture').getBoundingClientRect();
