@@ -73,6 +73,7 @@ static const struct {
     {"SCAN:START", "SCAN:STAR", 0, 1, ""},
     {"SCAN:STOP", "SCAN:STOP", 0, 1, ""},
     {"SCAN:COUNT", "SCAN:COUN", 1, 0, ""},
+    {"SCAN:WAVEFORM", "SCAN:WAV", 1, 1, " OFF"},
     {"SCAN:REPLAY", "SCAN:REPL", 1, 1, " 2"},
     {"SITE:POSE", "SITE:POSE", 1, 1, " 1, DEF"},
     {"HELP", "HELP", 1, 0, ""},

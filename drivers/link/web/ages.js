@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// A limit of the points' age: only the last seconds before the newest point are shown. Ages count in device time, so a
+// This row limits the points' age: only the last seconds before the newest point are shown. Ages count in device time, so a
 // head that rests keeps its last points on the picture.
 import {make} from './page.js';
 

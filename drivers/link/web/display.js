@@ -86,7 +86,7 @@ export class Display {
     this.#showLegend();
   }
 
-  // A PNG of the picture, with the legend where it is shown.
+  // Returns a PNG of the picture, with the legend where it is shown.
   async picture() {
     const canvas = await this.#view.picture(), legend = this.#is('legend') ? this.#view.legend() : null;
     if (legend) drawLegend(canvas, legend, this.#view.colours.css, (item) => this.#itemName(item), this.#view.ratio);

@@ -27,7 +27,7 @@ export class Keeper {
     if (this.isOn) this.#put(bytes);
   }
 
-  /** From now on. A recording begins as a reader does that joins late: with what the points after it need. */
+  /** Keeps frames from now on. A recording begins as a reader does that joins late: with what its points need. */
   begin() {
     Object.assign(this, {bytes: 0, isOn: true, isFull: false});
     this.#parts = [];
@@ -59,7 +59,7 @@ export class Keeper {
   }
 }
 
-// The same frame, marked as for one reader alone: it has no number among the others.
+// Returns the same frame, marked as for one reader alone: it has no number among the others.
 function repeated(frame) {
   const bytes = frame.slice(), view = new DataView(bytes.buffer);
   bytes[3] |= REPEAT | LOCAL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The list of keys: a dialog that the button in the bar and the key ? open.
+// This module has the list of keys: a dialog that the button in the bar and the key ? open.
 import {byId, make} from './page.js';
 
 const EVERYWHERE = [['?', 'this list'], ['Tab, Shift + Tab', 'the next, the previous control'], ['Space, Enter', 'press it'],

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The rows of the display for colour scales and their limits: by shares of the points, or by hand.
+// This class has the rows of the display for colour scales and their limits: by shares of the points, or by hand.
 import {kept, make, say} from './page.js';
 import {MODES} from './view_colours.js';
 import {SCALES} from './view_ramps.js';
@@ -49,7 +49,7 @@ export class Limits {
     this.#view.ramp({scale: this.#parts.scale.value});
   }
 
-  // By hand begins with the limits that are shown.
+  // Limits by hand begin with those that are shown.
   #chosen() {
     const p = this.#parts, legend = this.#view.legend();
     if (p.share.value === 'hand' && typeof legend?.from === 'number') {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// Pictures to keep: what is on the canvases, with the legend, as a PNG file.
+// This module makes pictures to keep: the canvases with the legend, as a PNG file.
 
 const FONT = 'system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
 const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The points so far as a file: the head writes it, in the formats of `scanhead record` (GET /save), and the page fetches
+// This row saves the points so far as a file: the head writes it, in the formats of `scanhead record` (GET /save), and the page fetches
 // it in pieces.
 import {make, say} from './page.js';
 import {download, fileName} from './picture.js';

@@ -178,7 +178,7 @@ export class View extends EventTarget {
     this.#paint();
   }
 
-  // Of ramps: one of SCALES in view_ramps.js, and the share of the points that may lie beyond each end.
+  // Takes one of SCALES in view_ramps.js, and the share of the points that may lie beyond each end of a ramp.
   ramp({scale = this.#scale.scale, share = this.#scale.share}) {
     this.#scale.choose(scale, share);
     this.#paint();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The colour scales: a figure's place between its limits, 0 to 1, becomes a colour. It is pure.
+// This module has the colour scales: a figure's place between its limits, 0 to 1, becomes a colour. It is pure.
 //
 // Low and high mean the same on every scale, and the same as in files (core/colour.h): low is blue or dark, high is red
 // or bright. `even` and `blue` are computed in OKLab (Ottosson 2020), whose lightness is that of the eye. It rises
@@ -21,12 +21,12 @@ const EVEN = {
   blue: (f) => BLUE.map((v, k) => v + f * (YELLOW[k] - v)), // blue, grey, yellow: the colours that red-green blindness leaves
 };
 
-// What a user may choose, with its name. `usual` is the mode's own.
+// A user may choose these; each has its name. `usual` is the mode's own.
 export const SCALES = [['usual', 'Usual'], ['even', 'Violet to yellow'], ['blue', 'Blue to yellow'], ['grey', 'Grey']];
 
 const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
-// OKLab to linear light of sRGB, and to its bytes (IEC 61966-2-1).
+// Converts OKLab to linear light of sRGB, and that to its bytes (IEC 61966-2-1).
 function fromOklab(L, a, b) {
   const [l, m, s] = [L + 0.3963377774 * a + 0.2158037573 * b, L - 0.1055613458 * a - 0.0638541728 * b,
     L - 0.0894841775 * a - 1.291485548 * b].map((v) => v ** 3);

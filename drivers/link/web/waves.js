@@ -48,12 +48,14 @@ export class WavePlot {
     parent.append(this.#box);
     view.addEventListener('pick', ({detail}) => {
       const point = detail?.point ?? null, {descriptor} = head;
-      const has = point !== null && (descriptor?.content & HAS_WAVEFORMS) !== 0 && descriptor?.scan === point.scan;
+      const has = point !== null && (descriptor?.content & HAS_WAVEFORMS) !== 0;
       this.#point = has ? point : null;
-      if (has) head.askWaves(point.pulse);
+      if (has) head.askWaves(point.pulse, point.scan);
       else this.#box.hidden = true;
     });
-    head.addEventListener('waves', ({detail}) => detail.pulse === this.#point?.pulse && this.#show(detail.windows));
+    head.addEventListener('waves', ({detail: {pulse, scan, windows}}) => {
+      if (pulse === this.#point?.pulse && scan === this.#point.scan) this.#show(windows);
+    });
   }
 
   #show(windows) {

@@ -38,7 +38,7 @@ void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t l
 /* The frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece; one
  * beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err);
-/* The position of "from=POSITION"; 0 of "". Others: SH_EINPUT. */
+/* Reads the position of "from=POSITION"; of "" it is 0. Others are SH_EINPUT. */
 int past_read_position(const char *query, uint64_t *from, struct sh_err *err);
 /* A number that another run of a head does not have. */
 uint64_t past_run(const struct past *past);
