@@ -23,6 +23,7 @@ const turned = (deg) => ((deg + 180) % 360 + 360) % 360 - 180;
 export class Trial extends EventTarget {
   stations = [];
   cells = null; // null: not there yet, or there are none
+  isBlind = false; // there are none, since the scene has too many triangles: points are all that is shown
   reach = null; // the cells that can be seen from anywhere; null: not known yet
   sum = null;   // it has counts, none_m2, one_m2, several_m2, hidden_m2 of all stations
   step_deg; // of stations without a step of their own
@@ -54,6 +55,7 @@ export class Trial extends EventTarget {
     try {
       this.cells = parseCells(await ask('/cells'));
     } catch (error) {
+      this.isBlind = true;
       this.error = error.message;
     }
     this.#count();
@@ -131,6 +133,7 @@ export class Trial extends EventTarget {
       return;
     }
     for (const step_deg of COVER_STEPS_DEG) {
+      if (this.isBlind) return;
       if (step_deg !== COVER_STEPS_DEG[0]) await new Promise((done) => setTimeout(done, REST_MS));
       if (of !== station.wanted || !this.#has(station)) return;
       try {

@@ -263,6 +263,7 @@ export class TrialPanel {
     this.apply.disabled = not !== '' || moved.length === 0;
     this.apply.title = not || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
     this.take.disabled = !next;
+    for (const field of [this.paint, this.suggests]) field.disabled = this.#trial.isBlind;
     say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
       : this.suggests.checked ? error || 'Looking for it.' : 'It can be clicked in the picture.');
   }

@@ -42,6 +42,7 @@ struct preview_seen {
 /* The work; the preview's own thread alone. */
 struct preview_work {
     const struct preview_options *options;
+    struct coverage *coverage; /* without cells where the options have none */
     const struct sites *sites; /* a scanner that could not be set up has no site */
     struct sh_report stop;     /* of long work */
 };

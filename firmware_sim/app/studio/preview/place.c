@@ -178,7 +178,7 @@ static void put_tripod(char *to, const struct site_tripod *t)
 static int put_place(const struct preview_work *work, uint32_t number, const struct points *points,
                      const struct coverage_pulses *pulses, struct web_body *out)
 {
-    struct coverage *coverage = work->options->coverage;
+    struct coverage *coverage = work->coverage;
     const size_t words = preview_words(coverage);
     uint64_t *cells = malloc((words + 1) * sizeof *cells);
     *out = (struct web_body){"application/octet-stream", NULL,
@@ -229,12 +229,12 @@ int preview_look(const struct preview_work *work, const struct preview_request *
         memcpy(points.origin_m, at->scan.setup.station_m, sizeof points.origin_m);
         at->scan.take = take_hits;
         at->scan.take_ctx = &points;
-        rc = coverage_look(work->options->coverage, &at->scan, "preview", &work->stop, &pulses, err);
+        rc = coverage_look(work->coverage, &at->scan, "preview", &work->stop, &pulses, err);
     }
     if (rc == SH_OK && (points.failed || put_place(work, number, &points, &pulses, out) != SH_OK))
         rc = sh_fail(err, SH_ENOMEM, "no memory for the points of a preview");
     if (rc == SH_OK) put_tripod(out->bytes + 56, &tripod);
-    coverage_drop(work->options->coverage);
+    coverage_drop(work->coverage);
     site_free_tripod(&tripod);
     free(points.xyz_m);
     free(points.range_m);

@@ -20,6 +20,7 @@
 #include "firmware_sim/base/clock.h"
 
 enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20 };
+static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
@@ -39,6 +40,8 @@ struct preview {
     struct preview_options options;
     struct sites sites;
     struct preview_work work;
+    struct coverage *blind; /* of a scene that has no coverage */
+    struct sh_err why;      /* there is none of these either */
     atomic_int ending;
     pthread_t thread;
     int running;
@@ -107,7 +110,7 @@ static int is_ending(void *ctx)
 /* Copies what a preview saw out of its answer. The lock is held. */
 static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *seen, struct sh_err *err)
 {
-    const size_t words = preview_words(p->options.coverage);
+    const size_t words = preview_words(p->work.coverage);
     seen->cells = malloc((words + 1) * sizeof *seen->cells);
     if (seen->cells == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a suggestion");
     for (int i = 0; i < JOBS; i++) {
@@ -144,6 +147,7 @@ static int suggest(struct preview *p, const struct preview_request *request, str
 static int work_on(struct preview *p, const struct preview_request *request, uint32_t number, struct web_body *out,
                    struct sh_err *err)
 {
+    if (p->work.coverage == NULL) return sh_fail(err, p->why.code, "%s", p->why.text);
     if (request->kind == PREVIEW_NEXT || request->kind == PREVIEW_REACH) return suggest(p, request, out, err);
     if (request->kind == PREVIEW_CELLS) return preview_cells(&p->work, out, err);
     return preview_look(&p->work, request, number, out, err);
@@ -174,10 +178,24 @@ static void preview_do(struct preview *p, struct job *job)
     }
 }
 
+/* A coverage of surfaces that all give no cells: 4 bytes a triangle. */
+static int make_blind(struct preview *p, struct sh_err *err)
+{
+    uint8_t *silent = malloc(SCENE_MAX_SURFACES + 1);
+    if (silent == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
+    memset(silent, 1, SCENE_MAX_SURFACES + 1);
+    const struct coverage_spec spec = {
+        .bvh = p->options.site->bvh, .silent = silent, .cell_m = BLIND_CELL_M, .memory_mib = BLIND_MIB, .threads = 1};
+    const int rc = coverage_create(&spec, &p->work.stop, &p->blind, err);
+    free(silent);
+    return rc;
+}
+
 static void *preview_run(void *ctx)
 {
     struct preview *p = ctx;
     setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    if (p->work.coverage == NULL && make_blind(p, &p->why) == SH_OK) p->work.coverage = p->blind;
     pthread_mutex_lock(&p->lock);
     while (!atomic_load(&p->ending)) {
         struct job *job = newest_waiting(p);
@@ -258,7 +276,10 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     if (options->report != NULL) quiet = *options->report;
     quiet.warn = NULL; /* of scanners that this run does not serve */
     int rc = sites_load_beside(options->cfg, options->site, &quiet, &p->sites, &why);
-    p->work = (struct preview_work){.options = &p->options, .sites = &p->sites, .stop = {.ctx = p, .stop = is_ending}};
+    p->work = (struct preview_work){.options = &p->options,
+                                    .coverage = options->coverage,
+                                    .sites = &p->sites,
+                                    .stop = {.ctx = p, .stop = is_ending}};
     if (rc == SH_OK) return SH_OK;
     if (rc == SH_EINPUT) {
         sh_warn(options->report, "the page previews the scanner of this run alone: %s", why.text);
@@ -279,6 +300,7 @@ void preview_free(struct preview *p)
     if (p->running) pthread_join(p->thread, NULL);
     for (int i = 0; i < JOBS; i++)
         forget_job(p, &p->job[i]);
+    coverage_free(p->blind);
     sites_free(&p->sites);
     pthread_cond_destroy(&p->wake);
     pthread_mutex_destroy(&p->lock);
