@@ -41,6 +41,7 @@ export class TrialPanel {
     title: 'Moves stations in this page alone, and shows at once what they see'}, 'Try places');
   #items = new Map(); // it maps a number to {item, fields, place, says, head}
   #timer = 0;
+  #run = '';
   #targets;
   #colours = tableOf('station');
 
@@ -55,8 +56,10 @@ export class TrialPanel {
     session.addEventListener('change', () => this.#trial && this.#allow());
   }
 
-  // A head that has no previews offers no trial.
-  offer(hasPreviews) {
+  // A head that has no previews offers no trial. Another run of it may have another scene, so that a trial ends.
+  offer(hasPreviews, run) {
+    if (this.#trial && run !== this.#run) this.end();
+    this.#run = run;
     this.#open.hidden = !hasPreviews || this.#view === null || this.#trial !== null;
   }
 
@@ -257,7 +260,7 @@ export class TrialPanel {
   }
 
   #allow() {
-    const {next, stations, error, sum} = this.#trial;
+    const {next, stations, nextError, sum} = this.#trial;
     const moved = stations.filter((s) => !s.isAdded && PLACE.some(([key]) => Math.abs(s[key] - s.was[key]) > 1e-9));
     const not = this.#session.whyNot('idle');
     this.apply.disabled = not !== '' || moved.length === 0;
@@ -265,13 +268,14 @@ export class TrialPanel {
     this.take.disabled = !next;
     for (const field of [this.paint, this.suggests]) field.disabled = this.#trial.isBlind;
     say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
-      : this.suggests.checked ? error || 'Looking for it.' : 'It can be clicked in the picture.');
+      : this.suggests.checked ? nextError || 'Looking for it.' : 'It can be clicked in the picture.');
   }
 
   // ---- what is done
 
   #suggestSoon() {
     clearTimeout(this.#timer);
+    this.#trial.nextError = '';
     if (!this.suggests.checked) {
       this.#trial.next = null;
       return this.#show();
