@@ -227,11 +227,11 @@ export class TrialPanel {
   }
 
   #sums() {
-    const {sum, cells, stations, reach} = this.#trial;
-    const parts = this.#shares(), of = `${stations.length} ${stations.length === 1 ? 'station' : 'stations'}`;
+    const {sum, cells, reach} = this.#trial;
+    const parts = this.#shares();
     this.shares.forEach((dd, i) => say(dd, percent(parts[i])));
     this.covered.style.width = sum ? `${(100 * (1 - parts[0])).toFixed(2)}%` : '0';
-    say(this.coverage, sum ? `${of}: ${percent(1 - parts[0])} of ${grouped(this.#all())}\u00a0m²${reach ? ' that can be seen' : ''}`
+    say(this.coverage, sum ? `${percent(1 - parts[0])} of ${grouped(this.#all())}\u00a0m² ${reach ? 'that can be seen' : 'of all surfaces'}`
       : this.#trial.error || (cells ? '' : 'The surface is being cut into cells.'));
     this.coverage.title = reach ? `Seen from anywhere that a tripod can stand, or by a station; ${grouped(sum.hidden_m2)} m² more can't be seen`
       : 'All surfaces, also those within walls';
