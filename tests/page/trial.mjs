@@ -95,6 +95,8 @@ export async function trialTests(page, other, SIZE) {
     await page.fill('#trial-2-pan1_deg', 400);
     const words = await page.until(`document.querySelector('#trial-2-pan1_deg').form.querySelector('.refusal').textContent`);
     equal(words, 'pan from 0 to 400 deg: allowed is a part of 0 to 360 deg, at most a turn, the lower one first', 'a refusal');
+    await page.fill('#trial-2-pan1_deg', 'wide');
+    equal(await page.until(`document.querySelector('#trial-2-pan1_deg').getAttribute('aria-invalid')`), 'true', 'a word is refused by the page');
     await page.fill('#trial-2-pan1_deg', 360);
     await page.until(`scanhead.trial.get(2).error === '' && ${RESTS}`);
   });

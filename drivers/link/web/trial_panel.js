@@ -18,7 +18,7 @@ const PLACE = [['x_m', 'East x, m'], ['y_m', 'North y, m'], ['z_m', 'Height z, m
   ['pitch_deg', 'Pitch, °'], ['roll_deg', 'Roll, °']];
 const NAMES = {step_deg: 'Step, °', far_m: 'Farthest, m', line0_deg: 'Line from, °', line1_deg: 'Line to, °',
   pan0_deg: 'Pan from, °', pan1_deg: 'Pan to, °'};
-const GHOST = 'next'; // the number of the suggested station in the picture
+const GHOST = 0; // the number of the suggested station in the picture; others begin at 1
 const SUGGEST_MS = 250; // a suggestion waits so long for another change
 
 const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
@@ -216,8 +216,11 @@ export class TrialPanel {
     const text = input.value.trim().replace('−', '-');
     const value = text === '' && SETTINGS.includes(key) ? null : Number(text);
     const isNumber = value === null || (text !== '' && Number.isFinite(value));
-    input.toggleAttribute('aria-invalid', !isNumber);
-    if (isNumber) this.#trial.change(number, {[key]: value});
+    if (isNumber) input.removeAttribute('aria-invalid');
+    else input.setAttribute('aria-invalid', 'true');
+    if (isNumber) return this.#trial.change(number, {[key]: value});
+    this.#trial.get(number).error = `${input.value} is no number.`;
+    return this.#fill(this.#trial.get(number));
   }
 
   #back(number) {
