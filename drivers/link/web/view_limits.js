@@ -10,13 +10,18 @@ const AGED = 1.15; // in the mode age the limits follow sooner
 export class Scale {
   mode = 'height';
   limits = null; // heights are relative to the cloud's origin
-  cloud;
+  #cloud;
   #fixed = null; // the user set these, in the scene frame
   #at = 0; // it is the total when they were found
   #sample = [];
   #legend = null;
 
-  constructor(cloud) { this.cloud = cloud; }
+  constructor(cloud) { this.#cloud = cloud; }
+
+  use(cloud) {
+    this.#cloud = cloud;
+    this.forget();
+  }
 
   forget() {
     this.limits = this.#legend = null;
@@ -36,23 +41,23 @@ export class Scale {
     this.forget();
   }
 
-  get #offset() { return this.mode === 'height' && this.cloud.origin ? this.cloud.origin[2] : 0; }
+  get #offset() { return this.mode === 'height' && this.#cloud.origin ? this.#cloud.origin[2] : 0; }
 
   legend() {
     this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample,
-      hasColours: this.cloud.blocks.some((block) => block.rgb !== null)});
+      hasColours: this.#cloud.blocks.some((block) => block.rgb !== null)});
     return this.#legend;
   }
 
   // Returns {first, changed}: there are limits for the first time, or other ones than before.
   follow() {
-    const {total, blocks} = this.cloud;
+    const {total, blocks} = this.#cloud;
     const due = total > this.#at && (total >= 2 * this.#at || (this.mode === 'age' && total > AGED * this.#at));
     if (!due) return {first: false, changed: false};
     const before = this.limits;
     this.#at = total;
     this.#legend = null;
-    this.#sample = sampleOf(this.cloud, this.mode);
+    this.#sample = sampleOf(this.#cloud, this.mode);
     if (MODES[this.mode].kind !== 'ramp') return {first: false, changed: false};
     if (this.mode === 'age') this.limits = [blocks[0]?.first ?? total, total];
     else this.limits = this.#fixed?.map((v) => v - this.#offset) ?? widened(before, robustLimits(this.#sample, MODES[this.mode].least));
