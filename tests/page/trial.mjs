@@ -15,7 +15,7 @@ const M2 = 1e-3; // areas come as floats; their sum over 20,000 cells of 0.02 m2
 const share = (page, i) => page.eval(`parseFloat(document.querySelector('#trial-seen-${i}').textContent)`);
 const RESTS = `scanhead.trial && !scanhead.trial.isBusy && scanhead.trial.sum && scanhead.trial.stations.every((s) => s.seen)`;
 
-// What the command says of the stations with the finest of the steps by which the page looks for cells.
+// Asks the command for the same stations, with the finest of the steps by which the page looks for cells.
 function covered(cell_m, stations) {
   const sets = [`coverage.cell_m=${cell_m}`, `head.lines_hz=${micro(LINES_HZ)}`, `head.pan_deg_s=${micro(STEP_DEG * LINES_HZ)}`, ...stations];
   return JSON.parse(run('coverage', CONFIG, '--json', '--quiet', ...sets.flatMap((s) => ['--set', s])));

@@ -223,6 +223,27 @@ static void test_reach(void **state)
     close_room(&r);
 }
 
+/* Places that are asked for while a search is on are answered, and so is the search in the end. */
+static void test_search_gives_way(void **state)
+{
+    (void)state;
+    struct room r = open_room("");
+    struct web_body body, reach;
+    char query[96];
+    assert_int_equal(preview_get(r.preview, "/reach", "station=1&height_m=1.2", &body, &err), SH_OK);
+    for (int i = 0; i < 20; i++) {
+        free(body.bytes);
+        snprintf(query, sizeof query, "station=1&x_m=%g&y_m=1&z_m=1.2&heading_deg=0", 1.0 + 0.1 * i);
+        body = need(&r, "/preview", query);
+        assert_int_equal(points_of(&body), 50 * 180);
+    }
+    free(body.bytes);
+    reach = need(&r, "/reach", "station=1&height_m=1.2");
+    assert_true(le_get32(reach.bytes + 12) > 50);
+    free(reach.bytes);
+    close_room(&r);
+}
+
 /* The bottom of a closed body lies on the ground: only who stands within the body sees it, and nobody does. */
 static void test_bodies(void **state)
 {
@@ -370,10 +391,10 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),   cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_next),     cmocka_unit_test(test_reach),    cmocka_unit_test(test_bodies),
-        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners), cmocka_unit_test(test_without_cells),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),        cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_next),          cmocka_unit_test(test_reach),    cmocka_unit_test(test_search_gives_way),
+        cmocka_unit_test(test_bodies),        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners),
+        cmocka_unit_test(test_without_cells), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// A trial: stations that stand, in this page alone, where its user wants to try them. Each has the points of a coarse
+// A trial has stations that stand, in this page alone, where its user wants to try them. Each has the points of a coarse
 // scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a trial
 // needs no control.
 
@@ -186,7 +186,7 @@ export class Trial extends EventTarget {
     return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer]))});
   }
 
-  // Whether the stations see the backs of most faces, so that these are turned the other way than they are looked at.
+  // Is true where the stations see the backs of most faces: these then look the other way.
   get seesBacks() {
     const all = this.stations.filter((s) => s.seen);
     return all.length > 0 && 2 * all.reduce((sum, s) => sum + s.front, 0) < all.reduce((sum, s) => sum + s.hits, 0);

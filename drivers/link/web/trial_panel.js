@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This part of the stations' panel is for trying places: stations that are moved, added and set in this page alone, what
-// they see together, and the best next place. It takes the place of the list of stations while it is open.
+// This part of the stations' panel is for trying places. It has stations that are moved, added and set in this page alone,
+// what they see together, and the best next place. It takes the place of the list of stations while it is open.
 
 import {bodyOf, grouped, kept, make, percent, say} from './page.js';
 import {why} from './session.js';

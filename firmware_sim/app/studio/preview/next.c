@@ -12,7 +12,7 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
 
-/* Places of the grid, about; the ray step they are compared by; how many of the best are scanned. */
+/* The grid has about so many places. They are compared by rays so far apart, and SCANS of the best are scanned. */
 static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
 enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };
 
@@ -56,7 +56,7 @@ static void keep_seen(struct coverage *coverage, const struct preview_seen *seen
     }
 }
 
-/* Places to stand on, and what they are compared by. */
+/* This has the places to stand on, and the rays that they are compared by. */
 struct stand {
     struct preview_site *of;
     struct coverage_next_options options;

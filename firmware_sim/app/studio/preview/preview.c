@@ -3,7 +3,8 @@
  *
  *     free --asked--> waiting --taken--> working --> done --asked--> its body, again and again
  *
- * A request is known by its text. The newest one is worked on first: while a station is dragged, older ones are about
+ * A request is known by its text. One for a place stops the search for a next station, which takes longer and then
+ * begins again, so that a dragged station does not wait for it. The newest one is worked on first: while a station is dragged, older ones are about
  * places that it has left. One that nobody asked for lately gives its slot away, and so do the oldest answers. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
@@ -40,9 +41,9 @@ struct preview {
     struct preview_options options;
     struct sites sites;
     struct preview_work work;
-    struct coverage *blind; /* of a scene that has no coverage */
-    struct sh_err why;      /* there is none of these either */
-    atomic_int ending;
+    struct coverage *blind;                       /* of a scene that has no coverage */
+    struct sh_err why;                            /* there is none of these either */
+    atomic_int ending, is_search, is_place_asked; /* of the work at hand; since it began */
     pthread_t thread;
     int running;
     pthread_mutex_t lock;
@@ -101,10 +102,12 @@ static struct job *newest_waiting(struct preview *p)
 
 /* ---- the work */
 
-static int is_ending(void *ctx)
+static int must_stop(void *ctx)
 {
     const struct preview *p = ctx;
-    return atomic_load_explicit(&p->ending, memory_order_relaxed);
+    return atomic_load_explicit(&p->ending, memory_order_relaxed) ||
+           (atomic_load_explicit(&p->is_search, memory_order_relaxed) &&
+            atomic_load_explicit(&p->is_place_asked, memory_order_relaxed));
 }
 
 /* Copies what a preview saw out of its answer. The lock is held. */
@@ -126,7 +129,7 @@ static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *se
     return sh_fail(err, SH_EINPUT, "preview %u is kept no more; ask for its place again", number);
 }
 
-/* What follows from what previews saw. */
+/* Answers from the cells of earlier previews. */
 static int suggest(struct preview *p, const struct preview_request *request, struct web_body *out, struct sh_err *err)
 {
     struct preview_seen seen[PREVIEW_MOST_OF] = {{.cells = NULL}};
@@ -159,6 +162,8 @@ static void preview_do(struct preview *p, struct job *job)
     struct web_body body = {NULL, NULL, 0};
     struct sh_err err = {0, ""};
     job->state = JOB_WORKING;
+    atomic_store(&p->is_place_asked, 0);
+    atomic_store(&p->is_search, job->request.kind == PREVIEW_NEXT || job->request.kind == PREVIEW_REACH);
     pthread_mutex_unlock(&p->lock);
     const int rc = work_on(p, &job->request, job->number, &body, &err);
     pthread_mutex_lock(&p->lock);
@@ -166,7 +171,8 @@ static void preview_do(struct preview *p, struct job *job)
         free(body.bytes);
         body = (struct web_body){NULL, NULL, 0};
     }
-    job->state = JOB_DONE;
+    job->state = rc == SH_ESTOPPED ? JOB_WAITING : JOB_DONE;
+    if (job->state == JOB_WAITING) return;
     job->rc = rc;
     job->err = err;
     job->body = body;
@@ -222,6 +228,7 @@ static int add_job(struct preview *p, char *text, const struct preview_request *
         return sh_fail(err, SH_ESTATE,
                        job == NULL ? "too many previews wait already; ask again" : "no thread for previews");
     }
+    if (request->kind == PREVIEW_PLACE) atomic_store(&p->is_place_asked, 1);
     *job = (struct job){.state = JOB_WAITING, .text = text, .request = *request, .number = ++p->numbers};
     pthread_cond_signal(&p->wake);
     return SH_OK;
@@ -271,6 +278,8 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
     p->options = *options;
     atomic_init(&p->ending, 0);
+    atomic_init(&p->is_search, 0);
+    atomic_init(&p->is_place_asked, 0);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->wake, NULL);
     if (options->report != NULL) quiet = *options->report;
@@ -279,7 +288,7 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     p->work = (struct preview_work){.options = &p->options,
                                     .coverage = options->coverage,
                                     .sites = &p->sites,
-                                    .stop = {.ctx = p, .stop = is_ending}};
+                                    .stop = {.ctx = p, .stop = must_stop}};
     if (rc == SH_OK) return SH_OK;
     if (rc == SH_EINPUT) {
         sh_warn(options->report, "the page previews the scanner of this run alone: %s", why.text);
