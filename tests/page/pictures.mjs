@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // make page-pictures: this makes pictures of the page in three widths and both themes, for people to look at. They show a
-// scan in progress, that scan when it is done, and its recording.
+// scan in progress, that scan when it is done, stations that are tried, and its recording.
 //   node tests/page/pictures.mjs [--out FOLDER] [--only WORD] [--best FILE]
 // --best makes only the picture of the first page: config/demo.yaml from its three stations, 1280 x 900.
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
@@ -55,8 +55,15 @@ await grant(3);
 if (values.best === undefined) await shots('progress');
 await grant(4);
 await page.until('scanhead.head.state === "idle"');
-if (values.best === undefined) await shots('done');
-else {
+if (values.best === undefined) {
+  await shots('done');
+  await page.press('#try');
+  await page.until('scanhead.trial.reach && !scanhead.trial.isBusy');
+  await page.click('#trial-suggest');
+  await page.until('scanhead.trial.next');
+  await shots('trial');
+  await page.press('#trial-end');
+} else {
   for (const station of [2, 3]) {
     await page.eval(`scanhead.head.command('HEAD:STATION ${station}')`);
     await page.click('#start');

@@ -22,7 +22,8 @@ struct room {
     struct preview *preview;
 };
 
-/* A closed body in the right leg, no wall of which goes through a place of the grid, from the ground to 0.1 m below the ceiling, wide enough to stand in. */
+/* A closed body in the right leg, from the ground to 0.1 m below the ceiling, wide enough to stand in. None of its walls
+ * goes through a place of the grid. */
 static const char BODY[] = "o body\nv 3.1 0.2 0.01\nv 5.1 0.2 0.01\nv 5.1 1.8 0.01\nv 3.1 1.8 0.01\n"
                            "v 3.1 0.2 2.3\nv 5.1 0.2 2.3\nv 5.1 1.8 2.3\nv 3.1 1.8 2.3\n"
                            "f 13 16 15 14\nf 17 18 19 20\nf 13 14 18 17\nf 14 15 19 18\nf 15 16 20 19\nf 16 13 17 20\n";
@@ -222,6 +223,27 @@ static void test_reach(void **state)
     close_room(&r);
 }
 
+/* Places that are asked for while a search is on are answered, and so is the search in the end. */
+static void test_search_gives_way(void **state)
+{
+    (void)state;
+    struct room r = open_room("");
+    struct web_body body, reach;
+    char query[96];
+    assert_int_equal(preview_get(r.preview, "/reach", "station=1&height_m=1.2", &body, &err), SH_OK);
+    for (int i = 0; i < 20; i++) {
+        free(body.bytes);
+        snprintf(query, sizeof query, "station=1&x_m=%g&y_m=1&z_m=1.2&heading_deg=0", 1.0 + 0.1 * i);
+        body = need(&r, "/preview", query);
+        assert_int_equal(points_of(&body), 50 * 180);
+    }
+    free(body.bytes);
+    reach = need(&r, "/reach", "station=1&height_m=1.2");
+    assert_true(le_get32(reach.bytes + 12) > 50);
+    free(reach.bytes);
+    close_room(&r);
+}
+
 /* The bottom of a closed body lies on the ground: only who stands within the body sees it, and nobody does. */
 static void test_bodies(void **state)
 {
@@ -319,6 +341,25 @@ static void test_scanners(void **state)
     close_room(&r);
 }
 
+/* A scene without a coverage has points, and no cells. */
+static void test_without_cells(void **state)
+{
+    (void)state;
+    struct room r = open_room("");
+    const struct preview_options options = {.cfg = cfg, .site = r.site};
+    struct web_body body;
+    preview_free(r.preview);
+    if (preview_create(&options, &r.preview, &err) != SH_OK) fail_msg("%s", err.text);
+    struct web_body b = need(&r, "/preview", "station=1&x_m=4.25&y_m=0.75&z_m=1.5&heading_deg=33&step_deg=2");
+    assert_int_equal(le_get32(b.bytes + 12), 0);
+    assert_int_equal(points_of(&b), 50 * 180);
+    free(b.bytes);
+    assert_int_equal(ask(&r, "/cells", "", &body), SH_ESTATE);
+    assert_non_null(strstr(err.text, "too many triangles"));
+    assert_int_equal(ask(&r, "/next", "station=1", &body), SH_ESTATE);
+    close_room(&r);
+}
+
 static void test_refusals(void **state)
 {
     (void)state;
@@ -350,9 +391,10 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points), cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_next),   cmocka_unit_test(test_reach),    cmocka_unit_test(test_bodies),
-        cmocka_unit_test(test_tripod), cmocka_unit_test(test_scanners), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),        cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_next),          cmocka_unit_test(test_reach),    cmocka_unit_test(test_search_gives_way),
+        cmocka_unit_test(test_bodies),        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners),
+        cmocka_unit_test(test_without_cells), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

@@ -128,7 +128,7 @@ function startHead(cloud, view, names, keepsPast) {
     bar.name(info);
     session.paced(info.pace);
     if (view) view.stations.fields = info.fields ?? [];
-    stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true)).catch(() => {}); // it is gone again
+    stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // it is gone again
     showPlan();
     display.setScene(await fetchScene());
   };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// A trial: stations that stand, in this page alone, where its user wants to try them. Each has the points of a coarse
+// A trial has stations that stand, in this page alone, where its user wants to try them. Each has the points of a coarse
 // scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a trial
 // needs no control.
 
@@ -9,6 +9,7 @@ import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} f
 // grazing surfaces need.
 const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station rests so long before the finer ones
+const COVER_MS = 500; // while a station is dragged, its cells come so far apart
 const MOST_OF = 16; // stations that a suggestion may be about
 
 // These are settings of a station that a preview takes; null: as at power-up.
@@ -23,10 +24,12 @@ const turned = (deg) => ((deg + 180) % 360 + 360) % 360 - 180;
 export class Trial extends EventTarget {
   stations = [];
   cells = null; // null: not there yet, or there are none
+  isBlind = false; // there are none, since the scene has too many triangles: points are all that is shown
   reach = null; // the cells that can be seen from anywhere; null: not known yet
   sum = null;   // it has counts, none_m2, one_m2, several_m2, hidden_m2 of all stations
   step_deg; // of stations without a step of their own
-  error = '';
+  error = ''; // it says why there are no cells
+  nextError = ''; // it says why there is no suggestion
   next = null;  // the suggestion: {x_m, y_m, z_m, heading_deg, gain_m2, none_m2}
   #cloud;
   #scans = 0;
@@ -43,7 +46,7 @@ export class Trial extends EventTarget {
   }
 
   #put(station) {
-    Object.assign(station, {served: true, seen: null, answer: 0, wanted: 0, shown: 0, isBusy: false, points: 0, error: '',
+    Object.assign(station, {served: true, seen: null, answer: 0, covered_ms: -Infinity, wanted: 0, shown: 0, isBusy: false, points: 0, error: '',
       ...Object.fromEntries(SETTINGS.map((key) => [key, station[key] ?? null]))});
     this.stations.push(station);
     this.renew(station);
@@ -54,6 +57,7 @@ export class Trial extends EventTarget {
     try {
       this.cells = parseCells(await ask('/cells'));
     } catch (error) {
+      this.isBlind = true;
       this.error = error.message;
     }
     this.#count();
@@ -131,13 +135,16 @@ export class Trial extends EventTarget {
       return;
     }
     for (const step_deg of COVER_STEPS_DEG) {
-      if (step_deg !== COVER_STEPS_DEG[0]) await new Promise((done) => setTimeout(done, REST_MS));
-      if (of !== station.wanted || !this.#has(station)) return;
+      const isFirst = step_deg === COVER_STEPS_DEG[0];
+      if (this.isBlind) return;
+      if (!isFirst) await new Promise((done) => setTimeout(done, REST_MS));
+      const isDue = isFirst && performance.now() - station.covered_ms > COVER_MS;
+      if ((of !== station.wanted && !isDue) || !this.#has(station)) return;
       try {
         const {seen, number, hits, front} = await this.#ask(station, {step_deg, points: 0});
-        Object.assign(station, {seen, answer: number, hits, front, error: ''});
+        Object.assign(station, {seen, answer: number, hits, front, error: '', covered_ms: performance.now()});
       } catch (error) {
-        if (step_deg === COVER_STEPS_DEG[0]) station.error = error.message;
+        if (isFirst) station.error = error.message;
         return; // so fine a scan may have more pulses than the head computes for a page
       }
       if (this.#has(station)) this.#count();
@@ -179,7 +186,7 @@ export class Trial extends EventTarget {
     return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer]))});
   }
 
-  // Whether the stations see the backs of most faces, so that these are turned the other way than they are looked at.
+  // Is true where the stations see the backs of most faces: these then look the other way.
   get seesBacks() {
     const all = this.stations.filter((s) => s.seen);
     return all.length > 0 && 2 * all.reduce((sum, s) => sum + s.front, 0) < all.reduce((sum, s) => sum + s.hits, 0);
@@ -193,10 +200,10 @@ export class Trial extends EventTarget {
       const found = JSON.parse(new TextDecoder().decode(await ask(this.#about('next'))));
       if (!this.#on || before !== this.#stamp()) return; // something has moved meanwhile
       this.next = found.place ? {...found.place, pitch_deg: 0, roll_deg: 0, gain_m2: found.gain_m2, none_m2: found.none_m2} : null;
-      this.error = found.place ? '' : 'No place would add anything.';
+      this.nextError = found.place ? '' : 'No place would add anything.';
     } catch (error) {
       if (error.status === 400 && all.length > 0 && before === this.#stamp()) all.forEach((s) => this.renew(s)); // kept no more
-      else this.error = error.message;
+      else this.nextError = error.message;
     }
     this.#tell('change');
   }

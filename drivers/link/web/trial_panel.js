@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This part of the stations' panel is for trying places: stations that are moved, added and set in this page alone, what
-// they see together, and the best next place. It takes the place of the list of stations while it is open.
+// This part of the stations' panel is for trying places. It has stations that are moved, added and set in this page alone,
+// what they see together, and the best next place. It takes the place of the list of stations while it is open.
 
 import {bodyOf, grouped, kept, make, percent, say} from './page.js';
 import {why} from './session.js';
@@ -18,7 +18,7 @@ const PLACE = [['x_m', 'East x, m'], ['y_m', 'North y, m'], ['z_m', 'Height z, m
   ['pitch_deg', 'Pitch, °'], ['roll_deg', 'Roll, °']];
 const NAMES = {step_deg: 'Step, °', far_m: 'Farthest, m', line0_deg: 'Line from, °', line1_deg: 'Line to, °',
   pan0_deg: 'Pan from, °', pan1_deg: 'Pan to, °'};
-const GHOST = 'next'; // the number of the suggested station in the picture
+const GHOST = 0; // the number of the suggested station in the picture; others begin at 1
 const SUGGEST_MS = 250; // a suggestion waits so long for another change
 
 const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
@@ -41,6 +41,7 @@ export class TrialPanel {
     title: 'Moves stations in this page alone, and shows at once what they see'}, 'Try places');
   #items = new Map(); // it maps a number to {item, fields, place, says, head}
   #timer = 0;
+  #run = '';
   #targets;
   #colours = tableOf('station');
 
@@ -55,8 +56,10 @@ export class TrialPanel {
     session.addEventListener('change', () => this.#trial && this.#allow());
   }
 
-  // A head that has no previews offers no trial.
-  offer(hasPreviews) {
+  // A head that has no previews offers no trial. Another run of it may have another scene, so that a trial ends.
+  offer(hasPreviews, run) {
+    if (this.#trial && run !== this.#run) this.end();
+    this.#run = run;
     this.#open.hidden = !hasPreviews || this.#view === null || this.#trial !== null;
   }
 
@@ -213,8 +216,11 @@ export class TrialPanel {
     const text = input.value.trim().replace('−', '-');
     const value = text === '' && SETTINGS.includes(key) ? null : Number(text);
     const isNumber = value === null || (text !== '' && Number.isFinite(value));
-    input.toggleAttribute('aria-invalid', !isNumber);
-    if (isNumber) this.#trial.change(number, {[key]: value});
+    if (isNumber) input.removeAttribute('aria-invalid');
+    else input.setAttribute('aria-invalid', 'true');
+    if (isNumber) return this.#trial.change(number, {[key]: value});
+    this.#trial.get(number).error = `${input.value} is no number.`;
+    return this.#fill(this.#trial.get(number));
   }
 
   #back(number) {
@@ -224,11 +230,11 @@ export class TrialPanel {
   }
 
   #sums() {
-    const {sum, cells, stations, reach} = this.#trial;
-    const parts = this.#shares(), of = `${stations.length} ${stations.length === 1 ? 'station' : 'stations'}`;
+    const {sum, cells, reach} = this.#trial;
+    const parts = this.#shares();
     this.shares.forEach((dd, i) => say(dd, percent(parts[i])));
     this.covered.style.width = sum ? `${(100 * (1 - parts[0])).toFixed(2)}%` : '0';
-    say(this.coverage, sum ? `${of}: ${percent(1 - parts[0])} of ${grouped(this.#all())}\u00a0m²${reach ? ' that can be seen' : ''}`
+    say(this.coverage, sum ? `${percent(1 - parts[0])} of ${grouped(this.#all())}\u00a0m² ${reach ? 'that can be seen' : 'of all surfaces'}`
       : this.#trial.error || (cells ? '' : 'The surface is being cut into cells.'));
     this.coverage.title = reach ? `Seen from anywhere that a tripod can stand, or by a station; ${grouped(sum.hidden_m2)} m² more can't be seen`
       : 'All surfaces, also those within walls';
@@ -257,20 +263,22 @@ export class TrialPanel {
   }
 
   #allow() {
-    const {next, stations, error, sum} = this.#trial;
+    const {next, stations, nextError, sum} = this.#trial;
     const moved = stations.filter((s) => !s.isAdded && PLACE.some(([key]) => Math.abs(s[key] - s.was[key]) > 1e-9));
     const not = this.#session.whyNot('idle');
     this.apply.disabled = not !== '' || moved.length === 0;
     this.apply.title = not || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
     this.take.disabled = !next;
+    for (const field of [this.paint, this.suggests]) field.disabled = this.#trial.isBlind;
     say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
-      : this.suggests.checked ? error || 'Looking for it.' : 'It can be clicked in the picture.');
+      : this.suggests.checked ? nextError || 'Looking for it.' : 'It can be clicked in the picture.');
   }
 
   // ---- what is done
 
   #suggestSoon() {
     clearTimeout(this.#timer);
+    this.#trial.nextError = '';
     if (!this.suggests.checked) {
       this.#trial.next = null;
       return this.#show();

@@ -149,8 +149,8 @@ export class View extends EventTarget {
   // Shows the points of another cloud from now on. The one before keeps its own.
   useCloud(cloud) {
     this.cloud.changed = null;
-    this.cloud = this.#points.cloud = this.#scale.cloud = cloud;
-    this.#scale.forget();
+    this.cloud = this.#points.cloud = cloud;
+    this.#scale.use(cloud);
     cloud.changed = () => this.#schedule();
     this.#ask('restart');
   }

@@ -12,13 +12,18 @@ export class Scale {
   scale = 'usual'; // of SCALES in view_ramps.js
   share = 0.01; // the limits leave out this share of the points at each end
   limits = null; // heights are relative to the cloud's origin
-  cloud;
+  #cloud;
   #fixed = null; // the user set these, in the scene frame
   #at = 0; // it is the total when they were found
   #sample = [];
   #legend = null;
 
-  constructor(cloud) { this.cloud = cloud; }
+  constructor(cloud) { this.#cloud = cloud; }
+
+  use(cloud) {
+    this.#cloud = cloud;
+    this.forget();
+  }
 
   forget() {
     this.limits = this.#legend = null;
@@ -48,27 +53,27 @@ export class Scale {
 
   // The age of the oldest point before the newest one, where the mode shows ages.
   get #oldest() {
-    const {blocks, latest_s} = this.cloud;
+    const {blocks, latest_s} = this.#cloud;
     return this.mode === 'age' && blocks.length > 0 ? latest_s - Math.min(...blocks.map(({began_s, span}) => began_s + span.from)) : NaN;
   }
 
-  get #offset() { return this.mode === 'height' && this.cloud.origin ? this.cloud.origin[2] : 0; }
+  get #offset() { return this.mode === 'height' && this.#cloud.origin ? this.#cloud.origin[2] : 0; }
 
   legend() {
     this.#legend ??= legendOf(this.mode, {limits: this.limits, offset: this.#offset, sample: this.#sample, scale: this.scale, oldest_s: this.#oldest,
-      hasColours: this.cloud.blocks.some((block) => block.rgb !== null)});
+      hasColours: this.#cloud.blocks.some((block) => block.rgb !== null)});
     return this.#legend;
   }
 
   // Returns {first, changed}: there are limits for the first time, or other ones than before.
   follow() {
-    const {total, blocks} = this.cloud;
+    const {total, blocks} = this.#cloud;
     const due = total > this.#at && (total >= 2 * this.#at || (this.mode === 'age' && total > AGED * this.#at));
     if (!due) return {first: false, changed: false};
     const before = this.limits;
     this.#at = total;
     this.#legend = null;
-    this.#sample = sampleOf(this.cloud, this.mode);
+    this.#sample = sampleOf(this.#cloud, this.mode);
     if (MODES[this.mode].kind !== 'ramp') return {first: false, changed: false};
     if (this.mode === 'age') this.limits = [blocks[0]?.first ?? total, total];
     else this.limits = this.#fixed?.map((v) => v - this.#offset) ?? widened(before, robustLimits(this.#sample, MODES[this.mode].least, this.share));

@@ -31,7 +31,7 @@ export class Solids {
 
   get isPainted() { return this.#painted !== null; }
 
-  // See View. The same cells again take no time.
+  // View says what it takes. The same cells again keep their buffers.
   paint(cells, seen) {
     if (this.cellsPart && this.#painted?.cells !== cells) {
       this.cellsPart.free();

@@ -33,15 +33,16 @@ struct preview_request {
 int preview_read_request(const struct preview_options *options, const char *path, const char *query,
                          struct preview_request *out, struct sh_err *err);
 
-/* What an answered preview saw. */
+/* The cells and hits of a preview that was answered. */
 struct preview_seen {
     uint64_t *cells; /* [preview_words] */
     uint64_t hits, front;
 };
 
-/* The work; the preview's own thread alone. */
+/* The preview's own thread alone uses this. */
 struct preview_work {
     const struct preview_options *options;
+    struct coverage *coverage; /* without cells where the options have none */
     const struct sites *sites; /* a scanner that could not be set up has no site */
     struct sh_report stop;     /* of long work */
 };
@@ -50,7 +51,7 @@ static inline size_t preview_words(const struct coverage *coverage)
     return ((size_t)coverage_cells(coverage) + 63) / 64;
 }
 
-/* A site with the scanner's settings as a request has them, and room for a place; it shares all else. Large. */
+/* This site has the scanner's settings as a request says, and room for a place; it shares all else. It is large. */
 struct preview_site {
     struct site site;
     struct config cfg;
@@ -58,7 +59,7 @@ struct preview_site {
 int preview_site_open(const struct preview_work *work, const struct preview_request *request, struct preview_site **out,
                       struct sh_err *err);
 
-/* Bodies; README.md has their formats. number: the preview's. */
+/* These make bodies, whose formats README.md has. number: the preview's. */
 int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
                  struct web_body *out, struct sh_err *err);
 /* The cells of such a body, which stay there, and its hits. */

@@ -12,7 +12,7 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
 
-/* Places of the grid, about; the ray step they are compared by; how many of the best are scanned. */
+/* The grid has about so many places. They are compared by rays so far apart, and SCANS of the best are scanned. */
 static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
 enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };
 
@@ -56,7 +56,7 @@ static void keep_seen(struct coverage *coverage, const struct preview_seen *seen
     }
 }
 
-/* Places to stand on, and what they are compared by. */
+/* This has the places to stand on, and the rays that they are compared by. */
 struct stand {
     struct preview_site *of;
     struct coverage_next_options options;
@@ -70,6 +70,8 @@ static int stand_open(const struct preview_work *work, const struct preview_requ
 {
     *s = (struct stand){.options = {.stations = 1, .height_m = r->height_m, .step_deg = RAYS_DEG, .scans = SCANS},
                         .result = {.base = r->station, .cell_m = work->options->cell_m}};
+    if (coverage_cells(work->coverage) == 0)
+        return sh_fail(err, SH_ESTATE, "the scene has too many triangles for coverage, so no place can be suggested");
     int rc = preview_site_open(work, r, &s->of, err);
     if (rc != SH_OK) return rc;
     for (int i = 0; i < 3; i++)
@@ -78,13 +80,13 @@ static int stand_open(const struct preview_work *work, const struct preview_requ
     s->result.site = &s->of->site;
     s->result.station = calloc(s->of->site.n_stations, sizeof *s->result.station);
     if (s->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
-    keep_seen(work->options->coverage, seen, r->n_of, &s->result.station[0].pulses);
+    keep_seen(work->coverage, seen, r->n_of, &s->result.station[0].pulses);
     return coverage_next_open(&s->options, &s->result, &work->stop, &s->next, &s->finder, err);
 }
 
 static void stand_close(const struct preview_work *work, struct stand *s)
 {
-    coverage_forget(work->options->coverage);
+    coverage_forget(work->coverage);
     coverage_next_free(&s->next, &s->finder);
     free(s->result.station);
     free(s->of);
@@ -95,7 +97,7 @@ int preview_next(const struct preview_work *work, const struct preview_request *
 {
     struct stand s;
     int rc = stand_open(work, r, seen, &s, err);
-    if (rc == SH_OK) rc = coverage_next_find(&s.finder, work->options->coverage, err);
+    if (rc == SH_OK) rc = coverage_next_find(&s.finder, work->coverage, err);
     if (rc == SH_OK) rc = page_json(put_next, &s.next, out, err);
     stand_close(work, &s);
     return rc;
@@ -107,7 +109,7 @@ int preview_next(const struct preview_work *work, const struct preview_request *
  * Returns the places that count, or an error. */
 static int mark_reach(const struct preview_work *work, const struct stand *s, uint64_t *reach, struct sh_err *err)
 {
-    const struct coverage *coverage = work->options->coverage;
+    const struct coverage *coverage = work->coverage;
     const struct coverage_finder *f = &s->finder;
     const struct config_profile *profile = site_profile(f->site);
     const struct coverage_pulses *sum = &s->result.station[0].pulses;
@@ -135,7 +137,7 @@ int preview_reach(const struct preview_work *work, const struct preview_request 
                   struct web_body *out, struct sh_err *err)
 {
     struct stand s;
-    const size_t words = preview_words(work->options->coverage);
+    const size_t words = preview_words(work->coverage);
     uint64_t *reach = calloc(words + 1, sizeof *reach);
     int n = stand_open(work, r, seen, &s, err);
     if (n == SH_OK)
@@ -147,7 +149,7 @@ int preview_reach(const struct preview_work *work, const struct preview_request 
     if (out->bytes != NULL) {
         memcpy(out->bytes, "SHRE", 4);
         le_put32(out->bytes + 4, REACH_VERSION);
-        le_put32(out->bytes + 8, coverage_cells(work->options->coverage));
+        le_put32(out->bytes + 8, coverage_cells(work->coverage));
         le_put32(out->bytes + 12, (uint32_t)n);
         for (size_t k = 0; k < words; k++)
             le_put64(out->bytes + REACH_HEAD_BYTES + 8 * k, reach[k]);

@@ -23,7 +23,7 @@ static int64_t udeg_or(double deg, int64_t otherwise_udeg)
     return isinf(deg) ? otherwise_udeg : llround(1e6 * deg);
 }
 
-/* A window of the lines or of the pan; only a line head's can be cut without another plan. */
+/* Sets windows of the lines and of the pan. Only a line head's can be cut without another plan. */
 static int set_windows(const struct preview_request *r, const struct config_profile *p, struct head_settings *s,
                        struct sh_err *err)
 {
@@ -51,7 +51,7 @@ static int set_windows(const struct preview_request *r, const struct config_prof
                    1e-6 * (double)p->pan_max_udeg);
 }
 
-/* The rates that give a step (command/step.c has the formulas). A head with a fixed pattern keeps it. */
+/* Sets the rates that give a step (command/step.c has the formulas). A head with a fixed pattern keeps it. */
 static void set_step(const struct site *site, double step_deg, struct head_settings *s)
 {
     struct schedule_spec spec;
@@ -93,7 +93,7 @@ int preview_site_open(const struct preview_work *work, const struct preview_requ
 
 /* ---- the scan */
 
-/* Points as they come. */
+/* The points are kept as they come. */
 struct points {
     const struct site *site;
     double origin_m[3];
@@ -134,7 +134,7 @@ static int check_pulses(const struct schedule_segment *seg, double step_deg, str
                    step_deg, (unsigned long long)n, PREVIEW_MOST_PULSES);
 }
 
-/* Where the station would stand, as if its keys said so. */
+/* Places the station as if its keys said so. */
 static int place_station(struct preview_site *p, const struct preview_request *r, struct coverage_scan_at *at,
                          struct site_tripod *tripod, struct sh_err *err)
 {
@@ -165,7 +165,8 @@ static void put_floats(char **to, const float *v, size_t n)
         le_put_float(*to, v[i]);
 }
 
-/* Height above the ground, what a cone hides there, and how far the feet reach: NaN and 0 without a tripod. */
+/* Writes the height above the ground, the radius that a cone hides there, and how far the feet reach. Without a tripod
+ * they are NaN and 0. */
 static void put_tripod(char *to, const struct site_tripod *t)
 {
     const int stands = t->from != NULL, hides = stands && t->cast.cos_opening < 1.0 && !isnan(t->head_m);
@@ -178,7 +179,7 @@ static void put_tripod(char *to, const struct site_tripod *t)
 static int put_place(const struct preview_work *work, uint32_t number, const struct points *points,
                      const struct coverage_pulses *pulses, struct web_body *out)
 {
-    struct coverage *coverage = work->options->coverage;
+    struct coverage *coverage = work->coverage;
     const size_t words = preview_words(coverage);
     uint64_t *cells = malloc((words + 1) * sizeof *cells);
     *out = (struct web_body){"application/octet-stream", NULL,
@@ -229,12 +230,12 @@ int preview_look(const struct preview_work *work, const struct preview_request *
         memcpy(points.origin_m, at->scan.setup.station_m, sizeof points.origin_m);
         at->scan.take = take_hits;
         at->scan.take_ctx = &points;
-        rc = coverage_look(work->options->coverage, &at->scan, "preview", &work->stop, &pulses, err);
+        rc = coverage_look(work->coverage, &at->scan, "preview", &work->stop, &pulses, err);
     }
     if (rc == SH_OK && (points.failed || put_place(work, number, &points, &pulses, out) != SH_OK))
         rc = sh_fail(err, SH_ENOMEM, "no memory for the points of a preview");
     if (rc == SH_OK) put_tripod(out->bytes + 56, &tripod);
-    coverage_drop(work->options->coverage);
+    coverage_drop(work->coverage);
     site_free_tripod(&tripod);
     free(points.xyz_m);
     free(points.range_m);

@@ -3,7 +3,8 @@
  *
  *     free --asked--> waiting --taken--> working --> done --asked--> its body, again and again
  *
- * A request is known by its text. The newest one is worked on first: while a station is dragged, older ones are about
+ * A request is known by its text. One for a place stops the search for a next station, which takes longer and then
+ * begins again, so that a dragged station does not wait for it. The newest one is worked on first: while a station is dragged, older ones are about
  * places that it has left. One that nobody asked for lately gives its slot away, and so do the oldest answers. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
@@ -20,6 +21,7 @@
 #include "firmware_sim/base/clock.h"
 
 enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20 };
+static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
@@ -39,7 +41,9 @@ struct preview {
     struct preview_options options;
     struct sites sites;
     struct preview_work work;
-    atomic_int ending;
+    struct coverage *blind;                       /* of a scene that has no coverage */
+    struct sh_err why;                            /* there is none of these either */
+    atomic_int ending, is_search, is_place_asked; /* of the work at hand; since it began */
     pthread_t thread;
     int running;
     pthread_mutex_t lock;
@@ -98,16 +102,18 @@ static struct job *newest_waiting(struct preview *p)
 
 /* ---- the work */
 
-static int is_ending(void *ctx)
+static int must_stop(void *ctx)
 {
     const struct preview *p = ctx;
-    return atomic_load_explicit(&p->ending, memory_order_relaxed);
+    return atomic_load_explicit(&p->ending, memory_order_relaxed) ||
+           (atomic_load_explicit(&p->is_search, memory_order_relaxed) &&
+            atomic_load_explicit(&p->is_place_asked, memory_order_relaxed));
 }
 
 /* Copies what a preview saw out of its answer. The lock is held. */
 static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *seen, struct sh_err *err)
 {
-    const size_t words = preview_words(p->options.coverage);
+    const size_t words = preview_words(p->work.coverage);
     seen->cells = malloc((words + 1) * sizeof *seen->cells);
     if (seen->cells == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a suggestion");
     for (int i = 0; i < JOBS; i++) {
@@ -123,7 +129,7 @@ static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *se
     return sh_fail(err, SH_EINPUT, "preview %u is kept no more; ask for its place again", number);
 }
 
-/* What follows from what previews saw. */
+/* Answers from the cells of earlier previews. */
 static int suggest(struct preview *p, const struct preview_request *request, struct web_body *out, struct sh_err *err)
 {
     struct preview_seen seen[PREVIEW_MOST_OF] = {{.cells = NULL}};
@@ -144,6 +150,7 @@ static int suggest(struct preview *p, const struct preview_request *request, str
 static int work_on(struct preview *p, const struct preview_request *request, uint32_t number, struct web_body *out,
                    struct sh_err *err)
 {
+    if (p->work.coverage == NULL) return sh_fail(err, p->why.code, "%s", p->why.text);
     if (request->kind == PREVIEW_NEXT || request->kind == PREVIEW_REACH) return suggest(p, request, out, err);
     if (request->kind == PREVIEW_CELLS) return preview_cells(&p->work, out, err);
     return preview_look(&p->work, request, number, out, err);
@@ -155,6 +162,8 @@ static void preview_do(struct preview *p, struct job *job)
     struct web_body body = {NULL, NULL, 0};
     struct sh_err err = {0, ""};
     job->state = JOB_WORKING;
+    atomic_store(&p->is_place_asked, 0);
+    atomic_store(&p->is_search, job->request.kind == PREVIEW_NEXT || job->request.kind == PREVIEW_REACH);
     pthread_mutex_unlock(&p->lock);
     const int rc = work_on(p, &job->request, job->number, &body, &err);
     pthread_mutex_lock(&p->lock);
@@ -162,7 +171,8 @@ static void preview_do(struct preview *p, struct job *job)
         free(body.bytes);
         body = (struct web_body){NULL, NULL, 0};
     }
-    job->state = JOB_DONE;
+    job->state = rc == SH_ESTOPPED ? JOB_WAITING : JOB_DONE;
+    if (job->state == JOB_WAITING) return;
     job->rc = rc;
     job->err = err;
     job->body = body;
@@ -174,10 +184,24 @@ static void preview_do(struct preview *p, struct job *job)
     }
 }
 
+/* A coverage of surfaces that all give no cells: 4 bytes a triangle. */
+static int make_blind(struct preview *p, struct sh_err *err)
+{
+    uint8_t *silent = malloc(SCENE_MAX_SURFACES + 1);
+    if (silent == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
+    memset(silent, 1, SCENE_MAX_SURFACES + 1);
+    const struct coverage_spec spec = {
+        .bvh = p->options.site->bvh, .silent = silent, .cell_m = BLIND_CELL_M, .memory_mib = BLIND_MIB, .threads = 1};
+    const int rc = coverage_create(&spec, &p->work.stop, &p->blind, err);
+    free(silent);
+    return rc;
+}
+
 static void *preview_run(void *ctx)
 {
     struct preview *p = ctx;
     setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    if (p->work.coverage == NULL && make_blind(p, &p->why) == SH_OK) p->work.coverage = p->blind;
     pthread_mutex_lock(&p->lock);
     while (!atomic_load(&p->ending)) {
         struct job *job = newest_waiting(p);
@@ -204,6 +228,7 @@ static int add_job(struct preview *p, char *text, const struct preview_request *
         return sh_fail(err, SH_ESTATE,
                        job == NULL ? "too many previews wait already; ask again" : "no thread for previews");
     }
+    if (request->kind == PREVIEW_PLACE) atomic_store(&p->is_place_asked, 1);
     *job = (struct job){.state = JOB_WAITING, .text = text, .request = *request, .number = ++p->numbers};
     pthread_cond_signal(&p->wake);
     return SH_OK;
@@ -253,12 +278,17 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
     p->options = *options;
     atomic_init(&p->ending, 0);
+    atomic_init(&p->is_search, 0);
+    atomic_init(&p->is_place_asked, 0);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->wake, NULL);
     if (options->report != NULL) quiet = *options->report;
     quiet.warn = NULL; /* of scanners that this run does not serve */
     int rc = sites_load_beside(options->cfg, options->site, &quiet, &p->sites, &why);
-    p->work = (struct preview_work){.options = &p->options, .sites = &p->sites, .stop = {.ctx = p, .stop = is_ending}};
+    p->work = (struct preview_work){.options = &p->options,
+                                    .coverage = options->coverage,
+                                    .sites = &p->sites,
+                                    .stop = {.ctx = p, .stop = must_stop}};
     if (rc == SH_OK) return SH_OK;
     if (rc == SH_EINPUT) {
         sh_warn(options->report, "the page previews the scanner of this run alone: %s", why.text);
@@ -279,6 +309,7 @@ void preview_free(struct preview *p)
     if (p->running) pthread_join(p->thread, NULL);
     for (int i = 0; i < JOBS; i++)
         forget_job(p, &p->job[i]);
+    coverage_free(p->blind);
     sites_free(&p->sites);
     pthread_cond_destroy(&p->wake);
     pthread_mutex_destroy(&p->lock);

@@ -18,7 +18,8 @@ struct preview;
 struct preview_options {
     const struct config *cfg;
     const struct site *site; /* of the head that runs, copies written out; it and cfg outlive the preview */
-    /* Of that site. Its scans and stations are the preview's; others may only ask it for cells of places. */
+    /* It is that site's. Its scans and stations are the preview's; others may only ask it for cells of places. NULL: there
+     * is none, and previews have points alone. */
     struct coverage *coverage;
     double cell_m;
     const struct sh_report *report; /* hears why a scanner of the scene can't be previewed */

@@ -63,7 +63,7 @@ static void close_watch(struct watch *w)
     free(w);
 }
 
-/* Stations that can be moved can be tried at other places, where there are cells to count. */
+/* Stations that can be moved can be tried at other places. */
 static int open_preview(struct watch *w, struct sh_err *err)
 {
     const struct preview_options options = {.cfg = w->cfg,
@@ -71,7 +71,7 @@ static int open_preview(struct watch *w, struct sh_err *err)
                                             .coverage = w->seen.coverage,
                                             .cell_m = w->seen.cell_m,
                                             .report = w->options.report};
-    if (options.coverage == NULL || site_why_fixed(w->site) != NULL) return SH_OK;
+    if (site_why_fixed(w->site) != NULL) return SH_OK;
     return preview_create(&options, &w->preview, err);
 }
 
