@@ -290,9 +290,21 @@ test('a panorama: points at their angles, the nearest of each direction, other s
   const {pixels, limits} = panorama.colours('label');
   same([pixels.length, limits], [4 * panorama.width * panorama.height, null], 'colours of labels');
   near(panorama.colours('range').limits[0], 7, 0.2, 'limits of the range');
+  const filled = pixels.filter((v, i) => i % 4 === 3 && v === 255).length;
+  same(filled > 0.95 * pixels.length / 4, true, `${filled} of ${pixels.length / 4} pixels have a colour`);
   same(panorama.isOld, false, 'nothing has come');
   cloud.add(batch(1, () => placeOf(toScene(STATION, 5, 0, 0)), {scan: 2}));
   same(panorama.isOld, true, 'a point has come');
+});
+
+test('pixels of a panorama are wider where lines are further apart than the points in them', () => {
+  const cloud = new Cloud();
+  const places = [];
+  for (let a = -60; a < 60; a += 3) for (let e = -30; e <= 30; e += 0.25) places.push(placeOf(toScene(STATION, 7, radians(e), radians(a))));
+  cloud.add(batch(places.length, (i) => places[i]));
+  const panorama = ended(new Panorama(cloud, STATION).make());
+  const degrees = panorama.span.map((v, k) => v * 180 / Math.PI / [panorama.width, panorama.height][k]);
+  same(degrees[0] / degrees[1] > 3.9, true, `pixels of ${degrees} degrees`); // 3 and 0.25 degrees: 12 times; the shapes are 1, 2, 4, 8
 });
 
 await runTests();

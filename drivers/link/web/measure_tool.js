@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool measures between points that are picked in the picture or the panorama. A click takes the point nearest to
 // it; with keys, Enter takes the one in the middle of the picture.
-import {grouped, make, metres, say} from './page.js';
+import {grouped, make, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
 import {runSlowly} from './view_pick.js';
 
@@ -187,7 +187,7 @@ export class MeasureTool {
     const spacing = Math.max(...m.points.map((p) => p.spacing));
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
-    if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', metres(Number(spacing.toPrecision(2))),
+    if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', millimetres(spacing),
       'The points are so far apart there: an edge may lie beyond the one that was picked']);
     return rows;
   }
@@ -239,11 +239,13 @@ export class MeasureTool {
   }
 }
 
+// Writes two figures.
+const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
+
 // Flatness is told beside what noise alone gives.
 function flatRows({flat, beyond, depth_m}) {
   const {n, rms, largest, sigma} = flat, isKnown = sigma > 0;
-  const mm = (v) => `${(1e3 * v).toPrecision(2)}\u00a0mm`.replace('-', '−');
-  const beside = (v, expected) => (isKnown ? `${mm(v)}; noise gives ${mm(expected)}` : mm(v));
+  const beside = (v, expected) => (isKnown ? `${millimetres(v)}; noise gives ${millimetres(expected)}` : millimetres(v));
   const rows = [['RMS', beside(rms, sigma)], ['Largest', beside(largest, sigma * largestOf(n)), 'More than 0 is towards the head'],
     ['Points', grouped(n)]];
   if (beyond > 0) rows.push(['Left out', `${grouped(beyond)} beyond ${depth_m}\u00a0m`, `Those up to ${4 * depth_m} m from the plane; nothing further was looked at`]);

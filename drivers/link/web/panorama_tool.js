@@ -91,20 +91,21 @@ export class PanoramaTool {
       this.#rests_until = performance.now() + 3 * (performance.now() - this.#began);
       if (panorama.n === 0) return this.#empty(station);
       this.panorama = panorama;
-      this.#size(panorama.width, panorama.height);
+      this.#size(panorama.width, panorama.height, panorama.span[0] / panorama.span[1]);
       return this.#paint();
     });
     return undefined;
   }
 
-  #size(width, height) {
+  // Pixels need not be square.
+  #size(width, height, aspect) {
     Object.assign(this.#canvas, {width, height});
-    this.#canvas.parentElement.style.setProperty('--aspect', width / height);
+    this.#canvas.parentElement.style.setProperty('--aspect', aspect);
   }
 
   #empty(station) {
     this.panorama = null;
-    this.#size(360, 90);
+    this.#size(360, 90, 4);
     this.#cross.hidden = true;
     say(this.#says, station ? 'This station has no points yet.' : 'No station has a known place.');
   }
