@@ -8,7 +8,8 @@ import {GREY, NONE, robustLimits, tableOf, valuesOf} from './view_colours.js';
 
 const TURN = 2 * Math.PI;
 const PER_PIXEL = 2.5; // points, so that few pixels have none
-const WIDEST = 2048;
+const WIDEST = 1440;
+const SAMPLED = 20_000; // pixels for the limits of the colours
 const EMPTY = 0xffffffff;
 const SHAPES = [1, 0.125, 0.25, 0.5, 2, 4, 8]; // of pixels: height over width
 const TRIED = 500_000; // points for choosing one of them
@@ -156,12 +157,13 @@ export class Panorama {
       if (from !== null) values[p] = all === null ? this.#range[from] : all[this.#block[from]][this.#point[from]];
     }
     const isList = mode === 'label';
-    const limits = isList ? null : robustLimits(values.filter((v) => v === v && v !== NONE));
+    const every = Math.ceil(n / SAMPLED);
+    const limits = isList ? null : robustLimits(values.filter((v, p) => p % every === 0 && v === v && v !== NONE));
     const table = tableOf(mode), pixels = new Uint8ClampedArray(4 * n);
     for (let p = 0; p < n; p++) {
       const v = values[p];
       if (v !== v) continue;
-      if (v === NONE) pixels.set([...GREY, 255], 4 * p);
+      if (v === NONE || (!isList && limits === null)) pixels.set([...GREY, 255], 4 * p);
       else {
         const at = isList ? v & 255 : Math.round(255 * Math.min(1, Math.max(0, (v - limits[0]) / (limits[1] - limits[0]))));
         for (let c = 0; c < 4; c++) pixels[4 * p + c] = table[4 * at + c];
