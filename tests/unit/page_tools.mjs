@@ -19,7 +19,7 @@ const ended = (steps) => {
   }
 };
 
-// Numbers of a fixed seed, uniform and normal (mulberry32; Box and Muller).
+// This gives numbers of a fixed seed, uniform and normal (mulberry32; Box and Muller).
 function randomOf(seed) {
   const uniform = () => {
     seed = (seed + 0x6d2b79f5) | 0;
@@ -150,7 +150,8 @@ const NOISE = {range_sigma_m: 0.004, range_sigma_per_m: 1e-5, range_floor_m: nul
   angle_sigma_rad: [4e-4, 7e-4], angle_step_rad: [0, 0], ball_m: 0, ball_per_m: 0, ball_factor: [1, 1, 1], ball_local: false};
 const STATION = {number: 1, x_m: 100, y_m: -50, z_m: 2, heading_deg: 40, pitch_deg: 8, roll_deg: -5};
 
-// From angles of a head to the scene, by turns one after the other: roll about forward, pitch about right, heading about up.
+// This goes from a head's angles to the scene, by one turn after the other: roll about forward, pitch about right, heading
+// about up.
 function toScene(station, range, mirror, pan) {
   let [x, y, z] = [range * Math.cos(mirror) * Math.sin(pan), range * Math.cos(mirror) * Math.cos(pan), range * Math.sin(mirror)];
   const [h, p, r] = [station.heading_deg, station.pitch_deg, station.roll_deg].map(radians);

@@ -129,7 +129,7 @@ export class Panorama {
     return Math.min(height - 1, Math.floor(y * height)) * width + Math.min(width - 1, Math.floor(x * width));
   }
 
-  // Returns the pixel that a pixel without a point takes its colour from: itself, or the one beside it where both have one.
+  // Returns the pixel whose point a pixel shows: itself, or one beside it where both sides have a point. null: none.
   #shown(pixel) {
     if (this.#block[pixel] !== EMPTY) return pixel;
     for (const step of [1, this.width]) {

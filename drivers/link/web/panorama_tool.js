@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This tool shows the panorama of a station under the picture, by range, intensity or surface. Pointing at it shows the
-// point in the picture, and back. A click turns the picture to the point; while something is measured, it picks the point.
+// point in the picture, and back. A click turns the picture to the point, or picks it while something is measured.
 import {atMostEvery, byId, make, say, short} from './page.js';
 import {MODES} from './view_colours.js';
 import {Panorama} from './panorama.js';
