@@ -44,13 +44,13 @@ export class MeasureTool {
     });
     const action = (id, name, title, click) => make('button', {type: 'button', id, title, click}, name);
     this.buttons = {
-      end: action('measure-end', 'End outline', 'Key Enter, after the last corner', () => this.#endOutline()),
+      end: action('measure-end', 'End outline', 'A click on the first corner, or Enter on the last one, does the same', () => this.#endOutline()),
       undo: action('measure-undo', 'Undo', 'Takes the last point back (key Backspace)', () => this.#undo()),
       clear: action('measure-clear', 'Clear', 'Removes all measurements', () => this.#clear()),
       csv: action('measure-csv', 'Points as CSV', 'Downloads the table of the picked points', () => download('points.csv', this.csv)),
     };
     this.depthRow = make('div', {class: 'row'}, make('label', {for: 'measure-depth'}, 'Depth to each side'), this.#depth, make('span', {class: 'unit'}, 'm'));
-    this.body = make('div', {}, make('div', {class: 'actions', role: 'group', 'aria-label': 'Kind of measurement'}, ...kinds), this.depthRow,
+    this.body = make('div', {}, make('div', {class: 'kinds', role: 'group', 'aria-label': 'Kind of measurement'}, ...kinds), this.depthRow,
       this.#says, this.#list, make('div', {class: 'actions'}, ...Object.values(this.buttons)), this.#table);
     this.#choose('distance');
   }
@@ -79,6 +79,10 @@ export class MeasureTool {
   tap(p) {
     this.#expected.ask(); // for the points of a scan since
     this.#stop?.();
+    if (this.#kind === 'flatness' && this.#picked.length >= 3 && this.#isAt(this.#picked[0], p)) {
+      this.#endOutline();
+      return true;
+    }
     this.#stop = this.#view.pointed.find(p, PICK_PX, (point) => {
       this.#stop = null;
       if (point === null) say(this.#says, 'There is no point within 12 pixels of the click.');
@@ -89,18 +93,20 @@ export class MeasureTool {
 
   key({key}) {
     const {width, height} = this.#view.camera;
-    if (key === 'Enter' && this.#kind === 'flatness' && this.#picked.length >= 3 && this.#atMiddle) this.#endOutline();
-    else if (key === 'Enter' || key === ' ') this.tap({x: 0.5 * width, y: 0.5 * height});
+    const middle = {x: 0.5 * width, y: 0.5 * height};
+    const isLast = this.#kind === 'flatness' && this.#picked.length >= 3 && this.#isAt(this.#picked.at(-1), middle);
+    if (key === 'Enter' && isLast) this.#endOutline();
+    else if (key === 'Enter' || key === ' ') this.tap(middle);
     else if (key === 'Backspace') this.#undo();
     else if (key === 'Escape') this.leave();
     else return false;
     return true;
   }
 
-  // The point in the middle was picked last, so Enter there ends an outline.
-  get #atMiddle() {
-    const {camera} = this.#view, last = this.#picked.at(-1), p = camera.project(placeOf(last));
-    return Math.hypot(p.x - 0.5 * camera.width, p.y - 0.5 * camera.height) < PICK_PX;
+  // A click on the first corner ends an outline, and so does Enter on the last one.
+  #isAt(point, {x, y}) {
+    const p = this.#view.camera.project(placeOf(point));
+    return Math.hypot(p.x - x, p.y - y) < PICK_PX;
   }
 
   // point: as pointOf() returns it
@@ -226,7 +232,7 @@ export class MeasureTool {
     const at = m.flat ? camera.project(m.flat.at) : m.kind === 'angle' ? seen[1] :
       {x: 0.5 * (seen[0].x + seen[1].x), y: 0.5 * (seen[0].y + seen[1].y)};
     if (m.flat) pen.dot(at.x, at.y, 5, pen.colours.ink);
-    pen.text(m.flat ? `largest ${figureText('m', {value: m.flat.largest, error: m.flat.sigma})}` : figureText(m.figures[0][1], m.figures[0][2]),
+    pen.text(m.flat ? `largest ${millimetres(m.flat.largest)}` : figureText(m.figures[0][1], m.figures[0][2]),
       at.x, at.y - 14, {bold: true, inside: camera.width});
   }
 
