@@ -103,6 +103,7 @@ test('a section: what is in it, turned; heights; faces that are pushed', () => {
   same([cut.between(1, 0.5), cut.between(0.5, 1), cut.to_m], [false, true, 1], 'between heights');
   same(cut.within({min: [-9, -9, -9], max: [9, 9, 9]}), {min: [-9, -9, cut.from_m], max: [9, 9, 1]}, 'what of a box is in a height cut');
   same(new Section({middle: [1, 1, 1], half: [1, 2, 30]}).within({min: [-9, -9, -9], max: [9, 9, 9]}), {min: [0, -1, -9], max: [2, 3, 9]}, 'and in a box');
+  same(cut.within({min: [0, 0, 5], max: [9, 9, 6]}), {min: [0, 0, 5], max: [9, 9, 6]}, 'nothing is in it');
   same(s.handles.map((h) => h.id).join(), 'right,left,ahead,back,top,bottom,turn,move', 'handles of a box');
   same(cut.handles.map((h) => h.id).join(), 'top,bottom', 'of a height cut');
 });
