@@ -78,7 +78,7 @@ struct deviation_hit {
 /* The expected sigma there, by noise; and what counts add, as if every place within a count were as likely. */
 double deviation_sigma_m(const struct deviation_head *head, const struct deviation_hit *hit, double *counts_m);
 
-/* The same in figures, for a client that calculates with them. Amplitudes count in units of the threshold. */
+/* These figures give a client the same sigma. Amplitudes count in units of the threshold. */
 struct deviation_terms {
     double range_sigma_m, range_sigma_per_m; /* sigma of the range, and its part per distance */
     double range_floor_m, range_jitter_m;    /* by the signal: at any amplitude, and at 1; NaN: range_sigma_m holds */

@@ -41,6 +41,25 @@ async function settled() {
   await page.eval('new Promise((done) => setTimeout(done, 300))');
 }
 
+// Shows the tools of the picture: a height cut, a distance, the panorama.
+async function tools() {
+  await page.resize(1600, 900);
+  await page.eval('scrollTo(0, 0)');
+  await page.click('#tool-section');
+  await page.click('#tool-panorama');
+  await page.click('#tool-measure');
+  await settled();
+  for (const share of [0.45, 0.55]) {
+    await page.clickAt(await page.eval(`(() => { const {left, top, width, height} = scanhead.view.canvas.getBoundingClientRect();
+      return [left + ${share} * width, top + 0.7 * height]; })()`));
+    await page.eval('new Promise((done) => setTimeout(done, 500))');
+  }
+  await shots('tools');
+  for (const name of ['measure', 'panorama', 'section']) await page.click(`#tool-${name}`);
+  await page.click('#section-off');
+  await page.key('Escape');
+}
+
 let page = await browser.open(endpoint(head, 'web'));
 const grant = async (s) => {
   for (let k = 0; k < 5 * s; k++) await page.eval("scanhead.head.command('TIME:STEP 200 MS')");
@@ -63,6 +82,7 @@ if (values.best === undefined) {
   await page.until('scanhead.trial.next');
   await shots('trial');
   await page.press('#trial-end');
+  await tools();
 } else {
   for (const station of [2, 3]) {
     await page.eval(`scanhead.head.command('HEAD:STATION ${station}')`);

@@ -164,6 +164,21 @@ export async function testTools(browser, url, points) {
     const byKey = await page.until(`${TOOLS}.measure.points[2]`), seen = await place(page, [byKey.x, byKey.y, byKey.z]);
     const middle = await page.eval('[scanhead.view.camera.width / 2, scanhead.view.camera.height / 2]');
     near(Math.hypot(...seen.map((v, k) => v - middle[k])), 0, 12, 'Enter picks within 12 pixels of the middle');
+    await page.click('#measure-flatness');
+    const face = await page.eval(`(async () => {
+      const {cloud} = scanhead, tool = ${TOOLS}.measure, {pointOf} = await import('/cloud.js');
+      const all = cloud.blocks.flatMap((block) => Array.from({length: block.n}, (_, i) => pointOf(cloud, block, i)));
+      const corners = [[2.2, 0.3], [3.5, 0.3], [3.5, -1.2], [2.2, -1.2]].map(([x, y]) => all.reduce((best, p) =>
+        (Math.hypot(p.x - x, p.y - y, p.z) < Math.hypot(best.x - x, best.y - y, best.z) ? p : best)));
+      corners.forEach((p) => tool.pick(p));
+      // The corners go clockwise, so a place in the outline is to the right of each side.
+      const side = (a, b, p) => (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+      return all.filter((p) => p.z < 0.05 && corners.every((a, k) => side(a, corners[(k + 1) % 4], p) < 0)).length;
+    })()`);
+    await page.press('#measure-end');
+    const {n, rms, sigma} = await page.until(`${TOOLS}.measure.done[1]?.flat`);
+    near(n, face, 4, 'points of the floor in the outline'); // its corners may count or not
+    is(face > 50 && rms < 1e-4 && sigma < 1e-3, `a floor without noise is flat: ${face} points, RMS ${rms}, expected ${sigma}`);
     await page.key('Escape');
     equal(await page.eval('scanhead.view.tool'), null, 'clicks are those of the picture again');
   });

@@ -19,7 +19,7 @@ const ended = (steps) => {
   }
 };
 
-// Numbers of a fixed seed, uniform and normal (mulberry32; Box and Muller).
+// This gives numbers of a fixed seed, uniform and normal (mulberry32; Box and Muller).
 function randomOf(seed) {
   const uniform = () => {
     seed = (seed + 0x6d2b79f5) | 0;
@@ -103,6 +103,7 @@ test('a section: what is in it, turned; heights; faces that are pushed', () => {
   same([cut.between(1, 0.5), cut.between(0.5, 1), cut.to_m], [false, true, 1], 'between heights');
   same(cut.within({min: [-9, -9, -9], max: [9, 9, 9]}), {min: [-9, -9, cut.from_m], max: [9, 9, 1]}, 'what of a box is in a height cut');
   same(new Section({middle: [1, 1, 1], half: [1, 2, 30]}).within({min: [-9, -9, -9], max: [9, 9, 9]}), {min: [0, -1, -9], max: [2, 3, 9]}, 'and in a box');
+  same(cut.within({min: [0, 0, 5], max: [9, 9, 6]}), {min: [0, 0, 5], max: [9, 9, 6]}, 'nothing is in it');
   same(s.handles.map((h) => h.id).join(), 'right,left,ahead,back,top,bottom,turn,move', 'handles of a box');
   same(cut.handles.map((h) => h.id).join(), 'top,bottom', 'of a height cut');
 });
@@ -150,7 +151,8 @@ const NOISE = {range_sigma_m: 0.004, range_sigma_per_m: 1e-5, range_floor_m: nul
   angle_sigma_rad: [4e-4, 7e-4], angle_step_rad: [0, 0], ball_m: 0, ball_per_m: 0, ball_factor: [1, 1, 1], ball_local: false};
 const STATION = {number: 1, x_m: 100, y_m: -50, z_m: 2, heading_deg: 40, pitch_deg: 8, roll_deg: -5};
 
-// From angles of a head to the scene, by turns one after the other: roll about forward, pitch about right, heading about up.
+// This goes from a head's angles to the scene, by one turn after the other: roll about forward, pitch about right, heading
+// about up.
 function toScene(station, range, mirror, pan) {
   let [x, y, z] = [range * Math.cos(mirror) * Math.sin(pan), range * Math.cos(mirror) * Math.cos(pan), range * Math.sin(mirror)];
   const [h, p, r] = [station.heading_deg, station.pitch_deg, station.roll_deg].map(radians);
@@ -290,9 +292,21 @@ test('a panorama: points at their angles, the nearest of each direction, other s
   const {pixels, limits} = panorama.colours('label');
   same([pixels.length, limits], [4 * panorama.width * panorama.height, null], 'colours of labels');
   near(panorama.colours('range').limits[0], 7, 0.2, 'limits of the range');
+  const filled = pixels.filter((v, i) => i % 4 === 3 && v === 255).length;
+  same(filled > 0.95 * pixels.length / 4, true, `${filled} of ${pixels.length / 4} pixels have a colour`);
   same(panorama.isOld, false, 'nothing has come');
   cloud.add(batch(1, () => placeOf(toScene(STATION, 5, 0, 0)), {scan: 2}));
   same(panorama.isOld, true, 'a point has come');
+});
+
+test('pixels of a panorama are wider where lines are further apart than the points in them', () => {
+  const cloud = new Cloud();
+  const places = [];
+  for (let a = -60; a < 60; a += 3) for (let e = -30; e <= 30; e += 0.25) places.push(placeOf(toScene(STATION, 7, radians(e), radians(a))));
+  cloud.add(batch(places.length, (i) => places[i]));
+  const panorama = ended(new Panorama(cloud, STATION).make());
+  const degrees = panorama.span.map((v, k) => v * 180 / Math.PI / [panorama.width, panorama.height][k]);
+  same(degrees[0] / degrees[1] > 3.9, true, `pixels of ${degrees} degrees`); // 3 and 0.25 degrees: 12 times; the shapes are 1, 2, 4, 8
 });
 
 await runTests();

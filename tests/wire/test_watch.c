@@ -281,6 +281,8 @@ static void noise_is_expected(void **state)
      * is of first order, and smooth faces are found by the noisy points themselves. */
     assert_true(n > 1000);
     same("sigma", number(quality, "along_beam", "expected_rms_m"), 0.003, 3e-6);
+    same("sigma for clients", number(quality, "\"expected\"", "range_sigma_m"), 0.003, 1e-15);
+    assert_true(number(quality, "\"expected\"", "range_step_m") > 0); /* a polar range has a count */
     same("rms", rms_m, 0.003, 0.003 * (6.0 / sqrt(2.0 * n) + 0.01));
     assert_true(isnan(number(quality, "\"verdict\"", "bound_m")));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));

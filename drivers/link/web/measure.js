@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // Measures between picked points, each figure with its expected error (one sigma). It is pure.
 //
-// The expected error of a point follows from the noise and the counts that the head reports (`expected` in /quality), as
-// in core/studio/deviation.h: along the beam that of the range, across it those of the angles times the range. A figure's
-// error is that of its points to first order, by differences.
+// The expected error of a point follows from the noise and the counts that the head reports (`expected` in /quality),
+// as in core/studio/deviation.h: along the beam that of the range, across it those of the angles times the range. The
+// error of a figure is that of its points to first order, by differences.
 
 import {add, dot, sub} from './view_camera.js';
 import {headAxes} from './view_stations.js';
@@ -136,8 +136,8 @@ function isInPolygon(polygon, u, v) {
 
 const FURTHER = 4; // points up to so many depths from the plane are counted, as left out
 
-// Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value is
-// {places (relative to the cloud's origin), plane, beyond}: beyond counts those a little further from the plane.
+// Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value
+// is {places (relative to the cloud's origin), plane, beyond}: beyond counts those a little further from the plane.
 export function* pointsOnFace(cloud, camera, corners, depth_m) {
   const origin = cloud.origin;
   const own = corners.map((p) => sub(placeOf(p), origin));
@@ -235,7 +235,7 @@ export function decimalsOf(error) {
 
 const minus = (text) => text.replace('-', '−');
 
-// Returns a figure in words, rounded by its error: "2.104 m ± 2 mm", "90.02° ± 0.11°"; without a known error "2.104 m".
+// Returns a figure in words, rounded by its error: "2.104 m ± 2 mm", "90.02° ± 0.11°"; "2.104 m" if it is not known.
 export function figureText(unitName, {value, error}) {
   const isKnown = Number.isFinite(error), decimals = decimalsOf(isKnown ? error : unitName === '°' ? 0.05 : NaN);
   const gap = unitName === '°' ? '' : '\u00a0';

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool measures between points that are picked in the picture or the panorama. A click takes the point nearest to
 // it; with keys, Enter takes the one in the middle of the picture.
-import {grouped, make, metres, say} from './page.js';
+import {grouped, make, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
 import {runSlowly} from './view_pick.js';
 
@@ -44,13 +44,13 @@ export class MeasureTool {
     });
     const action = (id, name, title, click) => make('button', {type: 'button', id, title, click}, name);
     this.buttons = {
-      end: action('measure-end', 'End outline', 'Key Enter, after the last corner', () => this.#endOutline()),
+      end: action('measure-end', 'End outline', 'A click on the first corner, or Enter on the last one, does the same', () => this.#endOutline()),
       undo: action('measure-undo', 'Undo', 'Takes the last point back (key Backspace)', () => this.#undo()),
       clear: action('measure-clear', 'Clear', 'Removes all measurements', () => this.#clear()),
       csv: action('measure-csv', 'Points as CSV', 'Downloads the table of the picked points', () => download('points.csv', this.csv)),
     };
     this.depthRow = make('div', {class: 'row'}, make('label', {for: 'measure-depth'}, 'Depth to each side'), this.#depth, make('span', {class: 'unit'}, 'm'));
-    this.body = make('div', {}, make('div', {class: 'actions', role: 'group', 'aria-label': 'Kind of measurement'}, ...kinds), this.depthRow,
+    this.body = make('div', {}, make('div', {class: 'kinds', role: 'group', 'aria-label': 'Kind of measurement'}, ...kinds), this.depthRow,
       this.#says, this.#list, make('div', {class: 'actions'}, ...Object.values(this.buttons)), this.#table);
     this.#choose('distance');
   }
@@ -79,6 +79,10 @@ export class MeasureTool {
   tap(p) {
     this.#expected.ask(); // for the points of a scan since
     this.#stop?.();
+    if (this.#kind === 'flatness' && this.#picked.length >= 3 && this.#isAt(this.#picked[0], p)) {
+      this.#endOutline();
+      return true;
+    }
     this.#stop = this.#view.pointed.find(p, PICK_PX, (point) => {
       this.#stop = null;
       if (point === null) say(this.#says, 'There is no point within 12 pixels of the click.');
@@ -89,18 +93,20 @@ export class MeasureTool {
 
   key({key}) {
     const {width, height} = this.#view.camera;
-    if (key === 'Enter' && this.#kind === 'flatness' && this.#picked.length >= 3 && this.#atMiddle) this.#endOutline();
-    else if (key === 'Enter' || key === ' ') this.tap({x: 0.5 * width, y: 0.5 * height});
+    const middle = {x: 0.5 * width, y: 0.5 * height};
+    const isLast = this.#kind === 'flatness' && this.#picked.length >= 3 && this.#isAt(this.#picked.at(-1), middle);
+    if (key === 'Enter' && isLast) this.#endOutline();
+    else if (key === 'Enter' || key === ' ') this.tap(middle);
     else if (key === 'Backspace') this.#undo();
     else if (key === 'Escape') this.leave();
     else return false;
     return true;
   }
 
-  // The point in the middle was picked last, so Enter there ends an outline.
-  get #atMiddle() {
-    const {camera} = this.#view, last = this.#picked.at(-1), p = camera.project(placeOf(last));
-    return Math.hypot(p.x - 0.5 * camera.width, p.y - 0.5 * camera.height) < PICK_PX;
+  // A click on the first corner ends an outline, and so does Enter on the last one.
+  #isAt(point, {x, y}) {
+    const p = this.#view.camera.project(placeOf(point));
+    return Math.hypot(p.x - x, p.y - y) < PICK_PX;
   }
 
   // point: as pointOf() returns it
@@ -187,7 +193,7 @@ export class MeasureTool {
     const spacing = Math.max(...m.points.map((p) => p.spacing));
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
-    if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', metres(Number(spacing.toPrecision(2))),
+    if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', millimetres(spacing),
       'The points are so far apart there: an edge may lie beyond the one that was picked']);
     return rows;
   }
@@ -226,7 +232,7 @@ export class MeasureTool {
     const at = m.flat ? camera.project(m.flat.at) : m.kind === 'angle' ? seen[1] :
       {x: 0.5 * (seen[0].x + seen[1].x), y: 0.5 * (seen[0].y + seen[1].y)};
     if (m.flat) pen.dot(at.x, at.y, 5, pen.colours.ink);
-    pen.text(m.flat ? `largest ${figureText('m', {value: m.flat.largest, error: m.flat.sigma})}` : figureText(m.figures[0][1], m.figures[0][2]),
+    pen.text(m.flat ? `largest ${millimetres(m.flat.largest)}` : figureText(m.figures[0][1], m.figures[0][2]),
       at.x, at.y - 14, {bold: true, inside: camera.width});
   }
 
@@ -239,11 +245,13 @@ export class MeasureTool {
   }
 }
 
+// Writes two figures.
+const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
+
 // Flatness is told beside what noise alone gives.
 function flatRows({flat, beyond, depth_m}) {
   const {n, rms, largest, sigma} = flat, isKnown = sigma > 0;
-  const mm = (v) => `${(1e3 * v).toPrecision(2)}\u00a0mm`.replace('-', '−');
-  const beside = (v, expected) => (isKnown ? `${mm(v)}; noise gives ${mm(expected)}` : mm(v));
+  const beside = (v, expected) => (isKnown ? `${millimetres(v)}; noise gives ${millimetres(expected)}` : millimetres(v));
   const rows = [['RMS', beside(rms, sigma)], ['Largest', beside(largest, sigma * largestOf(n)), 'More than 0 is towards the head'],
     ['Points', grouped(n)]];
   if (beyond > 0) rows.push(['Left out', `${grouped(beyond)} beyond ${depth_m}\u00a0m`, `Those up to ${4 * depth_m} m from the plane; nothing further was looked at`]);

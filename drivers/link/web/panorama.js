@@ -8,8 +8,11 @@ import {GREY, NONE, robustLimits, tableOf, valuesOf} from './view_colours.js';
 
 const TURN = 2 * Math.PI;
 const PER_PIXEL = 2.5; // points, so that few pixels have none
-const WIDEST = 2048;
+const WIDEST = 1440;
+const SAMPLED = 20_000; // pixels for the limits of the colours
 const EMPTY = 0xffffffff;
+const SHAPES = [1, 0.125, 0.25, 0.5, 2, 4, 8]; // of pixels: height over width
+const TRIED = 500_000; // points for choosing one of them
 
 // A station is {number, x_m, y_m, z_m, heading_deg, pitch_deg, roll_deg}.
 export class Panorama {
@@ -67,7 +70,9 @@ export class Panorama {
       yield;
     }
     if (this.n === 0) return this;
-    this.#size(lo, hi);
+    this.from = lo;
+    this.span = lo.map((v, k) => Math.max(0.01, hi[k] - v));
+    yield* this.#chooseShape(blocks);
     const nearest = this.#range = new Float32Array(this.width * this.height).fill(Infinity);
     this.#block = new Uint32Array(nearest.length).fill(EMPTY);
     this.#point = new Uint32Array(nearest.length);
@@ -84,12 +89,32 @@ export class Panorama {
     return this;
   }
 
-  #size(lo, hi) {
-    this.from = lo;
-    this.span = lo.map((v, k) => Math.max(0.01, hi[k] - v));
-    const pixels = this.n / PER_PIXEL, aspect = this.span[0] / this.span[1];
-    this.width = Math.round(Math.min(WIDEST, Math.max(60, Math.sqrt(pixels * aspect))));
-    this.height = Math.max(1, Math.round(this.width / aspect));
+  #size(shape) {
+    const pixels = this.n / PER_PIXEL, columns = this.span[0] / this.span[1] * shape; // for each row
+    this.width = Math.round(Math.min(WIDEST, Math.max(60, Math.sqrt(pixels * columns))));
+    this.height = Math.max(1, Math.min(WIDEST, Math.round(this.width / columns)));
+  }
+
+  // Where lines are further apart than the points in them, pixels are wider than high, or the other way round: of the
+  // shapes the one that has the most pixels with a point.
+  * #chooseShape(blocks) {
+    const tries = SHAPES.map((shape) => {
+      this.#size(shape);
+      return {shape, width: this.width, height: this.height, has: new Uint8Array(this.width * this.height)};
+    });
+    let n = 0;
+    for (const block of blocks) {
+      if (n > TRIED) break;
+      this.#each(block, (_, azimuth, elevation) => {
+        for (const size of tries) size.has[this.#pixel(azimuth, elevation, size) ?? -1] = 1;
+      });
+      n += block.n;
+      yield;
+    }
+    const share = ({has}) => has.reduce((sum, v) => sum + v, 0) / has.length;
+    let best = tries[0], most = 1.1 * share(best); // square ones where others have hardly more
+    for (const other of tries) if (share(other) > most) [best, most] = [other, share(other)];
+    this.#size(best.shape);
   }
 
   // Returns the column and row of angles, as shares of the width and the height.
@@ -97,13 +122,14 @@ export class Panorama {
     return [(azimuth - this.from[0]) / this.span[0], 1 - (elevation - this.from[1]) / this.span[1]];
   }
 
-  #pixel(azimuth, elevation) {
+  // Returns null for a point that came since the limits were found.
+  #pixel(azimuth, elevation, {width, height} = this) {
     const [x, y] = this.shareOf([azimuth, elevation]);
     if (!(x >= 0 && x <= 1 && y >= 0 && y <= 1)) return null;
-    return Math.min(this.height - 1, Math.floor(y * this.height)) * this.width + Math.min(this.width - 1, Math.floor(x * this.width));
+    return Math.min(height - 1, Math.floor(y * height)) * width + Math.min(width - 1, Math.floor(x * width));
   }
 
-  // Returns the pixel that a pixel without a point takes its colour from: itself, or the one beside it where both have one.
+  // Returns the pixel whose point a pixel shows: itself, or one beside it where both sides have a point. null: none.
   #shown(pixel) {
     if (this.#block[pixel] !== EMPTY) return pixel;
     for (const step of [1, this.width]) {
@@ -131,12 +157,13 @@ export class Panorama {
       if (from !== null) values[p] = all === null ? this.#range[from] : all[this.#block[from]][this.#point[from]];
     }
     const isList = mode === 'label';
-    const limits = isList ? null : robustLimits(values.filter((v) => v === v && v !== NONE));
+    const every = Math.ceil(n / SAMPLED);
+    const limits = isList ? null : robustLimits(values.filter((v, p) => p % every === 0 && v === v && v !== NONE));
     const table = tableOf(mode), pixels = new Uint8ClampedArray(4 * n);
     for (let p = 0; p < n; p++) {
       const v = values[p];
       if (v !== v) continue;
-      if (v === NONE) pixels.set([...GREY, 255], 4 * p);
+      if (v === NONE || (!isList && limits === null)) pixels.set([...GREY, 255], 4 * p);
       else {
         const at = isList ? v & 255 : Math.round(255 * Math.min(1, Math.max(0, (v - limits[0]) / (limits[1] - limits[0]))));
         for (let c = 0; c < 4; c++) pixels[4 * p + c] = table[4 * at + c];

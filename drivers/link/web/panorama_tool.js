@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This tool shows the panorama of a station under the picture, by range, intensity or surface. Pointing at it shows the
-// point in the picture, and back. A click turns the picture to the point; while something is measured, it picks the point.
+// point in the picture, and back. A click turns the picture to the point, or picks it while something is measured.
 import {atMostEvery, byId, make, say, short} from './page.js';
 import {MODES} from './view_colours.js';
 import {Panorama} from './panorama.js';
@@ -91,20 +91,21 @@ export class PanoramaTool {
       this.#rests_until = performance.now() + 3 * (performance.now() - this.#began);
       if (panorama.n === 0) return this.#empty(station);
       this.panorama = panorama;
-      this.#size(panorama.width, panorama.height);
+      this.#size(panorama.width, panorama.height, panorama.span[0] / panorama.span[1]);
       return this.#paint();
     });
     return undefined;
   }
 
-  #size(width, height) {
+  // Pixels need not be square.
+  #size(width, height, aspect) {
     Object.assign(this.#canvas, {width, height});
-    this.#canvas.parentElement.style.setProperty('--aspect', width / height);
+    this.#canvas.parentElement.style.setProperty('--aspect', aspect);
   }
 
   #empty(station) {
     this.panorama = null;
-    this.#size(360, 90);
+    this.#size(360, 90, 4);
     this.#cross.hidden = true;
     say(this.#says, station ? 'This station has no points yet.' : 'No station has a known place.');
   }

@@ -53,11 +53,12 @@ export class Section {
     });
   }
 
-  // Returns the part of {min, max} around what is in it.
+  // Returns the part of {min, max} around what is in it; all of it, if nothing is.
   within({min, max}) {
     const corners = this.corners, axes = this.kind === 'height' ? [2] : [0, 1, 2];
     const bound = (v, a, least, most) => (axes.includes(a) ? most(v, least(...corners.map((p) => p[a]))) : v);
-    return {min: min.map((v, a) => bound(v, a, Math.min, Math.max)), max: max.map((v, a) => bound(v, a, Math.max, Math.min))};
+    const inner = {min: min.map((v, a) => bound(v, a, Math.min, Math.max)), max: max.map((v, a) => bound(v, a, Math.max, Math.min))};
+    return inner.min.every((v, a) => v < inner.max[a]) ? inner : {min, max};
   }
 
   // Returns the eight corners, bit k of the index for axis k. Those of a height cut are where it was made.

@@ -41,6 +41,7 @@ export class Tools {
       if (this.#open) this.#stop(this.#open);
       this.#open = tool;
       say(this.#title, tool.title);
+      this.#card.setAttribute('aria-label', tool.title);
       this.#body.replaceChildren(tool.body);
     }
     tool.isOpen = true;

@@ -22,7 +22,7 @@ vec4 placed(vec3 s) {
 #endif
 `;
 
-// Depth at a distance along the line of sight, pushed away by a factor. The formulas are those of view_camera.js.
+// These give the depth at a distance along the line of sight, pushed away by a factor, as view_camera.js does.
 export const DEPTH = `
 const float NEAR = ${NEAR_M};
 const vec4 OUT = vec4(0.0, 0.0, 2.0, 1.0);

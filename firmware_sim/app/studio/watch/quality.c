@@ -72,7 +72,7 @@ static void put_pair(struct json *json, const char *key, const double v[2])
     json_close_array(json);
 }
 
-/* The noise and the counts from which the error of a point follows. */
+/* This writes the noise and the counts from which the error of a point follows. */
 static void put_expected(struct json *json, const struct watch_scan *s)
 {
     const struct deviation_terms *t = &s->expected;
