@@ -33,6 +33,7 @@ struct waveform_rule {
     struct waveform_node *node;
     uint32_t first[WAVEFORM_LEVELS + 1];
     double reach[WAVEFORM_LEVELS];
+    double square; /* mean of x^2 */
 };
 int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err);
 void waveform_rule_free(struct waveform_rule *rule);
@@ -42,10 +43,10 @@ struct waveform {
     double *table;
     struct waveform_pulse pulse;
     struct waveform_rule disc, bell;
-    double samples_1_m;               /* of range */
-    double counts_1;                  /* of a signal of 1 */
-    int64_t before, after, dead;      /* in samples */
-    int64_t gate_begin, gate_end;     /* 0 and 0: none */
+    double samples_1_m;           /* of range */
+    double counts_1;              /* of a signal of 1 */
+    int64_t before, after, dead;  /* in samples */
+    int64_t gate_begin, gate_end; /* 0 and 0: none */
     uint64_t key;
 };
 
