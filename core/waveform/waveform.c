@@ -17,7 +17,11 @@ static void set_up_digits(struct waveform *w)
 {
     const struct waveform_spec *s = &w->spec;
     w->samples_1_m = 2.0 / (LIGHT_SPEED_M_S * s->sample_s);
-    w->counts_1 = ((double)(1U << s->bits) - 1.0 - s->baseline_counts) / s->full_scale;
+    w->digits.top = (double)(1U << s->bits) - 1.0;
+    w->digits.baseline = s->baseline_counts;
+    w->digits.counts_1 = (w->digits.top - s->baseline_counts) / s->full_scale;
+    w->digits.noise = s->noise;
+    w->digits.most = s->saturation > 0.0 ? s->saturation : (double)INFINITY;
     w->before = samples_of(s->before_s, s->sample_s);
     w->after = samples_of(s->after_s, s->sample_s);
     w->dead = samples_of(s->dead_s, s->sample_s);

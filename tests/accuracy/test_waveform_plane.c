@@ -139,7 +139,7 @@ static void rings_come_nearer(void **state)
             assert_true(rms[i] < COUNTS * (k == WAVEREF_FOLIAGE ? 1.0 : 0.5) / sqrt(n));
         }
         assert_true(rms[4] < 0.5 * rms[0]);
-        print_message("# %-8s RMS counts by 7, 19, 61, 127, 1027 sub-rays: %.2f %.2f %.2f %.2f %.2f\n",
+        print_message("# %-12s RMS counts by 7, 19, 61, 127, 1027 sub-rays: %.2f %.2f %.2f %.2f %.2f\n",
                       waveref_shape[k].name, rms[0], rms[1], rms[2], rms[3], rms[4]);
     }
     waveform_free(w);
@@ -170,18 +170,15 @@ static void parts_are_nearly_exact(void **state)
     (void)state;
     static struct waveref_window reference, ours;
     struct waveform *w = open_waveform();
-    struct beam beam;
-    beam_init(&beam, 0.007, 0.35e-3, WAVEREF_PULSE_S);
     const double per_sigma = 0.15 / (WAVEREF_METRES_1_S * WAVEREF_SIGMA_S), row = 0.5 / sqrt(WAVEREF_RAYS);
     const double third = 1.38 / 6.0 * fmax(fabs(skewness(-0.23)), fabs(skewness(0.23)));
     for (int k = WAVEREF_STEP; k <= WAVEREF_WEDGE; k++) {
         struct waveform_return r[2];
         const double bound = COUNTS * (k == WAVEREF_STEP ? row : third * pow(per_sigma, 3) + row * per_sigma);
         waveref_by_rays(&waveref_shape[k], &reference);
-        waveref_parts(&beam, k, r);
-        waveref_fill(w, r, 2, &reference, &ours);
+        waveref_fill(w, r, waveref_parts(k, r), &reference, &ours);
         double rms = waveref_counts(&ours, &reference);
-        print_message("# %-8s RMS counts by parts: %.3f (bound %.3f)\n", waveref_shape[k].name, rms, bound);
+        print_message("# %-12s RMS counts by parts: %.3f (bound %.3f)\n", waveref_shape[k].name, rms, bound);
         assert_true(rms < bound);
     }
     waveform_free(w);

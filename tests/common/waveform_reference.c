@@ -70,6 +70,21 @@ void waveref_fill(const struct waveform *w, const struct waveform_return *r, uin
 
 /* ---- shapes */
 
+/* b = s tan i: a plane's range is FAR / (1 - b x) where the beam is far wider than its exit. */
+static const double B_60 = 0.175e-3 * 1.7320508075688772, B_85 = 0.175e-3 * 11.430052302761343;
+
+static double plane_60_range(double x, double y)
+{
+    (void)y;
+    return WAVEREF_FAR_M / (1.0 - B_60 * x);
+}
+
+static double plane_85_range(double x, double y)
+{
+    (void)y;
+    return WAVEREF_FAR_M / (1.0 - B_85 * x);
+}
+
 /* Where an edge or a fold crosses the disc. */
 static const double EDGE_X = 0.23, STEP_M = 0.5, LEFT_M = 0.15, RIGHT_M = 0.06;
 
@@ -106,7 +121,8 @@ static double foliage_range(double x, double y)
 }
 
 const struct waveref_shape waveref_shape[WAVEREF_SHAPES] = {
-    {"step", step_range}, {"wedge", wedge_range}, {"sphere", sphere_range}, {"foliage", foliage_range}};
+    {"plane 60 deg", plane_60_range}, {"plane 85 deg", plane_85_range}, {"step", step_range},
+    {"wedge", wedge_range},           {"sphere", sphere_range},         {"foliage", foliage_range}};
 
 void waveref_by_rays(const struct waveref_shape *shape, struct waveref_window *out)
 {
@@ -140,8 +156,23 @@ static struct waveform_return part_of(const struct beam *beam, double h, double 
                                     slope_m * sqrt(along / energy - centre * centre), WAVEFORM_BELL};
 }
 
-void waveref_parts(const struct beam *beam, int k, struct waveform_return r[2])
+/* Its mean range is FAR (1 + b^2 E x^2), E x^2 = 0.1715. */
+static struct waveform_return plane_of(double b)
 {
-    r[0] = part_of(beam, EDGE_X, k == WAVEREF_STEP ? 0.0 : RIGHT_M, WAVEREF_FAR_M + (k == WAVEREF_STEP ? STEP_M : 0.0));
-    r[1] = part_of(beam, -EDGE_X, k == WAVEREF_STEP ? 0.0 : LEFT_M, WAVEREF_FAR_M); /* the other side, turned round */
+    return (struct waveform_return){WAVEREF_FAR_M * (1.0 + 0.1715 * b * b), 1.0, WAVEREF_FAR_M * b, WAVEFORM_DISC};
+}
+
+uint32_t waveref_parts(int shape, struct waveform_return r[2])
+{
+    struct beam beam;
+    const int step = shape == WAVEREF_STEP;
+    if (shape == WAVEREF_PLANE_60 || shape == WAVEREF_PLANE_85) {
+        r[0] = plane_of(shape == WAVEREF_PLANE_60 ? B_60 : B_85);
+        return 1;
+    }
+    if (!step && shape != WAVEREF_WEDGE) return 0;
+    beam_init(&beam, 0.007, 0.35e-3, WAVEREF_PULSE_S);
+    r[0] = part_of(&beam, EDGE_X, step ? 0.0 : RIGHT_M, WAVEREF_FAR_M + (step ? STEP_M : 0.0));
+    r[1] = part_of(&beam, -EDGE_X, step ? 0.0 : LEFT_M, WAVEREF_FAR_M); /* the other side, turned round */
+    return 2;
 }

@@ -34,8 +34,16 @@ struct waveform_spec waveref_spec(void);
 void waveref_fill(const struct waveform *w, const struct waveform_return *r, uint32_t n,
                   const struct waveref_window *like, struct waveref_window *out);
 
-/* Ranges by place in the unit disc, m, about WAVEREF_FAR_M. */
-enum { WAVEREF_STEP, WAVEREF_WEDGE, WAVEREF_SPHERE, WAVEREF_FOLIAGE, WAVEREF_SHAPES };
+/* Ranges by place in the unit disc, m, about WAVEREF_FAR_M. Planes are at 60 and 85 degrees, in a beam of 0.35 mrad. */
+enum {
+    WAVEREF_PLANE_60,
+    WAVEREF_PLANE_85,
+    WAVEREF_STEP,
+    WAVEREF_WEDGE,
+    WAVEREF_SPHERE,
+    WAVEREF_FOLIAGE,
+    WAVEREF_SHAPES
+};
 struct waveref_shape {
     const char *name;
     double (*range_m)(double x, double y);
@@ -44,7 +52,7 @@ extern const struct waveref_shape waveref_shape[WAVEREF_SHAPES];
 void waveref_by_rays(const struct waveref_shape *shape, struct waveref_window *out);
 /* The pattern's sub-rays as points. Returns how many. */
 uint32_t waveref_rings(const struct waveref_shape *shape, uint32_t rings, struct waveform_return *r);
-/* The step (k = 0) or the wedge (1) as its two sides. */
-void waveref_parts(const struct beam *beam, int k, struct waveform_return r[2]);
+/* A shape without sub-rays: a plane as one return, the step or the wedge as its two sides. Returns how many; 0: others. */
+uint32_t waveref_parts(int shape, struct waveform_return r[2]);
 
 #endif
