@@ -457,6 +457,7 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_moving'" tests/bench/chart_moving.gp
+	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_waveform'" tests/bench/chart_waveform.gp
 objects: $(EVERYTHING)
 test-unit-programs test-programs: $(BUILD)/tests/joined
 test-programs: all $(BUILD)/bench $(call PROGRAMS,guest) $(FIGURES)
