@@ -102,7 +102,7 @@ static void add_pulse(const struct waveform_pulse *pulse, double amplitude, doub
     if (from >= to) return;
     for (int64_t j = 0; j < 4; j++) {
         int64_t over = phase + j >= phases;
-        row[j] = pulse->h + (phase + j - over * phases) * pulse->pitch + k + over + from;
+        row[j] = pulse->h + ((phase + j - over * phases) * pulse->pitch + k + over + from);
     }
     const double *restrict r0 = row[0], *restrict r1 = row[1], *restrict r2 = row[2], *restrict r3 = row[3];
     double *restrict out = signal + from;
