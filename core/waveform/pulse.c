@@ -135,9 +135,8 @@ static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, s
         sum += h[i];
         moment += h[i] * i;
     }
-    pulse->centroid = moment / sum;
     pulse->area_s = sum * spec->sample_s / pulse->phases;
-    pulse->lead = pulse->centroid / pulse->phases;
+    pulse->lead = moment / sum / pulse->phases;
     pulse->lag = (double)n / pulse->phases - pulse->lead;
     return SH_OK;
 }

@@ -39,10 +39,9 @@ static struct span span_of(const struct sampling *s, uint32_t i)
     if (i == s->n) return (struct span){w->gate_begin, w->gate_end};
     const struct waveform_return *r = &s->returns[i];
     const double centre = r->range_m * w->samples_1_m, reach = waveform_reach(w, r);
-    struct span span = {(int64_t)floor(centre - reach - w->pulse.lead) - w->before,
-                        (int64_t)ceil(centre + reach + w->pulse.lag) + w->after + 1};
-    if (span.begin < 0) span.begin = 0; /* nothing is sampled before the emission */
-    return span;
+    const double from = centre - reach - w->pulse.lead - (double)w->before;
+    /* nothing is sampled before the emission */
+    return (struct span){from > 0.0 ? (int64_t)from : 0, (int64_t)(centre + reach + w->pulse.lag) + w->after + 2};
 }
 
 /* The first stretch from `from` on that returns reach one by one; what begins before `from` is in an earlier one. */

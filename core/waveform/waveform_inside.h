@@ -13,8 +13,7 @@
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
-    double centroid;                /* in steps */
-    double lead, lag;               /* its first and last sample, before and after the centroid */
+    double lead, lag;               /* its first and last step before and behind the centroid, in samples */
     double scale;                   /* in samples: sigma of a Gaussian as short as the shortest that is in h */
     double area_s;
 };
