@@ -50,8 +50,7 @@ static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;
     if (spread == WAVEFORM_DISC) return (n - 5.0) / 2.6;
-    const double steps = n / 8.0;
-    return steps > 1.0 ? sqrt(steps * steps - 1.0) : 0.0;
+    return n / 7.4 - 1.0;
 }
 
 int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err)

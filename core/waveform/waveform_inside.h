@@ -14,7 +14,7 @@ struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
     double lead, lag;               /* its first and last step before and behind the centroid, in samples */
-    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest that is in h */
+    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest in h */
     double area_s;
 };
 /* Where the spec's limits are kept. Frees nothing on failure: waveform_pulse_free. */
