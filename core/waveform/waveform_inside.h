@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private: a waveform's tables, and the steps from returns to samples. Times are counted in samples of the digitiser, or
- * in steps, which are sample_s / phases. */
+/* Private: a waveform's tables, and the steps from returns to samples. Times are counted in samples of the digitiser,
+ * or in steps, which are sample_s / phases. */
 #ifndef CORE_WAVEFORM_WAVEFORM_INSIDE_H
 #define CORE_WAVEFORM_WAVEFORM_INSIDE_H
 
@@ -8,8 +8,8 @@
 
 #include "core/waveform.h"
 
-/* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples apart,
- * read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
+/* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples
+ * apart, read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
