@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Waveforms of planes, steps, wedges, spheres and foliage against 100,000 sub-rays, which are summed here with a pulse
- * of the test's own. A figure is the RMS of all samples of a window, in counts of 12 bits, with full scale at the peak.
- * */
+ * of the test's own. Figures are the RMS of all samples of a window, in counts of 12 bits, full scale at the peak. */
 #include <math.h>
 #include <string.h>
 

@@ -319,8 +319,7 @@ static void limits_are_told(void **state)
     }
 }
 
-/* The limit that the text names is one that is taken: 0.684 of the width is where 2 exp(-2 (pi sigma / T)^2) is 0.1 %.
- * */
+/* The limit that the text names is taken: 0.684 of the width is where 2 exp(-2 (pi sigma / T)^2) is 0.1 %. */
 static void the_coarsest_sampling_is_taken(void **state)
 {
     (void)state;
