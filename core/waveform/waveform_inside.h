@@ -17,7 +17,7 @@ struct waveform_pulse {
     double scale;                   /* in samples: sigma of a Gaussian as short as the shortest in h */
     double area_s;
 };
-/* Where the spec's limits are kept. Frees nothing on failure: waveform_pulse_free. */
+/* For a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a failure. */
 int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err);
 void waveform_pulse_free(struct waveform_pulse *pulse);
 
@@ -60,4 +60,5 @@ void waveform_add(const struct waveform *waveform, const struct waveform_return 
                   double *signal);
 /* How far a return reaches about its centroid beyond the pulse itself, in samples. */
 double waveform_reach(const struct waveform *waveform, const struct waveform_return *part);
+
 #endif
