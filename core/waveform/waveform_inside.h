@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+/* Private: a waveform's tables, and the steps from returns to samples. Times are counted in samples of the digitiser,
+ * or in steps, which are sample_s / phases. */
+#ifndef CORE_WAVEFORM_WAVEFORM_INSIDE_H
+#define CORE_WAVEFORM_WAVEFORM_INSIDE_H
+
+#include <stdint.h>
+
+#include "core/waveform.h"
+
+/* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples
+ * apart, read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
+struct waveform_pulse {
+    double *h;
+    uint32_t phases, length, pitch; /* pitch = length + 1 */
+    double lead, lag;               /* its first and last step before and behind the centroid, in samples */
+    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest in h */
+    double area_s;
+};
+/* For a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a failure. */
+int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err);
+void waveform_pulse_free(struct waveform_pulse *pulse);
+
+/* How energy spreads, as nodes with weights of sum 1. Level k has its own nodes, enough up to extents of reach[k] times
+ * the pulse's scale. */
+enum { WAVEFORM_LEVELS = 18, WAVEFORM_MOST_NODES = 2048 };
+#define WAVEFORM_BELL_END 4.8 /* standard deviations: 1.6e-6 of the energy lies beyond */
+struct waveform_node {
+    double x, weight;
+};
+struct waveform_rule {
+    struct waveform_node *node;
+    uint32_t first[WAVEFORM_LEVELS + 1];
+    double reach[WAVEFORM_LEVELS];
+    double square; /* mean of x^2 */
+};
+int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err);
+void waveform_rule_free(struct waveform_rule *rule);
+
+/* A count is baseline + counts_1 times the signal, which is `most` at most, and its noise. */
+struct waveform_digits {
+    double baseline, counts_1, noise, most, top;
+};
+
+struct waveform {
+    struct waveform_spec spec; /* with a table of its own */
+    double *table;
+    struct waveform_pulse pulse;
+    struct waveform_rule disc, bell;
+    double samples_1_m; /* of range */
+    struct waveform_digits digits;
+    int64_t before, after, dead;  /* in samples */
+    int64_t gate_begin, gate_end; /* 0 and 0: none */
+    uint64_t key;
+};
+
+int waveform_check(const struct waveform_spec *spec, struct sh_err *err);
+/* Adds a return whose centroid lies `centre` samples after signal[0]. */
+void waveform_add(const struct waveform *waveform, const struct waveform_return *part, double centre, uint32_t n,
+                  double *signal);
+/* How far a return reaches about its centroid beyond the pulse itself, in samples. */
+double waveform_reach(const struct waveform *waveform, const struct waveform_return *part);
+
+#endif
