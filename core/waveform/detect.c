@@ -107,11 +107,6 @@ static int detect_joined(const struct finder_run *run, const struct finder_peak 
     return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);
 }
 
-static int detect_limited(const struct finder_run *run, const struct finder_peak *peak)
-{
-    return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
-}
-
 static void detect_gaussians(const struct finder_run *run, double level, struct finder_list *list)
 {
     struct finder_peak peak[FINDER_PEAKS];
@@ -128,7 +123,7 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
         struct finder_mix mix = {.n = 1};
         for (end = i + 1; end < n && end - i < FINDER_MIX && detect_joined(run, &peak[end - 1], &peak[end]);)
             end++;
-        if (end > i + 1 || detect_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
+        if (end > i + 1 || finder_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
             finder_decompose(run, &peak[i], end - i, level, &mix);
         for (uint32_t j = 0; j < mix.n; j++)
             finder_add_gaussian(run, &mix, j, level, list);

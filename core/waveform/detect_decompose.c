@@ -52,7 +52,7 @@ static void decompose_begin(const struct finder_run *run, const struct finder_pe
     for (uint32_t j = 0; j < n; j++) {
         struct finder_gaussian *g = &mix->g[j];
         double side[2], height = run->y[peak[j].top];
-        if (run->mark != NULL && run->mark[peak[j].top] != FINDER_PLAIN) {
+        if (finder_limited(run, &peak[j])) {
             mix->limited |= 1U << j;
             mix->open |= 1U << j;
             decompose_limited(run, &peak[j], g);

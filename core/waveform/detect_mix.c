@@ -74,14 +74,14 @@ static void mix_add(const struct mix_walker *walker, const uint32_t *active, uin
     }
 }
 
-/* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.15 where the echo's top is not seen. So a
+/* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.03 where the echo's top is not seen. So a
  * flank alone, which many pairs of peak and sigma explain, has one answer. */
 static double mix_expect(const struct finder_task *task, const struct finder_mix *mix, struct mix_normal *normal)
 {
     double chi2 = 0.0;
     for (uint32_t j = 0; j < mix->n; j++) {
         double q = log(mix->g[j].sigma / task->run->finder->spread[0].sigma);
-        double within = mix->open >> j & 1 ? 0.15 : 2.0, weight = task->variance / (within * within);
+        double within = mix->open >> j & 1 ? 0.03 : 2.0, weight = task->variance / (within * within);
         chi2 += weight * q * q;
         normal->h[3 * j + 2][3 * j + 2] += weight;
         normal->r[3 * j + 2] -= weight * q;
