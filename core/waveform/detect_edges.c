@@ -8,18 +8,6 @@
 
 #include <math.h>
 
-/* The largest signal, from the parabola through the logarithms of three samples: exact for a Gaussian. A neighbour of zero
- * or less is noise of a pulse that is short beside the sampling: it counts as 2 % of the top. */
-static double edges_peak(const struct finder_run *run, uint32_t top)
-{
-    const double y = run->y[top], least = 0.02 * y;
-    if (top == 0 || top + 1 == run->n) return y;
-    double a = log(fmax(run->y[top - 1], least) / y), b = log(fmax(run->y[top + 1], least) / y);
-    double bend = a + b, slope = b - a;
-    if (!(bend < 0.0)) return y;
-    return y * exp(-0.125 * slope * slope / bend);
-}
-
 /* How long before its centroid h has `part` of its peak. */
 static double edges_lead(const struct finder *finder, double part)
 {
@@ -63,7 +51,7 @@ void finder_threshold(const struct finder_run *run, double level, struct finder_
         for (peak.to = i; peak.to < run->n && y[peak.to] > 0.0 && y[peak.to] < at;)
             peak.to++;
         if (edges_hidden(run, &peak, list)) continue;
-        double height = edges_peak(run, peak.top), side[2];
+        double place, height = finder_top(run, peak.top, &place), side[2];
         (void)finder_half(run, &peak, height, side);
         const struct finder_found found = {edges_centroid(run, cross, at, height), height, side[1] - side[0], 0};
         finder_add(run, &found, NULL, 0, list);
@@ -80,7 +68,7 @@ void finder_fraction(const struct finder_run *run, double level, struct finder_l
         n = FINDER_PEAKS;
     }
     for (uint32_t i = 0; i < n; i++) {
-        double height = edges_peak(run, peak[i].top), side[2];
+        double place, height = finder_top(run, peak[i].top, &place), side[2];
         if (height < at || edges_hidden(run, &peak[i], list)) continue;
         (void)finder_half(run, &peak[i], height, side);
         struct finder_spread spread;

@@ -16,7 +16,8 @@ static double sample_m(const struct wave_echoes *w)
     return 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(w->waveform)->sample_s;
 }
 
-/* Without noise the digits alone are in the way: steps of 0.006 thresholds, 1/(50 sqrt(12)) of that in range. */
+/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a Gaussian of
+ * 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
 static void a_plain_echo_is_where_it_is(void **state)
 {
     (void)state;
@@ -29,7 +30,7 @@ static void a_plain_echo_is_where_it_is(void **state)
         for (int k = 0; k < 50; k++) {
             const struct waveform_return r = {100.0 + 0.02 * k * sample_m(&w), 50.0, 0.0, WAVEFORM_POINT};
             assert_int_equal(wave_shoot(&w, all[d], 1, &r, 1), 1);
-            wave_near(w.echo[0].range_m, r.range_m, 1e-3);
+            wave_near(w.echo[0].range_m, r.range_m, 1.5e-3);
             wave_near(w.echo[0].amplitude, 50.0, 0.5);
             wave_near(w.echo[0].width_s, 4e-9, 0.05e-9);
             assert_true(w.echo[0].deviation < 0.005);
@@ -313,7 +314,7 @@ static void any_samples_are_taken(void **state)
             assert_true(found <= WAVE_MOST);
             for (uint32_t i = 0; i < found; i++) {
                 const struct waveform_echo *e = &w.echo[i];
-                if(!(isfinite(e->range_m) && isfinite(e->amplitude) && isfinite(e->width_s))) print_message("DBG %d %d %u %g %g %g\n", kind, d, n, e->range_m, e->amplitude, e->width_s);
+                if(!(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0)) print_message("DBG %d %d %u %g %g %g %g\n", kind, d, n, e->range_m, e->amplitude, e->width_s, e->deviation);
                 assert_true(isfinite(e->range_m) && isfinite(e->amplitude) && isfinite(e->width_s));
                 assert_true(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0);
             }
