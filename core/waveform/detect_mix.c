@@ -148,14 +148,17 @@ static double mix_within(double x, double least, double most)
     return x < least ? least : x > most ? most : x;
 }
 
-/* A step, shortened: in one, a peak changes by at most a factor of e^2, a centre by 1.5 sigma. */
+/* A step, shortened: in one, a peak changes by at most a factor of e^2, a centre by 1.5 sigma. A centre stays among the
+ * samples, unless the window ends there. */
 static void mix_move(const struct finder_task *task, const double p[MIX_MOST], struct finder_mix *mix)
 {
     const double h = task->run->finder->spread[0].sigma, room = task->hi - task->lo + 1.0;
+    const double first = task->lo > 0 ? task->lo : -3.0 * h;
+    const double last = task->hi + 1 < task->run->n ? task->hi : task->hi + 3.0 * h;
     for (uint32_t j = 0; j < mix->n; j++, p += 3) {
         struct finder_gaussian *g = &mix->g[j];
         g->peak = mix_within(g->peak * exp(mix_within(p[0], -2.0, 2.0)), 1e-9, 1e12);
-        g->at = mix_within(g->at + g->sigma * mix_within(p[1], -1.5, 1.5), task->lo - 3.0 * h, task->hi + 3.0 * h);
+        g->at = mix_within(g->at + g->sigma * mix_within(p[1], -1.5, 1.5), first, last);
         g->sigma = mix_within(g->sigma * exp(mix_within(p[2], -0.7, 0.7)), FINDER_LEAST * h, fmax(h, room));
     }
 }
