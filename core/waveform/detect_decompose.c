@@ -19,8 +19,8 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     while (hi + 1 < last->to && run->y[hi] > fmax(noise, 0.005 * run->y[last->top]))
         hi++;
     task->run = run;
-    task->lo = lo > margin ? lo - (uint32_t)margin : 0;
-    task->hi = hi + margin < run->n ? hi + (uint32_t)margin : run->n - 1;
+    task->lo = (uint32_t)fmax(lo - margin, peak->from);
+    task->hi = (uint32_t)fmin(hi + margin, last->to - 1.0);
     task->variance = run->finder->noise * run->finder->noise;
 }
 
@@ -141,23 +141,28 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
     return 1;
 }
 
-/* One more component, in the two ways that there are. Returns 1 where a better mixture came of it. */
-static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
+/* A component for what is left over. */
+static int decompose_extra(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     double rest[WAVEFORM_MAX_SAMPLES];
-    struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
     finder_mix_rest(task, mix, rest);
     struct finder_gaussian more = decompose_largest(task, rest);
-    int n = 0;
-    if (more.peak >= least) {
-        tried[n].g[tried[n].n++] = more;
-        n++;
-    }
-    n += decompose_split(task, &tried[n]);
-    for (int i = 0; i < n; i++) {
+    if (more.peak < least) return 0;
+    mix->g[mix->n++] = more;
+    return 1;
+}
+
+/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1 where
+ * a better mixture came of it. */
+static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
+{
+    struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
+    for (int i = 0; i < 2; i++) {
+        if (!(i == 0 ? decompose_split(task, &tried[i]) : decompose_extra(task, least, &tried[i]))) continue;
         finder_mix_fit(task, &tried[i]);
-        int sound = decompose_sound(task, &tried[i], least);
-        if (sound && (best == NULL || tried[i].chi2 < best->chi2)) best = &tried[i];
+        if (!decompose_sound(task, &tried[i], least) || (best != NULL && tried[i].chi2 >= best->chi2)) continue;
+        best = &tried[i];
+        if (decompose_enough(task, best)) break;
     }
     /* Three more parameters lower the sum by 3 variances if they mean nothing; 25 by chance in one of 60,000. */
     if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance + decompose_shapes(task, best)) return 0;
@@ -165,14 +170,47 @@ static int decompose_more(const struct finder_task *task, double least, struct f
     return 1;
 }
 
+/* Two pulses with the energy, the mean, the variance and the third moment of the samples. Shares p and q, d apart: the
+ * variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
+static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
+{
+    const double sigma = task->run->finder->spread[0].sigma;
+    double m[4] = {0.0}, middle = 0.5 * ((double)task->lo + (double)task->hi);
+    for (uint32_t i = task->lo; i <= task->hi; i++) {
+        double x = i - middle, y = task->run->y[i];
+        m[0] += y;
+        m[1] += y * x;
+        m[2] += y * x * x;
+        m[3] += y * x * x * x;
+    }
+    const double mean = m[1] / m[0], square = m[2] / m[0] - mean * mean, more = square - sigma * sigma;
+    const double third = m[3] / m[0] - 3.0 * mean * m[2] / m[0] + 2.0 * mean * mean * mean;
+    if (!(m[0] > 0.0 && more > 0.05 * sigma * sigma)) return 0;
+    const double skew = third / (more * sqrt(more)), p = 0.5 + 0.5 * skew / sqrt(skew * skew + 4.0);
+    const double apart = sqrt(more / (p * (1.0 - p))), height = m[0] / (sigma * sqrt(2.0 * M_PI)), at = middle + mean;
+    *mix = (struct finder_mix){.n = 2,
+                               .g = {{at - (1.0 - p) * apart, sigma, p * height},
+                                     {at + p * apart, sigma, (1.0 - p) * height}}};
+    return 1;
+}
+
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
                       struct finder_mix *mix)
 {
+    const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     decompose_begin(run, peak, n, mix);
+    /* One Gaussian was not enough already. Mostly two are. */
+    struct finder_mix two;
+    if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
+        finder_mix_fit(&task, &two);
+        if (decompose_sound(&task, &two, least) && decompose_enough(&task, &two)) {
+            *mix = two;
+            return;
+        }
+    }
     finder_mix_fit(&task, mix);
-    const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
     while (mix->n < FINDER_MIX && !decompose_enough(&task, mix) && decompose_more(&task, least, mix)) {
     }
 }

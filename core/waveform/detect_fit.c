@@ -135,5 +135,5 @@ int finder_fit(const struct finder_run *run, const struct finder_peak *peak, str
     double rms = finder_fit_near(run, peak, g);
     if (rms < 0.0 || g->sigma < FINDER_LEAST * finder->spread[0].sigma) return 0;
     finder_by_sigma(finder, g->sigma, &spread);
-    return rms <= fit_explained(run, g, spread.misfit) && fit_alone(run, peak, g, spread.tail + FINDER_ROUGH);
+    return rms <= fit_explained(run, g, spread.misfit) && fit_alone(run, peak, g, 1.2 * spread.tail + FINDER_ROUGH);
 }

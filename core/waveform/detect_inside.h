@@ -16,7 +16,7 @@
 enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 385, FINDER_MIX = 8, FINDER_PEAKS = 64 };
 #define FINDER_NEAR       2.5   /* sigmas about its centre: there one Gaussian is fitted */
 #define FINDER_LEAST      0.75  /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
-#define FINDER_ROUGH      0.003 /* of a peak: how far samples at any phase leave the learned misfit */
+#define FINDER_ROUGH      0.001 /* of a peak: how far samples at any phase leave the learned misfit */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 32.0) /* widths of the pulse */

@@ -11,11 +11,19 @@
 #include <math.h>
 #include <string.h>
 
-enum { MIX_MOST = 3 * FINDER_MIX, MIX_STEPS = 40 };
+#include "core/vecmath.h"
+
+enum { MIX_MOST = 3 * FINDER_MIX, MIX_STEPS = 16 };
 #define MIX_REACH 5.0 /* sigmas: a Gaussian is 4e-6 of its peak there */
 
 struct mix_normal {
     double h[MIX_MOST][MIX_MOST], r[MIX_MOST];
+};
+
+/* Samples are taken in blocks. A row has a derivative's values in a block's samples, and 0 beyond its ends. */
+enum { MIX_BLOCK = 32, MIX_LANES = 8 };
+struct mix_block {
+    double row[MIX_MOST][MIX_BLOCK], rest[MIX_BLOCK];
 };
 
 /* A component on its way along the samples (detect_fit.c has the recurrence). */
@@ -39,39 +47,74 @@ static void mix_begin(const struct finder_task *task, const struct finder_gaussi
     walker->change = exp(-walker->step * walker->step);
 }
 
-static void mix_next(struct mix_walker *walker)
+/* A component's values and derivatives in samples first .. first + MIX_BLOCK. */
+static void mix_rows(struct mix_walker *w, uint32_t first, double (*row)[MIX_BLOCK])
 {
-    walker->value *= walker->ratio;
-    walker->ratio *= walker->change;
-    walker->d += walker->step;
+    uint32_t from = w->lo > first ? w->lo - first : 0;
+    memset(row, 0, 3 * sizeof *row);
+    for (uint32_t k = from; k < MIX_BLOCK && first + k <= w->hi; k++) {
+        row[0][k] = w->value;
+        row[1][k] = w->value * w->d;
+        row[2][k] = row[1][k] * w->d;
+        w->value *= w->ratio;
+        w->ratio *= w->change;
+        w->d += w->step;
+    }
 }
 
-/* What the model leaves of sample i. */
-static double mix_rest(const struct finder_run *run, uint32_t i, double model)
+/* The sum in lanes, which is the same with any width of vectors. */
+VEC_INLINE double mix_dot(const double *restrict a, const double *restrict b)
+{
+    double sum[MIX_LANES] = {0.0};
+    for (uint32_t k = 0; k < MIX_BLOCK; k += MIX_LANES)
+        for (uint32_t j = 0; j < MIX_LANES; j++)
+            sum[j] += a[k + j] * b[k + j];
+    return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+}
+
+/* Adds a block to the lower half of the normal equations; its rows are those of the n components in `active`. Returns its
+ * sum of squares. */
+VEC_CLONES
+static double mix_add(const struct mix_block *block, const uint32_t *active, uint32_t n, struct mix_normal *normal)
+{
+    for (uint32_t a = 0; a < 3 * n; a++) {
+        const uint32_t x = 3 * active[a / 3] + a % 3;
+        normal->r[x] += mix_dot(block->row[a], block->rest);
+        for (uint32_t b = 0; b <= a; b++)
+            normal->h[x][3 * active[b / 3] + b % 3] += mix_dot(block->row[a], block->row[b]);
+    }
+    return mix_dot(block->rest, block->rest);
+}
+
+/* What the model leaves of sample i. *counts: whether the sample says anything. */
+static double mix_rest(const struct finder_run *run, uint32_t i, double model, int *counts)
 {
     if (run->mark == NULL || run->mark[i] == FINDER_PLAIN) return run->y[i] - model;
-    if (run->mark[i] == FINDER_BLIND) return 0.0;
-    return fmax(0.0, run->finder->limit - model);
+    double rest = run->mark[i] == FINDER_BLIND ? 0.0 : fmax(0.0, run->finder->limit - model);
+    if (rest == 0.0) *counts = 0;
+    return rest;
 }
 
-/* Adds a sample to the lower half of the normal equations: its derivatives are of the components in `active`. */
-static void mix_add(const struct mix_walker *walker, const uint32_t *active, uint32_t n, double rest,
-                    struct mix_normal *normal)
+/* Fills a block from the walkers that reach it, whose numbers go to `active`. Returns how many do. */
+static uint32_t mix_fill(const struct finder_task *task, struct mix_walker *walker, uint32_t components, uint32_t first,
+                         struct mix_block *block, uint32_t *active)
 {
-    double v[FINDER_MIX][3];
-    for (uint32_t a = 0; a < n; a++) {
-        const struct mix_walker *w = &walker[active[a]];
-        const uint32_t row = 3 * active[a];
-        v[a][0] = w->value;
-        v[a][1] = w->value * w->d;
-        v[a][2] = v[a][1] * w->d;
-        for (uint32_t x = 0; x < 3; x++) {
-            normal->r[row + x] += v[a][x] * rest;
-            for (uint32_t b = 0; b <= a; b++)
-                for (uint32_t y = 0; y < 3; y++)
-                    normal->h[row + x][3 * active[b] + y] += v[a][x] * v[b][y];
-        }
+    uint32_t n = 0;
+    double model[MIX_BLOCK] = {0.0};
+    for (uint32_t j = 0; j < components; j++) {
+        if (walker[j].lo >= first + MIX_BLOCK || walker[j].hi < first || walker[j].lo > walker[j].hi) continue;
+        mix_rows(&walker[j], first, &block->row[3 * n]);
+        for (uint32_t k = 0; k < MIX_BLOCK; k++)
+            model[k] += block->row[3 * n][k];
+        active[n++] = j;
     }
+    for (uint32_t k = 0; k < MIX_BLOCK; k++) {
+        int counts = first + k <= task->hi;
+        block->rest[k] = counts ? mix_rest(task->run, first + k, model[k], &counts) : 0.0;
+        for (uint32_t a = 0; !counts && a < 3 * n; a++)
+            block->row[a][k] = 0.0;
+    }
+    return n;
 }
 
 /* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.03 where the echo's top is not seen. So a
@@ -93,26 +136,17 @@ static double mix_expect(const struct finder_task *task, const struct finder_mix
 static double mix_walk(const struct finder_task *task, const struct finder_mix *mix, struct mix_normal *normal)
 {
     struct mix_walker walker[FINDER_MIX];
+    struct mix_block block;
+    uint32_t active[FINDER_MIX];
     double chi2 = 0.0;
     for (uint32_t j = 0; j < mix->n; j++)
         mix_begin(task, &mix->g[j], &walker[j]);
     for (uint32_t j = 0; j < 3 * mix->n; j++)
         memset(normal->h[j], 0, 3 * mix->n * sizeof normal->h[j][0]);
     memset(normal->r, 0, sizeof normal->r);
-    for (uint32_t i = task->lo; i <= task->hi; i++) {
-        uint32_t active[FINDER_MIX], n = 0;
-        double model = 0.0;
-        for (uint32_t j = 0; j < mix->n; j++)
-            if (i >= walker[j].lo && i <= walker[j].hi) {
-                active[n++] = j;
-                model += walker[j].value;
-            }
-        double rest = mix_rest(task->run, i, model);
-        chi2 += rest * rest;
-        int counts = task->run->mark == NULL || task->run->mark[i] == FINDER_PLAIN || rest > 0.0;
-        if (counts) mix_add(walker, active, n, rest, normal);
-        for (uint32_t a = 0; a < n; a++)
-            mix_next(&walker[active[a]]);
+    for (uint32_t i = task->lo; i <= task->hi; i += MIX_BLOCK) {
+        uint32_t n = mix_fill(task, walker, mix->n, i, &block, active);
+        chi2 += mix_add(&block, active, n, normal);
     }
     return chi2 + mix_expect(task, mix, normal);
 }
@@ -184,7 +218,8 @@ void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix)
         const double gain = mix->chi2 - next.chi2;
         *mix = next;
         now = 1 - now;
-        if (gain <= 0.01 * task->variance && damping < 1.0) return;
+        /* Steps that are hardly damped gain a tenth of the one before, or less. */
+        if (gain <= 0.5 * task->variance && damping < 1.0) return;
         damping *= 0.15;
     }
 }
@@ -192,15 +227,13 @@ void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix)
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest)
 {
     struct mix_walker walker[FINDER_MIX];
+    struct mix_block block;
+    uint32_t active[FINDER_MIX];
     for (uint32_t j = 0; j < mix->n; j++)
         mix_begin(task, &mix->g[j], &walker[j]);
-    for (uint32_t i = task->lo; i <= task->hi; i++) {
-        double model = 0.0;
-        for (uint32_t j = 0; j < mix->n; j++)
-            if (i >= walker[j].lo && i <= walker[j].hi) {
-                model += walker[j].value;
-                mix_next(&walker[j]);
-            }
-        rest[i - task->lo] = mix_rest(task->run, i, model);
+    for (uint32_t i = task->lo; i <= task->hi; i += MIX_BLOCK) {
+        const uint32_t n = task->hi + 1 - i;
+        (void)mix_fill(task, walker, mix->n, i, &block, active);
+        memcpy(rest + (i - task->lo), block.rest, (n < MIX_BLOCK ? n : MIX_BLOCK) * sizeof *rest);
     }
 }
