@@ -13,7 +13,7 @@
 
 #include "core/vecmath.h"
 
-enum { MIX_MOST = 3 * FINDER_MIX, MIX_STEPS = 16 };
+enum { MIX_MOST = 3 * FINDER_MIX, MIX_STEPS = 12 };
 #define MIX_REACH 5.0 /* sigmas: a Gaussian is 4e-6 of its peak there */
 
 struct mix_normal {
@@ -154,7 +154,7 @@ static double mix_walk(const struct finder_task *task, const struct finder_mix *
 /* Solves (h + damping diag h) p = r by Cholesky's decomposition. Returns 0 where that is not positive. */
 static int mix_solve(const struct mix_normal *normal, uint32_t n, double damping, double p[MIX_MOST])
 {
-    double l[MIX_MOST][MIX_MOST];
+    double l[MIX_MOST][MIX_MOST], by[MIX_MOST]; /* by: 1 over the diagonal */
     for (uint32_t i = 0; i < n; i++) {
         double right = normal->r[i];
         for (uint32_t j = 0; j <= i; j++) {
@@ -163,16 +163,17 @@ static int mix_solve(const struct mix_normal *normal, uint32_t n, double damping
             for (uint32_t k = 0; k < j; k++)
                 sum -= l[i][k] * l[j][k];
             if (i == j && !(sum > 0.0)) return 0;
-            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
+            if (i == j) by[i] = 1.0 / sqrt(sum);
+            l[i][j] = sum * by[j];
         }
         for (uint32_t k = 0; k < i; k++)
             right -= l[i][k] * p[k];
-        p[i] = right / l[i][i];
+        p[i] = right * by[i];
     }
     for (uint32_t i = n; i-- > 0;) {
         for (uint32_t k = i + 1; k < n; k++)
             p[i] -= l[k][i] * p[k];
-        p[i] /= l[i][i];
+        p[i] *= by[i];
     }
     return 1;
 }
