@@ -84,7 +84,7 @@ static double decompose_shapes(const struct finder_task *task, const struct find
 static int decompose_enough(const struct finder_task *task, const struct finder_mix *mix)
 {
     double n = fmax(1.0, task->hi - task->lo + 1.0 - 3.0 * mix->n);
-    return mix->chi2 <= n * task->variance * (1.0 + 4.0 * sqrt(2.0 / n)) + decompose_shapes(task, mix);
+    return mix->chi2 <= n * finder_noise2(task->run->finder, n) + decompose_shapes(task, mix);
 }
 
 /* The pulse that explains most of the rest: its amplitude by least squares at each place. */

@@ -94,6 +94,9 @@ struct finder_found {
     double at, peak, width;
     int saturated;
 };
+/* A mean of n squares of noise is larger than this once in 30,000 times. */
+double finder_noise2(const struct finder *finder, double n);
+
 /* A sum of Gaussians. `open`: bit j is set where component j is limited, or cut by the window's end. */
 struct finder_mix {
     uint32_t n, open, limited; /* limited: the same bits, only of those that are limited */

@@ -20,7 +20,7 @@ struct learn_echo {
 /* The signal of an echo of amplitude 1, x samples after its centroid. */
 static double learn_signal(const struct waveform *waveform, double metre, double extent_m, double x)
 {
-    const double far_m = 1024.0 * metre;
+    const double far_m = 1e6 * metre; /* no bend of a near plane */
     const struct waveform_return part = {far_m, 1.0, extent_m, extent_m > 0.0 ? WAVEFORM_DISC : WAVEFORM_POINT};
     return waveform_signal(waveform, &part, 1, far_m + x * metre);
 }
