@@ -67,8 +67,8 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
             if (i + 1 < run->n && !detect_fell(run->finder, run->y[top], y)) continue;
             rising = 0;
             /* After a blind start of a window the signal falls: its maximum was not seen. */
-            int hidden = run->mark != NULL && top > 0 && run->mark[top] != FINDER_LIMITED &&
-                         run->mark[top - 1] == FINDER_BLIND;
+            int hidden =
+                run->mark != NULL && top > 0 && run->mark[top] != FINDER_LIMITED && run->mark[top - 1] == FINDER_BLIND;
             if (run->y[top] >= least && !hidden) {
                 if (n < most) peak[n] = (struct finder_peak){top, valley, run->n};
                 if (n > 0 && n < most) peak[n - 1].to = valley + 1;
@@ -130,7 +130,8 @@ int finder_half(const struct finder_run *run, const struct finder_peak *peak, do
 }
 
 /* Maxima are one mixture where the signal between them stays above noise, and above 2 % of the smaller one. */
-static int detect_joined(const struct finder_run *run, const struct finder_peak *before, const struct finder_peak *after)
+static int detect_joined(const struct finder_run *run, const struct finder_peak *before,
+                         const struct finder_peak *after)
 {
     double smaller = fmin(run->y[before->top], run->y[after->top]);
     return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);

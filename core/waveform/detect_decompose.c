@@ -188,9 +188,8 @@ static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
     if (!(m[0] > 0.0 && more > 0.05 * sigma * sigma)) return 0;
     const double skew = third / (more * sqrt(more)), p = 0.5 + 0.5 * skew / sqrt(skew * skew + 4.0);
     const double apart = sqrt(more / (p * (1.0 - p))), height = m[0] / (sigma * sqrt(2.0 * M_PI)), at = middle + mean;
-    *mix = (struct finder_mix){.n = 2,
-                               .g = {{at - (1.0 - p) * apart, sigma, p * height},
-                                     {at + p * apart, sigma, (1.0 - p) * height}}};
+    *mix = (struct finder_mix){
+        .n = 2, .g = {{at - (1.0 - p) * apart, sigma, p * height}, {at + p * apart, sigma, (1.0 - p) * height}}};
     return 1;
 }
 

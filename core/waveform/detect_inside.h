@@ -14,9 +14,9 @@
 #include "core/waveform.h"
 
 enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 385, FINDER_MIX = 8, FINDER_PEAKS = 64 };
-#define FINDER_NEAR       2.5   /* sigmas about its centre: there one Gaussian is fitted */
-#define FINDER_LEAST      0.75  /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
-#define FINDER_ROUGH      0.001 /* of a peak: how far samples at any phase leave the learned misfit */
+#define FINDER_NEAR       2.5                /* sigmas about its centre: there one Gaussian is fitted */
+#define FINDER_LEAST      0.75               /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
+#define FINDER_ROUGH      0.001              /* of a peak: how far samples at any phase leave the learned misfit */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 32.0) /* widths of the pulse */
@@ -40,13 +40,13 @@ struct finder_spread {
 
 /* What detectors know of the pulse h. Constant after finder_learn. */
 struct finder {
-    double peak;    /* of h */
-    double width;   /* of h, full at half maximum */
-    double signal;  /* of one count */
-    double noise;   /* sigma of a sample, digits included */
-    double limit;   /* a sample from here on is limited */
-    uint32_t blind; /* samples without signal after a limited one */
-    double metre;   /* range of one sample */
+    double peak;                                 /* of h */
+    double width;                                /* of h, full at half maximum */
+    double signal;                               /* of one count */
+    double noise;                                /* sigma of a sample, digits included */
+    double limit;                                /* a sample from here on is limited */
+    uint32_t blind;                              /* samples without signal after a limited one */
+    double metre;                                /* range of one sample */
     struct finder_spread spread[FINDER_SPREADS]; /* by growing tilt; the first is a plane that is hit head on */
     double lead[FINDER_LEADS];  /* by v: from the first crossing of exp(-v v / 2) of h's peak to its centroid */
     double shape[FINDER_SHAPE]; /* h over its peak */

@@ -42,11 +42,12 @@ static void aim(int scene, uint64_t p, struct pulse *pulse)
     pulse->n = 1;
     r[0] = (struct waveform_return){at_m, amplitude, 0.0, WAVEFORM_POINT};
     if (scene == 1) r[0] = (struct waveform_return){at_m, amplitude, 0.2, WAVEFORM_DISC};
-    if (scene == 2) r[pulse->n++] = (struct waveform_return){at_m + WIDTH_M, 40.0 - 0.5 * amplitude, 0.0, WAVEFORM_POINT};
+    if (scene == 2)
+        r[pulse->n++] = (struct waveform_return){at_m + WIDTH_M, 40.0 - 0.5 * amplitude, 0.0, WAVEFORM_POINT};
     if (scene == 3)
         for (pulse->n = 0; pulse->n < MOST_RETURNS; pulse->n++)
-            r[pulse->n] = (struct waveform_return){at_m + 3.0 * even(p, 10 + pulse->n), 4.0 * even(p, 90 + pulse->n), 0.0,
-                                                   WAVEFORM_POINT};
+            r[pulse->n] = (struct waveform_return){at_m + 3.0 * even(p, 10 + pulse->n), 4.0 * even(p, 90 + pulse->n),
+                                                   0.0, WAVEFORM_POINT};
     if (scene == 4) r[0].amplitude = 1e5;
     if (scene == 5) pulse->n = 0;
 }

@@ -314,7 +314,9 @@ static void any_samples_are_taken(void **state)
             assert_true(found <= WAVE_MOST);
             for (uint32_t i = 0; i < found; i++) {
                 const struct waveform_echo *e = &w.echo[i];
-                if(!(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0)) print_message("DBG %d %d %u %g %g %g %g\n", kind, d, n, e->range_m, e->amplitude, e->width_s, e->deviation);
+                if (!(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0))
+                    print_message("DBG %d %d %u %g %g %g %g\n", kind, d, n, e->range_m, e->amplitude, e->width_s,
+                                  e->deviation);
                 assert_true(isfinite(e->range_m) && isfinite(e->amplitude) && isfinite(e->width_s));
                 assert_true(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0);
             }
