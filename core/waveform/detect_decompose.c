@@ -27,7 +27,7 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
 /* A top that is limited. With both flanks seen, the pulse is as high as it has to be to stay above the limit for so long.
  * Where the receiver went blind, the rising flank's last two samples have to do: the log of a Gaussian has the slope
  * (at - x) / sigma^2. */
-static void decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_gaussian *g)
+static void decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
 {
     const double sigma = run->finder->spread[0].sigma, noise = run->finder->noise, limit = run->finder->limit;
     uint32_t a = peak->top, b = peak->top;
@@ -42,7 +42,7 @@ static void decompose_limited(const struct finder_run *run, const struct finder_
         at = (double)a - 1.5 + sigma * sigma * log(run->y[a - 1] / run->y[a - 2]);
     at = fmax(at, (double)a - 0.5);
     double d = (at - ((double)a - 0.5)) / sigma;
-    *g = (struct finder_gaussian){at, sigma, limit * exp(fmin(0.5 * d * d, 20.0))};
+    *g = (struct finder_term){at, sigma, limit * exp(fmin(0.5 * d * d, 20.0))};
 }
 
 static void decompose_begin(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
@@ -50,7 +50,7 @@ static void decompose_begin(const struct finder_run *run, const struct finder_pe
 {
     *mix = (struct finder_mix){.n = n};
     for (uint32_t j = 0; j < n; j++) {
-        struct finder_gaussian *g = &mix->g[j];
+        struct finder_term *g = &mix->g[j];
         double side[2], height = run->y[peak[j].top];
         if (finder_limited(run, &peak[j])) {
             mix->limited |= 1U << j;
@@ -88,15 +88,15 @@ static int decompose_enough(const struct finder_task *task, const struct finder_
 }
 
 /* The pulse that explains most of the rest: its amplitude by least squares at each place. */
-static struct finder_gaussian decompose_largest(const struct finder_task *task, const double *rest)
+static struct finder_term decompose_largest(const struct finder_task *task, const double *rest)
 {
     const double sigma = task->run->finder->spread[0].sigma;
     const int32_t reach = (int32_t)ceil(2.0 * sigma), n = (int32_t)(task->hi - task->lo + 1);
-    struct finder_gaussian best = {0.0, sigma, 0.0};
+    struct finder_term best = {0.0, sigma, 0.0};
     double kernel[2 * DECOMPOSE_REACH + 1];
     const int32_t side = reach < DECOMPOSE_REACH ? reach : DECOMPOSE_REACH;
     for (int32_t k = -side; k <= side; k++)
-        kernel[k + side] = exp(-0.5 * (k / sigma) * (k / sigma));
+        kernel[k + side] = finder_value(task->run->finder, k / sigma);
     for (int32_t i = 0; i < n; i++) {
         double by = 0.0, squares = 0.0;
         for (int32_t k = -side; k <= side; k++)
@@ -104,7 +104,7 @@ static struct finder_gaussian decompose_largest(const struct finder_task *task, 
                 by += kernel[k + side] * rest[i + k];
                 squares += kernel[k + side] * kernel[k + side];
             }
-        if (by > best.peak * squares) best = (struct finder_gaussian){(double)task->lo + i, sigma, by / squares};
+        if (by > best.peak * squares) best = (struct finder_term){(double)task->lo + i, sigma, by / squares};
     }
     return best;
 }
@@ -116,11 +116,11 @@ static int decompose_split(const struct finder_task *task, struct finder_mix *mi
     uint32_t widest = 0;
     for (uint32_t j = 1; j < mix->n; j++)
         if (mix->g[j].sigma > mix->g[widest].sigma) widest = j;
-    struct finder_gaussian *g = &mix->g[widest];
+    struct finder_term *g = &mix->g[widest];
     if (g->sigma < 1.05 * sigma || mix->open >> widest & 1) return 0;
     double apart = sqrt(g->sigma * g->sigma - sigma * sigma), peak = 0.5 * g->peak * g->sigma / sigma;
-    mix->g[mix->n++] = (struct finder_gaussian){g->at + apart, sigma, peak};
-    *g = (struct finder_gaussian){g->at - apart, sigma, peak};
+    mix->g[mix->n++] = (struct finder_term){g->at + apart, sigma, peak};
+    *g = (struct finder_term){g->at - apart, sigma, peak};
     return 1;
 }
 
@@ -129,7 +129,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
 {
     for (uint32_t j = 0; j < mix->n; j++)
         for (uint32_t k = 0; k < mix->n; k++) {
-            const struct finder_gaussian *a = &mix->g[j], *b = &mix->g[k];
+            const struct finder_term *a = &mix->g[j], *b = &mix->g[k];
             if (a->peak < least) return 0;
             if (j == k) continue;
             struct finder_spread spread;
@@ -146,7 +146,7 @@ static int decompose_extra(const struct finder_task *task, double least, struct 
 {
     double rest[WAVEFORM_MAX_SAMPLES];
     finder_mix_rest(task, mix, rest);
-    struct finder_gaussian more = decompose_largest(task, rest);
+    struct finder_term more = decompose_largest(task, rest);
     if (more.peak < least) return 0;
     mix->g[mix->n++] = more;
     return 1;
@@ -174,7 +174,8 @@ static int decompose_more(const struct finder_task *task, double least, struct f
  * variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
 static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
 {
-    const double sigma = task->run->finder->spread[0].sigma;
+    const struct finder *finder = task->run->finder;
+    const double sigma = finder->spread[0].sigma, lag = finder->spread[0].lag;
     double m[4] = {0.0}, middle = 0.5 * ((double)task->lo + (double)task->hi);
     for (uint32_t i = task->lo; i <= task->hi; i++) {
         double x = i - middle, y = task->run->y[i];
@@ -183,11 +184,12 @@ static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
         m[2] += y * x * x;
         m[3] += y * x * x * x;
     }
-    const double mean = m[1] / m[0], square = m[2] / m[0] - mean * mean, more = square - sigma * sigma;
-    const double third = m[3] / m[0] - 3.0 * mean * m[2] / m[0] + 2.0 * mean * mean * mean;
+    const double mean = m[1] / m[0], square = m[2] / m[0] - mean * mean, more = square - finder->variance;
+    const double third = m[3] / m[0] - 3.0 * mean * m[2] / m[0] + 2.0 * mean * mean * mean - finder->third;
     if (!(m[0] > 0.0 && more > 0.05 * sigma * sigma)) return 0;
     const double skew = third / (more * sqrt(more)), p = 0.5 + 0.5 * skew / sqrt(skew * skew + 4.0);
-    const double apart = sqrt(more / (p * (1.0 - p))), height = m[0] / (sigma * sqrt(2.0 * M_PI)), at = middle + mean;
+    const double apart = sqrt(more / (p * (1.0 - p))), at = middle + mean + lag;
+    const double height = m[0] * finder->peak / finder->area;
     *mix = (struct finder_mix){
         .n = 2, .g = {{at - (1.0 - p) * apart, sigma, p * height}, {at + p * apart, sigma, (1.0 - p) * height}}};
     return 1;

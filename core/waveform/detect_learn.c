@@ -11,6 +11,9 @@ enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
 /* Extent of each tilt, in widths of the pulse. */
 static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
 
+/* Of the peak: 4e-6 is 5 sigmas of a Gaussian. */
+#define LEARN_LEAST 4e-6
+
 /* An echo on a grid of its own: y[i] lies `from` + i `step` samples after its centroid. */
 struct learn_echo {
     double from, step, y[LEARN_ROOM];
@@ -58,6 +61,7 @@ static void learn_pulse(const struct waveform *waveform, struct finder *finder, 
         guess = finder->width = learn_half(finder, echo, &rise) * echo->step;
     }
     finder->peak = echo->y[echo->top];
+    finder->middle = (echo->from + rise * echo->step) / finder->width + 0.5;
 }
 
 /* Crossings of falling levels, from the top outward: each is where h is last below the level before its peak. */
@@ -76,19 +80,46 @@ static void learn_leads(struct finder *finder, const struct learn_echo *echo)
 
 static void learn_shape(const struct waveform *waveform, struct finder *finder)
 {
+    const double step = FINDER_SHAPE_STEP * finder->width;
+    double m[4] = {0.0};
     for (uint32_t i = 0; i < FINDER_SHAPE; i++) {
-        double x = (i * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
-        finder->shape[i] = learn_signal(waveform, finder->metre, 0.0, x) / finder->peak;
+        const double x = (i * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
+        const double y = learn_signal(waveform, finder->metre, 0.0, x) / finder->peak;
+        const double before = learn_signal(waveform, finder->metre, 0.0, x - 0.5 * step) / finder->peak;
+        const double after = learn_signal(waveform, finder->metre, 0.0, x + 0.5 * step) / finder->peak;
+        finder->shape[i] = y;
+        finder->slope[i] = (after - before) / FINDER_SHAPE_STEP;
+        m[0] += y;
+        m[2] += y * x * x;
+        m[3] += y * x * x * x;
+        if (y > LEARN_LEAST) finder->reach[1] = (x / finder->width - finder->middle) * FINDER_FWHM;
     }
+    finder->area = waveform_pulse_area_s(waveform) / waveform_spec_of(waveform)->sample_s;
+    finder->variance = m[2] / m[0];
+    finder->third = m[3] / m[0];
+    finder->reach[0] = (FINDER_SHAPE_LEAD + finder->middle) * FINDER_FWHM;
+    if (finder->gaussian) finder->reach[0] = finder->reach[1] = 5.0;
 }
 
-/* The Gaussian of an echo, and what it leaves. */
+double finder_value(const struct finder *finder, double d)
+{
+    if (finder->gaussian) return exp(-0.5 * d * d);
+    return finder_table(finder->shape, finder->middle + d * (1.0 / FINDER_FWHM));
+}
+
+double finder_fall(const struct finder *finder, double d)
+{
+    if (finder->gaussian) return d * exp(-0.5 * d * d);
+    return finder_table(finder->slope, finder->middle + d * (1.0 / FINDER_FWHM)) * (-1.0 / FINDER_FWHM);
+}
+
+/* The term of an echo, and what it leaves. */
 static void learn_fit(const struct finder *finder, const struct learn_echo *echo, struct finder_spread *spread)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
     const struct finder_peak peak = {echo->top, 0, echo->n};
     const double top = echo->y[echo->top];
-    struct finder_gaussian g;
+    struct finder_term g;
     double rms = finder_fit_near(&run, &peak, &g), rise;
     spread->sigma = g.sigma * echo->step;
     spread->lag = echo->from + g.at * echo->step;
@@ -98,7 +129,7 @@ static void learn_fit(const struct finder *finder, const struct learn_echo *echo
     spread->half_lead = -(echo->from + rise * echo->step);
     spread->tail = 0.0;
     for (uint32_t i = 0; i < echo->n; i++) {
-        double d = (i - g.at) / g.sigma, rest = echo->y[i] - g.peak * exp(-0.5 * d * d);
+        double d = (i - g.at) / g.sigma, rest = echo->y[i] - g.peak * finder_value(finder, d);
         if (fabs(d) > FINDER_NEAR) spread->tail = fmax(spread->tail, rest / top);
     }
 }
@@ -111,6 +142,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     finder->metre = 0.5 * LIGHT_SPEED_M_S * spec->sample_s;
     finder->signal = spec->full_scale / (most - spec->baseline_counts);
     finder->noise = 0.0; /* of what follows */
+    finder->gaussian = spec->shape == WAVEFORM_GAUSSIAN;
     finder->limit = INFINITY;
     finder->blind = spec->saturation > 0.0 ? (uint32_t)waveform->dead : 0;
     learn_pulse(waveform, finder, &echo);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A sum of Gaussians fitted to samples: Levenberg's and Marquardt's steps with analytic derivatives, after W. Wagner et
+/* A sum of terms fitted to samples: Levenberg's and Marquardt's steps with analytic derivatives, after W. Wagner et
  * al., Gaussian decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
  * 2006.
  *
@@ -14,7 +14,6 @@
 #include "core/vecmath.h"
 
 enum { MIX_MOST = 3 * FINDER_MIX, MIX_STEPS = 12 };
-#define MIX_REACH 5.0 /* sigmas: a Gaussian is 4e-6 of its peak there */
 
 struct mix_normal {
     double h[MIX_MOST][MIX_MOST], r[MIX_MOST];
@@ -29,19 +28,21 @@ struct mix_block {
 /* A component on its way along the samples (detect_fit.c has the recurrence). */
 struct mix_walker {
     uint32_t lo, hi; /* samples that it reaches */
-    double step, d, value, ratio, change;
+    double step, d, peak, value, ratio, change;
+    const struct finder *finder;
 };
 
-static void mix_begin(const struct finder_task *task, const struct finder_gaussian *g, struct mix_walker *walker)
+static void mix_begin(const struct finder_task *task, const struct finder_term *g, struct mix_walker *walker)
 {
-    double from = ceil(g->at - MIX_REACH * g->sigma), to = floor(g->at + MIX_REACH * g->sigma);
-    from = fmax(from, task->lo);
-    to = fmin(to, task->hi);
-    *walker = (struct mix_walker){.lo = 1, .hi = 0, .step = 1.0 / g->sigma};
+    const struct finder *finder = task->run->finder;
+    const double from = fmax(ceil(g->at - finder->reach[0] * g->sigma), task->lo);
+    const double to = fmin(floor(g->at + finder->reach[1] * g->sigma), task->hi);
+    *walker = (struct mix_walker){.lo = 1, .hi = 0, .step = 1.0 / g->sigma, .peak = g->peak, .finder = finder};
     if (from > to) return;
     walker->lo = (uint32_t)from;
     walker->hi = (uint32_t)to;
     walker->d = (from - g->at) * walker->step;
+    if (!finder->gaussian) return;
     walker->value = g->peak * exp(-0.5 * walker->d * walker->d);
     walker->ratio = exp(-walker->step * (walker->d + 0.5 * walker->step));
     walker->change = exp(-walker->step * walker->step);
@@ -52,13 +53,17 @@ static void mix_rows(struct mix_walker *w, uint32_t first, double (*row)[MIX_BLO
 {
     uint32_t from = w->lo > first ? w->lo - first : 0;
     memset(row, 0, 3 * sizeof *row);
-    for (uint32_t k = from; k < MIX_BLOCK && first + k <= w->hi; k++) {
-        row[0][k] = w->value;
-        row[1][k] = w->value * w->d;
+    for (uint32_t k = from; k < MIX_BLOCK && first + k <= w->hi; k++, w->d += w->step) {
+        if (w->finder->gaussian) {
+            row[0][k] = w->value;
+            row[1][k] = w->value * w->d;
+            w->value *= w->ratio;
+            w->ratio *= w->change;
+        } else {
+            row[0][k] = w->peak * finder_value(w->finder, w->d);
+            row[1][k] = w->peak * finder_fall(w->finder, w->d);
+        }
         row[2][k] = row[1][k] * w->d;
-        w->value *= w->ratio;
-        w->ratio *= w->change;
-        w->d += w->step;
     }
 }
 
@@ -191,7 +196,7 @@ static void mix_move(const struct finder_task *task, const double p[MIX_MOST], s
     const double first = task->lo > 0 ? task->lo : -3.0 * h;
     const double last = task->hi + 1 < task->run->n ? task->hi : task->hi + 3.0 * h;
     for (uint32_t j = 0; j < mix->n; j++, p += 3) {
-        struct finder_gaussian *g = &mix->g[j];
+        struct finder_term *g = &mix->g[j];
         g->peak = mix_within(g->peak * exp(mix_within(p[0], -2.0, 2.0)), 1e-9, 1e12);
         g->at = mix_within(g->at + g->sigma * mix_within(p[1], -1.5, 1.5), first, last);
         g->sigma = mix_within(g->sigma * exp(mix_within(p[2], -0.7, 0.7)), FINDER_LEAST * h, fmax(h, room));
