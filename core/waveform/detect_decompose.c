@@ -24,30 +24,82 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* A top that is limited. With both flanks seen, the pulse is as high as it has to be to stay above the limit for so long.
- * Where the receiver went blind, the rising flank's last two samples have to do: the log of a Gaussian has the slope
- * (at - x) / sigma^2. */
-static void decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
+/* How long h is above a part of its peak; *rise: where that begins, from its centroid. */
+static double decompose_span(const struct finder *finder, double part, double *rise)
 {
-    const double sigma = run->finder->spread[0].sigma, noise = run->finder->noise, limit = run->finder->limit;
+    uint32_t a = 0, b = FINDER_SHAPE - 1;
+    while (a < b && finder->shape[a] < part)
+        a++;
+    while (b > a && finder->shape[b] < part)
+        b--;
+    *rise = (a * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
+    return (b - a) * FINDER_SHAPE_STEP * finder->width;
+}
+
+/* The height of a top that stays above the limit for so long, by halving; *centroid: where the pulse then is, from the
+ * moment in which it reaches the limit. */
+static double decompose_height(const struct finder *finder, double span, double *centroid)
+{
+    double least = -14.0, most = 0.0, rise = 0.0; /* logarithms of the limit over the peak */
+    for (int i = 0; i < 20; i++) {
+        double half = 0.5 * (least + most);
+        if (decompose_span(finder, exp(half), &rise) > span)
+            least = half;
+        else
+            most = half;
+    }
+    *centroid = -rise;
+    return finder->limit * exp(-most);
+}
+
+/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies between
+ * what they are of it. *centroid: from the sample of y1. */
+static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
+{
+    double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
+    for (int i = 0; i < 20; i++) {
+        double half = 0.5 * (least + most), part = exp(-half);
+        if (finder_lead(finder, part * y0 / y1) - finder_lead(finder, part) > 1.0)
+            least = half;
+        else
+            most = half;
+    }
+    *centroid = finder_lead(finder, exp(-least));
+    return y1 * exp(least);
+}
+
+/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do; returns 1
+ * then, since a fit to these has nothing to add. */
+static int decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
+{
+    const struct finder *finder = run->finder;
     uint32_t a = peak->top, b = peak->top;
     while (a > peak->from && run->mark[a - 1] == FINDER_LIMITED)
         a--;
     while (b + 1 < peak->to && run->mark[b + 1] == FINDER_LIMITED)
         b++;
     int blind = b + 1 < peak->to && run->mark[b + 1] == FINDER_BLIND;
-    double at = 0.5 * ((double)a + (double)b);
-    if (blind) at = (double)a + sigma;
-    if (blind && a >= peak->from + 2 && run->y[a - 2] > 3.0 * noise)
-        at = (double)a - 1.5 + sigma * sigma * log(run->y[a - 1] / run->y[a - 2]);
-    at = fmax(at, (double)a - 0.5);
-    double d = (at - ((double)a - 0.5)) / sigma;
-    *g = (struct finder_term){at, sigma, limit * exp(fmin(0.5 * d * d, 20.0))};
+    double centroid, height, from = (double)a - 0.5;
+    if (!blind) {
+        height = decompose_height(finder, (double)b - (double)a + 1.0, &centroid);
+    } else {
+        /* Half of what could be told from noise stands for a sample that can't. */
+        const double least = 1.5 * finder->noise;
+        uint32_t k = a > peak->from && run->y[a - 1] > 2.0 * least ? a - 1 : a;
+        height = decompose_flank(finder, k > peak->from ? fmax(run->y[k - 1], least) : least,
+                                 fmin(run->y[k], finder->limit), &centroid);
+        from = k;
+    }
+    const double at = from + centroid + finder->spread[0].lag;
+    *g = (struct finder_term){at, finder->spread[0].sigma, fmax(height, finder->limit)};
+    return blind;
 }
 
-static void decompose_begin(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
-                            struct finder_mix *mix)
+/* Returns 1 where nothing is left to fit. */
+static int decompose_begin(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
+                           struct finder_mix *mix)
 {
+    int blind = 0;
     *mix = (struct finder_mix){.n = n};
     for (uint32_t j = 0; j < n; j++) {
         struct finder_term *g = &mix->g[j];
@@ -55,7 +107,7 @@ static void decompose_begin(const struct finder_run *run, const struct finder_pe
         if (finder_limited(run, &peak[j])) {
             mix->limited |= 1U << j;
             mix->open |= 1U << j;
-            decompose_limited(run, &peak[j], g);
+            blind |= decompose_limited(run, &peak[j], g);
             continue;
         }
         int seen = finder_half(run, &peak[j], height, side);
@@ -66,6 +118,7 @@ static void decompose_begin(const struct finder_run *run, const struct finder_pe
         g->sigma = usable ? sigma : run->finder->spread[0].sigma;
         g->peak = height;
     }
+    return n == 1 && blind;
 }
 
 /* What the shapes of echoes on planes leave when Gaussians fit them, as a sum of squares. */
@@ -201,7 +254,7 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
     struct finder_task task;
     decompose_range(run, peak, n, &task);
-    decompose_begin(run, peak, n, mix);
+    if (decompose_begin(run, peak, n, mix)) return;
     /* One Gaussian was not enough already. Mostly two are. */
     struct finder_mix two;
     if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {

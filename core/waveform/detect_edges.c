@@ -8,21 +8,12 @@
 
 #include <math.h>
 
-/* How long before its centroid h has `part` of its peak. */
-static double edges_lead(const struct finder *finder, double part)
-{
-    double v = part < 1.0 ? sqrt(-2.0 * log(part)) / FINDER_LEAD_STEP : 0.0;
-    v = fmin(v, FINDER_LEADS - 1.001);
-    uint32_t k = (uint32_t)v;
-    return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
-}
-
 /* The centroid, from the crossing of a level between sample k - 1 and sample k. */
 static double edges_centroid(const struct finder_run *run, uint32_t k, double level, double peak)
 {
-    double above = k + edges_lead(run->finder, run->y[k] / peak);
+    double above = k + finder_lead(run->finder, run->y[k] / peak);
     if (k == 0 || run->y[k - 1] < fmax(2.0 * run->finder->noise, 1e-5 * peak)) return above;
-    double below = k - 1.0 + edges_lead(run->finder, run->y[k - 1] / peak);
+    double below = k - 1.0 + finder_lead(run->finder, run->y[k - 1] / peak);
     double u = (level - run->y[k - 1]) / (run->y[k] - run->y[k - 1]);
     return below + u * (above - below);
 }

@@ -42,7 +42,7 @@ static void fit_sum(const struct finder_run *run, const struct finder_term *g, u
     *sums = (struct fit_sums){.n = hi - lo + 1};
     if (!run->finder->gaussian) {
         for (uint32_t i = lo; i <= hi; i++, d += step) {
-            const double value = finder_value(run->finder, d), fall = finder_fall(run->finder, d);
+            const double value = finder_value(run->finder, d), fall = finder_fall(run->finder, d, value);
             fit_add(sums, run->y[i] - g->peak * value, value, fall, fall * d);
         }
         return;

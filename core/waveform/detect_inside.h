@@ -55,7 +55,8 @@ struct finder {
     double middle;                /* from the centroid of h to its middle, in widths */
     double reach[2];              /* sigmas: before and after them a term is nothing */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
-    double shape[FINDER_SHAPE], slope[FINDER_SHAPE]; /* h over its peak, and its derivative by widths */
+    double shape[FINDER_SHAPE];   /* h over its peak */
+    double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
 };
 
 /* A table of h, so many widths after its centroid. */
@@ -66,9 +67,11 @@ static inline double finder_table(const double table[FINDER_SHAPE], double width
     uint32_t k = (uint32_t)place;
     return table[k] + (place - k) * (table[k + 1] - table[k]);
 }
-/* A term of peak 1, d of its sigmas after its middle: its value, and minus its derivative by d. */
+/* A term of peak 1, d of its sigmas after its middle: its value, and minus its derivative by d there. */
 double finder_value(const struct finder *finder, double d);
-double finder_fall(const struct finder *finder, double d);
+double finder_fall(const struct finder *finder, double d, double value);
+/* How long before its centroid h has `part` of its peak. */
+double finder_lead(const struct finder *finder, double part);
 
 /* Fills `finder` from the signals of a waveform that is otherwise complete. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);

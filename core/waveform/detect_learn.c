@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "core/light.h"
+#include "core/vecmath.h"
 #include "core/waveform/waveform_inside.h"
 
 enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
@@ -12,7 +13,8 @@ enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
 static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
 
 /* Of the peak: 4e-6 is 5 sigmas of a Gaussian. */
-#define LEARN_LEAST 4e-6
+#define LEARN_LEAST   4e-6
+#define LEARN_NOTHING 1e-12
 
 /* An echo on a grid of its own: y[i] lies `from` + i `step` samples after its centroid. */
 struct learn_echo {
@@ -88,7 +90,8 @@ static void learn_shape(const struct waveform *waveform, struct finder *finder)
         const double before = learn_signal(waveform, finder->metre, 0.0, x - 0.5 * step) / finder->peak;
         const double after = learn_signal(waveform, finder->metre, 0.0, x + 0.5 * step) / finder->peak;
         finder->shape[i] = y;
-        finder->slope[i] = (after - before) / FINDER_SHAPE_STEP;
+        finder->log_shape[i] = log(fmax(y, LEARN_NOTHING));
+        finder->log_slope[i] = log(fmax(after, LEARN_NOTHING) / fmax(before, LEARN_NOTHING)) / FINDER_SHAPE_STEP;
         m[0] += y;
         m[2] += y * x * x;
         m[3] += y * x * x * x;
@@ -101,16 +104,26 @@ static void learn_shape(const struct waveform *waveform, struct finder *finder)
     if (finder->gaussian) finder->reach[0] = finder->reach[1] = 5.0;
 }
 
+/* Logarithms are interpolated: flanks of saturated pulses are far below the peak. */
 double finder_value(const struct finder *finder, double d)
 {
     if (finder->gaussian) return exp(-0.5 * d * d);
-    return finder_table(finder->shape, finder->middle + d * (1.0 / FINDER_FWHM));
+    const double widths = finder->middle + d * (1.0 / FINDER_FWHM), value = finder_table(finder->log_shape, widths);
+    return value < 0.0 ? vec_exp(value) : finder_table(finder->shape, widths);
 }
 
-double finder_fall(const struct finder *finder, double d)
+double finder_fall(const struct finder *finder, double d, double value)
 {
-    if (finder->gaussian) return d * exp(-0.5 * d * d);
-    return finder_table(finder->slope, finder->middle + d * (1.0 / FINDER_FWHM)) * (-1.0 / FINDER_FWHM);
+    if (finder->gaussian) return d * value;
+    return finder_table(finder->log_slope, finder->middle + d * (1.0 / FINDER_FWHM)) * (-1.0 / FINDER_FWHM) * value;
+}
+
+double finder_lead(const struct finder *finder, double part)
+{
+    double v = part < 1.0 ? sqrt(-2.0 * log(part)) / FINDER_LEAD_STEP : 0.0;
+    v = fmin(v, FINDER_LEADS - 1.001);
+    uint32_t k = (uint32_t)v;
+    return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
 }
 
 /* The term of an echo, and what it leaves. */
@@ -158,8 +171,8 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     }
     finder->noise = sqrt(spec->noise * spec->noise + finder->signal * finder->signal / 12.0);
     finder->limit = (most - spec->baseline_counts - 0.5) * finder->signal;
-    /* Noise comes after the receiver's limit: it lowers one sample in 740 below this. */
-    if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 3.0 * finder->noise);
+    /* Noise comes after the receiver's limit: it lowers one sample in 3 million below this. */
+    if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 5.0 * finder->noise);
 }
 
 /* Between tilts k and k + 1 by u. */

@@ -61,7 +61,7 @@ static void mix_rows(struct mix_walker *w, uint32_t first, double (*row)[MIX_BLO
             w->ratio *= w->change;
         } else {
             row[0][k] = w->peak * finder_value(w->finder, w->d);
-            row[1][k] = w->peak * finder_fall(w->finder, w->d);
+            row[1][k] = finder_fall(w->finder, w->d, row[0][k]);
         }
         row[2][k] = row[1][k] * w->d;
     }
