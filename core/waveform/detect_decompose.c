@@ -24,32 +24,22 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* How long h is above a part of its peak; *rise: where that begins, from its centroid. */
-static double decompose_span(const struct finder *finder, double part, double *rise)
-{
-    uint32_t a = 0, b = FINDER_SHAPE - 1;
-    while (a < b && finder->shape[a] < part)
-        a++;
-    while (b > a && finder->shape[b] < part)
-        b--;
-    *rise = (a * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
-    return (b - a) * FINDER_SHAPE_STEP * finder->width;
-}
-
-/* The height of a top that stays above the limit for so long, by halving; *centroid: where the pulse then is, from the
- * moment in which it reaches the limit. */
+/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is above it
+ * for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
-    double least = -14.0, most = 0.0, rise = 0.0; /* logarithms of the limit over the peak */
-    for (int i = 0; i < 20; i++) {
-        double half = 0.5 * (least + most);
-        if (decompose_span(finder, exp(half), &rise) > span)
-            least = half;
+    const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
+    uint32_t a = 0, b;
+    while (a + 2 < FINDER_SHAPE && (h[a] < h[a + 1] || h[a] < 0.5))
+        a++;
+    for (b = a; b - a < steps && a > 0 && b + 1 < FINDER_SHAPE;) {
+        if (h[a - 1] > h[b + 1])
+            a--;
         else
-            most = half;
+            b++;
     }
-    *centroid = -rise;
-    return finder->limit * exp(-most);
+    *centroid = (FINDER_SHAPE_LEAD - a * FINDER_SHAPE_STEP) * finder->width;
+    return finder->limit / fmax(fmax(h[a], h[b]), 1e-6);
 }
 
 /* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies between

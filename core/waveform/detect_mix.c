@@ -20,7 +20,7 @@ struct mix_normal {
 };
 
 /* Samples are taken in blocks. A row has a derivative's values in a block's samples, and 0 beyond its ends. */
-enum { MIX_BLOCK = 32, MIX_LANES = 8 };
+enum { MIX_BLOCK = 48, MIX_LANES = 8 };
 struct mix_block {
     double row[MIX_MOST][MIX_BLOCK], rest[MIX_BLOCK];
 };
@@ -49,22 +49,25 @@ static void mix_begin(const struct finder_task *task, const struct finder_term *
 }
 
 /* A component's values and derivatives in samples first .. first + MIX_BLOCK. */
-static void mix_rows(struct mix_walker *w, uint32_t first, double (*row)[MIX_BLOCK])
+static void mix_rows(struct mix_walker *walker, uint32_t first, double (*restrict row)[MIX_BLOCK])
 {
-    uint32_t from = w->lo > first ? w->lo - first : 0;
+    struct mix_walker w = *walker;
+    const uint32_t from = w.lo > first ? w.lo - first : 0;
+    const uint32_t to = w.hi - first < MIX_BLOCK ? w.hi - first + 1 : MIX_BLOCK;
     memset(row, 0, 3 * sizeof *row);
-    for (uint32_t k = from; k < MIX_BLOCK && first + k <= w->hi; k++, w->d += w->step) {
-        if (w->finder->gaussian) {
-            row[0][k] = w->value;
-            row[1][k] = w->value * w->d;
-            w->value *= w->ratio;
-            w->ratio *= w->change;
+    for (uint32_t k = from; k < to; k++, w.d += w.step) {
+        if (w.finder->gaussian) {
+            row[0][k] = w.value;
+            w.value *= w.ratio;
+            w.ratio *= w.change;
+            row[1][k] = row[0][k] * w.d;
         } else {
-            row[0][k] = w->peak * finder_value(w->finder, w->d);
-            row[1][k] = finder_fall(w->finder, w->d, row[0][k]);
+            row[0][k] = w.peak * finder_value(w.finder, w.d);
+            row[1][k] = finder_fall(w.finder, w.d, row[0][k]);
         }
-        row[2][k] = row[1][k] * w->d;
+        row[2][k] = row[1][k] * w.d;
     }
+    *walker = w;
 }
 
 /* The sum in lanes, which is the same with any width of vectors. */
@@ -91,13 +94,12 @@ static double mix_add(const struct mix_block *block, const uint32_t *active, uin
     return mix_dot(block->rest, block->rest);
 }
 
-/* What the model leaves of sample i. *counts: whether the sample says anything. */
-static double mix_rest(const struct finder_run *run, uint32_t i, double model, int *counts)
+/* What the model leaves of sample i. Returns whether the sample says anything. */
+static int mix_rest(const struct finder_run *run, uint32_t i, double model, double *rest)
 {
-    if (run->mark == NULL || run->mark[i] == FINDER_PLAIN) return run->y[i] - model;
-    double rest = run->mark[i] == FINDER_BLIND ? 0.0 : fmax(0.0, run->finder->limit - model);
-    if (rest == 0.0) *counts = 0;
-    return rest;
+    if (run->mark[i] == FINDER_PLAIN) *rest = run->y[i] - model;
+    if (run->mark[i] == FINDER_LIMITED) *rest = fmax(0.0, run->finder->limit - model);
+    return run->mark[i] == FINDER_PLAIN || *rest > 0.0;
 }
 
 /* Fills a block from the walkers that reach it, whose numbers go to `active`. Returns how many do. */
@@ -113,12 +115,17 @@ static uint32_t mix_fill(const struct finder_task *task, struct mix_walker *walk
             model[k] += block->row[3 * n][k];
         active[n++] = j;
     }
-    for (uint32_t k = 0; k < MIX_BLOCK; k++) {
-        int counts = first + k <= task->hi;
-        block->rest[k] = counts ? mix_rest(task->run, first + k, model[k], &counts) : 0.0;
-        for (uint32_t a = 0; !counts && a < 3 * n; a++)
-            block->row[a][k] = 0.0;
+    const uint32_t left = task->hi + 1 - first, m = left < MIX_BLOCK ? left : MIX_BLOCK;
+    memset(block->rest, 0, sizeof block->rest);
+    if (task->run->mark == NULL) {
+        for (uint32_t k = 0; k < m; k++)
+            block->rest[k] = task->run->y[first + k] - model[k];
+        return n;
     }
+    for (uint32_t k = 0; k < m; k++)
+        if (!mix_rest(task->run, first + k, model[k], &block->rest[k]))
+            for (uint32_t a = 0; a < 3 * n; a++)
+                block->row[a][k] = 0.0;
     return n;
 }
 

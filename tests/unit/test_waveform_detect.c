@@ -294,16 +294,11 @@ static void detection_is_pure(void **state)
 }
 
 /* Any counts at all: random walks, spikes, all the largest, all nothing. Figures stay finite. */
-static void any_samples_are_taken(void **state)
+static void take_any_samples(const struct waveform_spec *spec, uint64_t seed)
 {
-    (void)state;
-    struct waveform_spec spec = wave_spec();
     struct wave_echoes w;
-    uint64_t seed = 9;
-    spec.saturation = 80.0;
-    spec.dead_s = 7e-9;
-    wave_open(&w, &spec);
-    for (int turn = 0; turn < fewer(3000); turn++) {
+    wave_open(&w, spec);
+    for (int turn = 0; turn < fewer(1000); turn++) {
         uint32_t n = (uint32_t)case_between(&seed, 1, turn % 50 == 0 ? WAVEFORM_MAX_SAMPLES : 60);
         int kind = (int)case_between(&seed, 0, 4);
         double level = 200.0;
@@ -326,6 +321,26 @@ static void any_samples_are_taken(void **state)
         }
     }
     wave_close(&w);
+}
+
+static void any_samples_are_taken(void **state)
+{
+    (void)state;
+    static const double humps[7] = {0.0, 1.0, 0.2, 0.3, 0.9, 0.4, 0.0};
+    struct waveform_spec spec = wave_spec();
+    spec.saturation = 80.0;
+    spec.dead_s = 7e-9;
+    take_any_samples(&spec, 9);
+    spec.shape = WAVEFORM_ASYMMETRIC;
+    spec.skew = 3.0;
+    spec.width_s = 12e-9;
+    take_any_samples(&spec, 10);
+    spec.shape = WAVEFORM_TABLE;
+    spec.table = humps;
+    spec.n_table = 7;
+    spec.table_step_s = 3e-9;
+    spec.bandwidth_hz = 150e6;
+    take_any_samples(&spec, 11);
 }
 
 int main(void)
