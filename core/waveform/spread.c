@@ -50,8 +50,7 @@ static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;
     if (spread == WAVEFORM_DISC) return (n - 5.0) / 2.6;
-    const double steps = n / 8.0;
-    return steps > 1.0 ? sqrt(steps * steps - 1.0) : 0.0;
+    return n / 7.4 - 1.0;
 }
 
 int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err)
@@ -91,23 +90,22 @@ VEC_CLONES
 static void add_pulse(const struct waveform_pulse *pulse, double amplitude, double centre, uint32_t n,
                       double *restrict signal)
 {
-    const double at = pulse->centroid - centre * pulse->phases, whole = floor(at), f = at - whole;
-    const int64_t phases = pulse->phases, step = (int64_t)whole - 1;
-    const int64_t k = step >= 0 ? step / phases : -((phases - 1 - step) / phases), phase = step - k * phases;
+    const double at = pulse->lead - centre, whole = floor(at), fine = (at - whole) * pulse->phases;
+    const int64_t phases = pulse->phases, phase = (int64_t)fine, k = (int64_t)whole - (phase == 0);
     const int64_t from = k < 0 ? -k : 0, to = (int64_t)pulse->length - k < n ? (int64_t)pulse->length - k : n;
+    const double f = fine - (double)phase;
     const double c[4] = {-amplitude * f * (f - 1.0) * (f - 2.0) / 6.0,
                          amplitude * (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0,
                          -amplitude * (f + 1.0) * f * (f - 2.0) / 2.0, amplitude * (f + 1.0) * f * (f - 1.0) / 6.0};
     const double *row[4];
     if (from >= to) return;
-    for (int64_t j = 0; j < 4; j++) {
-        int64_t over = phase + j >= phases;
-        row[j] = pulse->h + ((phase + j - over * phases) * pulse->pitch + k + over + from);
+    for (int64_t j = 0; j < 4; j++) { /* steps phase - 1 .. phase + 2 of this sample, or of its neighbours */
+        const int64_t step = phase - 1 + j, over = step < 0 ? -1 : step >= phases;
+        row[j] = pulse->h + ((step - over * phases) * pulse->pitch + (int64_t)whole + over + from);
     }
     const double *restrict r0 = row[0], *restrict r1 = row[1], *restrict r2 = row[2], *restrict r3 = row[3];
     double *restrict out = signal + from;
-    const int64_t m = to - from;
-    for (int64_t i = 0; i < m; i++)
+    for (int64_t i = 0; i < to - from; i++)
         out[i] += (c[0] * r0[i] + c[1] * r1[i]) + (c[2] * r2[i] + c[3] * r3[i]);
 }
 

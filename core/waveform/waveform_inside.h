@@ -14,9 +14,8 @@
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
-    double centroid;                /* in steps */
-    double lead, lag;               /* its first and last sample, before and after the centroid */
-    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest that is in h */
+    double lead, lag;               /* its first and last step before and behind the centroid, in samples */
+    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest in h */
     double area_s;
 };
 /* Where the spec's limits are kept. Frees nothing on failure: waveform_pulse_free. */
