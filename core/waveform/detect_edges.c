@@ -28,9 +28,11 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
     return 1;
 }
 
+/* Another echo may begin once the signal is 5 sigma below the level: noise on a slow tail would cross it again. */
 void finder_threshold(const struct finder_run *run, double level, struct finder_list *list)
 {
-    const double *y = run->y, at = level * run->finder->peak, again = at - fmin(3.0 * run->finder->noise, 0.5 * at);
+    const double *y = run->y, at = level * run->finder->peak;
+    const double again = fmax(at - 5.0 * run->finder->noise, run->finder->noise);
     for (uint32_t i = 0; i < run->n; i++) {
         if (y[i] < at) continue;
         const uint32_t cross = i;

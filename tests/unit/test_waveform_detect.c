@@ -166,6 +166,24 @@ static void noise_is_no_echo(void **state)
     wave_close(&w);
 }
 
+/* The tail of an asymmetric pulse takes 20 samples to fall through the level, with noise on it. */
+static void a_tail_is_no_echo(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.shape = WAVEFORM_ASYMMETRIC;
+    spec.skew = 2.0;
+    spec.sample_s = 0.5e-9;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (uint64_t p = 0; p < 2000; p++) {
+            const struct waveform_return r = {30.0 + 1e-4 * (double)p, 10.0 + 0.03 * (double)p, 0.0, WAVEFORM_POINT};
+            assert_int_equal(wave_shoot(&w, all[d], p, &r, 1), 1);
+        }
+    wave_close(&w);
+}
+
 /* Half of the pulses see a target at the level; twice the level is 8 sigma above it, half of it 4 below. A fit has less
  * noise than a sample; a sample near the top is up to 3 % lower. */
 static void the_level_decides(void **state)
@@ -352,6 +370,7 @@ int main(void)
         cmocka_unit_test(windows_are_one_pulse),
         cmocka_unit_test(the_weakest_are_left_out),
         cmocka_unit_test(noise_is_no_echo),
+        cmocka_unit_test(a_tail_is_no_echo),
         cmocka_unit_test(the_level_decides),
         cmocka_unit_test(two_surfaces_are_two_echoes),
         cmocka_unit_test(the_deviation_shows_mixed_echoes),
