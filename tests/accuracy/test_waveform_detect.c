@@ -147,6 +147,18 @@ static double extent_m(double incidence_deg)
     return 0.5 * BEAM_RAD * RANGE_M * tan(incidence_deg * M_PI / 180.0);
 }
 
+/* The largest signal of a return, over that of one that is hit head on. */
+static double peak_of(const struct wave_echoes *w, const struct waveform_return *r)
+{
+    const struct waveform_return point = {r->range_m, 1.0, 0.0, WAVEFORM_POINT};
+    double most = 0.0, head_on = 0.0;
+    for (int k = -200; k <= 200; k++) {
+        most = fmax(most, waveform_signal(w->waveform, r, 1, r->range_m + 0.005 * k));
+        head_on = fmax(head_on, waveform_signal(w->waveform, &point, 1, r->range_m + 0.005 * k));
+    }
+    return most / head_on;
+}
+
 static void planes(const struct waveform_spec *spec, const char *name, double most_m[WAVE_DETECTORS])
 {
     static const double incidence_deg[7] = {0.0, 30.0, 60.0, 70.0, 80.0, 85.0, 88.0};
@@ -167,6 +179,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
             const double skew_m = extent * extent / RANGE_M / 3.0;
             wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
+        for (int d = 1; d < WAVE_DETECTORS; d++)
+            wave_near(f[d].amplitude / peak_of(&w, &r), 1.0, 0.01);
         struct beam beam;
         float width_m;
         const float steep = (float)(1.0 / pow(cos(incidence_deg[k] * M_PI / 180.0), 2.0));

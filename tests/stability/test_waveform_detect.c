@@ -166,13 +166,13 @@ static void limited(void **state)
     table_check();
 }
 
-/* Windows of a gate that begin within the echo, up to a sigma after its top. */
+/* Windows of a gate that begin within the echo, up to 2.4 samples after its top. */
 static void truncated(void **state)
 {
     (void)state;
     struct waveform_spec spec = wave_spec();
     struct errors worst = {0.0, 0.0};
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 20; k++) {
         struct wave_echoes w;
         spec.near_m = 40.0;
         spec.far_m = 46.0;
