@@ -201,7 +201,7 @@ static int decompose_more(const struct finder_task *task, double least, struct f
 {
     struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
     for (int i = 0; i < 2; i++) {
-        if (!(i == 0 ? decompose_split(task, &tried[i]) : decompose_extra(task, least, &tried[i]))) continue;
+        if (!(i == 0 ? decompose_extra(task, least, &tried[i]) : decompose_split(task, &tried[i]))) continue;
         finder_mix_fit(task, &tried[i]);
         if (!decompose_sound(task, &tried[i], least) || (best != NULL && tried[i].chi2 >= best->chi2)) continue;
         best = &tried[i];
@@ -211,6 +211,19 @@ static int decompose_more(const struct finder_task *task, double least, struct f
     if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance + decompose_shapes(task, best)) return 0;
     *mix = *best;
     return 1;
+}
+
+/* A component that came early may stand in a place that none has now. Takes away what the others can do without. */
+static void decompose_fewer(const struct finder_task *task, double least, struct finder_mix *mix)
+{
+    for (uint32_t j = 0; j < mix->n && mix->n > 1; j++) {
+        struct finder_mix fewer = *mix;
+        fewer.g[j] = fewer.g[--fewer.n];
+        finder_mix_fit(task, &fewer);
+        if (!decompose_enough(task, &fewer) || !decompose_sound(task, &fewer, least)) continue;
+        *mix = fewer;
+        j = UINT32_MAX; /* begins again */
+    }
 }
 
 /* Two pulses with the energy, the mean, the variance and the third moment of the samples. Shares p and q, d apart: the
@@ -257,4 +270,5 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     finder_mix_fit(&task, mix);
     while (mix->n < FINDER_MIX && !decompose_enough(&task, mix) && decompose_more(&task, least, mix)) {
     }
+    if (mix->n > n + 1) decompose_fewer(&task, least, mix);
 }
