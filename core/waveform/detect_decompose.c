@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-enum { DECOMPOSE_REACH = 64 }; /* samples: how far a pulse is compared with the rest */
+enum { DECOMPOSE_TURNS = 2, DECOMPOSE_REACH = 64 }; /* samples: how far a pulse is compared with the rest */
 
 /* The samples of a mixture: from its first maximum down to the foot, or to the window's end, and so behind its last. */
 static void decompose_range(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
@@ -213,16 +213,23 @@ static int decompose_more(const struct finder_task *task, double least, struct f
     return 1;
 }
 
-/* A component that came early may stand in a place that none has now. Takes away what the others can do without. */
+/* A component that came early may stand in a place that none has now: the others can do without it. The two weakest are
+ * tried, since each try costs a fit. */
 static void decompose_fewer(const struct finder_task *task, double least, struct finder_mix *mix)
 {
-    for (uint32_t j = 0; j < mix->n && mix->n > 1; j++) {
+    uint32_t tried = 0;
+    for (uint32_t turn = 0; turn < DECOMPOSE_TURNS && mix->n > 2; turn++) {
         struct finder_mix fewer = *mix;
-        fewer.g[j] = fewer.g[--fewer.n];
+        uint32_t weakest = FINDER_MIX;
+        for (uint32_t j = 0; j < mix->n; j++)
+            if (!(tried >> j & 1) && (weakest == FINDER_MIX || mix->g[j].peak < mix->g[weakest].peak)) weakest = j;
+        if (weakest == FINDER_MIX) return;
+        tried |= 1U << weakest;
+        fewer.g[weakest] = fewer.g[--fewer.n];
         finder_mix_fit(task, &fewer);
         if (!decompose_enough(task, &fewer) || !decompose_sound(task, &fewer, least)) continue;
         *mix = fewer;
-        j = UINT32_MAX; /* begins again */
+        tried = 0;
     }
 }
 

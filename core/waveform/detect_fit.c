@@ -113,7 +113,7 @@ double finder_fit_near(const struct finder_run *run, const struct finder_peak *p
     return -1.0;
 }
 
-/* Beyond the fit no sample may exceed the Gaussian by what noise, the pulse's tail, or 0.7 of an echo explain. */
+/* Beyond the fit no sample may exceed the term by more than noise and the learned tail explain. */
 static int fit_alone(const struct finder_run *run, const struct finder_peak *peak, const struct finder_term *g,
                      double tail)
 {
