@@ -42,7 +42,10 @@ static void fit_sum(const struct finder_run *run, const struct finder_term *g, u
     *sums = (struct fit_sums){.n = hi - lo + 1};
     if (!run->finder->gaussian) {
         for (uint32_t i = lo; i <= hi; i++, d += step) {
-            const double value = finder_value(run->finder, d), fall = finder_fall(run->finder, d, value);
+            /* Near its peak h needs no logarithm. */
+            const double widths = run->finder->middle + d * (1.0 / FINDER_FWHM);
+            const double value = finder_table(run->finder->shape, widths);
+            const double fall = finder_table(run->finder->log_slope, widths) * (-1.0 / FINDER_FWHM) * value;
             fit_add(sums, run->y[i] - g->peak * value, value, fall, fall * d);
         }
         return;
