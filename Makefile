@@ -422,10 +422,6 @@ bench-copies: deps-build
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
-# The samples of a full waveform, ns a pulse by spread and window; with --chart methods beside 100,000 sub-rays.
-bench-waveform: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waveform
-	@$(BUILD)/tests/bench/waveform
 # The arithmetic around the cast, ns a pulse: as on this CPU, and as x86 has it without AVX-512.
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
@@ -511,6 +507,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waveform bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

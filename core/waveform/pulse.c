@@ -90,8 +90,8 @@ static double spectrum(const struct outgoing *o, double sigma_s, double per_s)
     return sqrt(even * even + odd * odd) / all * exp(-0.5 * per_s * per_s * sigma_s * sigma_s);
 }
 
-/* sigma of the Gaussian whose spectrum ends, at 1e-5, where that of h does. A table's straight lines have no such end: what
- * the sampling does not resolve does not count. */
+/* sigma of the Gaussian whose spectrum ends, at 1e-5, where that of h does. A table's straight lines have no such end:
+ * what the sampling does not resolve does not count. */
 static double scale_of(const struct outgoing *o, double sigma_s)
 {
     const double end = 4.798526, least_s = 0.3 * o->spec->sample_s; /* exp(-end^2 / 2) = 1e-5 */
@@ -101,8 +101,9 @@ static double scale_of(const struct outgoing *o, double sigma_s)
     return scale_s;
 }
 
-/* h on n steps, the first of them at from_s: the receiver's answers to all of the pulse lie within them. The pulse is taken
- * finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by less than 1e-6. */
+/* h on n steps, the first of them at from_s: the receiver's answers to all of the pulse lie within them. The pulse is
+ * taken finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by less than
+ * 1e-6. */
 static void fill_steps(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
 {
     const double fine_s = fmin(o->fine_s, sigma_s), reach_s = GAUSSIAN_END * sigma_s;

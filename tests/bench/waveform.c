@@ -2,7 +2,7 @@
 /* This measures what the samples of a pulse cost, in processor time of the thread, medians of the rounds.
  *
  *   build/tests/bench/waveform            ns a pulse by spread and window, with and without noise
- *   build/tests/bench/waveform --chart    rows of the chart's table: methods for the footprint against 100,000 sub-rays,
+ *   build/tests/bench/waveform --chart    rows of the chart's table: methods for a footprint, against 100,000 sub-rays,
  *                                         with errors in counts of 12 bits in place of metres */
 #include <math.h>
 #include <stdio.h>
