@@ -100,13 +100,15 @@ static double normal(double x)
 
 static double seen_by_level(const struct wave_echoes *w, const struct waveform_return *r, double noise)
 {
-    const double sample_m = C_2 * waveform_spec_of(w->waveform)->sample_s;
+    const struct waveform_spec *spec = waveform_spec_of(w->waveform);
+    const double sample_m = C_2 * spec->sample_s, count = spec->full_scale / (4095.0 - spec->baseline_counts);
+    const double level = (ceil(1.0 / count) - 0.5) * count; /* counts are rounded */
     double sum = 0.0;
     for (int phase = 0; phase < 20; phase++) {
         double missed = 1.0;
         for (int k = -10; k <= 10; k++) {
             double y = waveform_signal(w->waveform, r, 1, r->range_m + (k + 0.05 * phase) * sample_m);
-            missed *= normal((1.0 - y) / noise);
+            missed *= normal((level - y) / noise);
         }
         sum += 1.0 - missed;
     }
@@ -131,7 +133,7 @@ static void targets_are_seen_as_often_as_they_should(void **state)
         const double fitted = normal(k * (amplitude[a] - 1.0) / less);
         printf("# %4.1f: %.3f | %.3f, %.3f | %.3f | %.3f, %.3f\n", amplitude[a], normal(k * (amplitude[a] - 1.0)),
                f[2].single / n, fitted, f[1].single / n, f[0].single / n, level);
-        wave_between(f[0].single / n, level - 0.02, level + ERRORS * 0.5 / sqrt(n));
+        wave_near(f[0].single / n, level, ERRORS * 0.5 / sqrt(n));
         wave_between(f[2].single / n, fitted - 0.08, fitted + 0.08);
     }
     wave_close(&w);
@@ -173,7 +175,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
         const struct waveform_return r = {RANGE_M, 60.0, extent, extent > 0.0 ? WAVEFORM_DISC : WAVEFORM_POINT};
         for (int d = 0; d < WAVE_DETECTORS; d++) {
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
-            assert_int_equal(f[d].single, pulses() / 4);
+            /* the tail of a skew echo may reach the level once more, with noise on it */
+            assert_true(f[d].single >= pulses() / 4 - pulses() / 4000);
             /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape through it
              * lies off the centroid: by less than the third of what the rims are off. */
             const double skew_m = extent * extent / RANGE_M / 3.0;
