@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Maxima that run into each other, or whose tops are not seen, as a sum of Gaussians: where it begins, and when what is
- * left over asks for one more. */
+/* Maxima that run into each other, or whose tops are not seen, are a sum of terms. This says where it begins, and how
+ * many there are. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -24,8 +24,8 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is above it
- * for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
+/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is
+ * above it for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
@@ -42,8 +42,8 @@ static double decompose_height(const struct finder *finder, double span, double 
     return finder->limit / fmax(fmax(h[a], h[b]), 1e-6);
 }
 
-/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies between
- * what they are of it. *centroid: from the sample of y1. */
+/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies
+ * between what they are of it. *centroid: from the sample of y1. */
 static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
 {
     double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
@@ -58,8 +58,8 @@ static double decompose_flank(const struct finder *finder, double y0, double y1,
     return y1 * exp(least);
 }
 
-/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do; returns 1
- * then, since a fit to these has nothing to add. */
+/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do;
+ * returns 1 then, since a fit to these has nothing to add. */
 static int decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
 {
     const struct finder *finder = run->finder;
@@ -111,7 +111,7 @@ static int decompose_begin(const struct finder_run *run, const struct finder_pea
     return n == 1 && blind;
 }
 
-/* What the shapes of echoes on planes leave when Gaussians fit them, as a sum of squares. */
+/* The sum of squares that terms leave of echoes on planes, whose shape is another. */
 static double decompose_shapes(const struct finder_task *task, const struct finder_mix *mix)
 {
     double sum = 0.0;
@@ -195,8 +195,8 @@ static int decompose_extra(const struct finder_task *task, double least, struct 
     return 1;
 }
 
-/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1 where
- * a better mixture came of it. */
+/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1
+ * where a better mixture came of it. */
 static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
@@ -265,7 +265,7 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
-    /* One Gaussian was not enough already. Mostly two are. */
+    /* One term was not enough already. Mostly two are. */
     struct finder_mix two;
     if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);

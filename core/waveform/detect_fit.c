@@ -2,9 +2,9 @@
 /* One term through the samples of one maximum: the way of nearly all echoes, so it has to be cheap.
  *
  * The half maxima give a first one. Gauss and Newton's steps then minimise the squares of what is left within
- * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 1.3 % (the part of the
- * integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from the sample
- * before by two products, since the ratio of neighbours changes by a constant factor. */
+ * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 0.6 % (the part of
+ * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from the
+ * sample before by two products, since the ratio of neighbours changes by a constant factor. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -59,8 +59,8 @@ static void fit_sum(const struct finder_run *run, const struct finder_term *g, u
     }
 }
 
-/* The step, by Cramer's rule. Returns by how much it lowers the sum of squares, below 0 where the samples don't determine
- * it. */
+/* The step, by Cramer's rule. Returns by how much it lowers the sum of squares, below 0 where the samples don't
+ * determine it. */
 static double fit_step(const struct fit_sums *m, double peak, double p[3])
 {
     const double *h = m->h, *r = m->r;
@@ -135,7 +135,8 @@ static int fit_alone(const struct finder_run *run, const struct finder_peak *pea
     return 1;
 }
 
-/* Wilson's and Hilferty's approximation of the quantile of chi^2 over n (1931), at 4 sigma: one in 30,000 lies beyond. */
+/* Wilson's and Hilferty's approximation of the quantile of chi^2 over n (1931), at 4 sigma: one in 30,000 lies
+ * beyond. */
 double finder_noise2(const struct finder *finder, double n)
 {
     const double by = 2.0 / (9.0 * n), root = 1.0 - by + 4.0 * sqrt(by);

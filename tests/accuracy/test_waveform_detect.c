@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How well each detector ranges, against theory and against another decomposition, and where it is biased. The tables are
- * those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their standard errors. */
+/* How well each detector ranges, against theory and against another decomposition, and where it is biased. The tables
+ * are those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their standard errors. */
 #include <math.h>
 #include <stdio.h>
 
@@ -22,8 +22,8 @@ static uint32_t pulses(void)
 
 /* ---- one echo */
 
-/* The deviation of ranges: of the decomposition within 10 % of Cramer's and Rao's bound, which no unbiased estimate beats.
- * Of the edges: noise over the slope at the crossing, and what the peak's noise does to the correction. */
+/* The deviation of ranges: of the decomposition within 10 % of Cramer's and Rao's bound, which no unbiased estimate
+ * beats. Of the edges: noise over the slope at the crossing, and what the peak's noise does to the correction. */
 static double edge_sigma_m(double peak, double part, double noise, double sigma_s)
 {
     double v = sqrt(-2.0 * log(part)), at_edge = noise / (peak * part * v), by_peak = noise / (peak * v);
@@ -177,8 +177,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
             /* the tail of a skew echo may reach the level once more, with noise on it */
             assert_true(f[d].single >= pulses() / 4 - pulses() / 4000);
-            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape through it
-             * lies off the centroid: by less than the third of what the rims are off. */
+            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape
+             * through it lies off the centroid: by less than the third of what the rims are off. */
             const double skew_m = extent * extent / RANGE_M / 3.0;
             wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
@@ -264,8 +264,8 @@ static void echoes_that_overlap_are_separated(void **state)
     two(&spec, "asymmetric", 60.0);
 }
 
-/* Three of 5 to 60 thresholds, 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own. Few are found as
- * two, fewer as four. */
+/* Three of 5 to 60 thresholds, 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own. Few are found
+ * as two, fewer as four. */
 static void three_echoes_are_three(void **state)
 {
     (void)state;
@@ -304,9 +304,9 @@ static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *ec
     return other_decompose(y, window->n, 1.0, 4, 12, echo, WAVE_MOST);
 }
 
-/* Its ranges are samples with the largest count. Noise may make a neighbour larger where the top lies between both: by the
- * peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one. Centres and widths of its fits
- * differ from ours by the noise of the offset that it fits too. */
+/* Its ranges are samples with the largest count. Noise may make a neighbour larger where the top lies between both:
+ * by the peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one. Centres and widths
+ * of its fits differ from ours by the noise of the offset that it fits too. */
 static void another_decomposition_agrees(void **state)
 {
     (void)state;

@@ -16,8 +16,8 @@ static double sample_m(const struct wave_echoes *w)
     return 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(w->waveform)->sample_s;
 }
 
-/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a Gaussian of
- * 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
+/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a
+ * Gaussian of 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
 static void a_plain_echo_is_where_it_is(void **state)
 {
     (void)state;
@@ -274,9 +274,9 @@ static void the_deviation_shows_mixed_echoes(void **state)
     wave_close(&w);
 }
 
-/* Limited by the digits, by the receiver, and by a receiver that is then blind. The echo says so, and its range holds. Two
- * samples of one flank may be all that there is. For an amplitude of 120 both are well above the noise of 1/8; for 1,000 the
- * weaker is not, so the range holds to a sample of 1 ns. */
+/* Limited by the digits, by the receiver, and by a receiver that is then blind. The echo says so, and its range
+ * holds. Two samples of one flank may be all that there is. For an amplitude of 120 both are well above the noise of
+ * 1/8; for 1,000 the weaker is not, so the range holds to a sample of 1 ns. */
 static void a_saturated_echo_is_flagged_and_ranged(void **state)
 {
     (void)state;
