@@ -60,6 +60,7 @@ struct head_settings {
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
     int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
     int64_t step_udeg;                       /* of a sphere, as it was set; of a planar head with geometries; else 0 */
+    uint32_t waves;                          /* 1: waveforms are sent */
 };
 
 enum { HEAD_MAX_RATES = 8 };

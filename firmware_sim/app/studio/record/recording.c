@@ -130,6 +130,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
     if (frame->type == SCANHEAD_DESCRIPTOR) r->scan_s = progress_scan_s(frame);
     if (frame->type == SCANHEAD_EMITTER) r->scan_s *= lines_of_frame(r->sh);
     if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
+    if (frame->type == SCANHEAD_WAVES) r->result->lost_samples += scanhead_waves_lost(r->sh, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_SCAN_START) {
         r->scan_t0_ns = (int64_t)frame->event_value[1];
