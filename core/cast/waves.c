@@ -280,10 +280,10 @@ static void clear_list(struct caster *c, const struct chunk *k)
     struct echo_list *l = &c->list;
     uint8_t *merged = c->waves->merged;
     for (uint32_t i = 0; i < k->n; i++)
-        merged[i] = !isnan(l->range_m[i]);
+        merged[i] = (uint8_t)!isnan(l->range_m[i]);
     for (uint32_t g = 0; g < l->n_secondary; g++)
         for (uint32_t i = l->secondary[g].at; i < l->secondary[g].at + l->secondary[g].n; i++)
-            merged[l->secondary[g].pulse] += !isnan(l->range_m[i]);
+            merged[l->secondary[g].pulse] += (uint8_t)!isnan(l->range_m[i]);
     l->n = k->n;
     l->n_secondary = 0;
 }

@@ -17,16 +17,14 @@ static int has_gate(const struct config_waveform *w)
     return w->near_m < w->far_m;
 }
 
-/* Samples of the window that the keys alone give, before any return makes it longer. */
-static double samples_of(const struct config_waveform *w)
-{
-    const double span_ns = has_gate(w) ? 2e9 / LIGHT_SPEED_M_S * (w->far_m - w->near_m) : w->before_ns + w->after_ns;
-    return floor(span_ns / w->sample_ns) + 1.0;
-}
-
+/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. */
 uint32_t config_wave_samples(const struct config *cfg)
 {
-    return (uint32_t)fmin(samples_of(&cfg->waveform), (double)WAVEFORM_MAX_SAMPLES);
+    const struct config_waveform *w = &cfg->waveform;
+    const double pulse_ns = 3.0 * cfg->profile.pulse_width_ns;
+    const double span_ns =
+        has_gate(w) ? 2e9 / LIGHT_SPEED_M_S * (w->far_m - w->near_m) : w->before_ns + pulse_ns + w->after_ns;
+    return (uint32_t)fmin(floor(span_ns / w->sample_ns) + 1.0, (double)WAVEFORM_MAX_SAMPLES);
 }
 
 double config_wave_bytes_s(const struct config *cfg)
@@ -68,7 +66,7 @@ static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
 static void check_windows(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;
-    const double n = samples_of(w), rate_bytes = config_wave_bytes_s(cfg);
+    const double rate_bytes = config_wave_bytes_s(cfg);
     const char *key = has_gate(w) ? "waveform.far_m" : "waveform.after_ns";
     if (!CFG_SOUND(rd, 0, "waveform.near_m", "waveform.far_m", "waveform.before_ns", "waveform.after_ns",
                    "waveform.sample_ns"))
@@ -77,13 +75,9 @@ static void check_windows(struct cfg_reader *rd, const struct config *cfg)
         cfg_fail_key(rd, cfg_is_given(rd, "waveform.far_m", 0) ? "waveform.far_m" : "waveform.near_m", 0,
                      "a window from %.10g to %.10g m; allowed a far_m above %.10g, or 0 for both", w->near_m, w->far_m,
                      w->near_m);
-    else if (n > WAVEFORM_MAX_SAMPLES)
-        cfg_fail_key(rd, key, 0, "a window of %.0f samples; allowed up to %d: %.6g ns, or %.6g m", n,
-                     WAVEFORM_MAX_SAMPLES, w->sample_ns * (WAVEFORM_MAX_SAMPLES - 1),
-                     0.5e-9 * LIGHT_SPEED_M_S * w->sample_ns * (WAVEFORM_MAX_SAMPLES - 1));
     else if (rate_bytes > MOST_BYTES_S && cfg_has_profile(rd) && CFG_SOUND(rd, 0, "head.prr_hz"))
-        cfg_fail_key(rd, key, 0, "windows of %.0f samples for %.10g pulses/s are %.4g MB/s; allowed up to %.4g MB/s",
-                     n, config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
+        cfg_fail_key(rd, key, 0, "windows of %u samples for %.10g pulses/s are %.4g MB/s; allowed up to %.4g MB/s",
+                     config_wave_samples(cfg), config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
 }
 
 void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg)
