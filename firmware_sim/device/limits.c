@@ -84,7 +84,6 @@ void device_set_limits(const struct site *site, struct head_limits *l)
     set_pattern(cfg, l);
     set_range_limits(site, l);
     set_noise_limits(cfg, l);
-    l->waves_most = cfg->head.settings.waves;
     for (uint32_t i = 0; i < p->n_programs; i++)
         l->rate_uhz[i] = p->program[i].prr_uhz;
     for (uint32_t i = 0; i < site->n_stations && i < 64; i++)

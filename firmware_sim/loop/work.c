@@ -7,6 +7,7 @@
 
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
+#include "drivers/protocol/native_waves.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/waves.h"
 

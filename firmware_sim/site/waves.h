@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "core/cast.h"
+#include "core/plan.h"
 
 struct line_block;
 struct sh_err;
