@@ -65,6 +65,7 @@ int waveform_create(const struct waveform_spec *spec, struct waveform **out, str
         return rc;
     }
     set_up_digits(w);
+    finder_learn(w, &w->finder);
     *out = w;
     return SH_OK;
 }

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "core/waveform.h"
+#include "core/waveform/detect_inside.h"
 
 /* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples apart,
  * read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
@@ -53,6 +54,7 @@ struct waveform {
     int64_t before, after, dead;  /* in samples */
     int64_t gate_begin, gate_end; /* 0 and 0: none */
     uint64_t key;
+    struct finder finder;
 };
 
 int waveform_check(const struct waveform_spec *spec, struct sh_err *err);
