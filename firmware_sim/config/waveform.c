@@ -55,8 +55,8 @@ static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
 {
     const double ps = 1e3 * w->sample_ns, steps = 16.0 * w->baseline_counts;
     if (fabs(ps - rint(ps)) > 1e-6)
-        cfg_fail_key(rd, "waveform.sample_ns", 0, "%.10g is no whole number of ps; allowed 0.05 to 100 in steps of 0.001",
-                     w->sample_ns);
+        cfg_fail_key(rd, "waveform.sample_ns", 0,
+                     "%.10g is no whole number of ps; allowed 0.05 to 100 in steps of 0.001", w->sample_ns);
     if (steps != floor(steps))
         cfg_fail_key(rd, "waveform.baseline_counts", 0, "%.10g is no multiple of 1/16; allowed 0 to 4095 in such steps",
                      w->baseline_counts);

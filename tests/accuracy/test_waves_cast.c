@@ -126,7 +126,7 @@ static void check_beam(const struct waves *w, const struct line_wave *wave, uint
     for (int i = 0; i < 3; i++)
         length2 += (double)e[i] * (double)e[i];
     assert_true(fabs(length2 - 1.0) < 1e-6); /* of floats */
-    for (int i = 0; i < 3; i++) /* a count of 10 um at 20 m and more, and floats */
+    for (int i = 0; i < 3; i++)              /* a count of 10 um at 20 m and more, and floats */
         assert_true(fabs((double)e[i] - 1e-5 * (int32_t)at[i] / w->lit.near_m * (double)e[1]) < 2e-6);
 }
 
@@ -228,7 +228,8 @@ static void echoes_are_found_in_samples(void **state)
                 assert_int_equal(b->echo[p], 0x11);
                 assert_int_equal(b->label[p], FRONT);
                 const double off_m = 1e-6 * ((double)b->a[p] - (double)range[p]);
-                if (!(fabs(off_m) < most_m[detector])) fail_msg("detector %d, pulse %u: %.3f mm off", detector, p, 1e3 * off_m);
+                if (!(fabs(off_m) < most_m[detector]))
+                    fail_msg("detector %d, pulse %u: %.3f mm off", detector, p, 1e3 * off_m);
                 assert_true(abs(b->amplitude_cdb[p] - amplitude_cdb[p]) <= 2);
                 assert_true(abs(b->refl_cdb[p] - refl_cdb[p]) <= 2);
                 assert_true(abs(b->width_cns[p] - 400) <= 8); /* 4 ns, to 2 % */

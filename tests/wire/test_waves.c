@@ -159,7 +159,8 @@ static void test_energy(void **state)
         assert_int_equal(s->windows, 1);
         assert_true(s->from_m < s->range_m && s->range_m < s->to_m);
         const double off = s->energy_ns / (s->amplitude * area_ns) - 1.0;
-        if (!(fabs(off) < 0.0022 + 1.0 / (s->amplitude * area_ns))) fail_msg("pulse %td: energy is off by %.3f %%", s - shots[0], 100.0 * off);
+        if (!(fabs(off) < 0.0022 + 1.0 / (s->amplitude * area_ns)))
+            fail_msg("pulse %td: energy is off by %.3f %%", s - shots[0], 100.0 * off);
         n++;
     }
     assert_true(n > 5000);
@@ -186,8 +187,8 @@ static void test_echoes(void **state)
             assert_int_equal(b->windows, 0); /* they are not sent */
             if (a->echoes != b->echoes) fail_msg("%s: pulse %d has %d echoes, not %d", how[i], k, b->echoes, a->echoes);
             if (a->echoes == 0) continue;
-            if (!(fabs(a->range_m - b->range_m) < most_m[i] &&
-                  fabs(b->amplitude / a->amplitude - 1.0) < 0.01 && fabs(b->width_ns - a->width_ns) < 0.08))
+            if (!(fabs(a->range_m - b->range_m) < most_m[i] && fabs(b->amplitude / a->amplitude - 1.0) < 0.01 &&
+                  fabs(b->width_ns - a->width_ns) < 0.08))
                 fail_msg("%s: pulse %d: %.4f m, not %.4f; amplitude %.1f, not %.1f; %.2f ns, not %.2f", how[i], k,
                          b->range_m, a->range_m, b->amplitude, a->amplitude, b->width_ns, a->width_ns);
         }
@@ -249,7 +250,8 @@ static void test_refused(void **state)
     refuse(wire, (const char *const[]){send, table, uneven, NULL}, "uneven.csv:4: t_ns is 2.5");
     refuse(wire, (const char *const[]){send, table, dark, NULL}, "dark.csv:3: a power of -2");
     refuse(wire, (const char *const[]){send, "waveform.after_ns=3000", NULL}, "waveform: 5 ns kept before an echo");
-    refuse(wire, (const char *const[]){send, "waveform.near_m=1", "waveform.far_m=2000", NULL}, "a window from 1 to 2000 m");
+    refuse(wire, (const char *const[]){send, "waveform.near_m=1", "waveform.far_m=2000", NULL},
+           "a window from 1 to 2000 m");
 }
 
 /* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used: 41,667
