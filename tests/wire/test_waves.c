@@ -273,8 +273,8 @@ static void test_capacity(void **state)
     free(err);
 }
 
-/* Takes frames up to a new descriptor that says so, and then up to the end of a line. Returns the frames of waveforms
- * since that descriptor. */
+/* Takes frames up to a new descriptor that says so, and then up to the end of a whole line. Returns the frames of
+ * waveforms since that descriptor. */
 static uint32_t count_waves(struct scanhead *sh, int has)
 {
     struct scanhead_frame frame;
@@ -284,10 +284,10 @@ static uint32_t count_waves(struct scanhead *sh, int has)
         client_next(sh, &frame);
         wire_soon(&since_ns, frame.t_ns, "a descriptor");
     } while (frame.type != SCANHEAD_DESCRIPTOR || scanhead_has_waves(sh) != has);
-    do {
+    for (int lines = 0; lines < 2; lines += frame.type == SCANHEAD_LINE_END) {
         client_next(sh, &frame);
         n += frame.type == SCANHEAD_WAVES;
-    } while (frame.type != SCANHEAD_LINE_END);
+    }
     return n;
 }
 
