@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* waveform.send and waveform.echoes from the configuration to a client: what stays the same, the energy of what comes
- * beside it, echoes that are found, what is lost, and what is refused. */
+ * beside it, echoes that are found, and what is lost. */
 #include "tests/wire/room.h"
 
 enum { MOST = 40000, POINTS = 4096, WINDOWS = 4096, CONTENT_WAVES = 4 };
@@ -39,10 +39,11 @@ static void record(struct wire *wire, const struct room_config *scan, const char
     assert_int_equal(status, 0);
 }
 
-/* A pulse with one echo, as the stream has it. */
+/* A pulse as the stream has it. */
 struct shot {
     int echoes, windows;
-    double range_m, amplitude, width_ns, energy_ns, from_m, to_m; /* of its windows: signal times time; their place */
+    double range_m, width_ns, amplitude; /* of its first echo; the sum of all */
+    double energy_ns, from_m, to_m;      /* of its windows: signal times time; their place */
 };
 static struct shot shots[2][MOST];
 
@@ -85,13 +86,14 @@ static uint64_t read_shots(const struct wire *wire, const char *name, struct sho
         if (frame.type != SCANHEAD_ATTRIBUTES) continue;
         assert_int_equal(scanhead_attributes(sh, &frame, 0, attribute, POINTS), n);
         for (uint32_t i = 0; i < n; i++) {
-            if (point[i].echo > 1) continue;
-            assert_true(pulse < MOST);
-            struct shot *s = &shot[pulse++];
+            pulse += point[i].echo < 2;
+            assert_true(pulse <= MOST);
+            struct shot *s = &shot[pulse - 1];
             s->echoes = point[i].echo_count;
             if (s->echoes == 0) continue;
+            s->amplitude += pow(10.0, 0.1 * attribute[i].amplitude_db);
+            if (point[i].echo > 1) continue;
             s->range_m = point[i].range_m;
-            s->amplitude = pow(10.0, 0.1 * attribute[i].amplitude_db);
             s->width_ns = attribute[i].width_ns;
         }
     }
@@ -166,6 +168,37 @@ static void test_energy(void **state)
     assert_true(n > 5000);
 }
 
+/* A pane 2 m before a wall: what is sampled is what comes back of both. It is up to 3 % more where the model leaves out what
+ * the samples have: at the pane's edge echoes with less than 1 % of a footprint; where pane and floor are one echo, that
+ * 1 / R^2 of both is more than that of their mean, 3 (0.3 m / R)^2 at most. */
+static void test_glass(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const modes[] = {"beam.mode=single", "beam.mode=adaptive"};
+    const double area_ns = 4.0 * sqrt(M_PI / (4.0 * M_LN2));
+    room_write(wire);
+    FILE *f = fopen(wire_path(wire, "room.obj"), "a");
+    assert_non_null(f);
+    fputs("v 1 2 -1.4\nv 2.5 2 -1.4\nv 2.5 2 2\nv 1 2 2\no pane\nusemtl pane\nf 9 10 11 12\n", f);
+    assert_int_equal(fclose(f), 0);
+    for (int mode = 0; mode < 2; mode++) {
+        uint32_t several = 0;
+        record(wire, &SCAN, "glass.shs",
+               (const char *const[]){"waveform.send=on", "surfaces.0.material=paint-*", "surfaces.1.material=pane",
+                                     "surfaces.1.glass=0.9", "surfaces.1.reflectance=0.01", "optics.depth=4",
+                                     modes[mode], NULL});
+        read_shots(wire, "glass.shs", shots[0]);
+        for (const struct shot *s = shots[0]; s < shots[0] + MOST; s++) {
+            if (s->echoes == 0) continue;
+            const double off = s->energy_ns / (s->amplitude * area_ns) - 1.0, slack = 2.0 / (s->amplitude * area_ns);
+            if (!(off > -0.0022 - slack && off < 0.03 + slack))
+                fail_msg("%s, pulse %td: energy is off by %.3f %%", modes[mode], s - shots[0], 100.0 * off);
+            several += s->echoes > 1;
+        }
+        assert_true(several > 300);
+    }
+}
+
 /* Without noise, echoes that are found are those of the model, but for digits: half a count is an eighth of a threshold.
  * From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 19 mm. A straight
  * line between samples 1 ns apart is off by 3.6 mm at half of the peak, where a detector takes one. Amplitudes to 1 %,
@@ -216,60 +249,6 @@ static void test_lost(void **state)
     assert_int_equal(stats_uint(wire, "lost_samples"), lost);
     char *err = wire_read(wire_path(wire, "err"), NULL);
     assert_non_null(strstr(err, "samples of waveforms left out"));
-    free(err);
-}
-
-static void refuse(struct wire *wire, const char *const *sets, const char *says)
-{
-    char config[352];
-    const char *args[16] = {"check", config};
-    int n = 2;
-    snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
-    for (int i = 0; sets[i] != NULL; i++) {
-        args[n++] = "--set";
-        args[n++] = sets[i];
-    }
-    args[n] = NULL;
-    wire_expect_usage(wire, args, says);
-}
-
-/* Of figures by themselves, which core/waveform knows. config_cases.h has those that contradict each other. */
-static void test_refused(void **state)
-{
-    struct wire *wire = *state;
-    room_write(wire);
-    wire_write_text(wire, "few.csv", "t_ns,power\n0,1\n1,2\n");
-    wire_write_text(wire, "uneven.csv", "t_ns,power\n0,1\n1,2\n2.5,1\n");
-    wire_write_text(wire, "dark.csv", "t_ns,power\n0,1\n1,-2\n2,1\n");
-    char few[400], uneven[400], dark[400];
-    snprintf(few, sizeof few, "waveform.pulse_file=%s", wire_path(wire, "few.csv"));
-    snprintf(uneven, sizeof uneven, "waveform.pulse_file=%s", wire_path(wire, "uneven.csv"));
-    snprintf(dark, sizeof dark, "waveform.pulse_file=%s", wire_path(wire, "dark.csv"));
-    const char *table = "waveform.pulse=table", *send = "waveform.send=on";
-    refuse(wire, (const char *const[]){send, table, few, NULL}, "few.csv: 2 lines; allowed are 3 to 1024");
-    refuse(wire, (const char *const[]){send, table, uneven, NULL}, "uneven.csv:4: t_ns is 2.5");
-    refuse(wire, (const char *const[]){send, table, dark, NULL}, "dark.csv:3: a power of -2");
-    refuse(wire, (const char *const[]){send, "waveform.after_ns=3000", NULL}, "waveform: 5 ns kept before an echo");
-    refuse(wire, (const char *const[]){send, "waveform.near_m=1", "waveform.far_m=2000", NULL},
-           "a window from 1 to 2000 m");
-}
-
-/* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used: 41,667
- * pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 28 samples, 5 + 3 x 4 + 10 ns and one. */
-static void test_capacity(void **state)
-{
-    struct wire *wire = *state;
-    struct room_config scan = SCAN;
-    char config[352];
-    room_write(wire);
-    scan.links = "links: [{type: usb, port: 0, speed: full}]\n";
-    snprintf(config, sizeof config, "%s", room_config_write(wire, &scan));
-    const char *const args[] = {"run", config, "--duration", "0.01", "--quiet", "--set", "waveform.send=on", NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
-    char *err = wire_read(wire_path(wire, "err"), NULL);
-    if (strstr(err, "the stream has 4.50 MB/s, the link carries 1.22 MB/s") == NULL ||
-        strstr(err, ", or leave out waveform.send\n") == NULL)
-        fail_msg("%s", err);
     free(err);
 }
 
@@ -349,31 +328,6 @@ static void test_directions(void **state)
     scanhead_close(sh);
 }
 
-/* The plan has a row for waveforms. */
-static void test_plan_row(void **state)
-{
-    struct wire *wire = *state;
-    static const struct {
-        const char *set, *row;
-    } cases[] = {{"waveform.send=off", "\"method\": \"none\""},
-                 {"waveform.send=on", "\"method\": \"closed form\""},
-                 {"beam.mode=rings", "\"method\": \"sub-rays\""}};
-    char config[352];
-    room_write(wire);
-    snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
-    for (int i = 0; i < 3; i++) {
-        const char *const args[] = {"plan", config, "--json", "--set", "waveform.send=on", "--set", cases[i].set, NULL};
-        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
-        char *out = wire_read(wire_path(wire, "out"), NULL);
-        const char *row = strstr(out, "\"stage\": \"waveform\"");
-        assert_non_null(row);
-        const char *method = strstr(row, "\"method\"");
-        assert_non_null(method);
-        if (strncmp(method, cases[i].row, strlen(cases[i].row)) != 0) fail_msg("%.80s", row);
-        free(out);
-    }
-}
-
 /* A recording that runs as a head sends the frames of waveforms on as they are. */
 static void test_replayed(void **state)
 {
@@ -395,13 +349,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_off_and_on, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_energy, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_glass, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_echoes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lost, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_switched, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_directions, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_plan_row, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_replayed, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
