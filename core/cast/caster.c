@@ -125,10 +125,11 @@ static void hide(struct caster *c, const struct chunk *k)
     c->counters.hidden += caster_hide(k->s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
 }
 
-/* Returns NULL where there are no waveforms. */
+/* Returns NULL where nobody wants waveforms: no setup, no memory, no room in the block. */
 static const struct wave_chunk *begin_waves(struct caster *c, const struct chunk *k, struct wave_chunk *waves)
 {
     if (c->waves == NULL || k->s->waves == NULL) return NULL;
+    if (k->block->waves == NULL && !k->s->waves->finds) return NULL;
     *waves = (struct wave_chunk){.s = k->s,
                                  .how = k->s->waves,
                                  .work = c->waves,

@@ -19,10 +19,10 @@ struct chunk {
     struct bvh_origins from;
     int linear;                     /* the directions that the encoders read are turned into the CRS already */
     int attributes;                 /* the block has room for them */
-    const struct wave_chunk *waves; /* NULL: no waveforms */
-    int spreads;                    /* returns say how their ranges spread: for widths, or for waveforms */
     int colours;                    /* likewise */
     int texels;                     /* colours are those of textures: hits carry them */
+    const struct wave_chunk *waves; /* NULL: no waveforms */
+    int spreads;                    /* returns say how their ranges spread: for widths, or for waveforms */
 };
 
 #endif

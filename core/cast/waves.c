@@ -286,8 +286,8 @@ static void clear_list(const struct wave_chunk *k)
     l->n_secondary = 0;
 }
 
-/* The part that sends most within half an echo's width of it; where there is none, the nearest. NULL: the echo is
- * noise. */
+/* The part that sends most within half an echo's width of it; where there is none, the nearest within two widths. NULL:
+ * the echo is noise. */
 static const struct wave_part *part_of(const struct wave_chunk *k, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {
@@ -299,7 +299,8 @@ static const struct wave_part *part_of(const struct wave_chunk *k, const struct 
         if (away_m <= half_m && (best == p->n || r[i].amplitude > r[best].amplitude)) best = i;
         if (away_m < fabs(r[nearest].range_m - echo->range_m)) nearest = i;
     }
-    return p->n == 0 ? NULL : &p->part[best < p->n ? best : nearest];
+    if (best < p->n) return &p->part[best];
+    return p->n > 0 && fabs(r[nearest].range_m - echo->range_m) < 4.0 * half_m ? &p->part[nearest] : NULL;
 }
 
 static int16_t as_cdb(double ratio)
@@ -345,7 +346,6 @@ void caster_waves(const struct wave_chunk *k)
 {
     const int sends = k->block->waves != NULL, finds = k->how->finds;
     const uint32_t first = sends ? k->block->waves->n : 0;
-    if (!sends && !finds) return;
     if (finds) clear_list(k);
     for (uint32_t i = 0; i < k->n; i++) {
         struct wave_pulse pulse;
