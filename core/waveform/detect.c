@@ -38,8 +38,8 @@ static void detect_mark(const struct finder *finder, const struct waveform_windo
     }
 }
 
-/* A maximum stands out by 15 %, which the shape of an echo on a plane never does, and by 6.5 sigma: the noise of 20 samples
- * spans more than that once in 1,000. */
+/* A maximum stands out by 15 %, which the shape of an echo on a plane never does, and by 6.5 sigma: the noise of 20
+ * samples spans more than that once in 1,000. */
 static double detect_prominence(const struct finder *finder, double y)
 {
     return fmax(6.5 * finder->noise, 0.15 * y);
@@ -85,8 +85,8 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
     return n;
 }
 
-/* The parabola through the logarithms of three samples is exact for a Gaussian. A neighbour of zero or less is noise of a
- * pulse that is short beside the sampling: it counts as 2 % of the top. */
+/* The parabola through the logarithms of three samples is exact for a Gaussian. A neighbour of zero or less is noise
+ * of a pulse that is short beside the sampling: it counts as 2 % of the top. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place)
 {
     const double y = run->y[top], least = 0.02 * y;
@@ -108,7 +108,7 @@ static double detect_crossing(const double *y, uint32_t a, uint32_t b, double le
     return (double)a + u * ((double)b - (double)a);
 }
 
-/* What is no echo may rise and fall within a sample: no width is below half of one. */
+/* A spike that is no echo may rise and fall within a sample. No width is below half of one. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2])
 {
     const double level = 0.5 * height;
@@ -141,7 +141,8 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
 {
     struct finder_peak peak[FINDER_PEAKS];
     const struct finder *finder = run->finder;
-    /* Noise may lower all samples of an echo that just reaches the level, and the largest lies half a sample from its top. */
+    /* Noise may lower all samples of an echo that just reaches the level, and the largest lies half a sample from its
+     * top. */
     double least = level * finder->peak - 3.0 * finder->noise;
     least = fmax(least, 0.5 * level * finder->peak);
     uint32_t n = finder_peaks(run, least, peak, FINDER_PEAKS), end;

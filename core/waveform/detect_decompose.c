@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Maxima that run into each other, or whose tops are not seen, as a sum of Gaussians: where it begins, and when what is
- * left over asks for one more. */
+/* Maxima that run into each other, or whose tops are not seen, are a sum of terms. This says where it begins, and how
+ * many there are. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
 
-enum { DECOMPOSE_REACH = 64 }; /* samples: how far a pulse is compared with the rest */
+enum { DECOMPOSE_TURNS = 2, DECOMPOSE_REACH = 64 }; /* samples: how far a pulse is compared with the rest */
 
 /* The samples of a mixture: from its first maximum down to the foot, or to the window's end, and so behind its last. */
 static void decompose_range(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
@@ -24,8 +24,8 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is above it
- * for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
+/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is
+ * above it for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
@@ -42,8 +42,8 @@ static double decompose_height(const struct finder *finder, double span, double 
     return finder->limit / fmax(fmax(h[a], h[b]), 1e-6);
 }
 
-/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies between
- * what they are of it. *centroid: from the sample of y1. */
+/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies
+ * between what they are of it. *centroid: from the sample of y1. */
 static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
 {
     double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
@@ -58,8 +58,8 @@ static double decompose_flank(const struct finder *finder, double y0, double y1,
     return y1 * exp(least);
 }
 
-/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do; returns 1
- * then, since a fit to these has nothing to add. */
+/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do;
+ * returns 1 then, since a fit to these has nothing to add. */
 static int decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
 {
     const struct finder *finder = run->finder;
@@ -111,7 +111,7 @@ static int decompose_begin(const struct finder_run *run, const struct finder_pea
     return n == 1 && blind;
 }
 
-/* What the shapes of echoes on planes leave when Gaussians fit them, as a sum of squares. */
+/* The sum of squares that terms leave of echoes on planes, whose shape is another. */
 static double decompose_shapes(const struct finder_task *task, const struct finder_mix *mix)
 {
     double sum = 0.0;
@@ -195,13 +195,13 @@ static int decompose_extra(const struct finder_task *task, double least, struct 
     return 1;
 }
 
-/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1 where
- * a better mixture came of it. */
+/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1
+ * where a better mixture came of it. */
 static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
     for (int i = 0; i < 2; i++) {
-        if (!(i == 0 ? decompose_split(task, &tried[i]) : decompose_extra(task, least, &tried[i]))) continue;
+        if (!(i == 0 ? decompose_extra(task, least, &tried[i]) : decompose_split(task, &tried[i]))) continue;
         finder_mix_fit(task, &tried[i]);
         if (!decompose_sound(task, &tried[i], least) || (best != NULL && tried[i].chi2 >= best->chi2)) continue;
         best = &tried[i];
@@ -211,6 +211,26 @@ static int decompose_more(const struct finder_task *task, double least, struct f
     if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance + decompose_shapes(task, best)) return 0;
     *mix = *best;
     return 1;
+}
+
+/* A component that came early may stand in a place that none has now: the others can do without it. The two weakest are
+ * tried, since each try costs a fit. */
+static void decompose_fewer(const struct finder_task *task, double least, struct finder_mix *mix)
+{
+    uint32_t tried = 0;
+    for (uint32_t turn = 0; turn < DECOMPOSE_TURNS && mix->n > 2; turn++) {
+        struct finder_mix fewer = *mix;
+        uint32_t weakest = FINDER_MIX;
+        for (uint32_t j = 0; j < mix->n; j++)
+            if (!(tried >> j & 1) && (weakest == FINDER_MIX || mix->g[j].peak < mix->g[weakest].peak)) weakest = j;
+        if (weakest == FINDER_MIX) return;
+        tried |= 1U << weakest;
+        fewer.g[weakest] = fewer.g[--fewer.n];
+        finder_mix_fit(task, &fewer);
+        if (!decompose_enough(task, &fewer) || !decompose_sound(task, &fewer, least)) continue;
+        *mix = fewer;
+        tried = 0;
+    }
 }
 
 /* Two pulses with the energy, the mean, the variance and the third moment of the samples. Shares p and q, d apart: the
@@ -245,7 +265,7 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
-    /* One Gaussian was not enough already. Mostly two are. */
+    /* One term was not enough already. Mostly two are. */
     struct finder_mix two;
     if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);
@@ -257,4 +277,6 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     finder_mix_fit(&task, mix);
     while (mix->n < FINDER_MIX && !decompose_enough(&task, mix) && decompose_more(&task, least, mix)) {
     }
+    /* The bits of open components would have to move with them. */
+    if (mix->n > n + 1 && mix->open == 0) decompose_fewer(&task, least, mix);
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Echoes by the rising edge: where it crosses a fixed level, or a fraction of the peak.
  *
- * Two samples lie about the crossing. Each of them alone says where the echo is, since h says how long before its centroid
- * it has that part of its peak: this corrects the walk, and there is no interpolation error in a pulse of h's shape. The
- * place is taken between both, as the level lies between them. */
+ * Two samples lie about the crossing. Each of them alone says where the echo is, since h says how long before its
+ * centroid it has that part of its peak: this corrects the walk, and there is no interpolation error in a pulse of
+ * h's shape. The place is taken between both, as the level lies between them. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>

@@ -22,14 +22,14 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
 
-/* What fits put together: a Gaussian, or where h is none, h stretched. Its middle is between its half maxima, its sigma what
- * a Gaussian of its width has. */
+/* A term is what fits put together: a Gaussian, or where h is none, h stretched. Its middle is between its half
+ * maxima, its sigma what a Gaussian of its width has. */
 struct finder_term {
     double at, sigma, peak;
 };
 
-/* An echo of a plane that is tilted so far, without noise: its true figures beside those of the term that fits it best. A
- * real head is adjusted on such targets. */
+/* An echo of a plane that is tilted so far, without noise: its true figures beside those of the term that fits it
+ * best. A real head is adjusted on such targets. */
 struct finder_spread {
     double sigma;     /* of that term */
     double lag;       /* from the echo's centroid to that term's middle */
@@ -40,7 +40,7 @@ struct finder_spread {
     double tail;      /* most of echo minus term further out, over its peak */
 };
 
-/* What detectors know of the pulse h. Constant after finder_learn. */
+/* The pulse h, as detectors know it. Constant after finder_learn. */
 struct finder {
     double peak;                                 /* of h */
     double width;                                /* of h, full at half maximum */
@@ -99,12 +99,12 @@ static inline int finder_limited(const struct finder_run *run, const struct find
 {
     return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
 }
-/* Those of at least `least`; at most `most`. Returns their number, with those that found no room. */
+/* Finds maxima of at least `least`, and keeps `most` of them. Returns their number, with those that found no room. */
 uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most);
 /* The largest signal about a top sample, and where it is. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place);
-/* Where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side where it
- * doesn't, that of the other side is mirrored. Returns how many sides were seen. */
+/* Finds where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side
+ * where it doesn't, that of the other side is mirrored. Returns how many sides were seen. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2]);
 
 struct finder_list {
@@ -118,7 +118,7 @@ struct finder_found {
 /* A mean of n squares of noise is larger than this once in 30,000 times. */
 double finder_noise2(const struct finder *finder, double n);
 
-/* A sum of Gaussians. `open`: bit j is set where component j is limited, or cut by the window's end. */
+/* A sum of terms. `open`: bit j is set where component j is limited, or cut by the window's end. */
 struct finder_mix {
     uint32_t n, open, limited; /* limited: the same bits, only of those that are limited */
     struct finder_term g[FINDER_MIX];
@@ -147,8 +147,8 @@ struct finder_task {
 void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
 /* rest[hi - lo + 1]: what the components leave of the samples. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
-/* Begins with one component a peak, and adds more while what is left over could be another echo of this level; INFINITY:
- * adds none. Where a top is not seen, its flanks decide. */
+/* Begins with one component a peak, and adds more while what is left over could be another echo of this level;
+ * INFINITY: adds none. Where a top is not seen, its flanks decide. */
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
                       struct finder_mix *mix);
 

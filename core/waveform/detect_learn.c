@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How the pulse's echoes look to the detectors: measured once on signals without noise, as a head is adjusted on targets. */
+/* How the pulse's echoes look to the detectors: measured once on signals without noise, as a head is adjusted on
+ * targets. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -12,7 +13,7 @@ enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
 /* Extent of each tilt, in widths of the pulse. */
 static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
 
-/* Of the peak: 4e-6 is 5 sigmas of a Gaussian. */
+/* Parts of the peak. A Gaussian has 4e-6 at 5 sigmas. */
 #define LEARN_LEAST   4e-6
 #define LEARN_NOTHING 1e-12
 

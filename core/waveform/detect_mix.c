@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A sum of terms fitted to samples: Levenberg's and Marquardt's steps with analytic derivatives, after W. Wagner et
- * al., Gaussian decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
- * 2006.
+ * al., Gaussian decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser
+ * scanner, 2006.
  *
- * Parameters of a component are log peak, centre in its sigmas, and log sigma: all of one size, and no step makes a peak
- * or a sigma negative. A limited sample only says that the signal is at least so large: it counts where the model is
- * below it. That keeps a saturated echo from being fitted to its flat top. A blind sample does not count. */
+ * Parameters of a component are log peak, centre in its sigmas, and log sigma: all of one size, and no step makes a
+ * peak or a sigma negative. A limited sample only says that the signal is at least so large: it counts where the
+ * model is below it. That keeps a saturated echo from being fitted to its flat top. A blind sample does not count. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -80,8 +80,8 @@ VEC_INLINE double mix_dot(const double *restrict a, const double *restrict b)
     return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
 }
 
-/* Adds a block to the lower half of the normal equations; its rows are those of the n components in `active`. Returns its
- * sum of squares. */
+/* Adds a block to the lower half of the normal equations; its rows are those of the n components in `active`. Returns
+ * its sum of squares. */
 VEC_CLONES
 static double mix_add(const struct mix_block *block, const uint32_t *active, uint32_t n, struct mix_normal *normal)
 {
@@ -94,7 +94,7 @@ static double mix_add(const struct mix_block *block, const uint32_t *active, uin
     return mix_dot(block->rest, block->rest);
 }
 
-/* What the model leaves of sample i. Returns whether the sample says anything. */
+/* Sets what the model leaves of sample i. Returns whether the sample says anything. */
 static int mix_rest(const struct finder_run *run, uint32_t i, double model, double *rest)
 {
     if (run->mark[i] == FINDER_PLAIN) *rest = run->y[i] - model;
@@ -129,8 +129,8 @@ static uint32_t mix_fill(const struct finder_task *task, struct mix_walker *walk
     return n;
 }
 
-/* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.03 where the echo's top is not seen. So a
- * flank alone, which many pairs of peak and sigma explain, has one answer. */
+/* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.03 where the echo's top is not seen.
+ * So a flank alone, which many pairs of peak and sigma explain, has one answer. */
 static double mix_expect(const struct finder_task *task, const struct finder_mix *mix, struct mix_normal *normal)
 {
     double chi2 = 0.0;

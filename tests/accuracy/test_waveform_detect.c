@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How well each detector ranges, against theory and against another decomposition, and where it is biased. The tables are
- * those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their standard errors. */
+/* How well each detector ranges, against theory and against another decomposition, and where it is biased. The tables
+ * are those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their standard errors. */
 #include <math.h>
 #include <stdio.h>
 
@@ -22,8 +22,8 @@ static uint32_t pulses(void)
 
 /* ---- one echo */
 
-/* The deviation of ranges: of the decomposition within 10 % of Cramer's and Rao's bound, which no unbiased estimate beats.
- * Of the edges: noise over the slope at the crossing, and what the peak's noise does to the correction. */
+/* The deviation of ranges: of the decomposition within 10 % of Cramer's and Rao's bound, which no unbiased estimate
+ * beats. Of the edges: noise over the slope at the crossing, and what the peak's noise does to the correction. */
 static double edge_sigma_m(double peak, double part, double noise, double sigma_s)
 {
     double v = sqrt(-2.0 * log(part)), at_edge = noise / (peak * part * v), by_peak = noise / (peak * v);
@@ -100,13 +100,15 @@ static double normal(double x)
 
 static double seen_by_level(const struct wave_echoes *w, const struct waveform_return *r, double noise)
 {
-    const double sample_m = C_2 * waveform_spec_of(w->waveform)->sample_s;
+    const struct waveform_spec *spec = waveform_spec_of(w->waveform);
+    const double sample_m = C_2 * spec->sample_s, count = spec->full_scale / (4095.0 - spec->baseline_counts);
+    const double level = (ceil(1.0 / count) - 0.5) * count; /* counts are rounded */
     double sum = 0.0;
     for (int phase = 0; phase < 20; phase++) {
         double missed = 1.0;
         for (int k = -10; k <= 10; k++) {
             double y = waveform_signal(w->waveform, r, 1, r->range_m + (k + 0.05 * phase) * sample_m);
-            missed *= normal((1.0 - y) / noise);
+            missed *= normal((level - y) / noise);
         }
         sum += 1.0 - missed;
     }
@@ -131,7 +133,7 @@ static void targets_are_seen_as_often_as_they_should(void **state)
         const double fitted = normal(k * (amplitude[a] - 1.0) / less);
         printf("# %4.1f: %.3f | %.3f, %.3f | %.3f | %.3f, %.3f\n", amplitude[a], normal(k * (amplitude[a] - 1.0)),
                f[2].single / n, fitted, f[1].single / n, f[0].single / n, level);
-        wave_between(f[0].single / n, level - 0.02, level + ERRORS * 0.5 / sqrt(n));
+        wave_near(f[0].single / n, level, ERRORS * 0.5 / sqrt(n));
         wave_between(f[2].single / n, fitted - 0.08, fitted + 0.08);
     }
     wave_close(&w);
@@ -145,6 +147,18 @@ static const double BEAM_RAD = 0.7e-3, RANGE_M = 100.0;
 static double extent_m(double incidence_deg)
 {
     return 0.5 * BEAM_RAD * RANGE_M * tan(incidence_deg * M_PI / 180.0);
+}
+
+/* The largest signal of a return, over that of one that is hit head on. */
+static double peak_of(const struct wave_echoes *w, const struct waveform_return *r)
+{
+    const struct waveform_return point = {r->range_m, 1.0, 0.0, WAVEFORM_POINT};
+    double most = 0.0, head_on = 0.0;
+    for (int k = -200; k <= 200; k++) {
+        most = fmax(most, waveform_signal(w->waveform, r, 1, r->range_m + 0.005 * k));
+        head_on = fmax(head_on, waveform_signal(w->waveform, &point, 1, r->range_m + 0.005 * k));
+    }
+    return most / head_on;
 }
 
 static void planes(const struct waveform_spec *spec, const char *name, double most_m[WAVE_DETECTORS])
@@ -161,12 +175,15 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
         const struct waveform_return r = {RANGE_M, 60.0, extent, extent > 0.0 ? WAVEFORM_DISC : WAVEFORM_POINT};
         for (int d = 0; d < WAVE_DETECTORS; d++) {
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
-            assert_int_equal(f[d].single, pulses() / 4);
-            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape through it
-             * lies off the centroid: by less than the third of what the rims are off. */
+            /* the tail of a skew echo may reach the level once more, with noise on it */
+            assert_true(f[d].single >= pulses() / 4 - pulses() / 4000);
+            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape
+             * through it lies off the centroid: by less than the third of what the rims are off. */
             const double skew_m = extent * extent / RANGE_M / 3.0;
             wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
+        for (int d = 1; d < WAVE_DETECTORS; d++)
+            wave_near(f[d].amplitude / peak_of(&w, &r), 1.0, 0.01);
         struct beam beam;
         float width_m;
         const float steep = (float)(1.0 / pow(cos(incidence_deg[k] * M_PI / 180.0), 2.0));
@@ -247,6 +264,33 @@ static void echoes_that_overlap_are_separated(void **state)
     two(&spec, "asymmetric", 60.0);
 }
 
+/* Three of 5 to 60 thresholds, 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own. Few are found
+ * as two, fewer as four. */
+static void three_echoes_are_three(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    const uint32_t n = pulses();
+    struct wave_echoes w;
+    uint64_t seed = 1;
+    uint32_t count[WAVE_MOST + 1] = {0};
+    wave_open(&w, &spec);
+    for (uint32_t p = 0; p < n; p++) {
+        struct waveform_return r[3];
+        double at_m = 30.0 + case_unit(&seed);
+        for (int k = 0; k < 3; k++) {
+            r[k] = (struct waveform_return){at_m, 5.0 + 55.0 * case_unit(&seed), 0.0, WAVEFORM_POINT};
+            at_m += (0.8 + 0.8 * case_unit(&seed)) * C_2 * spec.width_s;
+        }
+        count[wave_shoot(&w, WAVEFORM_GAUSSIANS, p, r, 3)]++;
+    }
+    printf("# three echoes, 0.8 to 1.6 widths apart: of %u pulses %u with two, %u with three, %u with four\n", n,
+           count[2], count[3], count[4]);
+    wave_between(count[3], 0.96 * n, n);
+    wave_between(count[4], 0.0, 0.01 * n);
+    wave_close(&w);
+}
+
 /* ---- the other decomposition */
 
 static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *echo)
@@ -260,9 +304,9 @@ static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *ec
     return other_decompose(y, window->n, 1.0, 4, 12, echo, WAVE_MOST);
 }
 
-/* Its ranges are samples with the largest count. Noise may make a neighbour larger where the top lies between both: by the
- * peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one. Centres and widths of its fits
- * differ from ours by the noise of the offset that it fits too. */
+/* Its ranges are samples with the largest count. Noise may make a neighbour larger where the top lies between both:
+ * by the peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one. Centres and widths
+ * of its fits differ from ours by the noise of the offset that it fits too. */
 static void another_decomposition_agrees(void **state)
 {
     (void)state;
@@ -308,6 +352,7 @@ int main(void)
         cmocka_unit_test(targets_are_seen_as_often_as_they_should),
         cmocka_unit_test(planes_are_ranged_by_their_centroid),
         cmocka_unit_test(echoes_that_overlap_are_separated),
+        cmocka_unit_test(three_echoes_are_three),
         cmocka_unit_test(another_decomposition_agrees),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -43,9 +43,9 @@ void wave_between(double got, double least, double most);
 
 /* sigma of a Gaussian by its full width at half maximum. */
 double wave_sigma(double width);
-/* The least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise: its peak and sigma have no part in
- * it, since their derivatives are even and that of the place is odd. Sum of (A (t - t0) / s^2 g)^2 over samples dt apart:
- * A^2 sqrt(pi) / (2 s dt). */
+/* The least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise: its peak and sigma have no
+ * part in it, since their derivatives are even and that of the place is odd. Sum of (A (t - t0) / s^2 g)^2 over
+ * samples dt apart: A^2 sqrt(pi) / (2 s dt). */
 double wave_least_sigma_m(double peak, double noise, double sigma_s, double sample_s);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where plain detectors of echoes break: tops that the digits make flat, echoes of any strength at one level, pulses that
- * the receiver limits or the window cuts, and a parabola through logarithms of samples that are not positive. */
+/* Where plain detectors of echoes break: tops that the digits make flat, echoes of any strength at one level, pulses
+ * that the receiver limits or the window cuts, and a parabola through logarithms of samples that are not positive. */
 #include <math.h>
 #include <stdio.h>
 
@@ -10,7 +10,7 @@
 
 static const double SAMPLE_M = 0.5 * 299792458.0 * 1e-9;
 
-/* What was detected, as signals. */
+/* Fills y with the signals of the window. Returns how many there are. */
 static uint32_t signals(const struct wave_echoes *w, double *y)
 {
     const struct waveform_spec *spec = waveform_spec_of(w->waveform);
@@ -51,7 +51,8 @@ static double by_log_parabola(const double *y, uint32_t n)
     return top + 0.5 * (a - c) / (a - 2.0 * b + c);
 }
 
-/* One Gaussian by Gauss and Newton's steps through all samples as they are, from the largest sample and the pulse's sigma. */
+/* One Gaussian by Gauss and Newton's steps through all samples as they are, from the largest sample and the pulse's
+ * sigma. */
 static double by_plain_fit(const double *y, uint32_t n)
 {
     double at = largest(y, n), peak = y[largest(y, n)], sigma = wave_sigma(4.0);
@@ -92,8 +93,8 @@ static void compare(struct wave_echoes *w, double (*naive)(const double *, uint3
     worst->ours_m = fmax(worst->ours_m, ours_m);
 }
 
-/* 8 bits, and an echo of a few counts: the top is a plateau of equal samples, of which the first is the largest. Noise is
- * a quarter of a count, so digits are what there is: 1/sqrt(12) of one in about 4. */
+/* 8 bits, and an echo of a few counts: the top is a plateau of equal samples, of which the first is the largest.
+ * Noise is a quarter of a count, so digits are what there is: 1/sqrt(12) of one in about 4. */
 static void flat_tops(void **state)
 {
     (void)state;
@@ -136,8 +137,8 @@ static void walk(void **state)
             compare(&w, by_level, WAVEFORM_THRESHOLD, &r, p, &worst);
         }
         snprintf(regime, sizeof regime, "a level 1, an echo %d dB above it", db);
-        /* Digits of 0.0074 thresholds: half of one in the sample below the level, which is not below 0.1 nor its slope below
-         * 0.2 a sample, is 0.02 samples. */
+        /* Digits of 0.0074 thresholds: half of one in the sample below the level, which is not below 0.1 nor its
+         * slope below 0.2 a sample, is 0.02 samples. */
         table_row(regime, "crossing, half a pulse later", worst.naive_m, worst.ours_m, 3e-3, "m");
     }
     wave_close(&w);
@@ -166,13 +167,13 @@ static void limited(void **state)
     table_check();
 }
 
-/* Windows of a gate that begin within the echo, up to a sigma after its top. */
+/* Windows of a gate that begin within the echo, up to 2.4 samples after its top. */
 static void truncated(void **state)
 {
     (void)state;
     struct waveform_spec spec = wave_spec();
     struct errors worst = {0.0, 0.0};
-    for (int k = 0; k < 12; k++) {
+    for (int k = 0; k < 20; k++) {
         struct wave_echoes w;
         spec.near_m = 40.0;
         spec.far_m = 46.0;

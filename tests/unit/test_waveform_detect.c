@@ -16,8 +16,8 @@ static double sample_m(const struct wave_echoes *w)
     return 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(w->waveform)->sample_s;
 }
 
-/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a Gaussian of
- * 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
+/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a
+ * Gaussian of 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
 static void a_plain_echo_is_where_it_is(void **state)
 {
     (void)state;
@@ -230,6 +230,28 @@ static void two_surfaces_are_two_echoes(void **state)
     wave_close(&w);
 }
 
+/* The weak one in the middle has no maximum of its own. */
+static void three_surfaces_are_three_echoes(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    spec.noise = 0.03; /* widths of three that overlap take much of it */
+    struct wave_echoes w;
+    wave_open(&w, &spec);
+    const double width_m = 0.5 * LIGHT_SPEED_M_S * spec.width_s;
+    for (uint64_t p = 0; p < 40; p++) {
+        struct waveform_return r[3];
+        static const double amplitude[3] = {60.0, 15.0, 40.0};
+        for (int k = 0; k < 3; k++)
+            r[k] = (struct waveform_return){20.0 + 0.025 * (double)p * sample_m(&w) + 1.1 * k * width_m, amplitude[k],
+                                            0.0, WAVEFORM_POINT};
+        assert_int_equal(wave_shoot(&w, WAVEFORM_GAUSSIANS, p, r, 3), 3);
+        for (int k = 0; k < 3; k++)
+            wave_near(w.echo[k].range_m, r[k].range_m, 0.05);
+    }
+    wave_close(&w);
+}
+
 /* RIEGL's pulse shape deviation: small on one flat surface, large where two surfaces make one echo. */
 static void the_deviation_shows_mixed_echoes(void **state)
 {
@@ -252,15 +274,17 @@ static void the_deviation_shows_mixed_echoes(void **state)
     wave_close(&w);
 }
 
-/* Limited by the digits, by the receiver, and by a receiver that is then blind. The echo says so, and its range holds: to a
- * sample of 1 ns where two samples of one flank are all that there is, the weaker of them near the noise. */
+/* Limited by the digits, by the receiver, and by a receiver that is then blind. The echo says so, and its range
+ * holds. Two samples of one flank may be all that there is. For an amplitude of 120 both are well above the noise of
+ * 1/8; for 1,000 the weaker is not, so the range holds to a sample of 1 ns. */
 static void a_saturated_echo_is_flagged_and_ranged(void **state)
 {
     (void)state;
     static const struct {
-        double saturation, dead_s, most_m;
-    } how[3] = {{0.0, 0.0, 0.01}, {60.0, 0.0, 0.01}, {60.0, 20e-9, 0.15}};
-    for (int h = 0; h < 6; h++) {
+        double saturation, dead_s, amplitude, most_m;
+    } how[4] = {
+        {0.0, 0.0, 1000.0, 0.01}, {60.0, 0.0, 1000.0, 0.01}, {60.0, 20e-9, 1000.0, 0.15}, {60.0, 20e-9, 120.0, 0.025}};
+    for (int h = 0; h < 8; h++) {
         struct waveform_spec spec = wave_spec();
         struct wave_echoes w;
         spec.saturation = how[h / 2].saturation;
@@ -272,8 +296,8 @@ static void a_saturated_echo_is_flagged_and_ranged(void **state)
         }
         wave_open(&w, &spec);
         for (int d = 0; d < WAVE_DETECTORS; d++)
-            for (uint64_t p = 0; p < 50; p++) {
-                const struct waveform_return r = {20.0 + 0.003 * (double)p, 1000.0, 0.0, WAVEFORM_POINT};
+            for (uint64_t p = 0; p < 150; p++) {
+                const struct waveform_return r = {20.0 + 0.001 * (double)p, how[h / 2].amplitude, 0.0, WAVEFORM_POINT};
                 assert_int_equal(wave_shoot(&w, all[d], p, &r, 1), 1);
                 assert_int_equal(w.echo[0].saturated, 1);
                 wave_near(w.echo[0].range_m, r.range_m, how[h / 2].most_m);
@@ -373,6 +397,7 @@ int main(void)
         cmocka_unit_test(a_tail_is_no_echo),
         cmocka_unit_test(the_level_decides),
         cmocka_unit_test(two_surfaces_are_two_echoes),
+        cmocka_unit_test(three_surfaces_are_three_echoes),
         cmocka_unit_test(the_deviation_shows_mixed_echoes),
         cmocka_unit_test(a_saturated_echo_is_flagged_and_ranged),
         cmocka_unit_test(detection_is_pure),
