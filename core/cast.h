@@ -110,13 +110,13 @@ struct cast_disturbance {
     } wobble[CAST_MAX_WOBBLES];
 };
 
-/* Waveforms. The samples of a pulse go into blocks that have room for them. A single ray counts as a footprint that lies
- * on the plane it hits. Needs cast_detect with a signal. */
+/* Waveforms. The samples of a pulse go into blocks that have room for them. A single ray counts as a footprint that
+ * lies on the plane it hits. Needs cast_detect with a signal. */
 struct cast_waves {
     const struct waveform *waveform;
     const struct beam *beam; /* the head's, also of single rays */
-    /* The echoes of a pulse are those that the detector finds in its samples, in place of merged returns. Their noise is
-     * that of the samples: cast_setup's range noise is not added. */
+    /* The echoes of a pulse are those that the detector finds in its samples, in place of merged returns. Their noise
+     * is that of the samples: cast_setup's range noise is not added. */
     int finds;
     enum waveform_detector detector;
 };

@@ -89,8 +89,8 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
 /* Up to so many returns stay as they are. */
 enum { FEW = 16 };
 
-/* Two equal pulses d apart differ from the one that they are joined to by a third moment of at most 0.096 d^3. With d a
- * fifteenth of a pulse's width that is 1e-4 of its peak: less than half a count of 12 bits. */
+/* Two equal pulses d apart differ from the one that they are joined to by a third moment of at most 0.096 d^3. With d
+ * a fifteenth of a pulse's width that is 1e-4 of its peak: less than half a count of 12 bits. */
 static double least_apart_m(const struct cast_waves *waves)
 {
     return 0.5 * LIGHT_SPEED_M_S * waveform_pulse_area_s(waves->waveform) / 16.0;
@@ -286,8 +286,8 @@ static void clear_list(const struct wave_chunk *k)
     l->n_secondary = 0;
 }
 
-/* The part that sends most within half an echo's width of it; where there is none, the nearest within two widths. NULL:
- * the echo is noise. */
+/* The part that sends most within half an echo's width of it; where there is none, the nearest within two widths.
+ * NULL: the echo is noise. */
 static const struct wave_part *part_of(const struct wave_chunk *k, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {

@@ -21,8 +21,8 @@ struct wave_part {
 
 /* Working memory of a thread. */
 struct wave_work {
-    /* Pulses with returns of their own: part[first .. first + n]. All others have the one return that is their entry of
-     * the list. */
+    /* Pulses with returns of their own: part[first .. first + n]. All others have the one return that is their entry
+     * of the list. */
     struct {
         uint32_t first, n;
         int own;

@@ -18,8 +18,8 @@ static int has_gate(const struct config_waveform *w)
     return w->near_m < w->far_m;
 }
 
-/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. The receiver makes it longer: 312 ns for a
- * Gaussian response of 1 MHz. */
+/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. The receiver makes it longer: 312 ns for
+ * a Gaussian response of 1 MHz. */
 uint32_t config_wave_samples(const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;

@@ -97,7 +97,8 @@ static void check_energies(enum beam_mode mode, const struct beam_view *view, co
     close_waves(&w);
 }
 
-/* To 0.1 %: digits at 10,000 counts, and what lies outside of the windows, are less. Plates are hit at up to 44 deg. */
+/* To 0.1 %: digits at 10,000 counts, and what lies outside of the windows, are less. Plates are hit at up to 44 deg.
+ * */
 static void energy_is_the_link_budget(void **state)
 {
     (void)state;
@@ -121,9 +122,9 @@ static void spread_samples(const struct line_waves *waves, uint32_t pulse, uint3
         }
 }
 
-/* A plane at 80 deg, 300 m away, is 0.6 m deep within a footprint, as long as the pulse. The closed form agrees with 1,027
- * sub-rays to a count of 12 bits, RMS: 4 counts here. It neglects that the far side is hit more steeply, by 0.3 % at the
- * rim. */
+/* A plane at 80 deg, 300 m away, is 0.6 m deep within a footprint, as long as the pulse. The closed form agrees with
+ * 1,027 sub-rays to a count of 12 bits, RMS: 4 counts here. It neglects that the far side is hit more steeply, by 0.3
+ * % at the rim. */
 static void closed_form_agrees_with_sub_rays(void **state)
 {
     (void)state;
@@ -249,9 +250,10 @@ static void lost_samples_are_counted(void **state)
 
 /* ---- echoes */
 
-/* Without noise, echoes of one plate are where the closed form has them, but for digits. Half a count is 0.06 thresholds.
- * From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 9 mm. At half of the
- * peak a straight line between samples 1 ns apart is off by P'' / 8, 3.6 mm, where a detector takes one. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
+/* Without noise, echoes of one plate are where the closed form has them, but for digits. Half a count is 0.06
+ * thresholds. From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 9
+ * mm. At half of the peak a straight line between samples 1 ns apart is off by P'' / 8, 3.6 mm, where a detector takes
+ * one. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
 static void echoes_are_found_in_samples(void **state)
 {
     (void)state;
@@ -308,9 +310,9 @@ static void look(const struct line_block *b, struct seen seen[PULSES])
     assert_int_equal(p, PULSES - 1);
 }
 
-/* An edge cuts footprints on two plates 40 m apart. Where each has 2 % of the light or more, or nothing, the echoes are
- * those of the closed forms: 2 % are 8 thresholds and more, of which half a count is 1 %, and that of a pulse's sigma 3
- * mm. (Of less the model makes no echo below 1 %, and the detector none below the threshold.) */
+/* An edge cuts footprints on two plates 40 m apart. Where each has 2 % of the light or more, or nothing, the echoes
+ * are those of the closed forms: 2 % are 8 thresholds and more, of which half a count is 1 %, and that of a pulse's
+ * sigma 3 mm. (Of less the model makes no echo below 1 %, and the detector none below the threshold.) */
 static void cut_footprints_have_two_echoes(void **state)
 {
     (void)state;

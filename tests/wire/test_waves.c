@@ -145,7 +145,8 @@ static void test_off_and_on(void **state)
 }
 
 /* A Gaussian pulse of 4 ns has an area of 4 ns sqrt(pi / (4 ln 2)). The amplitude is told in 0.01 dB, to 0.12 %, and
- * the energy is to be its to 0.1 %. A dozen samples of the pulse are rounded, to a count of a quarter: 1 ns at most. */
+ * the energy is to be its to 0.1 %. A dozen samples of the pulse are rounded, to a count of a quarter: 1 ns at most.
+ * */
 static void test_energy(void **state)
 {
     struct wire *wire = *state;
@@ -168,9 +169,9 @@ static void test_energy(void **state)
     assert_true(n > 5000);
 }
 
-/* A pane 2 m before a wall: what is sampled is what comes back of both. It is up to 3 % more where the model leaves out what
- * the samples have: at the pane's edge echoes with less than 1 % of a footprint; where pane and floor are one echo, that
- * 1 / R^2 of both is more than that of their mean, 3 (0.3 m / R)^2 at most. */
+/* A pane 2 m before a wall: what is sampled is what comes back of both. It is up to 3 % more where the model leaves
+ * out what the samples have: at the pane's edge echoes with less than 1 % of a footprint; where pane and floor are one
+ * echo, that 1 / R^2 of both is more than that of their mean, 3 (0.3 m / R)^2 at most. */
 static void test_glass(void **state)
 {
     struct wire *wire = *state;
@@ -199,10 +200,10 @@ static void test_glass(void **state)
     }
 }
 
-/* Without noise, echoes that are found are those of the model, but for digits: half a count is an eighth of a threshold.
- * From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 19 mm. A straight
- * line between samples 1 ns apart is off by 3.6 mm at half of the peak, where a detector takes one. Amplitudes to 1 %,
- * widths to 2 %. */
+/* Without noise, echoes that are found are those of the model, but for digits: half a count is an eighth of a
+ * threshold. From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 19
+ * mm. A straight line between samples 1 ns apart is off by 3.6 mm at half of the peak, where a detector takes one.
+ * Amplitudes to 1 %, widths to 2 %. */
 static void test_echoes(void **state)
 {
     struct wire *wire = *state;
@@ -228,8 +229,8 @@ static void test_echoes(void **state)
     }
 }
 
-/* A pulse of 1,000 ns, where the profile says 4, has windows longer than what a block has room for. What is lost is said
- * by the frames, by the statistics and in a warning, and all agree. */
+/* A pulse of 1,000 ns, where the profile says 4, has windows longer than what a block has room for. What is lost is
+ * said by the frames, by the statistics and in a warning, and all agree. */
 static void test_lost(void **state)
 {
     struct wire *wire = *state;
@@ -291,8 +292,8 @@ static void test_switched(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* In UTM the head stands at the anchor. A window's direction, times the range of its pulse's echo, leads to the point. Over
- * the room's 9 m the ellipsoid falls away by 6 um. Floats leave 0.5 um, counts of coordinates 1 um. */
+/* In UTM the head stands at the anchor. A window's direction, times the range of its pulse's echo, leads to the point.
+ * Over the room's 9 m the ellipsoid falls away by 6 um. Floats leave 0.5 um, counts of coordinates 1 um. */
 static void test_directions(void **state)
 {
     struct wire *wire = *state;

@@ -46,8 +46,9 @@ static void test_refused(void **state)
            "a window from 1 to 2000 m");
 }
 
-/* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used: 41,667
- * pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 28 samples, 5 + 3 x 4 + 10 ns and one. */
+/* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used:
+ * 41,667 pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 28 samples, 5 + 3 x 4 + 10 ns
+ * and one. */
 static void test_capacity(void **state)
 {
     struct wire *wire = *state;
