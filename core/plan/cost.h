@@ -13,6 +13,13 @@
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
 
+/* ---- waveforms (make bench-waveform, build/tests/bench/waveform_detect): of pulses with one return */
+
+#define PLAN_COST_WAVE        160.0 /* its window, */
+#define PLAN_COST_WAVE_SAMPLE 2.5   /* and each sample, with noise */
+#define PLAN_COST_FLANK       300.0 /* the echo, found by a threshold or a fraction of its peak, */
+#define PLAN_COST_GAUSSIANS   520.0 /* or by Gaussian decomposition */
+
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
 /* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra near a border, since rays

@@ -95,6 +95,7 @@ static const struct input {
     {RUN | RECORD | CHECK, "platform.file", "--set=platform.kind=trajectory --set=platform.file=@path.csv", "path.csv"},
     {RUN | RECORD | CHECK, "platform.waypoints", "--set=platform.kind=trajectory --set=platform.waypoints=@path.csv",
      "path.csv"},
+    {WITH_CONFIG, "waveform.pulse_file", "--set=waveform.pulse=table --set=waveform.pulse_file=@path.csv", "path.csv"},
     {RUN | RECORD | SOAK | CHECK, "--scenario", "--scenario=@loss.yaml", "loss.yaml"},
     {BATCH, "--scenario", "--scenario=@loss.yaml", "loss.yaml"},
     {RUN, "--replay-journal", "--replay-journal=@journal", "journal"},
