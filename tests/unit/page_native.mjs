@@ -11,6 +11,7 @@ import {PointHash} from '../../drivers/link/web/native_points.js';
 import {readWaves, Waves} from '../../drivers/link/web/native_waves.js';
 import {Poses} from '../../drivers/link/web/native_poses.js';
 import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
+import {Wire} from '../../drivers/link/web/wire.js';
 import {runTests, test} from './page_tap.mjs';
 
 const page = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
@@ -355,6 +356,26 @@ test('points before their anchor are counted and not placed', () => {
   const {decoder, batches} = readAll([Buffer.concat(samples.filter((_, i) => i !== 2).map(({bytes}) => bytes))]);
   equal(batches.length, 0, 'batches');
   equal(decoder.stats.unplaced_shots, 3, 'unplaced');
+});
+
+test('a page asks its wire for the waveform of a pulse', async () => {
+  const real = globalThis.WebSocket, sent = [];
+  let socket;
+  globalThis.WebSocket = class {
+    constructor() { socket = this; }
+    close() {}
+  };
+  try {
+    const wire = new Wire((message) => sent.push(...message.things));
+    wire.take({connect: 'ws://head/ws'});
+    socket.onmessage({data: new Uint8Array(stream).buffer});
+    wire.take({wavesOf: 1});
+    const [, answer] = sent.find(([name]) => name === 'waves');
+    equal(`${answer.pulse} ${answer.windows.length} ${answer.windows[0].samples.length}`, '1 1 6', 'answer');
+    wire.take({close: true});
+  } finally {
+    globalThis.WebSocket = real;
+  }
 });
 
 // ---- replies
