@@ -441,7 +441,7 @@ static void expect_beam(const struct scanhead_wave *w, int is_geo)
 
 static void expect_waves(struct scanhead *sh, const struct scanhead_frame *f)
 {
-    static struct scanhead_wave wave[64];
+    static struct scanhead_wave wave[NATIVE_MAX_PAYLOAD / NATIVE_WAVE_LEN];
     struct native_waves v;
     struct scanhead_info info;
     assert_int_equal(native_decode_waves(f->payload, f->payload_len, &v), 0);
@@ -451,10 +451,11 @@ static void expect_waves(struct scanhead *sh, const struct scanhead_frame *f)
     expect_real(S "waves.count_signal", (double)v.count_signal, 0);
     take_text(S "points_in");
     assert_int_equal(scanhead_get_info(sh, &info), 0);
-    assert_int_equal(scanhead_waves(sh, f, 0, wave, 64), v.n_windows);
+    assert_int_equal(scanhead_waves(sh, f, 0, wave, sizeof wave / sizeof wave[0]), v.n_windows);
     for (uint32_t i = 0; i < v.n_windows; i++) {
         const struct scanhead_wave *w = &wave[i];
-        char counts[512] = "";
+        static char counts[8 * NATIVE_MAX_SAMPLES];
+        counts[0] = 0;
         for (uint32_t k = 0; k < w->n; k++)
             snprintf(counts + strlen(counts), 8, k == 0 ? "%u" : " %u", le_get16(w->sample + 2 * k));
         expect_uint(S "wave.pulse", w->pulse);
