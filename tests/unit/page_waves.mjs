@@ -76,6 +76,7 @@ test('the last waveforms of a scan are kept, up to a limit', () => {
   equal(waves.of(high + 9998).length, 4, 'in two frames');
   waves.add(at(0), 2);
   equal(`${waves.of(high + 9998).length} ${waves.of(0).length}`, '0 2', 'another scan');
+  equal(`${waves.of(0, 1).length} ${waves.of(0, 2).length}`, '0 2', 'of a scan');
 });
 
 test('a page asks its wire for the waveform of a pulse', async () => {
@@ -89,9 +90,9 @@ test('a page asks its wire for the waveform of a pulse', async () => {
     const wire = new Wire((message) => sent.push(...message.things));
     wire.take({connect: 'ws://head/ws'});
     socket.onmessage({data: new Uint8Array(stream).buffer});
-    wire.take({wavesOf: 1});
+    wire.take({wavesOf: 1, scan: 1});
     const [, answer] = sent.find(([name]) => name === 'waves');
-    equal(`${answer.pulse} ${answer.windows.length} ${answer.windows[0].samples.length}`, '1 1 6', 'answer');
+    equal(`${answer.pulse} ${answer.scan} ${answer.windows.length} ${answer.windows[0].samples.length}`, '1 1 1 6', 'answer');
     wire.take({close: true});
   } finally {
     globalThis.WebSocket = real;
