@@ -4,10 +4,11 @@
 
 enum { MOST = 4096 };
 
+/* The pan has 720,000 counts, so 25 degrees a second are half a count a pulse: every second pulse is between two. */
 static const struct room_config SCAN = {.profile = "riegl-vz400i",
                                         .prr_hz = 100000,
                                         .lines_hz = 50,
-                                        .pan_deg_s = 60,
+                                        .pan_deg_s = 25,
                                         .pan_stop_deg = 90,
                                         .links = LINK_YAML_TCP,
                                         .more = "signal: {model: on}\nsurfaces: [{reflectance: 0.02}]\n"
