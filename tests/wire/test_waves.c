@@ -273,6 +273,61 @@ static void test_capacity(void **state)
     free(err);
 }
 
+/* Takes frames up to a new descriptor that says so, and then up to the end of a line. Returns the frames of waveforms
+ * since that descriptor. */
+static uint32_t count_waves(struct scanhead *sh, int has)
+{
+    struct scanhead_frame frame;
+    int64_t since_ns = 0;
+    uint32_t n = 0;
+    do {
+        client_next(sh, &frame);
+        wire_soon(&since_ns, frame.t_ns, "a descriptor");
+    } while (frame.type != SCANHEAD_DESCRIPTOR || scanhead_has_waves(sh) != has);
+    do {
+        client_next(sh, &frame);
+        n += frame.type == SCANHEAD_WAVES;
+    } while (frame.type != SCANHEAD_LINE_END);
+    return n;
+}
+
+/* A client switches waveforms off and on again while the head scans. The descriptor says so where it happens. */
+static void test_switched(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config scan = SCAN;
+    char config[352];
+    room_write(wire);
+    scan.links = LINK_YAML_TCP;
+    scan.frames = 0;
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &scan));
+    struct head head = head_start(wire, config, (const char *const[]){"--set", "waveform.send=on", "--start", NULL});
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    assert_true(count_waves(sh, 1) > 0);
+    assert_string_equal(client_ask(sh, "SCAN:WAV OFF"), "OK");
+    assert_int_equal(count_waves(sh, 0), 0);
+    assert_string_equal(client_ask(sh, "SCAN:WAV ON"), "OK");
+    assert_true(count_waves(sh, 1) > 0);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* A recording that runs as a head sends the frames of waveforms on as they are. */
+static void test_replayed(void **state)
+{
+    struct wire *wire = *state;
+    char path[352], hash[2][65], stats[352];
+    room_write(wire);
+    record(wire, &SCAN, "on.shs", (const char *const[]){"waveform.send=on", NULL});
+    stats_hash(wire, hash[0]);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "on.shs"));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    const char *const args[] = {"run", path, "--start", "--pace", "fast", "--quiet", "--stats", stats, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    stats_hash(wire, hash[1]);
+    assert_string_equal(hash[0], hash[1]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -282,6 +337,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_lost, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_switched, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_replayed, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
