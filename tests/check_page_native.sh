@@ -43,7 +43,7 @@ config still "$sweep" ''
 config ride "$sweep" 'platform: {kind: trajectory, file: ride.csv}'
 config beams 'profile: velodyne-vlp16, frames: 1' ''
 earth="scene.anchor.source=explicit scene.anchor.lat_deg=52.3 scene.anchor.lon_deg=13.1 scene.anchor.height_m=80 scene.anchor.north_deg=17"
-record polar still output.attributes=on output.colour=height signal.model=on
+record polar still output.attributes=on output.colour=height signal.model=on waveform.send=on waveform.echoes=fraction noise.range=off
 record moving ride
 record beams beams
 # shellcheck disable=SC2086

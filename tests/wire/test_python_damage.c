@@ -146,7 +146,9 @@ static void test_hostile(void **state)
     room_write(wire);
     write_ride(wire);
     char path[352];
-    snprintf(path, sizeof path, "%s", record(wire, &RIDE, "a.shs", "output.attributes=on"));
+    snprintf(path, sizeof path, "%s",
+             record(wire, &RIDE, "a.shs",
+                    "output.attributes=on signal.model=on waveform.send=on waveform.echoes=fraction noise.range=off"));
     for (int k = 0; k < 2; k++) {
         unsigned taken, refused;
         const char *said = ask_python(wire, flavours[k], "hostile", path, seeds[k]);

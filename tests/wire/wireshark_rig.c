@@ -11,10 +11,12 @@ static const struct {
     const char *name, *keys;
     int moves;
 } recording[N_RECORDINGS] = {
-    {"polar.shs", "output.attributes=on output.colour=height signal.model=on", 0},
+    {"polar.shs",
+     "output.attributes=on output.colour=height signal.model=on waveform.send=on waveform.echoes=fraction noise.range=off",
+     0},
     {"ride.shs", "output.attributes=off", 1},
     {"utm.shs", "output.layout=geo output.crs=utm time.epoch=2026-01-01T00:00:00Z time.ptp.follower=on" AT_BERLIN, 0},
-    {"geodetic.shs", "output.layout=geo output.crs=geodetic" AT_BERLIN, 0},
+    {"geodetic.shs", "output.layout=geo output.crs=geodetic signal.model=on waveform.send=on" AT_BERLIN, 0},
 };
 const char *const stream_name[N_STREAMS] = {"polar.shs",   "ride.shs",   "utm.shs", "geodetic.shs",
                                             "samples.shs", "joined.shs", "long.shs"};
