@@ -48,6 +48,7 @@ struct recorder_options {
     uint32_t n_heads;            /* heads that scan one after the other in one scene; 0: one, as far as known */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
+    int las_wdp;   /* waveforms of .las go to a .wdp beside it */
     int mesh;      /* .ply is a mesh of the scan's grid */
     double long_edge;     /* of meshes: leaves out triangles with an edge longer than so many mean edges; 0: none */
     double sparse_per_m2; /* > 0: .ply has points spread over the mesh, so many per square metre */

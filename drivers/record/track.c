@@ -45,6 +45,9 @@ static int check_info(struct track *t, struct sh_err *err)
     if (t->begun && t->has_colours != will_have_colours(t))
         return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s colours; a file holds one kind", t->path,
                        t->has_colours ? "without" : "with");
+    if (t->begun && t->ops->wants_waves && t->has_waves != (scanhead_has_waves(t->sh) == 1))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s waveforms; a file holds one kind", t->path,
+                       t->has_waves ? "without" : "with");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
     t->crs = crs;
@@ -54,6 +57,7 @@ static int check_info(struct track *t, struct sh_err *err)
     t->stops = info->stop;
     t->has_attributes = t->ops->wants_attributes && scanhead_has_attributes(t->sh) == 1;
     t->has_colours = will_have_colours(t);
+    t->has_waves = t->ops->wants_waves && scanhead_has_waves(t->sh) == 1;
     t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
     t->begun = 1;
     if (t->named == NULL || info->n_surfaces > t->n_named) {
@@ -265,8 +269,8 @@ static int track_take_points(struct track *t, const struct scanhead_frame *frame
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
     t->state.last_scan = t->info.scan;
-    if (rc == 0) rc = track_begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
+    if (rc == 0) rc = track_begin_waiting(t, frame, row, err);
     if (rc == 0 && row > UINT32_MAX - frame->n_points)
         rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
     return rc == 0 && t->ops->points != NULL ? take_batches(t, frame, row, err) : rc;
@@ -287,7 +291,11 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     if (frame->type == SCANHEAD_POINTS) return track_take_points(t, frame, err);
     if (frame->type == SCANHEAD_ATTRIBUTES) return track_attributes(t, frame, err);
     if (frame->type == SCANHEAD_COLOURS) return track_colours(t, frame, err);
-    if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
+    if (frame->type == SCANHEAD_WAVES) return track_waves(t, frame, err);
+    if (frame->type == SCANHEAD_LINE_END) {
+        take_line_end(t, frame);
+        return t->has_waves ? track_flush(t, err) : 0;
+    }
     struct native_descriptor d;
     if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
         set_limits(t, &d);

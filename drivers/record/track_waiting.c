@@ -10,6 +10,7 @@
 /* Points of a frame whose attributes or colours may follow, and which of these have come. */
 struct track_waiting {
     uint32_t n;
+    uint64_t pulse0, first_row; /* of the frame's first pulse */
     int have_attributes, have_colours;
     struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
     struct scanhead_colour colour[NATIVE_MAX_POINTS];
@@ -27,15 +28,17 @@ static int waits_for_colours(const struct track *t)
 
 int track_waits(const struct track *t)
 {
-    return t->has_attributes || waits_for_colours(t);
+    return t->has_attributes || waits_for_colours(t) || t->has_waves;
 }
 
-int track_begin_waiting(struct track *t, struct sh_err *err)
+int track_begin_waiting(struct track *t, const struct scanhead_frame *frame, uint64_t first_row, struct sh_err *err)
 {
     if (!track_waits(t)) return 0;
     if (t->waiting == NULL) t->waiting = malloc(sizeof *t->waiting);
     if (t->waiting == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a frame of points", t->path);
     t->waiting->n = 0;
+    t->waiting->pulse0 = frame->pulse0;
+    t->waiting->first_row = first_row;
     t->waiting->have_attributes = t->waiting->have_colours = 0;
     return 0;
 }
@@ -56,6 +59,16 @@ int track_give(struct track *t, int n, struct sh_err *err)
     for (int i = 0; i < n && t->has_colours && t->colour.given; i++)
         colour_of_point(&t->colour.scale, t, i, t->rgb[i]);
     return t->ops->points(t->rec, n, err);
+}
+
+/* Gives point n of the batch the window of waveforms that waiting point k lies in. */
+static void take_wave(struct track *t, const struct waiting_point *p, int n)
+{
+    const struct track_waiting *w = t->waiting;
+    t->wave[n] = NULL;
+    if (!t->has_waves || p->point.echo_count == 0) return;
+    t->wave[n] = track_find_wave(t, &p->point, w->pulse0 + (p->row - w->first_row), &t->wave_at[n]);
+    t->missing.n_without_waves += t->wave[n] == NULL;
 }
 
 /* Gives point n of the batch the attributes and the colour of waiting point k, and counts lost ones. */
@@ -87,12 +100,14 @@ static int hand_out(struct track *t, struct sh_err *err)
         t->frame[n] = p->frame;
         t->gps_s[n] = p->gps_s;
         take_along(t, k, n);
+        take_wave(t, p, n);
         if (++n < TRACK_BATCH && k + 1 < w->n) continue;
         t->waited = 1;
         rc = track_give(t, n, err);
         n = 0;
     }
     if (w != NULL) w->n = 0;
+    track_clear_waves(t);
     return rc;
 }
 
@@ -105,6 +120,7 @@ void track_free(struct track *t)
 {
     free(t->waiting);
     t->waiting = NULL;
+    track_free_waves(t);
 }
 
 int track_attributes(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
@@ -113,7 +129,7 @@ int track_attributes(struct track *t, const struct scanhead_frame *frame, struct
     if (w == NULL || w->n == 0 || !t->has_attributes) return 0;
     if (scanhead_attributes(t->sh, frame, 0, w->attribute, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_attributes = 1;
-    return waits_for_colours(t) ? 0 : hand_out(t, err);
+    return waits_for_colours(t) || t->has_waves ? 0 : hand_out(t, err);
 }
 
 int track_colours(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
@@ -122,5 +138,5 @@ int track_colours(struct track *t, const struct scanhead_frame *frame, struct sh
     if (w == NULL || w->n == 0 || !waits_for_colours(t)) return 0;
     if (scanhead_colours(t->sh, frame, 0, w->colour, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_colours = 1;
-    return hand_out(t, err);
+    return t->has_waves ? 0 : hand_out(t, err);
 }
