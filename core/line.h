@@ -46,6 +46,11 @@ struct line_waves {
     struct line_wave *wave;
     uint16_t *sample;
     uint32_t n_left_out; /* samples that found no room */
+    /* The digitiser: set once by who makes the block, and the same for all blocks of a scan. */
+    uint32_t sample_ps;   /* time between samples */
+    uint16_t baseline_16; /* the count without light, in 1/16 counts */
+    uint8_t bits;         /* of a sample */
+    float count_signal;   /* signal of one count, in thresholds */
 };
 
 struct line_block {

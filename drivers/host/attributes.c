@@ -1,19 +1,29 @@
 /* SPDX-License-Identifier: MIT */
-/* Stream frames that follow the points: attributes and colour of each point, sums of each line. */
+/* Stream frames that follow the points: attributes and colour of each point, sums of each line. waves.c has waveforms. */
 #include <math.h>
 
 #include "drivers/host/host.h"
+#include "drivers/protocol/native_waves.h"
+
+int host_has_content(const struct scanhead *sh, enum native_content content)
+{
+    if (!sh->have_descriptor) return SCANHEAD_ESTATE;
+    return (sh->descriptor.content & (uint32_t)content) != 0;
+}
 
 int scanhead_has_attributes(const struct scanhead *sh)
 {
-    if (!sh->have_descriptor) return SCANHEAD_ESTATE;
-    return (sh->descriptor.content & NATIVE_HAS_ATTRIBUTES) != 0;
+    return host_has_content(sh, NATIVE_HAS_ATTRIBUTES);
 }
 
 int scanhead_has_colours(const struct scanhead *sh)
 {
-    if (!sh->have_descriptor) return SCANHEAD_ESTATE;
-    return (sh->descriptor.content & NATIVE_HAS_COLOURS) != 0;
+    return host_has_content(sh, NATIVE_HAS_COLOURS);
+}
+
+int scanhead_has_deviations(const struct scanhead *sh)
+{
+    return host_has_content(sh, NATIVE_HAS_DEVIATIONS);
 }
 
 /* Whether the frame is number `after` behind the last points frame, and belongs to the same points. */
@@ -23,23 +33,39 @@ static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *
            frame->scan_line == sh->of_points.line && frame->n_points == sh->of_points.n_points;
 }
 
-int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
-                        struct scanhead_attribute *attributes, uint32_t max)
+/* How many there are from `first` on, at most max; or an error. */
+static int attributes_from(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, uint32_t max)
 {
     int rc = host_check_last(sh, frame, SCANHEAD_ATTRIBUTES);
     if (rc != 0) return rc;
     if (!is_of_points(sh, frame, 1))
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the points of these attributes were lost", sh->source.name);
-    if (first >= frame->n_points) return 0;
-    uint32_t n = frame->n_points - first;
-    if (n > max) n = max;
-    for (uint32_t i = 0; i < n; i++) {
+    const uint32_t n = first < frame->n_points ? frame->n_points - first : 0;
+    return (int)(n < max ? n : max);
+}
+
+int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, double *deviation,
+                        uint32_t max)
+{
+    if (scanhead_has_deviations(sh) != 1)
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the head's attributes have no deviations", sh->source.name);
+    const int n = attributes_from(sh, frame, first, max);
+    for (int i = 0; i < n; i++)
+        deviation[i] = native_decode_deviation(frame->payload, frame->n_points, first + (uint32_t)i) / 1000.0;
+    return n;
+}
+
+int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                        struct scanhead_attribute *attributes, uint32_t max)
+{
+    const int n = attributes_from(sh, frame, first, max);
+    for (int i = 0; i < n; i++) {
         struct native_attribute a;
-        native_decode_attribute(frame->payload, first + i, &a);
+        native_decode_attribute(frame->payload, first + (uint32_t)i, &a);
         attributes[i].amplitude_db = a.amplitude_cdb == NATIVE_AMPLITUDE_NONE ? (double)NAN : a.amplitude_cdb / 100.0;
         attributes[i].width_ns = a.width_cns == NATIVE_WIDTH_NONE ? (double)NAN : a.width_cns / 100.0;
     }
-    return (int)n;
+    return n;
 }
 
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,

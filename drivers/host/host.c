@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/protocol/native_waves.h"
+
 _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO && SCANHEAD_ENOMEM == (int)SH_ENOMEM &&
                    SCANHEAD_EPERM == (int)SH_EPERM && SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT &&
                    SCANHEAD_ECLOSED == (int)SH_ECLOSED && SCANHEAD_EFORMAT == (int)SH_EFORMAT &&
@@ -13,7 +15,7 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
                    SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EMITTER == (int)NATIVE_EMITTER &&
-                   SCANHEAD_COLOURS == (int)NATIVE_COLOURS && SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
+                   SCANHEAD_COLOURS == (int)NATIVE_COLOURS && SCANHEAD_WAVES == (int)NATIVE_WAVES && SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
                    SCANHEAD_MAX_BEAMS == (int)NATIVE_MAX_BEAMS && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
@@ -170,6 +172,8 @@ static void fill_points(struct scanhead *sh, struct scanhead_frame *frame)
     frame->line_t0_ns = points.line_t0_ns;
     sh->have_points = 1;
     sh->points_seq = frame->seq;
+    sh->points_t_ns = frame->t_ns;
+    sh->points_t0_ns = points.t0_ns;
     sh->of_points =
         (struct native_attributes){.pulse0 = points.pulse0, .line = points.line, .n_points = points.n_points};
 }
@@ -184,6 +188,15 @@ static void fill_beside(struct scanhead_frame *frame)
     if (rc != 0) return;
     frame->scan_line = head.line;
     frame->n_points = head.n_points;
+    frame->pulse0 = head.pulse0;
+}
+
+static void fill_waves(struct scanhead_frame *frame)
+{
+    struct native_waves head;
+    if (native_decode_waves(frame->payload, frame->payload_len, &head) != 0) return;
+    frame->scan_line = head.line;
+    frame->n_points = head.n_windows;
     frame->pulse0 = head.pulse0;
 }
 
@@ -216,6 +229,7 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
     };
     if (header.type == NATIVE_POINTS) fill_points(sh, frame);
     if (header.type == NATIVE_ATTRIBUTES || header.type == NATIVE_COLOURS) fill_beside(frame);
+    if (header.type == NATIVE_WAVES) fill_waves(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
     return SCANHEAD_OK;
@@ -228,6 +242,7 @@ int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enu
         [SCANHEAD_POSES] = "poses",
         [SCANHEAD_ATTRIBUTES] = "attributes",
         [SCANHEAD_COLOURS] = "colours",
+        [SCANHEAD_WAVES] = "waveforms",
     };
     if (frame->type == (int)type && frame->payload != NULL && frame->payload == sh->payload) return 0;
     return sh_fail(&sh->err, SCANHEAD_EINPUT, "this is not the %s frame that scanhead_next returned last", name[type]);

@@ -58,6 +58,7 @@ struct scanhead {
     int have_points;        /* a points frame has been handed out: */
     uint32_t points_seq;
     struct native_attributes of_points; /* how its attributes must begin */
+    int64_t points_t_ns, points_t0_ns;  /* device time and time in the scan of its first pulse */
 
     /* what the stream has said, as of the frame handed out last */
     int have_descriptor, have_anchor, have_pulse;
@@ -94,6 +95,9 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
 
 /* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);
+
+/* attributes.c: whether the descriptor says that the stream has this; SCANHEAD_ESTATE before it has come. */
+int host_has_content(const struct scanhead *sh, enum native_content content);
 
 /* poses.c: takes a poses frame in; forgets all (another scan). */
 int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);

@@ -115,6 +115,7 @@ enum scanhead_frame_type { /* as on the wire */
                            SCANHEAD_ATTRIBUTES = 9,
                            SCANHEAD_EMITTER = 10,
                            SCANHEAD_COLOURS = 11,
+                           SCANHEAD_WAVES = 12,
 };
 enum scanhead_frame_flags { SCANHEAD_REPEAT = 1, SCANHEAD_LOCAL = 2 };
 
@@ -143,7 +144,8 @@ struct scanhead_frame {
     size_t payload_len;
     const uint8_t *raw; /* the frame as on the wire, header and payload; valid as payload is */
     size_t raw_len;
-    /* for SCANHEAD_POINTS; for SCANHEAD_ATTRIBUTES and SCANHEAD_COLOURS only scan_line, n_points and pulse0 */
+    /* for SCANHEAD_POINTS; for SCANHEAD_ATTRIBUTES, SCANHEAD_COLOURS and SCANHEAD_WAVES only scan_line, n_points (of
+     * waves: windows) and pulse0 */
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
     int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
@@ -263,6 +265,40 @@ int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, ui
                      struct scanhead_colour *colours, uint32_t max);
 /* 1: a frame of colours follows each frame of points; else as scanhead_has_attributes. */
 int scanhead_has_colours(const struct scanhead *sh);
+
+/* Where the head finds echoes in waveforms: how far the shape of each echo is from the pulse's, RMS over its amplitude.
+ * They are in the frames of SCANHEAD_ATTRIBUTES, and decoded as scanhead_attributes does. 65.535: that or more; 0 for
+ * an empty shot. */
+int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, double *deviation,
+                        uint32_t max);
+/* 1: attributes have them; else as scanhead_has_attributes. */
+int scanhead_has_deviations(const struct scanhead *sh);
+
+/* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when it fires. */
+struct scanhead_wave {
+    uint64_t pulse;         /* its number in the scan */
+    int64_t t_ns;           /* firing time since the scan's start */
+    uint32_t first, n;      /* samples, by their number on the grid */
+    const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
+    double range_m, step_m; /* of the first sample; from one to the next */
+    /* Polar: the beam in the head's frame SOCS, of length one. Geo: the change of x, y and z in the CRS along a metre of
+     * range. An echo at p and r metres has the sample at range r_k at p + (r_k - r) direction. */
+    double direction[3];
+    uint32_t sample_ps, bits; /* time between samples; bits of a count */
+    double baseline;          /* the count without light */
+    double count_signal;      /* of one count, in units of the detection threshold */
+};
+/* Decodes windows of the frame of SCANHEAD_WAVES that scanhead_next returned last: at most max, from the index `first`,
+ * in order of pulse, then of range. Several such frames may follow a frame of points, after its attributes and colours;
+ * none does where no window was kept. Returns how many, or SCANHEAD_ESTATE where the points were lost. */
+int scanhead_waves(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_wave *waves,
+                   uint32_t max);
+/* Signal of sample i < wave->n in units of the detection threshold, without the baseline. */
+double scanhead_wave_signal(const struct scanhead_wave *wave, uint32_t i);
+/* Samples that found no room in the head, as a frame of SCANHEAD_WAVES says. SCANHEAD_EINPUT for another type. */
+int64_t scanhead_waves_lost(struct scanhead *sh, const struct scanhead_frame *frame);
+/* 1: frames of waveforms follow the points; else as scanhead_has_attributes. */
+int scanhead_has_waves(const struct scanhead *sh);
 
 struct scanhead_line_end {
     uint32_t scan_frame, scan_line;

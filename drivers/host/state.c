@@ -8,6 +8,7 @@
 #include "core/bytes.h"
 #include "core/grow.h"
 #include "drivers/host/host.h"
+#include "drivers/protocol/native_waves.h"
 
 static int bad(struct scanhead *sh, const char *what)
 {
@@ -79,13 +80,21 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
 static int absorb_attributes(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     struct native_attributes attributes;
-    return native_decode_attributes(payload, header->length, &attributes) != 0 ? bad(sh, "wrong attributes") : 0;
+    if (native_decode_attributes(payload, header->length, &attributes) != 0) return bad(sh, "wrong attributes");
+    if (scanhead_has_deviations(sh) != 1) return 0;
+    return native_check_deviations(header->length, attributes.n_points) != 0 ? bad(sh, "too few deviations") : 0;
 }
 
 static int absorb_colours(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     struct native_attributes colours;
     return native_decode_colours(payload, header->length, &colours) != 0 ? bad(sh, "wrong colours") : 0;
+}
+
+static int absorb_waves(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_waves waves;
+    return native_decode_waves(payload, header->length, &waves) != 0 ? bad(sh, "wrong waveforms") : 0;
 }
 
 /* The head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
@@ -190,6 +199,8 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
         return absorb_attributes(sh, header, payload);
     case NATIVE_COLOURS:
         return absorb_colours(sh, header, payload);
+    case NATIVE_WAVES:
+        return absorb_waves(sh, header, payload);
     case NATIVE_POSES:
         if (host_absorb_poses(sh, payload, header->length) == SH_EFORMAT) return bad(sh, "wrong poses");
         return sh->poses != NULL ? 0 : sh_fail(&sh->err, SH_ENOMEM, "no memory for poses");

@@ -6,12 +6,15 @@
 
 #include "core/bytes.h"
 #include "core/err.h"
-#include "drivers/protocol/native.h"
+#include "drivers/protocol/native_waves.h"
 
-#define UNIT_FIELD_32   4
-#define UNIT_FIELD_64   8
-#define UNIT_FIELD_REAL 8
-#define UNIT_FIELD_TEXT 1
+#define UNIT_FIELD_8     1
+#define UNIT_FIELD_16    2
+#define UNIT_FIELD_32    4
+#define UNIT_FIELD_64    8
+#define UNIT_FIELD_FLOAT 4
+#define UNIT_FIELD_REAL  8
+#define UNIT_FIELD_TEXT  1
 #define ROW(type, member, kind)                                                               \
     {                                                                                         \
         offsetof(struct type, member), kind, sizeof(((struct type *)0)->member) / UNIT_##kind \
@@ -90,6 +93,13 @@ static const struct field attributes[] = {
     ATTRIBUTES(n_points, FIELD_32),
 };
 
+#define WAVES(member, kind) ROW(native_waves, member, kind)
+static const struct field waves[] = {
+    WAVES(pulse0, FIELD_64),    WAVES(line, FIELD_32), WAVES(n_windows, FIELD_32), WAVES(sample_ps, FIELD_32),
+    WAVES(baseline_16, FIELD_16), WAVES(bits, FIELD_8),  WAVES(reserved, FIELD_8),   WAVES(count_signal, FIELD_FLOAT),
+    WAVES(n_lost, FIELD_32),
+};
+
 #define END(member, kind) ROW(line_end, member, kind)
 static const struct field line_end[] = {
     END(frame, FIELD_32),        END(line, FIELD_32),      END(pulse0, FIELD_64), END(t0_ns, FIELD_64),
@@ -136,6 +146,7 @@ const struct field_table fields_emitter = TABLE(emitter, native_emitter, NATIVE_
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN, NATIVE_POINTS);
 const struct field_table fields_attributes =
     TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);
+const struct field_table fields_waves = TABLE(waves, native_waves, NATIVE_WAVES_HEAD_LEN, NATIVE_WAVES);
 const struct field_table fields_line_end = TABLE(line_end, line_end, 68, NATIVE_LINE_END);
 const struct field_table fields_telemetry = {telemetry, sizeof telemetry / sizeof telemetry[0] - N_PTP_FIELDS - 1, 96,
                                              sizeof(struct native_telemetry), NATIVE_TELEMETRY};
@@ -145,10 +156,20 @@ const struct field_table fields_telemetry_ptp = TABLE(telemetry, native_telemetr
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 
-/* A number of 4 or 8 bytes between the machine's order and the wire's; the same both ways. */
+static const uint8_t unit_of[] = {[FIELD_8] = UNIT_FIELD_8,         [FIELD_16] = UNIT_FIELD_16,
+                                  [FIELD_32] = UNIT_FIELD_32,       [FIELD_64] = UNIT_FIELD_64,
+                                  [FIELD_FLOAT] = UNIT_FIELD_FLOAT, [FIELD_REAL] = UNIT_FIELD_REAL,
+                                  [FIELD_TEXT] = UNIT_FIELD_TEXT};
+
+/* A number of 1, 2, 4 or 8 bytes between the machine's order and the wire's; the same both ways. */
 static void fields_turn(void *to, const void *from, size_t unit)
 {
-    if (unit == 4) {
+    if (unit == 1) {
+        memcpy(to, from, 1);
+    } else if (unit == 2) {
+        uint16_t v = le_get16(from);
+        memcpy(to, &v, sizeof v);
+    } else if (unit == 4) {
         uint32_t v = le_get32(from);
         memcpy(to, &v, sizeof v);
     } else {
@@ -166,10 +187,19 @@ static size_t encode_field(const struct field *field, const char *from, uint8_t 
         memset(wire + len, 0, field->count - len);
         return field->count;
     }
-    size_t unit = field->kind == FIELD_32 ? 4 : 8;
+    const size_t unit = unit_of[field->kind];
     for (size_t i = 0; i < field->count; i++)
         fields_turn(wire + i * unit, from + i * unit, unit);
     return unit * field->count;
+}
+
+static int is_finite(const struct field *field, const char *value)
+{
+    double real = 0;
+    float small = 0;
+    if (field->kind == FIELD_REAL) memcpy(&real, value, sizeof real);
+    if (field->kind == FIELD_FLOAT) memcpy(&small, value, sizeof small);
+    return isfinite(real) && isfinite(small);
 }
 
 static int decode_field(const struct field *field, const uint8_t *wire, char *to)
@@ -180,12 +210,10 @@ static int decode_field(const struct field *field, const uint8_t *wire, char *to
         memcpy(to, wire, len);
         return field->count;
     }
-    size_t unit = field->kind == FIELD_32 ? 4 : 8;
+    const size_t unit = unit_of[field->kind];
     for (size_t i = 0; i < field->count; i++) {
-        double real = 0;
         fields_turn(to + i * unit, wire + i * unit, unit);
-        if (field->kind == FIELD_REAL) memcpy(&real, to + i * unit, sizeof real);
-        if (!isfinite(real)) return SH_EFORMAT;
+        if (!is_finite(field, to + i * unit)) return SH_EFORMAT;
     }
     return (int)unit * field->count;
 }

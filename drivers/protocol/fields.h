@@ -10,10 +10,13 @@
 #include <stdint.h>
 
 enum field_kind {
-    FIELD_32,   /* uint32_t */
-    FIELD_64,   /* uint64_t, int64_t */
-    FIELD_REAL, /* double; a value that is not finite is refused on decoding */
-    FIELD_TEXT, /* char array: NUL-terminated, padded with NUL */
+    FIELD_8,     /* uint8_t */
+    FIELD_16,    /* uint16_t */
+    FIELD_32,    /* uint32_t */
+    FIELD_64,    /* uint64_t, int64_t */
+    FIELD_FLOAT, /* float; a value that is not finite is refused on decoding, also of the next kind */
+    FIELD_REAL,  /* double */
+    FIELD_TEXT,  /* char array: NUL-terminated, padded with NUL */
 };
 
 struct field {
@@ -30,7 +33,7 @@ struct field_table {
 /* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three: lines
  * that files lack, and the PTP follower, are sent only where they are there. */
 extern const struct field_table fields_descriptor, fields_descriptor_content, fields_anchor, fields_emitter,
-    fields_points, fields_attributes, fields_line_end, fields_telemetry, fields_telemetry_lines, fields_telemetry_ptp,
+    fields_points, fields_attributes, fields_waves, fields_line_end, fields_telemetry, fields_telemetry_lines, fields_telemetry_ptp,
     fields_event, fields_pose;
 
 /* Writes exactly table->wire_len bytes. */

@@ -46,6 +46,7 @@ enum native_type {
     NATIVE_ATTRIBUTES = 9, /* amplitude and width of the points in the frame before */
     NATIVE_EMITTER = 10,   /* how the head's beams are arranged; after the descriptor, unless it is a line head */
     NATIVE_COLOURS = 11,   /* a colour for each of the points in the last points frame */
+    NATIVE_WAVES = 12,     /* waveforms of its pulses: native_waves.h */
 };
 
 enum native_flags {
@@ -136,6 +137,8 @@ struct native_beam { /* 0 i32 elevation, 4 i32 azimuth offset, 8 u32 firing time
 enum native_content {
     NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each one of points */
     NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows it, after that of the attributes */
+    NATIVE_HAS_WAVES = 4,      /* frames of waveforms follow it, after these */
+    NATIVE_HAS_DEVIATIONS = 8, /* attributes have deviations behind their records */
 };
 
 /* Geodetic coordinates and the angles of the descriptor are in degrees. */
@@ -385,7 +388,7 @@ void native_parser_finish(struct native_parser *parser);
 void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points, line-end,
- * poses, attributes and colours frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs over u8 type,
+ * poses, attributes, colours and waveforms frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs over u8 type,
  * u32 length (LE) and the payload of each. */
 int native_is_hashed(const struct native_header *header);
 

@@ -4,7 +4,7 @@
 #include "core/bytes.h"
 #include "core/err.h"
 #include "drivers/protocol/fields.h"
-#include "drivers/protocol/native.h"
+#include "drivers/protocol/native_waves.h"
 
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
 {
@@ -80,6 +80,29 @@ int native_decode_colours(const uint8_t *payload, size_t len, struct native_attr
 void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3])
 {
     memcpy(rgb, payload + NATIVE_COLOURS_HEAD_LEN + (size_t)i * NATIVE_COLOUR_LEN, NATIVE_COLOUR_LEN);
+}
+
+int native_check_deviations(size_t len, uint32_t n_points)
+{
+    const size_t each = NATIVE_ATTRIBUTE_LEN + NATIVE_DEVIATION_LEN;
+    return len >= NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)n_points * each ? 0 : SH_EFORMAT;
+}
+
+int native_decode_waves(const uint8_t *payload, size_t len, struct native_waves *out)
+{
+    size_t at = NATIVE_WAVES_HEAD_LEN;
+    int rc = fields_decode(&fields_waves, payload, len, out);
+    if (rc != 0) return rc;
+    if (out->sample_ps == 0 || out->bits < NATIVE_MIN_BITS || out->bits > NATIVE_MAX_BITS || !(out->count_signal > 0))
+        return SH_EFORMAT;
+    for (uint32_t i = 0; i < out->n_windows; i++) {
+        if (len - at < NATIVE_WAVE_LEN) return SH_EFORMAT;
+        const uint32_t n = le_get16(payload + at + 12);
+        const size_t window_len = native_wave_len(n);
+        if (n == 0 || n > NATIVE_MAX_SAMPLES || len - at < window_len) return SH_EFORMAT;
+        at += window_len;
+    }
+    return 0;
 }
 
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out)
@@ -173,5 +196,5 @@ int native_is_hashed(const struct native_header *header)
     if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
     return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR || header->type == NATIVE_POINTS ||
            header->type == NATIVE_LINE_END || header->type == NATIVE_POSES || header->type == NATIVE_ATTRIBUTES ||
-           header->type == NATIVE_EMITTER || header->type == NATIVE_COLOURS;
+           header->type == NATIVE_EMITTER || header->type == NATIVE_COLOURS || header->type == NATIVE_WAVES;
 }

@@ -6,6 +6,7 @@
 #include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/fields.h"
+#include "drivers/protocol/native_waves.h"
 
 /* Header in front of the payload that already stands at dst + NATIVE_HEADER_LEN. */
 static size_t put_header(uint8_t *dst, enum native_type type, int flags, size_t payload_len, int64_t t_ns)
@@ -114,13 +115,21 @@ size_t native_points_bound(uint32_t n_points)
 size_t native_attributes_bound(uint32_t n_points)
 {
     return frames_bound(n_points) * (NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN) +
-           (size_t)n_points * NATIVE_ATTRIBUTE_LEN;
+           (size_t)n_points * (NATIVE_ATTRIBUTE_LEN + NATIVE_DEVIATION_LEN);
 }
 
 size_t native_colours_bound(uint32_t n_points)
 {
     return frames_bound(n_points) * (NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN) +
            (size_t)n_points * NATIVE_COLOUR_LEN;
+}
+
+size_t native_waves_bound(uint32_t n_points, uint32_t n_windows, uint32_t n_samples)
+{
+    /* a frame ends where the next window doesn't fit, so it is filled up to the longest one */
+    const size_t least = NATIVE_MAX_PAYLOAD - NATIVE_WAVES_HEAD_LEN - native_wave_len(NATIVE_MAX_SAMPLES);
+    const size_t windows = n_windows * native_wave_len(1) + (size_t)n_samples * NATIVE_SAMPLE_LEN;
+    return (frames_bound(n_points) + windows / least) * (NATIVE_HEADER_LEN + NATIVE_WAVES_HEAD_LEN) + windows;
 }
 
 /* Every pulse has an entry whose echo number is 0 or 1, and it is its first. */
@@ -170,79 +179,143 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
-/* Attributes of the block's entries first .. first + n, whose points frame had this head. 0: no room. */
-static size_t put_attributes(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
-                             const struct native_points *points, int64_t t_ns)
+/* The entries of a block that go into one points frame, and what follows it. */
+struct encode_cut {
+    const struct line_block *block;
+    struct native_points head;
+    uint32_t first;  /* entry */
+    uint32_t pulse0; /* after the block's */
+    uint32_t dt0_ns; /* after the block's t0_ns */
+    uint32_t wave;   /* first window that was not sent yet */
+    uint32_t n_lost; /* samples, to be said by the next frame of waveforms */
+    int is_last;
+    int64_t t_ns; /* in the headers */
+};
+
+/* Attributes. 0, here and below: no room. */
+static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
-    const struct native_attributes head = {
-        .pulse0 = points->pulse0, .line = points->line, .n_points = points->n_points};
-    size_t payload_len = NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)head.n_points * NATIVE_ATTRIBUTE_LEN;
+    const struct line_block *block = cut->block;
+    const uint32_t n = cut->head.n_points, end = cut->first + n;
+    const struct native_attributes head = {.pulse0 = cut->head.pulse0, .line = cut->head.line, .n_points = n};
+    const size_t each = NATIVE_ATTRIBUTE_LEN + (block->deviation != NULL ? (size_t)NATIVE_DEVIATION_LEN : 0);
+    const size_t payload_len = NATIVE_ATTRIBUTES_HEAD_LEN + n * each;
     uint8_t *at = dst + NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
     fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
-    for (uint32_t i = first; i < first + head.n_points; i++, at += NATIVE_ATTRIBUTE_LEN)
+    for (uint32_t i = cut->first; i < end; i++, at += NATIVE_ATTRIBUTE_LEN)
         le_put32(at, (uint16_t)block->amplitude_cdb[i] | (uint32_t)block->width_cns[i] << 16);
-    return put_header(dst, NATIVE_ATTRIBUTES, 0, payload_len, t_ns);
+    for (uint32_t i = cut->first; block->deviation != NULL && i < end; i++, at += NATIVE_DEVIATION_LEN)
+        le_put16(at, block->deviation[i]);
+    return put_header(dst, NATIVE_ATTRIBUTES, 0, payload_len, cut->t_ns);
 }
 
 /* Colours likewise. */
-static size_t put_colours(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
-                          const struct native_points *points, int64_t t_ns)
+static size_t put_colours(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
     const struct native_attributes head = {
-        .pulse0 = points->pulse0, .line = points->line, .n_points = points->n_points};
+        .pulse0 = cut->head.pulse0, .line = cut->head.line, .n_points = cut->head.n_points};
     const size_t len = (size_t)head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
     fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
-    memcpy(dst + NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN, block->rgb + first, len);
-    return put_header(dst, NATIVE_COLOURS, 0, payload_len, t_ns);
+    memcpy(dst + NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN, cut->block->rgb + cut->first, len);
+    return put_header(dst, NATIVE_COLOURS, 0, payload_len, cut->t_ns);
 }
 
-/* Attributes and colours behind a points frame; 0: there is no room. */
-static size_t put_beside(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
-                         const struct native_points *points, int64_t t_ns)
+/* A window of samples, whose length is checked. */
+static void put_wave(uint8_t *restrict at, const struct line_waves *waves, const struct line_wave *w,
+                     const struct encode_cut *cut)
 {
-    size_t done = 0, len;
-    if (block->width_cns != NULL) {
-        done = put_attributes(dst, cap, block, first, points, t_ns);
-        if (done == 0) return 0;
+    const uint16_t *restrict sample = waves->sample + w->at;
+    const uint32_t n = w->n;
+    le_put64(at, (w->pulse - cut->pulse0) | (uint64_t)(w->dt_ns - cut->dt0_ns) << 32);
+    le_put64(at + 8, w->first | (uint64_t)n << 32);
+    le_put64(at + 16, w->a | (uint64_t)w->b << 32);
+    le_put32(at + 24, w->c);
+    at += NATIVE_WAVE_LEN;
+    for (uint32_t i = 0; i < n; i++)
+        le_put16(at + NATIVE_SAMPLE_LEN * (size_t)i, sample[i]);
+    if (n & 1) le_put16(at + NATIVE_SAMPLE_LEN * (size_t)n, 0);
+}
+
+/* Whether a frame of waveforms is still to come. */
+static int has_waves(const struct encode_cut *cut)
+{
+    const struct line_waves *waves = cut->block->waves;
+    if (waves == NULL) return 0;
+    if (cut->n_lost != 0) return 1;
+    return cut->wave < waves->n && (cut->is_last || waves->wave[cut->wave].pulse - cut->pulse0 < cut->head.n_pulses);
+}
+
+/* The next windows of these pulses, as many as one frame holds. 0 also where a window has no or too many samples. */
+static size_t put_waves(uint8_t *dst, size_t cap, struct encode_cut *cut)
+{
+    const struct line_waves *waves = cut->block->waves;
+    struct native_waves head = {.pulse0 = cut->head.pulse0,
+                                .line = cut->head.line,
+                                .sample_ps = waves->sample_ps,
+                                .baseline_16 = waves->baseline_16,
+                                .bits = waves->bits,
+                                .count_signal = waves->count_signal,
+                                .n_lost = cut->n_lost};
+    uint8_t *payload = dst + NATIVE_HEADER_LEN;
+    size_t len = NATIVE_WAVES_HEAD_LEN;
+    if (cap < NATIVE_HEADER_LEN + len) return 0;
+    const size_t room = cap - NATIVE_HEADER_LEN, most = room < NATIVE_MAX_PAYLOAD ? room : NATIVE_MAX_PAYLOAD;
+    for (cut->n_lost = 0; has_waves(cut); cut->wave++, head.n_windows++) {
+        const struct line_wave *w = &waves->wave[cut->wave];
+        if (w->n == 0 || w->n > NATIVE_MAX_SAMPLES) return 0;
+        if (native_wave_len(w->n) > most - len) break;
+        put_wave(payload + len, waves, w, cut);
+        len += native_wave_len(w->n);
     }
-    if (block->rgb == NULL) return done;
-    len = put_colours(dst + done, cap - done, block, first, points, t_ns);
-    return len == 0 ? 0 : done + len;
+    if (head.n_windows == 0 && has_waves(cut)) return 0;
+    fields_encode(&fields_waves, &head, payload);
+    return put_header(dst, NATIVE_WAVES, 0, len, cut->t_ns);
+}
+
+/* Attributes, colours and waveforms behind a points frame. *len: their bytes. SH_ENOMEM: there is no room. */
+static int put_beside(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *len)
+{
+    size_t done = 0, more = 1;
+    if (cut->block->width_cns != NULL) done += more = put_attributes(dst, cap, cut);
+    if (more != 0 && cut->block->rgb != NULL) done += more = put_colours(dst + done, cap - done, cut);
+    while (more != 0 && has_waves(cut))
+        done += more = put_waves(dst + done, cap - done, cut);
+    *len = done;
+    return more != 0 ? SH_OK : SH_ENOMEM;
 }
 
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns)
 {
-    size_t done = 0;
-    uint32_t first = 0, pulses = 0;
+    size_t done = 0, beside;
+    struct encode_cut cut = {.block = block};
     do {
-        uint32_t n = points_that_fit(block, first);
-        int last = first + n == block->n_points;
+        const uint32_t n = points_that_fit(block, cut.first);
+        cut.is_last = cut.first + n == block->n_points;
         size_t payload_len = NATIVE_POINTS_HEAD_LEN + (size_t)n * NATIVE_POINT_LEN;
-        if ((n == 0 && !last) || cap - done < NATIVE_HEADER_LEN + payload_len) return 0;
-        uint32_t dt0_ns = first == 0 ? 0 : block->dt_ns[first];
-        const struct native_points head = {
+        if ((n == 0 && !cut.is_last) || cap - done < NATIVE_HEADER_LEN + payload_len) return 0;
+        cut.dt0_ns = cut.first == 0 ? 0 : block->dt_ns[cut.first];
+        cut.head = (struct native_points){
             .frame = block->frame,
             .line = block->line,
-            .pulse0 = block->pulse0 + pulses,
-            .t0_ns = block->t0_ns + dt0_ns,
+            .pulse0 = block->pulse0 + cut.pulse0,
+            .t0_ns = block->t0_ns + cut.dt0_ns,
             .line_t0_ns = block->line_t0_ns,
-            .n_pulses = last ? block->n_pulses - pulses : count_pulses(block->echo + first, n),
+            .n_pulses = cut.is_last ? block->n_pulses - cut.pulse0 : count_pulses(block->echo + cut.first, n),
             .n_points = n,
         };
+        cut.t_ns = scan_t0_ns + cut.head.t0_ns;
         uint8_t *payload = dst + done + NATIVE_HEADER_LEN;
-        fields_encode(&fields_points, &head, payload);
-        if (put_points(payload + NATIVE_POINTS_HEAD_LEN, block, first, n, dt0_ns) != 0) return 0;
-        done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, scan_t0_ns + head.t0_ns);
-        if (block->width_cns != NULL || block->rgb != NULL) {
-            size_t len = put_beside(dst + done, cap - done, block, first, &head, scan_t0_ns + head.t0_ns);
-            if (len == 0) return 0;
-            done += len;
-        }
-        pulses += head.n_pulses;
-        first += n;
-    } while (first < block->n_points);
+        fields_encode(&fields_points, &cut.head, payload);
+        if (put_points(payload + NATIVE_POINTS_HEAD_LEN, block, cut.first, n, cut.dt0_ns) != 0) return 0;
+        done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, cut.t_ns);
+        if (cut.is_last && block->waves != NULL) cut.n_lost = block->waves->n_left_out;
+        if (put_beside(dst + done, cap - done, &cut, &beside) != SH_OK) return 0;
+        done += beside;
+        cut.pulse0 += cut.head.n_pulses;
+        cut.first += n;
+    } while (cut.first < block->n_points);
     return done;
 }
 

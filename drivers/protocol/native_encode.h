@@ -21,8 +21,8 @@ size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_tel
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 
 /* A block as one or more points frames of at most NATIVE_MAX_POINTS. After each of them come the frame of its
- * attributes and that of its colours, where the block has some. Cuts lie between pulses, so that a pulse's echoes stay
- * in one frame. scan_t0_ns: device time of the scan's start. */
+ * attributes, that of its colours, and those of its waveforms, where the block has some. Cuts lie between pulses, so
+ * that a pulse's echoes stay in one frame. scan_t0_ns: device time of the scan's start. */
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
 
@@ -46,10 +46,11 @@ size_t native_finish_frame(uint8_t *frame, uint32_t seq);
 /* Makes both checksums of a frame of len bytes right, whatever is in it. */
 void native_reseal(uint8_t *frame, size_t len);
 
-/* The most bytes that native_encode_points can need for n_points, and the most that their attributes and their
- * colours add. */
+/* The most bytes that native_encode_points can need for n_points, and the most that their attributes (with deviations),
+ * their colours and their waveforms add. */
 size_t native_points_bound(uint32_t n_points);
 size_t native_attributes_bound(uint32_t n_points);
 size_t native_colours_bound(uint32_t n_points);
+size_t native_waves_bound(uint32_t n_points, uint32_t n_windows, uint32_t n_samples);
 
 #endif

@@ -134,6 +134,7 @@ struct timing_moment timing_take(struct timing *timing, const struct native_head
         return take_line_end(timing, header, payload);
     case NATIVE_ATTRIBUTES:
     case NATIVE_COLOURS:
+    case NATIVE_WAVES:
         return (struct timing_moment){TIMING_FOLLOWS, header->t_ns};
     case NATIVE_DESCRIPTOR:
         take_descriptor(timing, header, payload);

@@ -374,7 +374,7 @@ static void test_is_hashed(void **state)
         for (int flags = 0; flags < 8; flags++) {
             struct native_header h = {.type = (uint8_t)type, .flags = (uint8_t)flags};
             int want = ((type >= 1 && type <= 4) || type == NATIVE_POSES || type == NATIVE_ATTRIBUTES ||
-                        type == NATIVE_EMITTER || type == NATIVE_COLOURS) &&
+                        type == NATIVE_EMITTER || type == NATIVE_COLOURS || type == NATIVE_WAVES) &&
                        (flags & 3) == 0;
             assert_int_equal(native_is_hashed(&h), want);
         }

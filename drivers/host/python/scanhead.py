@@ -37,7 +37,7 @@ except ImportError:  # everything works without, slower
     np = None
 
 (DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER,
- COLOURS) = range(1, 12)
+ COLOURS, WAVES) = range(1, 13)
 REPEAT, LOCAL = 1, 2  # flags of a frame
 (EV_STATE, EV_SCAN_START, EV_SCAN_END, EV_OVERRUN, EV_READER_LOST, EV_CONTROL, EV_ERROR, EV_SETTINGS,
  EV_POSE_LATE, EV_PPS, EV_TIME, EV_SITE, EV_PTP) = range(1, 14)
@@ -48,7 +48,9 @@ EMIT_LINE, EMIT_PLANAR, EMIT_BEAMS, EMIT_SPHERE, EMIT_DIRECTIONS = range(5)
 CRS_LOCAL, CRS_ECEF, CRS_UTM, CRS_GEODETIC = range(4)
 NO_LABEL = 0xFFFF
 
-_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS)
+HAS_ATTRIBUTES, HAS_COLOURS, HAS_WAVES, HAS_DEVIATIONS = 1, 2, 4, 8  # content of a descriptor
+
+_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS, WAVES)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
@@ -192,6 +194,7 @@ _LAYOUT = {
     EVENT: ("<IIQQQ96s", "code reserved a b c text"),
     ATTRIBUTES: ("<QII", "pulse0 line n_points"),
     COLOURS: ("<QII", "pulse0 line n_points"),
+    WAVES: ("<QIIIHBBfI", "pulse0 line n_windows sample_ps baseline_16 bits reserved count_signal n_lost"),
     EMITTER: ("<3I4iIQQqII", "kind n_beams steps first_step last_step front_step turn rings sequence_ns_num "
               "sequence_ns_den first_ring_udeg echoes gaps"),
 }
@@ -213,6 +216,7 @@ _UNPACK_MORE = {kind: [_unpacker(*layout) for layout in layouts] for kind, layou
 _POSE = struct.Struct("<q3d4ddII")
 _POINT = struct.Struct("<IIIhHI")
 _BEAM = struct.Struct("<iiI")
+_WAVE, _WAVE_COUNTS, _WAVE_SLOPES, _MAX_SAMPLES = struct.Struct("<3IHH3I"), "<III", "<fff", 4096
 
 
 def _text(field: bytes) -> str:
@@ -527,6 +531,63 @@ class Points:
         return len(self.t_ns)
 
 
+class Wave(NamedTuple):
+    """A window of samples of one pulse's waveform. All windows of a pulse have one grid; its sample 0 is taken when
+    the pulse fires.
+
+    pulse: its number in the scan; t_ns since the scan's start. first: number of the first sample on the grid.
+    direction: polar layout: the beam in the head's frame, of length one; geo layout: the change of x, y and z in
+    the CRS along a metre of range. baseline: the count without light; count_signal: signal of one count, in units
+    of the detection threshold."""
+    pulse: int
+    t_ns: int
+    first: int
+    counts: Tuple[int, ...]
+    direction: Tuple[float, ...]
+    sample_ps: int
+    bits: int
+    baseline: float
+    count_signal: float
+
+    @property
+    def step_m(self) -> float:
+        """Range from sample to sample."""
+        return 1e-3 * self.sample_ps * _M_PER_NS
+
+    def range_m(self, i: int = 0) -> float:
+        """Range of sample i of the window."""
+        return (self.first + i) * self.step_m
+
+    def signal(self) -> List[float]:
+        """The samples in units of the detection threshold, without the baseline."""
+        return [(count - self.baseline) * self.count_signal for count in self.counts]
+
+
+def _wave_records(payload: bytes, n: int) -> Iterator[Tuple]:
+    """Each of n windows: its record's numbers, and where its samples begin."""
+    at = _UNPACK[WAVES][0].size
+    for _ in range(n):
+        if len(payload) - at < _WAVE.size:
+            raise ScanheadError("a waveforms frame shorter than its windows")
+        record = _WAVE.unpack_from(payload, at)
+        counts_at, samples = at + _WAVE.size, record[3]
+        at = counts_at + 2 * (samples + (samples & 1))
+        if not 1 <= samples <= _MAX_SAMPLES or at > len(payload):
+            raise ScanheadError("a window without samples, or with more than its frame has")
+        yield record, counts_at
+
+
+def _wave_direction(payload: bytes, at: int, d: Dict) -> Tuple[float, ...]:
+    """From the three words at `at`."""
+    if d["layout"] == GEO:
+        return struct.unpack_from(_WAVE_SLOPES, payload, at)
+    _, mirror, pan = struct.unpack_from(_WAVE_COUNTS, payload, at)
+    mirror_rad, pan_rad = (_TWO_PI * (count / d[turn]) for count, turn in (
+        (mirror, "mirror_counts_per_turn"), (pan, "pan_counts_per_turn")))
+    flat = math.cos(mirror_rad)
+    return math.sin(pan_rad) * flat, math.cos(pan_rad) * flat, math.sin(mirror_rad)
+
+
 def _column(values, n: int):
     """An iterable of n numbers as a column."""
     return np.fromiter(values, dtype=np.float64, count=n) if np is not None else list(values)
@@ -539,6 +600,7 @@ def _mapped(function, *columns):
 
 
 _PARTS, _TWO_PI = 256, 6.283185307179586476925
+_M_PER_NS = 0.5 * 0.299792458  # range of one nanosecond of a pulse's way out and back
 _SIN = [math.sin(_TWO_PI * i / _PARTS) for i in range(_PARTS)]
 _COS = [math.cos(_TWO_PI * i / _PARTS) for i in range(_PARTS)]
 if np is not None:
@@ -1058,7 +1120,7 @@ class Head:
         self.surfaces = {}  # type: Dict[int, Tuple[str, str]]
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
-        self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = None
+        self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
         self._scan, self.scan_over = None, False  # the scan at hand; whether it ends with this frame
 
     def __enter__(self) -> "Head":
@@ -1310,7 +1372,7 @@ class Head:
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
                POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
                POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes, COLOURS: self._absorb_colours,
-               EMITTER: self._absorb_emitter}.get(frame.type)
+               WAVES: self._absorb_waves, EMITTER: self._absorb_emitter}.get(frame.type)
         if act is not None:
             act(frame)
         self._follow_scan(frame)
@@ -1380,6 +1442,7 @@ class Head:
         self._last_pulse0 = p["pulse0"]
         self._scan_t0_ns = frame.t_ns - p["t0_ns"]
         self._points_key = (frame.seq + 1) % 2**32, p["pulse0"], p["line"], p["n_points"]
+        self._points_time = frame.t_ns, p["t0_ns"]
 
     def _absorb_poses(self, frame: Frame) -> None:
         self._poses.absorb(frame.payload)
@@ -1387,10 +1450,22 @@ class Head:
     def _absorb_attributes(self, frame: Frame) -> None:
         if frame.fields["n_points"] > (len(frame.payload) - 16) // 4:
             raise ScanheadError("an attributes frame shorter than its attributes")
+        if self._has(HAS_DEVIATIONS) and frame.fields["n_points"] > (len(frame.payload) - 16) // 6:
+            raise ScanheadError("an attributes frame shorter than its deviations")
 
     def _absorb_colours(self, frame: Frame) -> None:
         if frame.fields["n_points"] > (len(frame.payload) - 16) // 3:
             raise ScanheadError("a colours frame shorter than its colours")
+
+    def _absorb_waves(self, frame: Frame) -> None:
+        f = frame.fields
+        if f["sample_ps"] == 0 or not 8 <= f["bits"] <= 14 or not f["count_signal"] > 0:
+            raise ScanheadError("a waveforms frame without time between samples, bits or signal of a count")
+        for _ in _wave_records(frame.payload, f["n_windows"]):
+            pass
+
+    def _has(self, content: int) -> bool:
+        return self.descriptor is not None and self.descriptor["content"] & content != 0
 
     def _absorb_event(self, frame: Frame) -> None:
         code, a, b, c = (frame.fields[k] for k in ("code", "a", "b", "c"))
@@ -1450,7 +1525,7 @@ class Head:
     def colours(self, frame: Frame) -> Optional[Tuple]:
         """Columns red, green and blue, 0 to 255, of the points in the last points frame; None: these were
         lost."""
-        after = 2 if self.descriptor is not None and self.descriptor["content"] & 1 else 1
+        after = 2 if self._has(HAS_ATTRIBUTES) else 1
         if not self._is_of_points(frame, after):
             return None
         data = frame.payload[16:16 + 3 * frame.fields["n_points"]]
@@ -1466,6 +1541,29 @@ class Head:
         raw = list(struct.iter_unpack("<hH", frame.payload[16:16 + 4 * n]))
         return (_column((_NAN if a == -32768 else a / 100.0 for a, _ in raw), n),
                 _column((w / 100.0 if w else _NAN for _, w in raw), n))
+
+    def deviations(self, frame: Frame) -> Optional[List[float]]:
+        """How far the shape of each echo is from the pulse's, RMS over its amplitude, from a frame of attributes:
+        65.535: that or more; 0: a shot without echo. None: the points were lost, or the head sends none."""
+        n = frame.fields["n_points"]
+        if not self._has(HAS_DEVIATIONS) or not self._is_of_points(frame, 1):
+            return None
+        return [d / 1000.0 for d in struct.unpack_from("<%dH" % n, frame.payload, 16 + 4 * n)]
+
+    def waves(self, frame: Frame) -> Optional[List[Wave]]:
+        """The windows of a waveforms frame, in order of pulse, then of range; None: their points were lost. Several
+        such frames may follow a points frame."""
+        f, key = frame.fields, self._points_key
+        if self.descriptor is None or key is None or key[1:3] != (f["pulse0"], f["line"]) or (
+                self._points_time[0] != frame.t_ns):
+            return None
+        waves = []
+        for (pulse, dt_ns, first, n, *_), at in _wave_records(frame.payload, f["n_windows"]):
+            waves.append(Wave(f["pulse0"] + pulse, self._points_time[1] + dt_ns, first,
+                              struct.unpack_from("<%dH" % n, frame.payload, at),
+                              _wave_direction(frame.payload, at - 12, self.descriptor),
+                              f["sample_ps"], f["bits"], f["baseline_16"] / 16.0, f["count_signal"]))
+        return waves
 
     def to_scene(self, p: Points) -> Tuple:
         """x, y, z in the scene frame, metres; of a moving head each point with the pose of its time. NaN: no
@@ -1543,7 +1641,7 @@ def _summary(head: Head) -> None:
             count = head.points(frame).echo_count
             echoes += int(np.count_nonzero(count)) if np is not None else sum(n > 0 for n in count)
     names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
-             "poses", "attributes", "emitters", "colours")
+             "poses", "attributes", "emitters", "colours", "waveforms")
     print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
     p = head.parser
     print(f"{echoes} echoes; frames lost: {p.seq_lost}, bytes skipped: {p.bad_bytes}")
