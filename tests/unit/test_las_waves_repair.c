@@ -6,19 +6,27 @@
 #include "tests/unit/repair_rig.h"
 #include "tests/unit/waves_rig.h"
 
-enum { N = 40, N_SAMPLES = 12, POINT = 61, PACKET = 2 * N_SAMPLES, EVLR = 60, WAVE_AT = 30 };
+enum { N = 40, LINES = 400, N_SAMPLES = 12, POINT = 61, PACKET = 2 * N_SAMPLES, EVLR = 60, WAVE_AT = 30 };
 
 static struct bytes left, left_wdp, whole; /* as a kill leaves them; completed, with its packets inside */
 static char wdp[168], wdp_part[176];
 
-static void put_stream(uint32_t lines)
+/* With it the points come out. */
+static void put_line_end(uint32_t line)
+{
+    static uint8_t out[256];
+    const struct line_end end = {.line = line, .pulse0 = line * N, .n_fired = N, .n_cast = N, .n_echoes = N};
+    rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
+}
+
+static void put_stream(uint32_t lines, uint16_t n_samples)
 {
     static struct rig_point p[N];
     static struct rig_window w[N];
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
     for (uint32_t i = 0; i < N; i++) {
         p[i] = (struct rig_point){5000, 0, 0, 0, 1, 1, 1};
-        w[i] = (struct rig_window){i, 28, N_SAMPLES, {0, 0, 0}};
+        w[i] = (struct rig_window){i, 28, n_samples, {0, 0, 0}};
     }
     rig_begin();
     rig_wave_descriptor(0, 1, 4);
@@ -26,6 +34,7 @@ static void put_stream(uint32_t lines)
     for (uint32_t line = 0; line < lines; line++) {
         rig_points(line, line * N, line * N, p, N);
         rig_waves(line, line * N, &rig_12_bits, w, N);
+        put_line_end(line);
     }
 }
 
@@ -55,7 +64,8 @@ static void leave(void)
                      0);
     while (scanhead_next(sh, &frame, -1) == 0)
         if (recorder_frame(rec, sh, &frame, &repair_err) != 0) fail_msg("%s", repair_err.text);
-    assert_int_equal(recorder_save(rec, &repair_err), 0);
+    for (int i = 0; i < 2; i++) /* the second call finds that nothing was written since the first */
+        assert_int_equal(recorder_save(rec, &repair_err), 0);
     left = repair_slurp(repair_part);
     left_wdp = repair_slurp(wdp_part);
     assert_int_equal(recorder_close(rec, 0, &repair_err), 0);
@@ -69,9 +79,9 @@ static int set_up(void **state)
     repair_name("a.las");
     snprintf(wdp, sizeof wdp, "%s", rig_path("a.wdp"));
     snprintf(wdp_part, sizeof wdp_part, "%s.part", wdp);
-    put_stream(2);
+    put_stream(2, N_SAMPLES);
     leave();
-    put_stream(2);
+    put_stream(2, N_SAMPLES);
     assert_int_equal(rig_record(repair_path, (struct recorder_options){0}, RIG_KEEP, &repair_err), 0);
     whole = repair_slurp(repair_path);
     unlink(repair_path);
@@ -222,25 +232,55 @@ static void test_refused(void **state)
     unlink(wdp_part);
 }
 
-/* A disk that gets full, first for the packets: what is left can be repaired. */
+/* A limit on the files' size stands for a full disk. What is left is repaired: so many points, so many of them with
+ * packets. */
+static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_t n_points, size_t n_packets)
+{
+    struct sh_err err = {0};
+    struct rlimit old, small;
+    struct repaired file;
+    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+    put_stream(LINES, n_samples);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    getrlimit(RLIMIT_FSIZE, &old);
+    small = (struct rlimit){size, old.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const int rc = rig_record(repair_path, (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err);
+    setrlimit(RLIMIT_FSIZE, &old);
+    signal(SIGXFSZ, was);
+    assert_int_equal(rc, SH_EIO);
+    assert_non_null(strstr(err.text, names));
+    assert_non_null(strstr(rig_notes, "--repair"));
+    assert_int_equal(access(repair_path, F_OK) | access(wdp, F_OK), -1);
+    if (repair_file(repair_path, NULL, &file, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(file.n_kept, n_points);
+    repair_free(&file);
+    struct bytes got = repair_slurp(repair_path);
+    size_t with = 0;
+    while (with < n_points && got.data[front_of(&got) + with * POINT + WAVE_AT] != 0)
+        with++;
+    assert_int_equal(with, n_packets);
+    assert_int_equal(left_len(wdp), EVLR + n_packets * 2 * n_samples);
+    free(got.data);
+    unlink(repair_path);
+    unlink(wdp);
+}
+
+/* A packet of 60 samples is longer than a point, so packets find no room first. Points that fit are kept. */
 static void test_disk_full(void **state)
 {
     (void)state;
-    put_stream(400);
-    rig_check_disk_full(rig_path("full.las"), 100000);
-    unlink(rig_path("full.wdp"));
+    check_full(100000, 60, "a.wdp", (100000 - front_of(&left)) / POINT, (100000 - EVLR) / 120);
 }
 
-/* The same when only the copy of the packets has no room. */
+/* Only the copy of the packets has no room: all is kept, in two files. */
 static void test_no_room_for_copy(void **state)
 {
     (void)state;
-    put_stream(400);
-    const rlim_t size = front_of(&left) + 400 * N * POINT + 5000;
-    assert_true(EVLR + 400 * N * PACKET < size);
-    rig_check_disk_full(rig_path("full.las"), size);
-    assert_int_equal(left_len(rig_path("full.wdp")), EVLR + 400 * N * PACKET);
-    unlink(rig_path("full.wdp"));
+    const rlim_t size = front_of(&left) + (rlim_t)LINES * N * POINT + 5000;
+    assert_true(EVLR + (rlim_t)LINES * N * PACKET < size);
+    check_full(size, N_SAMPLES, "a.las", LINES * N, LINES * N);
 }
 
 int main(void)
