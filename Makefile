@@ -193,7 +193,7 @@ $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.o $(BUILD)/head.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   head and studio, no main                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne loop_cost loading kernels panorama copies)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves loop_cost loading kernels panorama copies)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
 LIMIT = tests/common/limit.c
@@ -382,7 +382,7 @@ test-usb-million: deps
 
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
-#? bench             speed, and leaks of 10^8 rays; also bench-beam, -plain, -copies, -loading, -loop, -kernels, -page, -panorama, -velodyne
+#? bench             speed, and leaks of 10^8 rays; also bench-beam, -plain, -copies, -loading, -loop, -kernels, -page, -panorama, -velodyne, -waves
 bench: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
 	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --reach --leaks 1e8 -o $(BUILD)/bench.json
@@ -422,6 +422,10 @@ bench-copies: deps-build
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
+# Waveforms on the wire, ns a window.
+bench-waves: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waves
+	@$(BUILD)/tests/bench/waves
 # The arithmetic around the cast, ns a pulse: as on this CPU, and as x86 has it without AVX-512.
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
@@ -505,6 +509,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

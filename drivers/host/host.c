@@ -15,7 +15,8 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
                    SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EMITTER == (int)NATIVE_EMITTER &&
-                   SCANHEAD_COLOURS == (int)NATIVE_COLOURS && SCANHEAD_WAVES == (int)NATIVE_WAVES && SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
+                   SCANHEAD_COLOURS == (int)NATIVE_COLOURS && SCANHEAD_WAVES == (int)NATIVE_WAVES &&
+                   SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
                    SCANHEAD_MAX_BEAMS == (int)NATIVE_MAX_BEAMS && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
@@ -238,11 +239,8 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type)
 {
     static const char *const name[] = {
-        [SCANHEAD_POINTS] = "points",
-        [SCANHEAD_POSES] = "poses",
-        [SCANHEAD_ATTRIBUTES] = "attributes",
-        [SCANHEAD_COLOURS] = "colours",
-        [SCANHEAD_WAVES] = "waveforms",
+        [SCANHEAD_POINTS] = "points",   [SCANHEAD_POSES] = "poses",     [SCANHEAD_ATTRIBUTES] = "attributes",
+        [SCANHEAD_COLOURS] = "colours", [SCANHEAD_WAVES] = "waveforms",
     };
     if (frame->type == (int)type && frame->payload != NULL && frame->payload == sh->payload) return 0;
     return sh_fail(&sh->err, SCANHEAD_EINPUT, "this is not the %s frame that scanhead_next returned last", name[type]);

@@ -94,5 +94,6 @@ int64_t scanhead_waves_lost(struct scanhead *sh, const struct scanhead_frame *fr
     struct native_waves head;
     const int rc = host_check_last(sh, frame, SCANHEAD_WAVES);
     if (rc != 0) return rc;
-    return native_decode_waves(frame->payload, frame->payload_len, &head) == 0 ? head.n_lost : SCANHEAD_EFORMAT;
+    if (native_decode_waves(frame->payload, frame->payload_len, &head) != 0) return SCANHEAD_EFORMAT;
+    return head.n_lost;
 }

@@ -95,7 +95,7 @@ static const struct field attributes[] = {
 
 #define WAVES(member, kind) ROW(native_waves, member, kind)
 static const struct field waves[] = {
-    WAVES(pulse0, FIELD_64),    WAVES(line, FIELD_32), WAVES(n_windows, FIELD_32), WAVES(sample_ps, FIELD_32),
+    WAVES(pulse0, FIELD_64),      WAVES(line, FIELD_32), WAVES(n_windows, FIELD_32), WAVES(sample_ps, FIELD_32),
     WAVES(baseline_16, FIELD_16), WAVES(bits, FIELD_8),  WAVES(reserved, FIELD_8),   WAVES(count_signal, FIELD_FLOAT),
     WAVES(n_lost, FIELD_32),
 };
@@ -156,10 +156,10 @@ const struct field_table fields_telemetry_ptp = TABLE(telemetry, native_telemetr
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 
-static const uint8_t unit_of[] = {[FIELD_8] = UNIT_FIELD_8,         [FIELD_16] = UNIT_FIELD_16,
-                                  [FIELD_32] = UNIT_FIELD_32,       [FIELD_64] = UNIT_FIELD_64,
-                                  [FIELD_FLOAT] = UNIT_FIELD_FLOAT, [FIELD_REAL] = UNIT_FIELD_REAL,
-                                  [FIELD_TEXT] = UNIT_FIELD_TEXT};
+static const uint8_t unit_of[] = {
+    [FIELD_8] = UNIT_FIELD_8,      [FIELD_16] = UNIT_FIELD_16,       [FIELD_32] = UNIT_FIELD_32,
+    [FIELD_64] = UNIT_FIELD_64,    [FIELD_FLOAT] = UNIT_FIELD_FLOAT, [FIELD_REAL] = UNIT_FIELD_REAL,
+    [FIELD_TEXT] = UNIT_FIELD_TEXT};
 
 /* A number of 1, 2, 4 or 8 bytes between the machine's order and the wire's; the same both ways. */
 static void fields_turn(void *to, const void *from, size_t unit)

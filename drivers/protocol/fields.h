@@ -33,8 +33,8 @@ struct field_table {
 /* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three: lines
  * that files lack, and the PTP follower, are sent only where they are there. */
 extern const struct field_table fields_descriptor, fields_descriptor_content, fields_anchor, fields_emitter,
-    fields_points, fields_attributes, fields_waves, fields_line_end, fields_telemetry, fields_telemetry_lines, fields_telemetry_ptp,
-    fields_event, fields_pose;
+    fields_points, fields_attributes, fields_waves, fields_line_end, fields_telemetry, fields_telemetry_lines,
+    fields_telemetry_ptp, fields_event, fields_pose;
 
 /* Writes exactly table->wire_len bytes. */
 void fields_encode(const struct field_table *table, const void *from, uint8_t *wire);

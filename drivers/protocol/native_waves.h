@@ -23,12 +23,12 @@ enum {
 struct native_waves { /* begin of a payload; then n_windows windows */
     uint64_t pulse0;
     uint32_t line, n_windows;
-    uint32_t sample_ps;    /* time between samples */
-    uint16_t baseline_16;  /* the count without light, in 1/16 counts */
-    uint8_t bits;          /* of a sample */
-    uint8_t reserved;      /* 0 */
-    float count_signal;    /* signal of one count, in units of the detection threshold */
-    uint32_t n_lost;       /* samples that found no room in the head */
+    uint32_t sample_ps;   /* time between samples */
+    uint16_t baseline_16; /* the count without light, in 1/16 counts */
+    uint8_t bits;         /* of a sample */
+    uint8_t reserved;     /* 0 */
+    float count_signal;   /* signal of one count, in units of the detection threshold */
+    uint32_t n_lost;      /* samples that found no room in the head */
 };
 
 /* A window: 0 u32 pulse, 4 u32 time, 8 u32 first, 12 u16 n, 14 u16 0, 16 u32 a, 20 u32 b, 24 u32 c; then n samples of

@@ -31,7 +31,7 @@ static const struct command_unit unit_m = {"m", 9, "M, MM or KM", {{"M", 0}, {"M
 static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
 
 enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES, RANGE_MIN, RANGE_MAX,
-       NOISE, ANGLE, SIGMA, BALL, PHASE, PHASE_LOCK, STEP, STEP_LINE, STEP_PAN };
+       NOISE, ANGLE, SIGMA, BALL, PHASE, PHASE_LOCK, STEP, STEP_LINE, STEP_PAN, WAVES };
 
 /* In the order of enum beam_select. */
 static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
@@ -59,6 +59,7 @@ static const struct command_setting settings[] = {
                   "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, 0, NULL, NULL},
     [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(HEAD_MAX_FRAMES), NO_OTHER, NULL, NULL},
     [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words, NULL},
+    [WAVES] = {SETTING(waves), 1, 0, CONSTANT(0), PROFILE(waves_most), NO_OTHER, switch_words, NULL},
     [RANGE_MIN] = {SETTING(range_min_nm), 0, 1, PROFILE(range_min_nm), PROFILE(near_most_nm),
                    "HEAD:RANGe:MAX", SETTING(range_max_nm), COMMAND_UNBOUND, -1, 0, NULL, NULL},
     [RANGE_MAX] = {SETTING(range_max_nm), 0, 1, PROFILE(far_least_nm), PROFILE(range_max_nm),
@@ -329,6 +330,7 @@ const struct command_row command_rows[] = {
     VALUE("SCAN:PAN:STOP", unit_deg, PAN_STOP),
     VALUE("SCAN:FRAMes", unit_count, FRAMES),
     VALUE("SCAN:ECHoes", unit_count, ECHOES),
+    VALUE("SCAN:WAVeform", unit_count, WAVES),
     CHANGE("SCAN:STARt", act_start, HEAD_EV_START),
     CHANGE("SCAN:STOP", act_stop, HEAD_EV_STOP),
     QUERY("SCAN:COUNt", query_count),

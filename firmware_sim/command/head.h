@@ -60,6 +60,7 @@ struct head_settings {
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
     int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
     int64_t step_udeg;                       /* of a sphere, as it was set; of a planar head with geometries; else 0 */
+    uint32_t waves;                          /* 1: waveforms are sent */
 };
 
 enum { HEAD_MAX_RATES = 8 };
@@ -98,6 +99,7 @@ struct head_limits {
     int64_t near_most_nm, far_least_nm; /* largest range_min, smallest range_max: each pulse rate keeps some range */
     uint32_t noise_most, angle_most;    /* the largest number of a kind of range noise, of angle noise */
     uint32_t phase_lock_most;           /* 1: it has a rotor whose phase can be held */
+    uint32_t waves_most;                /* 1: it samples waveforms, and may send them */
     int64_t sigma_min_nm, ball_max_nm;
 };
 

@@ -61,6 +61,7 @@ static void set_pattern(const struct config *cfg, struct head_limits *l)
         l->geometry[l->n_geometries++] = (struct head_geometry){g->lines_uhz, g->steps_per_turn};
     }
     l->phase_lock_most = l->emitter == EMITTER_BEAMS;
+    l->waves_most = cfg->head.settings.waves;
     l->sweep_udeg = l->emitter == EMITTER_LINE ? llround(360e6 * p->optical_gain / p->facets) : 0;
     l->sequence_ps = p->arrangement.firing_fs / 1000;
 }

@@ -40,6 +40,7 @@ void replay_take_descriptor(struct replay *r, const struct native_descriptor *d)
     s->pan_start_udeg = l->pan_min_udeg = d->pan_start_udeg;
     s->pan_stop_udeg = l->pan_max_udeg = d->pan_stop_udeg;
     s->frames = d->frames;
+    s->waves = l->waves_most = (d->content & NATIVE_HAS_WAVES) != 0;
     s->range_min_nm = l->range_min_nm = l->near_most_nm = to_nm(d->range_min_m);
     s->range_max_nm = l->range_max_nm = l->far_least_nm = to_nm(d->range_max_m);
     l->sweep_udeg = d->sweep_udeg;

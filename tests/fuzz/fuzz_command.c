@@ -32,6 +32,7 @@ static void check_settings(const struct command_device *dev)
     fuzz_must(is_between(1, s->station, l->n_stations), "HEAD:STATION is one of the stations");
     fuzz_must(s->range_min_nm < s->range_max_nm, "the nearest range below the farthest");
     fuzz_must(s->noise <= l->noise_most && s->angle_noise <= l->angle_most, "kinds of noise that there are");
+    fuzz_must(s->waves <= l->waves_most, "waveforms where there are some");
 }
 
 static void run_line(struct command_device *dev, uint32_t session, const char *line)

@@ -8,6 +8,7 @@ import {crc32c, Decoder, Parser, LOCAL, REPEAT, TYPES} from '../../drivers/link/
 import {Losses} from '../../drivers/link/web/losses.js';
 import {CommandError, Replies} from '../../drivers/link/web/replies.js';
 import {PointHash} from '../../drivers/link/web/native_points.js';
+import {readWaves, Waves} from '../../drivers/link/web/native_waves.js';
 import {Poses} from '../../drivers/link/web/native_poses.js';
 import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
 import {runTests, test} from './page_tap.mjs';
@@ -42,6 +43,7 @@ function readAll(pieces, last = true) {
   return {...out, decoder, parser, stats: parser.stats};
 }
 
+const viewOf = (bytes) => new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
 const bytesOf = (frames) => frames.map((f) => Buffer.from(f.payload).toString('hex')).join();
 
 // ---- samples
@@ -67,6 +69,13 @@ const records = [
     return m[7].split(' ').forEach((v, i) => near([b.x, b.y, b.z][i][k], Number(v), 0.51e-4, 'scene'));
   }],
   [/^amplitude (\S+) dB, width/, ({batches: [b]}, k, m) => k < b.n && equal(b.amplitude[k], Math.fround(Number(m[1])), 'amplitude')],
+  [/^window of pulse (\d+), t_ns (\d+), first (\d+), direction (.*), counts (.*)$/, ({value, batches: [b]}, k, m) => {
+    const w = value.windows[k];
+    equal([w.pulse, w.dt_ns, w.first].join(), m.slice(1, 4).join(), 'window');
+    equal(w.counts.join(' '), m[5], 'counts');
+    equal(value.windows.length, 3, 'windows');
+    equal(b.pulse[0], 0, 'pulse'); // their points are those of the batch
+  }],
   [/^rgb (\d+) (\d+) (\d+)$/, ({batches: [b]}, k, m) => k < b.n &&
     [0, 1, 2].forEach((i) => equal(b.rgb[3 * k + i], Number(m[1 + i]), 'rgb'))],
   [/^label (\d+): (.*) of (.*)$/, ({value}, k, m) => {
@@ -120,16 +129,17 @@ test('crc32c: the check value of RFC 3720, of nothing, and byte by byte', () => 
 });
 
 test('every value of every sample', () => {
-  equal(samples.length, 13, 'samples');
+  equal(samples.length, 14, 'samples');
   const all = readAll([stream]), values = [...all.values];
-  equal(all.frames.length, 13, 'frames');
+  equal(all.frames.length, 14, 'frames');
   equal(all.batches.length, 1, 'batches');
   equal(all.batches[0].shots, 3, 'shots');
   equal([...all.batches[0].pulse].join(), '0,0,1', 'pulse numbers');
-  const without = ['points', 'attributes', 'colours'];
+  const without = ['points', 'attributes', 'colours', 'waveforms'];
   let n = 0;
   samples.forEach((sample, i) => {
-    const value = without.includes(TYPES[all.frames[i].type]) ? null : values.shift();
+    const isWaves = TYPES[all.frames[i].type] === 'waveforms';
+    const value = isWaves ? readWaves(viewOf(all.frames[i].payload)) : without.includes(TYPES[all.frames[i].type]) ? null : values.shift();
     n += sameAsSaid(sample, all.frames[i], value, all.batches);
   });
   if (n < 120) throw new Error(`only ${n} values were compared`);
@@ -174,7 +184,7 @@ test('garbage between frames, wrong checksums, bytes cut out: every whole frame 
       const pieces = samples.map(({bytes}, k) => (k === i ? damage(bytes) : bytes)), keeps = pieces[i].length > samples[i].bytes.length;
       const all = readAll([Buffer.concat(pieces)]), rest = samples.filter((_, k) => k !== i || keeps);
       equal(bytesOf(all.frames), rest.map(({bytes}) => bytes.subarray(28).toString('hex')).join(), `frames without ${i}`);
-      const lost = keeps || i === 0 || i === 12 ? 0 : i === 11 ? 0 : 1; // of the last in the sequence nobody knows
+      const lost = keeps || i === 0 || i === 13 ? 0 : i === 12 ? 0 : 1; // of the last in the sequence nobody knows
       equal(all.stats.lost_frames, lost, `lost frames, ${i}`);
       const taken = all.frames.reduce((sum, f) => sum + 28 + f.payload.length, 0);
       equal(all.stats.bad_bytes, all.stats.bytes - taken, 'bad bytes');
@@ -257,7 +267,7 @@ test('1,000 mutations, half of them with good checksums: nothing is thrown', () 
   for (let i = 0; i < 1000; i++) {
     const frames = samples.map(({bytes}) => Buffer.from(bytes));
     for (let k = 0; k < 1 + random(4); k++) {
-      const frame = frames[random(12)], at = i % 2 ? 28 + random(frame.length - 28) : random(frame.length);
+      const frame = frames[random(13)], at = i % 2 ? 28 + random(frame.length - 28) : random(frame.length);
       frame[at] = random(3) ? random(256) : 255;
       if (i % 2) signed(frame);
     }
@@ -281,6 +291,64 @@ test('payloads shorter than their tables, and longer', () => {
     equal(longer.refused.length, 0, `type ${bytes[1]}, longer`);
     for (const n of [0, 7]) equal(readAll([resized(n)]).refused.length, 1, `type ${bytes[1]} of ${n} bytes`);
   }
+});
+
+// ---- waveforms
+
+const wavesSample = samples.find(({bytes}) => bytes[1] === 12).bytes.subarray(28);
+
+test('the windows of a pulse: ranges, and samples in thresholds', () => {
+  const {decoder} = readAll([stream]), [near, far, ...more] = decoder.wavesOf(0);
+  const step_m = 0.5 * 0.299792458; // of 1 ns
+  equal(more.length, 0, 'windows');
+  [[near, 18, [201, 388, 1623, 702, 211]], [far, 28, [203, 529, 598, 207]],
+    [decoder.wavesOf(1)[0], 11, [200, 212, 446, 451, 205, 201]]].forEach(([w, first, counts]) => {
+    equal(w.stepM, step_m, 'step');
+    equal(w.rangeM0, first * step_m, 'range');
+    equal([...w.samples].join(), counts.map((c) => (c - 200.5) * 0.125).join(), 'samples');
+  });
+  equal(decoder.wavesOf(2).length, 0, 'of a shot without echo');
+  equal(decoder.stats.lost_samples, 7, 'lost');
+});
+
+test('waveforms that do not fit into their frame are refused', () => {
+  const whole = new Waves(), bytes = Buffer.from(wavesSample);
+  const isRefused = (part) => {
+    try {
+      whole.add(viewOf(part), 1);
+      return false;
+    } catch {
+      return true;
+    }
+  };
+  for (let n = 0; n < bytes.length; n++) equal(isRefused(Buffer.from(bytes.subarray(0, n))), true, `${n} bytes`);
+  equal(isRefused(bytes), false, 'whole');
+  for (const [at, value] of [[12, 4], [15, 255], [16 + 28 + 12, 0], [32 + 13, 16], [22, 7], [22, 15], [27, 191]]) {
+    const hurt = Buffer.from(bytes);
+    hurt[at] = value;
+    if (at === 56) hurt.writeUInt16LE(0, 32 + 12);
+    equal(isRefused(hurt), true, `byte ${at} is ${value}`);
+  }
+  const noStep = Buffer.from(bytes);
+  noStep.writeUInt32LE(0, 16);
+  equal(isRefused(noStep), true, 'no time between samples');
+});
+
+test('the last waveforms of a scan are kept, up to a limit', () => {
+  const waves = new Waves(2100 * wavesSample.length);
+  const at = (pulse0) => {
+    const frame = Buffer.from(wavesSample);
+    frame.writeBigUInt64LE(BigInt(pulse0));
+    return viewOf(frame);
+  };
+  const high = 2 ** 32; // pulse numbers of more than 32 bits
+  for (let i = 0; i < 5000; i++) waves.add(at(high + 2 * i), 1);
+  equal(waves.of(high + 2 * 2899).length, 0, 'gone');
+  for (const i of [2900, 3000, 4999]) equal(`${waves.of(high + 2 * i).length} ${waves.of(high + 2 * i + 1).length}`, '2 1', `frame ${i}`);
+  waves.add(at(high + 9998), 1); // one more of the same points
+  equal(waves.of(high + 9998).length, 4, 'in two frames');
+  waves.add(at(0), 2);
+  equal(`${waves.of(high + 9998).length} ${waves.of(0).length}`, '0 2', 'another scan');
 });
 
 test('points before their anchor are counted and not placed', () => {

@@ -50,8 +50,8 @@ static void check_settings(const struct command_device *dev, const char *line)
         s->pan_start_udeg >= s->pan_stop_udeg || s->pan_stop_udeg - s->pan_start_udeg > 360 * MICRO || s->station < 1 ||
         s->station > l->n_stations || s->range_min_nm < l->range_min_nm || s->range_min_nm > l->near_most_nm ||
         s->range_max_nm < l->far_least_nm || s->range_max_nm > l->range_max_nm || s->range_min_nm >= s->range_max_nm ||
-        s->noise > l->noise_most || s->angle_noise > l->angle_most || s->sigma_nm < l->sigma_min_nm ||
-        s->sigma_nm > 10 * NANO || s->ball_nm < 0 || s->ball_nm > l->ball_max_nm)
+        s->noise > l->noise_most || s->angle_noise > l->angle_most || s->waves > l->waves_most ||
+        s->sigma_nm < l->sigma_min_nm || s->sigma_nm > 10 * NANO || s->ball_nm < 0 || s->ball_nm > l->ball_max_nm)
         fail_msg("'%s' leaves settings out of range", line);
 }
 

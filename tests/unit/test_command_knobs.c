@@ -79,6 +79,25 @@ static void noise_has_kinds_and_sizes(void **ctx)
     refuse(&dev, "HEAD:NOIS:BALL 100.5", CMD_E_RANGE, "allowed 0 to 100");
 }
 
+/* Also within a scan, where the head samples them at all. */
+static void waveforms_can_be_switched(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "SCAN:WAV?", "OFF");
+    expect(&dev, "SCAN:WAVEFORM OFF", "OK");
+    refuse(&dev, "SCAN:WAV ON", CMD_E_SETTINGS, "SCAN:WAVeform ON needs waveform.send: on in the configuration");
+    expect(&dev, "SCAN:WAV? MAX", "OFF");
+    dev.limits.waves_most = 1;
+    dev.settings.waves = dev.defaults.waves = 1;
+    dev.state = HEAD_SCANNING;
+    expect(&dev, "SCAN:WAV OFF", "OK");
+    assert_int_equal(dev.settings.waves, 0);
+    expect(&dev, "SCAN:WAV DEF", "OK");
+    expect(&dev, "SCAN:WAV?", "ON");
+    refuse(&dev, "SCAN:WAV 1", CMD_E_DATA_TYPE, "SCAN:WAVeform takes OFF, ON, DEF, not '1'");
+}
+
 static void what_is_planned_rests_in_a_scan(void **ctx)
 {
     (void)ctx;
@@ -342,8 +361,7 @@ static void every_setting_is_listed(void **ctx)
     struct command_device dev = command_test_device();
     unsigned char has[sizeof(struct head_settings)] = {0};
     char listed[sizeof result.reply + 2], word[64];
-    const size_t gap = offsetof(struct head_settings, angle_noise) + sizeof dev.settings.angle_noise; /* no member */
-    memset(has + gap, 1, offsetof(struct head_settings, range_min_nm) - gap);
+    const size_t end = offsetof(struct head_settings, waves) + sizeof dev.settings.waves; /* of the last member */
     memset(has + offsetof(struct head_settings, step_udeg), 1, sizeof dev.settings.step_udeg);
     command_execute(&dev, 1, "HELP:SET?", &result);
     snprintf(listed, sizeof listed, " %s ", result.reply);
@@ -353,7 +371,7 @@ static void every_setting_is_listed(void **ctx)
         if (strstr(listed, word) == NULL) fail_msg("%s is not listed", row->header);
         if (row->setting->derived == NULL) memset(has + row->setting->offset, 1, row->setting->is_u32 ? 4 : 8);
     }
-    for (size_t i = 0; i < sizeof has; i++)
+    for (size_t i = 0; i < end; i++)
         if (!has[i]) fail_msg("no command has the setting at byte %zu of struct head_settings", i);
 }
 
@@ -363,6 +381,7 @@ int main(void)
         cmocka_unit_test(every_setting_is_listed),
         cmocka_unit_test(ranges_keep_apart),
         cmocka_unit_test(noise_has_kinds_and_sizes),
+        cmocka_unit_test(waveforms_can_be_switched),
         cmocka_unit_test(what_is_planned_rests_in_a_scan),
         cmocka_unit_test(a_line_heads_step_sets_its_rates),
         cmocka_unit_test(steps_stay_within_the_rates),

@@ -158,8 +158,8 @@ static void test_refused(void **state)
     static const struct {
         size_t at;
         uint8_t value;
-    } wrong[] = {{12, 3},  {15, 255}, {17, 0},       {22, 7},  {22, 15}, {27, 0xbe}, {27, 0x7f},
-                 {44, 0},  {44, 5},   {45, 0x11},    {80, 0},  {80, 3},  {81, 1}};
+    } wrong[] = {{12, 3}, {15, 255}, {17, 0},    {22, 7}, {22, 15}, {27, 0xbe}, {27, 0x7f},
+                 {44, 0}, {44, 5},   {45, 0x11}, {80, 0}, {80, 3},  {81, 1}};
     add_window(1, 20, 3);
     add_window(2, 40, 2);
     const size_t len = native_encode_points(out, sizeof out, &block, 0), n = 32 + 28 + 8 + 28 + 4;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/wire/dissected_frames.h"
 
-#include "drivers/protocol/native.h"
+#include "drivers/protocol/native_waves.h"
 
 const char *const all_fields[] = {"_ws.expert.severity",
                                   S "type",
@@ -50,6 +50,8 @@ const char *const all_fields[] = {"_ws.expert.severity",
                                   S "descriptor.content",
                                   S "descriptor.content.attributes",
                                   S "descriptor.content.colours",
+                                  S "descriptor.content.waveforms",
+                                  S "descriptor.content.deviations",
                                   S "descriptor.reserved",
                                   S "anchor.crs",
                                   S "anchor.epsg",
@@ -153,6 +155,7 @@ const char *const all_fields[] = {"_ws.expert.severity",
                                   S "attributes.n_points",
                                   S "attribute.amplitude_db",
                                   S "attribute.width_ns",
+                                  S "attribute.deviation",
                                   S "emitter.kind",
                                   S "emitter.n_beams",
                                   S "emitter.steps",
@@ -175,10 +178,32 @@ const char *const all_fields[] = {"_ws.expert.severity",
                                   S "colour.red",
                                   S "colour.green",
                                   S "colour.blue",
+                                  S "waves.pulse0",
+                                  S "waves.line",
+                                  S "waves.n_windows",
+                                  S "waves.sample_ps",
+                                  S "waves.baseline",
+                                  S "waves.bits",
+                                  S "waves.reserved",
+                                  S "waves.count_signal",
+                                  S "waves.n_lost",
+                                  S "wave.pulse",
+                                  S "wave.dt_ns",
+                                  S "wave.first",
+                                  S "wave.n",
+                                  S "wave.range_m",
+                                  S "wave.line_deg",
+                                  S "wave.pan_deg",
+                                  S "wave.dx",
+                                  S "wave.dy",
+                                  S "wave.dz",
+                                  S "wave.counts",
                                   S "missing_pulses",
                                   S "line_end.lost_pulses",
                                   S "points_in",
                                   NULL};
+
+static int64_t points_t0_ns; /* of the last points frame, since the scan's start */
 
 static void expect_header(const uint8_t *frame)
 {
@@ -223,6 +248,8 @@ static void expect_descriptor(const struct scanhead_frame *f)
     UINT("descriptor", content), UINT("descriptor", reserved);
     expect_uint(S "descriptor.content.attributes", v.content & 1);
     expect_uint(S "descriptor.content.colours", v.content >> 1 & 1);
+    expect_uint(S "descriptor.content.waveforms", v.content >> 2 & 1);
+    expect_uint(S "descriptor.content.deviations", v.content >> 3 & 1);
 }
 
 static void expect_anchor(const struct scanhead_frame *f)
@@ -275,6 +302,7 @@ static void expect_points(struct scanhead *sh, const struct scanhead_frame *f)
     static struct scanhead_point point[NATIVE_MAX_POINTS];
     struct scanhead_info info;
     uint64_t pulse = f->pulse0 - 1;
+    points_t0_ns = f->scan_t0_ns;
     expect_uint(S "points.frame", f->scan_frame);
     expect_uint(S "points.line", f->scan_line);
     expect_uint(S "points.pulse0", f->pulse0);
@@ -366,15 +394,19 @@ static void expect_poses(struct scanhead *sh, const struct scanhead_frame *f)
 static void expect_attributes(struct scanhead *sh, const struct scanhead_frame *f)
 {
     static struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
+    static double deviation[NATIVE_MAX_POINTS];
+    const int deviates = scanhead_has_deviations(sh) == 1;
     expect_uint(S "attributes.pulse0", f->pulse0);
     expect_uint(S "attributes.line", f->scan_line);
     expect_uint(S "attributes.n_points", f->n_points);
     take_text(S "points_in");
     assert_int_equal(scanhead_attributes(sh, f, 0, attribute, NATIVE_MAX_POINTS), f->n_points);
+    if (deviates) assert_int_equal(scanhead_deviations(sh, f, 0, deviation, NATIVE_MAX_POINTS), f->n_points);
     for (uint32_t i = 0; i < f->n_points; i++) {
         const struct scanhead_attribute *a = &attribute[i];
         if (!isnan(a->amplitude_db)) expect_real(S "attribute.amplitude_db", a->amplitude_db, 0);
         if (!isnan(a->width_ns)) expect_real(S "attribute.width_ns", a->width_ns, 0);
+        if (deviates) expect_real(S "attribute.deviation", deviation[i], 0);
     }
 }
 
@@ -390,6 +422,48 @@ static void expect_colours(struct scanhead *sh, const struct scanhead_frame *f)
         expect_uint(S "colour.red", colour[i].red);
         expect_uint(S "colour.green", colour[i].green);
         expect_uint(S "colour.blue", colour[i].blue);
+    }
+}
+
+/* The window's direction, by its angles: sine and cosine are of another library (expect_point). */
+static void expect_beam(const struct scanhead_wave *w, int is_geo)
+{
+    static const char *const slope[] = {S "wave.dx", S "wave.dy", S "wave.dz"};
+    for (int i = 0; is_geo && i < 3; i++)
+        expect_real(slope[i], w->direction[i], 0);
+    if (is_geo) return;
+    const double rad = 3.14159265358979323846 / 180;
+    const double line = rad * atof(take_text(S "wave.line_deg")), pan = rad * atof(take_text(S "wave.pan_deg"));
+    const double d[] = {sin(pan) * cos(line), cos(pan) * cos(line), sin(line)};
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(d[i] - w->direction[i]) < 1e-14);
+}
+
+static void expect_waves(struct scanhead *sh, const struct scanhead_frame *f)
+{
+    static struct scanhead_wave wave[64];
+    struct native_waves v;
+    struct scanhead_info info;
+    assert_int_equal(native_decode_waves(f->payload, f->payload_len, &v), 0);
+    UINT("waves", pulse0), UINT("waves", line), UINT("waves", n_windows), UINT("waves", sample_ps);
+    expect_real(S "waves.baseline", v.baseline_16 / 16.0, 0);
+    UINT("waves", bits), UINT("waves", reserved), UINT("waves", n_lost);
+    expect_real(S "waves.count_signal", (double)v.count_signal, 0);
+    take_text(S "points_in");
+    assert_int_equal(scanhead_get_info(sh, &info), 0);
+    assert_int_equal(scanhead_waves(sh, f, 0, wave, 64), v.n_windows);
+    for (uint32_t i = 0; i < v.n_windows; i++) {
+        const struct scanhead_wave *w = &wave[i];
+        char counts[512] = "";
+        for (uint32_t k = 0; k < w->n; k++)
+            snprintf(counts + strlen(counts), 8, k == 0 ? "%u" : " %u", le_get16(w->sample + 2 * k));
+        expect_uint(S "wave.pulse", w->pulse);
+        expect_uint(S "wave.dt_ns", (uint64_t)(w->t_ns - points_t0_ns));
+        expect_uint(S "wave.first", w->first);
+        expect_uint(S "wave.n", w->n);
+        expect_real(S "wave.range_m", w->range_m, 0);
+        expect_beam(w, info.geo);
+        expect_text(S "wave.counts", counts);
     }
 }
 
@@ -428,6 +502,7 @@ static void expect_frame(struct scanhead *sh, const struct scanhead_frame *f)
     if (f->type == SCANHEAD_ATTRIBUTES) expect_attributes(sh, f);
     if (f->type == SCANHEAD_COLOURS) expect_colours(sh, f);
     if (f->type == SCANHEAD_EMITTER) expect_emitter(sh, f);
+    if (f->type == SCANHEAD_WAVES) expect_waves(sh, f);
     if (f->type != SCANHEAD_SURFACES) return;
     expect_uint(S "surfaces.first", le_get32(f->payload));
     expect_uint(S "surfaces.count", le_get32(f->payload + 4));

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""test_python.c and test_python_damage.c ask the Python client by this. Its answers are binary rows or plain numbers.
+"""test_python.c, test_python_waves.c and test_python_damage.c ask the Python client by this. Its answers are binary rows or plain numbers.
 
     python_client.py FOLDER_OF_THE_CLIENT numpy|plain WHAT ...
         dump SOURCE OUT     points, attributes, poses and times, frame by frame, as test_python.c reads them
+        waves FILE OUT      its waveforms and deviations, as test_python_waves.c reads them
         live SOURCE         a session with a running head
         crs POLAR GEO       the same scan in both layouts: the largest differences, m: in the CRS; in the
                             scene; in the CRS with the formula of ANCHOR.md
@@ -60,6 +61,24 @@ def dump(source, out):
                 file.write(struct.pack("<cI", b"A", len(columns[0])))
                 file.writelines(struct.pack("<2d", *row) for row in zip(*columns))
         file.write(struct.pack("<cI", b"E", len(head.surfaces)))
+    print(head.stream_sha256())
+
+
+def waves(path, out):
+    head = scanhead.open(path)
+    with open(out, "wb") as file:
+        for frame in head.frames():
+            if frame.type == scanhead.ATTRIBUTES:
+                deviations = head.deviations(frame)
+                file.write(struct.pack("<cI%dd" % len(deviations), b"D", len(deviations), *deviations))
+            elif frame.type == scanhead.WAVES:
+                windows = head.waves(frame)
+                file.write(struct.pack("<cI", b"W", len(windows)))
+                for w in windows:
+                    signal = w.signal()
+                    file.write(struct.pack("<2q4I6d", w.pulse, w.t_ns, w.first, len(signal), w.sample_ps, w.bits, w.range_m(),
+                                           w.step_m, *w.direction, w.baseline))
+                    file.write(struct.pack("<%dd" % len(signal), *signal))
     print(head.stream_sha256())
 
 
@@ -176,9 +195,12 @@ def hostile(path, seed):
                 head.to_scene(points), head.to_crs(points)
                 head.pose(frame.fields["t0_ns"]), head.gps_time_ns(frame.fields["t0_ns"])
             elif frame.type == scanhead.ATTRIBUTES:
-                head.attributes(frame)
+                head.attributes(frame), head.deviations(frame)
             elif frame.type == scanhead.COLOURS:
                 head.colours(frame)
+            elif frame.type == scanhead.WAVES:
+                for wave in head.waves(frame) or ():
+                    wave.signal(), wave.range_m()
         except scanhead.ScanheadError:
             refused += 1
     assert head.parser.frames == 700
@@ -349,7 +371,8 @@ def words(value):
 
 def said_of(head, frame):
     """Returns the words below a sample: fields as `name value;`, then records, one a line."""
-    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes emitter colours".split()
+    names = ("? descriptor anchor points line-end telemetry event surfaces poses attributes emitter colours "
+             "waveforms").split()
     flags = "".join(f" {name}" for bit, name in ((1, "REPEAT"), (2, "LOCAL")) if frame.flags & bit)
     text = [f"{names[frame.type]}{flags}; seq {frame.seq}; t_ns {frame.t_ns}"]
     text += [f"{name} {words(value)}" for name, value in frame.fields.items()]
@@ -361,9 +384,14 @@ def said_of(head, frame):
                      f"{p.reflectance_db[i]:.2f} dB, t_ns {p.t_ns[i]}, "
                      f"head's frame {x} {y} {z}, scene {' '.join(scene)}"]
     if frame.type == scanhead.ATTRIBUTES:
-        text += [f"amplitude {a:.2f} dB, width {w:.2f} ns" for a, w in zip(*head.attributes(frame))]
+        rows = zip(*head.attributes(frame), head.deviations(frame))
+        text += [f"amplitude {a:.2f} dB, width {w:.2f} ns, deviation {d:.3f}" for a, w, d in rows]
     if frame.type == scanhead.COLOURS:
         text += [f"rgb {r} {g} {b}" for r, g, b in zip(*head.colours(frame))]
+    if frame.type == scanhead.WAVES:
+        text += [f"window of pulse {w.pulse}, t_ns {w.t_ns}, first {w.first}, direction "
+                 f"{' '.join(f'{v + 0.0:.4f}' for v in w.direction)}, counts {' '.join(map(str, w.counts))}"
+                 for w in head.waves(frame)]
     if frame.type == scanhead.EMITTER:
         text += [f"beam elevation {words(e)} deg, azimuth {words(a)} deg, {t} ns"
                  for e, a, t in head.emitter["beams"]]
@@ -389,14 +417,14 @@ def samples(page, out):
     print(*types, head.stream_sha256())
 
 
-CODES = {"u32": "I", "u64": "Q", "i32": "i", "i64": "q", "f64": "d", "char": "s"}
+CODES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i", "i64": "q", "f32": "f", "f64": "d", "char": "s"}
 
 
 def tables_of(folder):
     """For each type of frame, the struct format that the first table of its section gives. A type has one section."""
     found = {}
     pages = "".join(open(page).read() for page in sorted(glob.glob(folder + "/*.md")))
-    for kind, section in re.findall(r"\n## ([1-9]|1[01]) [a-z ]+\n(.*?)(?=\n##|\n# |\Z)", pages, re.S):
+    for kind, section in re.findall(r"\n## ([1-9]|1[0-2]) [a-z ]+\n(.*?)(?=\n##|\n# |\Z)", pages, re.S):
         assert int(kind) not in found, f"type {kind}: two sections"
         form = "<"
         for line in section[section.index("| ---"):].split("\n")[1:]:
@@ -416,7 +444,7 @@ def flat(fields):
 
 def tables(folder, path):
     forms, seen = tables_of(folder), []
-    assert sorted(forms) == list(range(1, 12)), sorted(forms)
+    assert sorted(forms) == list(range(1, 13)), sorted(forms)
     for frame in scanhead.open(path).frames():
         if not frame.fields:
             continue

@@ -5,6 +5,7 @@
 #include <nettle/sha2.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "drivers/protocol/native_waves.h"
 
 static const char page_path[] = "drivers/protocol/SAMPLES.md";
 
@@ -33,7 +34,28 @@ static size_t read_hex(const char *page, int n, uint8_t *bytes, size_t room)
     return len;
 }
 
-/* Encodes a block. Its attributes come from the frame after it, its colours from the one after that. */
+/* Windows of a frame of waveforms, into a block's. */
+static void take_waves(const uint8_t *frame, struct line_waves *waves)
+{
+    struct native_waves head;
+    size_t at = NATIVE_WAVES_HEAD_LEN;
+    assert_int_equal(native_decode_waves(frame + 28, le_get32(frame + 4), &head), 0);
+    waves->sample_ps = head.sample_ps;
+    waves->baseline_16 = head.baseline_16;
+    waves->bits = head.bits;
+    waves->count_signal = head.count_signal;
+    waves->n_left_out = head.n_lost;
+    for (uint32_t i = 0; i < head.n_windows; i++) {
+        struct native_wave w;
+        at = native_decode_wave(frame + 28, at, &w);
+        waves->wave[waves->n++] = (struct line_wave){w.pulse, w.dt_ns, w.first, w.n, waves->n_samples, w.a, w.b, w.c};
+        for (uint32_t k = 0; k < w.n; k++)
+            waves->sample[waves->n_samples++] = le_get16(w.sample + 2 * k);
+    }
+}
+
+/* Encodes a block. Its attributes come from the frame after it, its colours from the one after that, its waveforms from
+ * the next. */
 static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *out, size_t room)
 {
     struct native_header header;
@@ -48,6 +70,9 @@ static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *o
     assert_int_equal(line_block_alloc(&block, points.n_points, NULL), 0);
     assert_int_equal(line_block_alloc_attributes(&block, NULL), 0);
     assert_int_equal(line_block_alloc_colours(&block, NULL), 0);
+    assert_int_equal(line_block_alloc_deviations(&block, NULL), 0);
+    assert_int_equal(line_block_alloc_waves(&block, 8, 64, NULL), 0);
+    take_waves(colours + native_frame_len(colours), block.waves);
     block.frame = points.frame;
     block.line = points.line;
     block.pulse0 = points.pulse0;
@@ -71,6 +96,7 @@ static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *o
         block.amplitude_cdb[i] = a.amplitude_cdb;
         block.width_cns[i] = a.width_cns;
         native_decode_colour(colours + 28, i, block.rgb[i]);
+        block.deviation[i] = native_decode_deviation(next + 28, points.n_points, i);
     }
     size_t len = native_encode_points(out, room, &block, header.t_ns - points.t0_ns);
     line_block_free(&block);
@@ -198,7 +224,7 @@ static void test_frames(void **state)
         assert_memory_equal(again, frame, size);
         at += size;
     }
-    assert_int_equal(types, 0xffe); /* 1 to 11 */
+    assert_int_equal(types, 0x1ffe); /* 1 to 12 */
     uint8_t digest[SHA256_DIGEST_SIZE];
     char hex[2 * SHA256_DIGEST_SIZE + 3] = "`";
     sha256_digest(&sha256, sizeof digest, digest);
@@ -231,13 +257,14 @@ static void test_words(void **state)
     }
     snprintf(stream, sizeof stream, "%s", wire_path(wire, "samples.shs"));
     char *said = ask_python(wire, "samples", page_path, stream), *page = wire_read(page_path, NULL);
-    assert_int_equal(strncmp(said, "6 1 2 3 9 11 4 7 8 5 10 5 6 ", 28), 0);
+    assert_int_equal(strncmp(said, "6 1 2 3 9 11 12 4 7 8 5 10 5 6 ", 31), 0);
     said[strcspn(said, "\n")] = 0;
-    assert_non_null(strstr(page, said + 28));
+    assert_non_null(strstr(page, said + 31));
     free(said);
     free(page);
     said = ask_python(wire, "tables", "drivers/protocol", stream);
-    assert_string_equal(said, "6 1 2 3 9 11 4 5 10 5 6\n"); /* names and poses have no fixed part that is decoded so */
+    assert_string_equal(said,
+                        "6 1 2 3 9 11 12 4 5 10 5 6\n"); /* names and poses have no fixed part that is decoded so */
     free(said);
 }
 

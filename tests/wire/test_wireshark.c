@@ -99,7 +99,7 @@ static void test_every_value(void **state)
             if (carrier == 0) expect_tcp_lines(i);
             if (carrier == 1) expect_usb_lines();
         }
-        assert_int_equal(types, 0xffe); /* 1 to 11 */
+        assert_int_equal(types, 0x1ffe); /* 1 to 12 */
     }
     expect_marks();
     expect_no_more();

@@ -202,7 +202,7 @@ static const struct {
     {1, 128, 4, 2, 0, "layout 2, allowed 0 to 1"},
     {1, 252, 4, 65536, 0, "n_surfaces 65536, allowed 0 to 65535"},
     {1, 0, 0, 0, -200, "80 bytes, allowed 272 and more"},
-    {1, 272, 4, 8, 0, "Reserved bits are set"},
+    {1, 272, 4, 24, 0, "Reserved bits are set"}, /* attributes have deviations from here on */
     {2, 0, 4, 4, 0, "crs 4, allowed 0 to 3"},
     {2, 20, 4, 0x7ff80000, 0, "x: not a finite number"},
     {3, 36, 4, 5, 0, "5 points, and room for 4"},
@@ -215,10 +215,15 @@ static const struct {
     {7, 27, 1, 4, 0, "shorter than its names"}, /* the last one, of 3 bytes */
     {8, 0, 4, 1, 0, "1 poses, allowed 2 to 2"},
     {8, 44, 4, 0x40000000, 0, "a quaternion that is not of length one"},
-    {9, 12, 4, 5, 0, "5 points, and room for 4"},
+    {9, 12, 4, 5, 0, "5 deviations, and room for 4"},
     {10, 24, 4, 0, 0, "turn 0, allowed 1 and -1"},
     {10, 4, 4, 4, 0, "4 beams, and room for 3"},
     {11, 12, 4, 5, 0, "5 points, and room for 4"},
+    {12, 12, 4, 4, 0, "a window of 0 samples, allowed 1 to 4096"},
+    {12, 24, 4, 0, 0, "a count without signal"},
+    {12, 24, 4, 0x7fc00000, 0, "count_signal: not a finite number"},
+    {12, 22, 1, 15, 0, "bits 15, allowed 8 to 14"},
+    {12, 120, 1, 7, 0, "shorter than its windows"}, /* samples of the last window, of 6 */
 };
 enum { N_WRONG = sizeof wrong / sizeof wrong[0] };
 

@@ -28,6 +28,7 @@ export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ?
  * - `lost` {by, frames, pulses}, by 'head' (not computed in time), 'link' (this page was too slow), 'wire' (damaged) or
  *   'page' (dropped here)
  * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
+ * - `waves` {pulse, windows}: what askWaves asked for
  * - `points`, `descriptor`, `anchor`, `emitter`, `names`, `line-end`, `telemetry`, `event`, `poses` as the Decoder has
  *   them; `refused`, the words for a frame that was refused
  */
@@ -80,6 +81,12 @@ export class Head extends EventTarget {
    * where no reply came. */
   command(line, {timeout_s = TIMEOUT_S} = {}) {
     return this.#replies.ask(line, timeout_s);
+  }
+
+  /** Asks for the waveform of a pulse of the scan at hand; the answer is an event `waves`. Only the last ones are kept
+   * (native_waves.js). */
+  askWaves(pulse) {
+    this.#wire.post({wavesOf: pulse});
   }
 
   /** Takes control and changes nothing else. It throws -203 where another session has it. */

@@ -7,18 +7,19 @@ import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLine
 import {Columns, geoPlacer, PointHash, polarPlacer} from './native_points.js';
 import {Poses} from './native_poses.js';
 import {isBefore} from './native_sequence.js';
+import {Waves} from './native_waves.js';
 
 export {isBefore, LOCAL, Parser, REPEAT};
 export {crc32c} from './crc32c.js';
 const VERSION = 1;
 export const TYPES = ['', 'descriptor', 'anchor', 'points', 'line-end', 'telemetry', 'event', 'surfaces', 'poses',
-  'attributes', 'emitter', 'colours'];
+  'attributes', 'emitter', 'colours', 'waveforms'];
 export const STATES = ['off', 'boot', 'idle', 'spin-up', 'scanning', 'spin-down', 'fault'];
-const [, DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS] =
-  TYPES.keys();
+const [, DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS,
+  WAVES] = TYPES.keys();
 export {POINTS};
 export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
-const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768;
+const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768, HAS_DEVIATIONS = 8;
 
 /** Frames to values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
  * counted, and otherwise ignored. Only callbacks may throw. */
@@ -30,9 +31,10 @@ export class Decoder {
     this.on = callbacks;
     this.descriptor = this.anchor = null;
     this.emitter = null; // null: a line head
-    this.stats = {points: 0, shots: 0, empty: 0, unplaced_points: 0, unplaced_shots: 0, refused: 0, unknown: 0};
+    this.stats = {points: 0, shots: 0, empty: 0, unplaced_points: 0, unplaced_shots: 0, refused: 0, unknown: 0, lost_samples: 0};
     this.hash = new PointHash();
     this.poses = new Poses();
+    this.waves = new Waves();
     this.columns = new Columns(ROOM);
     this.lastPulse0 = -1;
     this.shots = 0;
@@ -63,6 +65,11 @@ export class Decoder {
       this.stats.refused++;
       this.on.refused?.(error.message, frame);
     }
+  }
+
+  /** The windows of a pulse of this scan: as Waves.of has them. */
+  wavesOf(pulse) {
+    return this.waves.of(pulse);
   }
 
   /** Hands on the points that are there. A frame whose attributes or colours are still to come stays, unless `all`. */
@@ -96,6 +103,7 @@ export class Decoder {
       case EMITTER: return this.#emitter(Object.assign(readEmitter(view), own));
       case ATTRIBUTES: return this.#attributes(frame, view);
       case COLOURS: return this.#colours(frame, view);
+      case WAVES: return this.#waves(view);
       case LINE_END: return this.on.lineEnd?.(Object.assign(readLineEnd(view), own));
       case TELEMETRY: return this.on.telemetry?.(Object.assign(readTelemetry(view), own));
       case EVENT: return this.#event(Object.assign(readEvent(view), own));
@@ -136,6 +144,11 @@ export class Decoder {
   #event(e) {
     if (e.name === 'SCAN_START' && this.descriptor !== null && e.scan !== this.descriptor.scan) this.#forget();
     this.on.event?.(e);
+  }
+
+  #waves(view) {
+    const lost = this.waves.add(view, this.descriptor?.scan ?? null);
+    this.stats.lost_samples += lost;
   }
 
   #poses(list) {
@@ -203,7 +216,8 @@ export class Decoder {
   }
 
   #attributes(frame, view) {
-    const beside = readBeside(view, 4, 'attributes'), of = this.#besidePoints(frame, beside, 1), c = this.columns;
+    const beside = readBeside(view, (this.descriptor?.content ?? 0) & HAS_DEVIATIONS ? 6 : 4, 'attributes');
+    const of = this.#besidePoints(frame, beside, 1), c = this.columns;
     if (of === null) return;
     for (let i = of.from; i < c.n; i++) {
       const amplitude = view.getInt16(16 + 4 * c.record[i], true);

@@ -15,12 +15,15 @@ const exact = (v) => (v <= Number.MAX_SAFE_INTEGER && v >= Number.MIN_SAFE_INTEG
 const finite = (v) => (Number.isFinite(v) ? v : refuse('a number that is not finite'));
 
 const readers = {
+  u8: [1, (v, at) => v.getUint8(at)],
+  u16: [2, (v, at) => v.getUint16(at, true)],
   u32: [4, (v, at) => v.getUint32(at, true)],
   i32: [4, (v, at) => v.getInt32(at, true)],
   u64: [8, (v, at) => exact(v.getBigUint64(at, true))],
   i64: [8, (v, at) => exact(v.getBigInt64(at, true))],
   U64: [8, (v, at) => v.getBigUint64(at, true)], // always BigInt
   I64: [8, (v, at) => v.getBigInt64(at, true)],
+  f32: [4, (v, at) => finite(v.getFloat32(at, true))],
   f64: [8, (v, at) => finite(v.getFloat64(at, true))],
 };
 
@@ -78,6 +81,8 @@ const event = layout('code u32, reserved u32, a U64, b U64, c U64, text char[96]
 const emitter = layout(`kind u32, n_beams u32, steps u32, first_step i32, last_step i32, front_step i32, turn i32,
   rings u32, sequence_ns_num u64, sequence_ns_den u64, first_ring_udeg i64, echoes u32, gaps u32`);
 const beam = layout('elevation_udeg i32, azimuth_udeg i32, offset_ns u32');
+const waves = layout(`pulse0 u64, line u32, n_windows u32, sample_ps u32, baseline_16 u16, bits u8, reserved u8,
+  count_signal f32, n_lost u32`);
 const pose = layout('t_ns I64, position_m f64[3], quat f64[4], frame f64, flags u32, reserved u32');
 
 function whole(table, view, what) {
@@ -174,6 +179,13 @@ export function readPoses(view) {
     if (i > 0 && p.t_ns <= poses[i - 1].t_ns) refuse('poses whose times do not rise');
   });
   return poses;
+}
+
+/** The beginning of a waveforms frame; native_waves.js has its windows. */
+export function readWavesHead(view) {
+  const w = whole(waves, view, 'waveforms');
+  if (w.sample_ps === 0 || w.bits < 8 || w.bits > 14 || !(w.count_signal > 0)) refuse('waveforms without a scale');
+  return w;
 }
 
 const utf8 = new TextDecoder();

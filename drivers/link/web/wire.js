@@ -41,11 +41,12 @@ export class Wire {
     this.#fresh();
   }
 
-  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true} or {ack: true}.
-   * */
+  /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true}, {ack: true}, or
+   * {wavesOf: pulse}, which is answered by a thing `waves` {pulse, windows}. */
   take(message) {
     if (message.connect !== undefined) this.#connect(message.connect, message.past ?? null);
     if (message.send !== undefined) this.#socket?.send(message.send);
+    if (message.wavesOf !== undefined) this.#addNow('waves', {pulse: message.wavesOf, windows: this.decoder.wavesOf(message.wavesOf)});
     if (message.close) this.#close();
     if (message.ack) this.#taken();
   }

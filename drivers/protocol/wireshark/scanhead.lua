@@ -16,9 +16,9 @@ if is_asked and known then return end
 local scanhead = Proto("scanhead", "Scan head")
 local HEADER_LEN, MOST_PAYLOAD, MOST_REPLY, MOST_COMMAND, SYNC = 28, 65536, 512, 256, 0xd5
 local TYPES = {"Descriptor", "Anchor", "Points", "Line end", "Telemetry", "Event", "Surfaces", "Poses", "Attributes",
-               "Emitter", "Colours"}
-local DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS =
-  1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
+               "Emitter", "Colours", "Waveforms"}
+local DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS, WAVES =
+  1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12
 local STATES = {[0] = "off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"}
 local unpack_bytes, byte, floor = Struct.unpack, string.byte, math.floor
 
@@ -119,13 +119,17 @@ local function micro(range) return range:le_uint64():tonumber() / 1e6 end
 local function signed_micro(range) return range:le_int64():tonumber() / 1e6 end
 local KINDS = {
   u8 = {1, whole(ProtoField.uint8)},
+  u16 = {2, whole(ProtoField.uint16)},
   u32 = {4, whole(ProtoField.uint32)},
   i32 = {4, whole(ProtoField.int32)},
   i64 = {8, whole(ProtoField.int64)},
   u64 = {8, whole(ProtoField.uint64)},
   hex = {4, function(abbr, title) return ProtoField.uint32(abbr, title, base.HEX) end},
   zero = {4, function(abbr, title) return ProtoField.uint32(abbr, title, base.HEX) end},
+  zero8 = {1, function(abbr, title) return ProtoField.uint8(abbr, title, base.HEX) end},
+  f32 = {4, real()},
   f64 = {8, real()},
+  counts16 = {2, real("counts"), function(range) return range:le_uint() / 16 end},
   hz = {8, real("Hz"), micro},
   deg = {8, real("°"), signed_micro},
   deg_s = {8, real("°/s"), micro},
@@ -149,8 +153,9 @@ local function rows_of(prefix, rows)
     local kind = KINDS[row[2]]
     row.name, row.kind, row.at, row.count = row[1], row[2], at, row[5] or 1
     row.size = kind[1] or row[4]
-    row.value, row.is_real = kind[3], row.kind == "f64" or row.kind:find("^deg") or row.kind == "hz"
-    row.known = row.kind == "zero" and 1 or row.kind == "hex" and row[4] or nil
+    row.value, row.is_real = kind[3], row.kind:find("^f") or row.kind:find("^deg") or row.kind == "hz" or
+      row.kind == "counts16"
+    row.known = row.kind:find("^zero") and 1 or row.kind == "hex" and row[4] or nil
     row.field = add_field(prefix .. row.name, kind[2], row[3], not row.known and row.kind ~= "text" and row[4] or nil)
     at = at + row.size * row.count
   end
@@ -174,7 +179,7 @@ local ROWS = {
     {"range_max_m", "f64", "Largest range", "m"}, {"max_echoes", "u32", "Most echoes of a pulse"},
     {"n_surfaces", "u32", "Surfaces"}, {"frames", "u32", "Frames of the scan (0: endless)"},
     {"scan", "u32", "Scan"}, {"seed", "u64", "Seed of random numbers"}}),
-  content = rows_of("descriptor.", {{"content", "hex", "Content", 4}, {"reserved", "zero", "Reserved"}}),
+  content = rows_of("descriptor.", {{"content", "hex", "Content", 16}, {"reserved", "zero", "Reserved"}}),
   [ANCHOR] = rows_of("anchor.", {
     {"crs", "u32", "CRS", {[0] = "local (scene frame)", "ECEF", "UTM or UPS", "geodetic"}},
     {"epsg", "u32", "EPSG code"},
@@ -247,6 +252,11 @@ local ROWS = {
                            {"offset_ns", "u32", "Fires after the sequence's first", "ns"}}),
   [COLOURS] = rows_of("colours.", {
     {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
+  [WAVES] = rows_of("waves.", {
+    {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_windows", "u32", "Windows"},
+    {"sample_ps", "u32", "Time between samples", "ps"}, {"baseline", "counts16", "Baseline"},
+    {"bits", "u8", "Bits of a sample"}, {"reserved", "zero8", "Reserved"},
+    {"count_signal", "f32", "Signal of one count", "thresholds"}, {"n_lost", "u32", "Samples lost in the head"}}),
 }
 -- Bits of a field, as further rows under it: {name, title, mask}.
 local function bits(of, prefix, name, list)
@@ -260,7 +270,8 @@ local function bits(of, prefix, name, list)
   end
 end
 bits(ROWS.content, "descriptor.", "content",
-     {{"attributes", "Attributes follow points", 1}, {"colours", "Colours follow points", 2}})
+     {{"attributes", "Attributes follow points", 1}, {"colours", "Colours follow points", 2},
+      {"waveforms", "Waveforms follow points", 4}, {"deviations", "Attributes have deviations", 8}})
 bits(ROWS[ANCHOR], "anchor.", "moving",
      {{"moves", "The head moves", 1}, {"stop", "It stands at a stop of a trajectory", 2}})
 bits(ROWS[LINE_END], "line_end.", "status",
@@ -317,10 +328,20 @@ add_field("point.x", real(), "x, or latitude")
 add_field("point.y", real(), "y, or longitude")
 add_field("point.z", real("m"), "z")
 local ATTRIBUTE_FIELDS = {add_field("attribute.amplitude_db", real("dB"), "Amplitude"),
-                          add_field("attribute.width_ns", real("ns"), "Width of the echo")}
+                          add_field("attribute.width_ns", real("ns"), "Width of the echo"),
+                          add_field("attribute.deviation", real(), "Deviation of its shape, of its amplitude")}
 local COLOUR_FIELDS = {add_field("colour.red", ProtoField.uint8, "Red"),
                        add_field("colour.green", ProtoField.uint8, "Green"),
                        add_field("colour.blue", ProtoField.uint8, "Blue")}
+local WAVE_FIELDS = {}
+for i, row in ipairs({{"pulse", ProtoField.uint64, "Pulse"}, {"dt_ns", ProtoField.uint32, "Fired after the points' first"},
+                      {"first", ProtoField.uint32, "First sample"}, {"n", ProtoField.uint16, "Samples"},
+                      {"range_m", real("m"), "Range of the first sample"},
+                      {"line_deg", real("°"), "Line angle"}, {"pan_deg", real("°"), "Pan angle"},
+                      {"dx", real(), "Change of x along a metre"}, {"dy", real(), "Change of y along a metre"},
+                      {"dz", real(), "Change of z along a metre"}, {"counts", ProtoField.string, "Counts"}}) do
+  WAVE_FIELDS[i] = add_field("wave." .. row[1], row[2], row[3])
+end
 local SURFACE_FIELDS = {add_field("surface.label", ProtoField.uint16, "Label"),
                         add_field("surface.object", ProtoField.string, "Object"),
                         add_field("surface.material", ProtoField.string, "Material")}
@@ -446,8 +467,8 @@ local function wrong_row(rows, bytes, at)
     if row.kind == "text" and not bytes:sub(from + 1, from + row.size):find("\0", 1, true) then
       return row.name .. ": a text without NUL"
     end
-    for i = 0, row.kind == "f64" and row.count - 1 or -1 do
-      local v = number_at(bytes, from + 8 * i, "<d")
+    for i = 0, row.kind:find("^f") and row.count - 1 or -1 do
+      local v = number_at(bytes, from + row.size * i, row.size == 8 and "<d" or "<f")
       if v ~= v or v == math.huge or v == -math.huge then return row.name .. ": not a finite number" end
     end
   end
@@ -490,6 +511,20 @@ local function wrong_poses(bytes, at, len)
   end
 end
 
+local function wrong_waves(bytes, at, len)
+  local _, _, n_windows, sample_ps, _, bits, _, signal = unpack_bytes("<I4I4I4I4I2BBf", bytes, at + 5)
+  if sample_ps == 0 then return "sample_ps 0" end
+  if bits < 8 or bits > 14 then return string.format("bits %d, allowed 8 to 14", bits) end
+  if signal <= 0 then return "a count without signal" end
+  local from, last = at + 32, at + len
+  for _ = 1, n_windows do
+    local n = from + 28 <= last and number_at(bytes, from + 12, "<I2") or 0
+    if n < 1 or n > 4096 then return string.format("a window of %d samples, allowed 1 to 4096", n) end
+    from = from + 28 + 2 * (n + n % 2)
+    if from > last then return "shorter than its windows" end
+  end
+end
+
 local function one_of(what, at_field, most)
   return function(bytes, at)
     local v = number_at(bytes, at + at_field)
@@ -512,6 +547,7 @@ local WRONG = {
   [POSES] = wrong_poses,
   [ATTRIBUTES] = records_fit("points", 12, 16, 4),
   [COLOURS] = records_fit("points", 12, 16, 3),
+  [WAVES] = wrong_waves,
   [EMITTER] = function(bytes, at, len)
     local turn = number_at(bytes, at + 24, "<i4")
     if number64(bytes, at + 40) == 0 then return "sequence_den 0" end
@@ -521,13 +557,16 @@ local WRONG = {
   end,
 }
 
-local function wrong_payload(h, bytes, at)
+local function wrong_payload(h, bytes, at, has_deviations)
   local rows = ROWS[h.type]
   if not rows then return nil end
   if h.length < rows.len and not (h.type == TELEMETRY and h.length >= 72) then
     return string.format("%d bytes, allowed %d and more", h.length, rows.len)
   end
   local problem = h.length >= rows.len and wrong_row(rows, bytes, at)
+  if not problem and h.type == ATTRIBUTES and has_deviations then
+    problem = records_fit("deviations", 12, 16, 6)(bytes, at, h.length)
+  end
   return problem or WRONG[h.type] and WRONG[h.type](bytes, at, h.length)
 end
 
@@ -539,6 +578,9 @@ local function forget(flow) flow.descriptor, flow.anchor, flow.emitter = nil, ni
 local function begin_scan(flow, scan)
   flow.scan, flow.line = {number = scan, received = 0}, {pulses = 0, whole = true}
 end
+
+-- The device time's eight bytes.
+local function time_in(h) return h.look:sub(16, 23) end
 
 local ABSORB = {
   [DESCRIPTOR] = function(flow, h, bytes, at, m)
@@ -571,7 +613,8 @@ local ABSORB = {
     if flow.last_pulse0 and pulse0 < flow.last_pulse0 then forget(flow) end
     if flow.anchor and flow.anchor.until_ns ~= 0 and t0_ns >= flow.anchor.until_ns then flow.anchor = nil end
     flow.last_pulse0 = pulse0
-    flow.points = {seq = h.seq, packet = m.packet, key = pulse0 .. "/" .. line .. "/" .. n}
+    flow.points = {seq = h.seq, packet = m.packet, key = pulse0 .. "/" .. line .. "/" .. n,
+                   waves = pulse0 .. "/" .. line .. "/" .. time_in(h)}
     local begun = 0
     for i = 0, n - 1 do
       if byte(bytes, at + 40 + 20 * i + 20) % 16 < 2 then begun = begun + 1 end
@@ -621,6 +664,12 @@ local function is_of_points(flow, h, bytes, at)
   return points and (points.seq + after) % MODULUS == h.seq and points.key == pulse0 .. "/" .. line .. "/" .. n
 end
 
+-- Frames of waveforms may be lost one by one, so their numbers say nothing.
+local function is_wave_of_points(flow, h, bytes, at)
+  local points = flow.points
+  return points and points.waves == number64(bytes, at) .. "/" .. number_at(bytes, at + 8) .. "/" .. time_in(h)
+end
+
 -- A whole frame seen for the first time: all that a later look at it needs goes to m.
 local function absorb(flow, h, bytes, at, m)
   m.notice, m.first_lost, m.lost = take_sequence(flow.sequence, h)
@@ -631,13 +680,17 @@ local function absorb(flow, h, bytes, at, m)
   if m.notice == RESTARTED then flow.scan, flow.line = nil, {pulses = 0, whole = false} end
   if m.notice then m.lost_so_far = flow.lost end
   if h.version ~= 1 then return end
-  m.wrong = wrong_payload(h, bytes, at) or false
+  m.has_deviations = flow.descriptor and floor(flow.descriptor.content / 8) % 2 == 1
+  m.wrong = wrong_payload(h, bytes, at, m.has_deviations) or false
   if m.wrong or m.notice == REPEATED or m.notice == LATE then return end
   if ABSORB[h.type] then ABSORB[h.type](flow, h, bytes, at, m) end
   if h.type == POINTS then
     m.descriptor, m.anchor, m.emitter = flow.descriptor, flow.anchor, flow.emitter
   elseif h.type == ATTRIBUTES or h.type == COLOURS then
     m.points_in = is_of_points(flow, h, bytes, at) and flow.points.packet
+  elseif h.type == WAVES then
+    m.descriptor = flow.descriptor
+    m.points_in = is_wave_of_points(flow, h, bytes, at) and flow.points.packet
   end
 end
 
@@ -821,15 +874,20 @@ local function put_points(tree, tvb, bytes, at, _, m)
   end)
 end
 
-local function put_attributes(tree, tvb, bytes, at)
+local function put_attributes(tree, tvb, bytes, at, _, m)
   if not is_wanted(tree, ATTRIBUTE_FIELDS) then return end
-  put_records(tree, tvb, at + 16, 4, number_at(bytes, at + 12), "Attributes", function(group, from, i)
+  local n = number_at(bytes, at + 12)
+  put_records(tree, tvb, at + 16, 4, n, "Attributes", function(group, from, i)
     local amplitude, width = unpack_bytes("<i2I2", bytes, from + 1)
     local item = group:add(tvb(from, 4), string.format("Point %d:%s%s", i,
       amplitude ~= -32768 and string.format(" %.2f dB", amplitude / 100) or " not modelled",
       width ~= 0 and string.format(", %.2f ns%s", width / 100, width == 65535 and " or more" or "") or ", no width"))
     if amplitude ~= -32768 then put_real(item, F["attribute.amplitude_db"], tvb(from, 2), amplitude / 100) end
     if width ~= 0 then put_real(item, F["attribute.width_ns"], tvb(from + 2, 2), width / 100) end
+    if m.has_deviations then
+      local range = tvb(at + 16 + 4 * n + 2 * i, 2)
+      put_real(item, F["attribute.deviation"], range, range:le_uint() / 1000)
+    end
   end)
 end
 
@@ -840,6 +898,45 @@ local function put_colours(tree, tvb, bytes, at)
     local item = group:add(tvb(from, 3), string.format("Point %d: #%02x%02x%02x", i, red, green, blue))
     for k = 1, 3 do item:add(COLOUR_FIELDS[k], tvb(from + k - 1, 1)) end
   end)
+end
+
+local function put_beam(item, m, tvb, from)
+  local d = m.descriptor
+  if d and d.layout == 1 then
+    for k, name in ipairs({"dx", "dy", "dz"}) do
+      local range = tvb(from + 12 + 4 * k, 4)
+      put_real(item, F["wave." .. name], range, range:le_float())
+    end
+  elseif d then
+    local line, pan = tvb(from + 20, 4), tvb(from + 24, 4)
+    put_real(item, F["wave.line_deg"], line, 360 * line:le_uint() / d.mirror_counts)
+    put_real(item, F["wave.pan_deg"], pan, 360 * pan:le_uint() / d.pan_counts)
+  end
+end
+
+local function put_waves(tree, tvb, bytes, at, _, m)
+  if not is_wanted(tree, WAVE_FIELDS) then return end
+  local pulse0, n_windows, step_ps = number64(bytes, at), number_at(bytes, at + 12), number_at(bytes, at + 16)
+  local from = at + 32
+  for i = 1, math.min(n_windows, scanhead.prefs.most) do
+    local offset, dt_ns, first, n = unpack_bytes("<I4I4I4I2", bytes, from + 1)
+    local len, counts = 28 + 2 * (n + n % 2), {}
+    for k = 0, n - 1 do counts[k + 1] = number_at(bytes, from + 28 + 2 * k, "<I2") end
+    local range_m = 1e-3 * step_ps * (0.5 * 0.299792458) * first
+    local item = tree:add(tvb(from, len), string.format("Window %d: pulse %.0f, %d samples from %.3f m on", i - 1,
+                                                        pulse0 + offset, n, range_m))
+    item:add(F["wave.pulse"], tvb(from, 4), UInt64.new(pulse0 + offset)):set_generated()
+    item:add(F["wave.dt_ns"], tvb(from + 4, 4), dt_ns)
+    item:add(F["wave.first"], tvb(from + 8, 4), first)
+    item:add(F["wave.n"], tvb(from + 12, 2), n)
+    put_real(item, F["wave.range_m"], tvb(from + 8, 4), range_m):set_generated()
+    put_beam(item, m, tvb, from)
+    item:add(F["wave.counts"], tvb(from + 28, 2 * n), table.concat(counts, " "))
+    from = from + len
+  end
+  if n_windows > scanhead.prefs.most then
+    tree:add(tvb(from), string.format("%d more (preference: most points shown)", n_windows - scanhead.prefs.most))
+  end
 end
 
 local function put_surfaces(tree, tvb, bytes, at)
@@ -880,11 +977,23 @@ local function put_beams(tree, tvb, bytes, at)
 end
 
 local RECORDS = {[POINTS] = put_points, [ATTRIBUTES] = put_attributes, [COLOURS] = put_colours,
-                 [SURFACES] = put_surfaces, [POSES] = put_poses, [EMITTER] = put_beams}
+                 [SURFACES] = put_surfaces, [POSES] = put_poses, [EMITTER] = put_beams, [WAVES] = put_waves}
+
+-- Where the windows of waveforms end.
+local function waves_len(bytes, at)
+  local len = 32
+  for _ = 1, number_at(bytes, at + 12) do
+    local n = number_at(bytes, at + len + 12, "<I2")
+    len = len + 28 + 2 * (n + n % 2)
+  end
+  return len
+end
+
 -- Length of a payload with its records; bytes after that may belong to a later version.
-local function known_len(h, bytes, at)
+local function known_len(h, bytes, at, m)
   if h.type == POINTS then return 40 + 20 * number_at(bytes, at + 36) end
-  if h.type == ATTRIBUTES then return 16 + 4 * number_at(bytes, at + 12) end
+  if h.type == ATTRIBUTES then return 16 + (m.has_deviations and 6 or 4) * number_at(bytes, at + 12) end
+  if h.type == WAVES then return waves_len(bytes, at) end
   if h.type == COLOURS then return 16 + 3 * number_at(bytes, at + 12) end
   if h.type == POSES then return 8 + 80 * number_at(bytes, at) end
   if h.type == EMITTER then return 64 + 12 * number_at(bytes, at + 4) end
@@ -939,7 +1048,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
     tree:add_proto_expert_info(E.type_unknown)
     return
   end
-  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at) end -- it was not there at the first look
+  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at, m.has_deviations) end -- it was not there at the first look
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
   if h.type == TELEMETRY and h.length >= 104 then put_rows(tree, ROWS.lost_lines, tvb, at + 96, 8) end
@@ -950,7 +1059,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
   end
   if RECORDS[h.type] then RECORDS[h.type](tree, tvb, bytes, at, h, m) end
   if h.type == EVENT then put_event(tree, tvb, bytes, at) end
-  local known = known_len(h, bytes, at)
+  local known = known_len(h, bytes, at, m)
   if h.length > known then
     tree:add(F["unknown"], tvb(at + known, h.length - known)):add_proto_expert_info(E.longer)
   end
