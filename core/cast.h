@@ -25,6 +25,7 @@
 #include "core/scene.h"
 #include "core/schedule.h"
 #include "core/sight.h"
+#include "core/waveform.h"
 
 enum { CAST_MAX_MOVERS = 16, CAST_MAX_WOBBLES = 32 };
 
@@ -109,6 +110,17 @@ struct cast_disturbance {
     } wobble[CAST_MAX_WOBBLES];
 };
 
+/* Waveforms. The samples of a pulse go into blocks that have room for them. A single ray counts as a footprint that lies
+ * on the plane it hits. Needs cast_detect with a signal. */
+struct cast_waves {
+    const struct waveform *waveform;
+    const struct beam *beam; /* the head's, also of single rays */
+    /* The echoes of a pulse are those that the detector finds in its samples, in place of merged returns. Their noise is
+     * that of the samples: cast_setup's range noise is not added. */
+    int finds;
+    enum waveform_detector detector;
+};
+
 /* Adds the wobbles at t_ns to scheduled angles. */
 void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, double *mirror_turn, double *pan_turn);
 
@@ -151,6 +163,7 @@ struct cast_setup {
     const struct cast_detect *detect;
     const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
     const struct cast_disturbance *disturbance; /* NULL: no disturbance. Not for caster_meet */
+    const struct cast_waves *waves; /* NULL: none, and nothing is spent on them. For casters with caster_add_waves */
 };
 
 /* Counts of what became of pulses. */
@@ -162,6 +175,7 @@ struct cast_counters {
                           * without echo, or fewer echoes */
     uint64_t crowded;    /* echoes beyond max_echoes: the weakest, left out */
     uint64_t hidden;     /* pulses into the tripod's cone: shots without echo */
+    uint64_t lost_samples; /* of waveforms, for which a block had no room */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
@@ -173,6 +187,8 @@ struct caster;
 /* Working memory of one thread. */
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
+/* Makes memory for waveforms. Without it a caster casts as if its setups had none. */
+int caster_add_waves(struct caster *caster, struct sh_err *err);
 
 /* Fills block from the run, with attributes where it has room for them. The echo of a single ray has the
  * width of the pulse. That of a footprint, or of returns merged from glass and mirrors, has the width of

@@ -12,7 +12,7 @@ studio='^(core/studio/|drivers/record/|firmware_sim/app/studio/|firmware_sim/mai
 #
 # In core and in firmware_sim a room may use itself and the rooms before it in this list, so that no rooms form a circle.
 # Files that lie in core itself are the first room, `core`: errors, lines, vectors, angles, random numbers.
-core_order='core texture georef scene import schedule pose surface instrument detect bvh sight footprint cast plan
+core_order='core texture georef scene import schedule pose surface instrument detect waveform bvh sight footprint cast plan
     studio/picture studio/mesh studio/analysis studio/viewpoint studio/coverage'
 firmware_order='base command fault config site device loop replay app app/help app/run app/studio app/studio/record app/studio/report
     app/studio/map app/studio/coverage app/studio/init app/studio/batch app/studio/verdict app/studio/soak app/studio/view app/studio/watch'

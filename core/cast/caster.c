@@ -8,6 +8,8 @@
  *     optics     optics.c         where that is glass or a mirror: what is seen there (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
+ *     waves      waves.c          the light of a pulse over time, and echoes found in it, where the setup has waveforms;
+ *                                 within echoes
  *     upset      disturbance.c          where the head has a fault: wobbles and a slipped pan within aim, a dark laser after
  *                                 it, a soiled window within echoes
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
@@ -28,6 +30,7 @@
 #include "core/cast/sub_rays.h"
 #include "core/cast/tripod.h"
 #include "core/cast/disturbance.h"
+#include "core/cast/waves.h"
 
 void caster_set_profile(struct caster *caster, struct bvh_profile *profile)
 {
@@ -43,6 +46,7 @@ int caster_create(struct caster **out, struct sh_err *err)
     c->nearest.bvh = NULL; /* the arrays are not touched until they are needed */
     c->nearest.sight = NULL;
     c->sub_rays = NULL;
+    c->waves = NULL;
     c->profile = NULL;
     c->steps.ready = 0;
     memset(&c->counters, 0, sizeof c->counters);
@@ -62,7 +66,14 @@ void caster_free(struct caster *caster)
     bvh_work_free(caster->nearest.bvh);
     sight_work_free(caster->nearest.sight);
     free(caster->sub_rays);
+    free(caster->waves);
     free(caster);
+}
+
+int caster_add_waves(struct caster *caster, struct sh_err *err)
+{
+    caster->waves = malloc(sizeof *caster->waves);
+    return caster->waves != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "cast: no memory for waveforms");
 }
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters)
@@ -122,8 +133,10 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
+    if (k->waves != NULL) waves_begin(c, k);
     if (s->disturbance != NULL && s->disturbance->dark) {
         caster_darken(&c->list);
+        if (k->waves != NULL) caster_waves(c, k);
         return caster_points(c, k);
     }
     const struct met met = centres(c, k);
@@ -145,6 +158,7 @@ static void begin_block(struct line_block *block, const struct cast_setup *setup
     block->t0_ns = run->t0_ns;
     block->line_t0_ns = run->line_t0_ns;
     block->layout = setup->layout;
+    if (block->waves != NULL) block->waves->n = block->waves->n_samples = block->waves->n_left_out = 0;
 }
 
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
@@ -153,6 +167,8 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     struct chunk chunk = {.s = setup, .run = run, .block = block, .attributes = block->width_cns != NULL};
     chunk.colours = block->rgb != NULL && setup->colour != NULL;
     chunk.texels = chunk.colours && setup->colour->scale.mode == COLOUR_TEXTURE;
+    chunk.waves = caster->waves != NULL ? setup->waves : NULL;
+    chunk.spreads = chunk.attributes || chunk.waves != NULL;
     uint32_t echoes = 0;
     begin_block(block, setup, run);
     /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the

@@ -17,6 +17,8 @@ struct chunk {
     struct bvh_origins from;
     int linear;     /* the directions that the encoders read are turned into the CRS already */
     int attributes; /* the block has room for them */
+    const struct cast_waves *waves; /* the setup's, where the caster has memory for them */
+    int spreads; /* returns say how their ranges spread: for widths, or for waveforms */
     int colours;    /* likewise */
     int texels;     /* colours are those of textures: hits carry them */
 };

@@ -11,6 +11,7 @@
 #include "core/cast/chunk.h"
 #include "core/cast/kernels_points.h"
 #include "core/cast/disturbance.h"
+#include "core/cast/waves.h"
 #include "core/rng.h"
 #include "core/surface.h"
 
@@ -123,6 +124,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
         if (caster_is_bare(k->s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
     for (uint32_t i = k->n; i < l->n; i++)
         l->label[i] += l->ghost[i] ? d->ghost_label : 0;
+    if (k->waves != NULL) waves_take_paths(c, k);
     for (uint32_t g = 0; g < l->n_secondary && d->separation_m > 0.0; g++)
         l->secondary[g].n = merge_pulse(l, &how, &l->secondary[g], k->texels);
 }
@@ -133,6 +135,12 @@ static uint32_t count_echoes(const struct echo_list *l)
     for (uint32_t i = 0; i < l->n; i++)
         n += l->range_m[i] == l->range_m[i];
     return n;
+}
+
+/* Whether echoes are those that were found in waveforms: detected, and with noise. */
+static int finds_echoes(const struct chunk *k)
+{
+    return k->waves != NULL && k->waves->finds;
 }
 
 /* Ranges of what is not detected become NaN. */
@@ -149,7 +157,7 @@ static void detect(struct caster *c, const struct chunk *k)
                                          .refl_cdb = l->refl_cdb,
                                          .scan_key = k->s->scan_key};
     uint32_t before = count_echoes(l);
-    if (d->signal != NULL) {
+    if (d->signal != NULL && !finds_echoes(k)) {
         if (k->s->disturbance != NULL) caster_weaken(k->s->disturbance, l->n, l->rho);
         detect_by_signal(d->signal, &echoes);
         if (k->attributes) detect_amplitudes(d->signal, &echoes, l->amplitude_cdb);
@@ -199,6 +207,7 @@ struct heard {
     uint64_t key;
     uint32_t label;
     int16_t refl_cdb, amplitude_cdb;
+    uint16_t deviation;
     float width_m;
     uint32_t colour;
 };
@@ -209,8 +218,8 @@ static uint32_t hear(const struct echo_list *l, const double *strength, const st
     for (uint32_t j = 0; j <= f->n; j++) {
         uint32_t i = echoes_place_of(f, j);
         if (!isnan(l->range_m[i]))
-            h[n++] = (struct heard){l->range_m[i],  strength[i],         l->key[i],     l->label[i],
-                                    l->refl_cdb[i], l->amplitude_cdb[i], l->width_m[i], l->colour[i]};
+            h[n++] = (struct heard){l->range_m[i],       strength[i],     l->key[i],     l->label[i], l->refl_cdb[i],
+                                    l->amplitude_cdb[i], l->deviation[i], l->width_m[i], l->colour[i]};
     }
     return n;
 }
@@ -278,6 +287,7 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
             l->key[i] = h[j].key;
             l->refl_cdb[i] = h[j].refl_cdb;
             l->amplitude_cdb[i] = h[j].amplitude_cdb;
+            l->deviation[i] = h[j].deviation;
             l->width_m[i] = h[j].width_m;
             if (k->texels) l->colour[i] = h[j].colour;
         }
@@ -304,10 +314,11 @@ void caster_echoes(struct caster *c, const struct chunk *k)
     kernel_limit(l->range_m, s->range_min_m, s->range_max_m, l->n);
     if (s->silent != NULL) silence(c, s);
     if (s->beam == NULL && s->detect != NULL) weigh_returns(c, k);
+    if (k->waves != NULL) caster_waves(c, k);
     if (s->detect != NULL || s->noise_on) make_keys(l, k);
     if (s->detect != NULL) detect(c, k);
     bvh_stage_ends(c->profile, CAST_DETECT);
-    add_noise(c, s);
+    if (!finds_echoes(k)) add_noise(c, s);
     bvh_stage_ends(c->profile, CAST_NOISE);
     if (l->n_secondary > 0) choose_echoes(c, k);
 }

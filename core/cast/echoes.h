@@ -31,6 +31,7 @@ struct echo_list {
     uint8_t ghost[CAST_LIST];
     double amplitude[CAST_LIST];
     int16_t refl_cdb[CAST_LIST], amplitude_cdb[CAST_LIST];
+    uint16_t deviation[CAST_LIST];
     float width_m[CAST_LIST];
     uint32_t colour[CAST_LIST]; /* packed */
 };

@@ -76,6 +76,8 @@ static uint32_t write_firsts(struct caster *c, const struct chunk *k)
     kernel_widths(l->width_m, echo, k->n, b->width_cns + k->at);
     for (uint32_t i = 0; i < k->n; i++)
         b->amplitude_cdb[k->at + i] = signal && echo[i] != 0 ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
+    for (uint32_t i = 0; i < k->n && b->deviation != NULL; i++)
+        b->deviation[k->at + i] = echo[i] != 0 ? l->deviation[i] : 0;
     return echoes;
 }
 
@@ -92,6 +94,7 @@ static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint3
     if (b->width_cns == NULL) return;
     memmove(b->width_cns + to, b->width_cns + from, n * sizeof *b->width_cns);
     memmove(b->amplitude_cdb + to, b->amplitude_cdb + from, n * sizeof *b->amplitude_cdb);
+    if (b->deviation != NULL) memmove(b->deviation + to, b->deviation + from, n * sizeof *b->deviation);
 }
 
 /* Echo i of the list, number `echo` of its pulse, becomes entry `to`. */
@@ -110,6 +113,7 @@ static void write_secondary(struct caster *c, const struct chunk *k, uint32_t to
     if (!k->attributes) return;
     kernel_widths(&l->width_m[i], &echo, 1, &b->width_cns[to]);
     b->amplitude_cdb[to] = signal ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
+    if (b->deviation != NULL) b->deviation[to] = l->deviation[i];
 }
 
 /* Inserts further echoes after the first ones of their pulses, beginning with the last, which moves
@@ -163,6 +167,7 @@ static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fit
     if (b->width_cns == NULL) return;
     b->amplitude_cdb[to] = fits ? b->amplitude_cdb[from] : (int16_t)LINE_AMPLITUDE_NONE;
     b->width_cns[to] = fits ? b->width_cns[from] : (uint16_t)LINE_WIDTH_NONE;
+    if (b->deviation != NULL) b->deviation[to] = fits ? b->deviation[from] : 0;
 }
 
 /* Drops and counts echoes whose positions did not fit. The pulse's other echoes get new numbers; each pulse

@@ -38,7 +38,7 @@ static void add_ray(struct caster *c, const struct chunk *k, struct job *job, co
     VEC3_SET(pool->d, i, out);
     pool->energy[i] = part->energy;
     job->n++;
-    if (!k->attributes) return;
+    if (!k->spreads) return;
     pool->xx[i] = (float)part->xx;
     pool->xy[i] = (float)part->xy;
     pool->yy[i] = (float)part->yy;
@@ -86,7 +86,7 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     vec3_sub(origin, local, origin);
     r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
     r->energy = part->energy;
-    r->sigma_m = k->attributes ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;
+    r->sigma_m = k->spreads ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;
     r->label = c->list.label[p];
     if (k->texels) r->colour = c->list.colour[p];
     return 1;
@@ -118,7 +118,7 @@ int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double 
     job->centre.energy = 0.0;
     job->whole = 0;
     if (lines > BEAM_MAX_LINES || ++job->passes > MAX_PASSES ||
-        beam_cut(&b->beam, &b->fine, line, lines, k->attributes, &parts) != 0) {
+        beam_cut(&b->beam, &b->fine, line, lines, k->spreads, &parts) != 0) {
         plan_whole(c, k, job);
         c->counters.ragged++;
         return 1;

@@ -7,6 +7,7 @@
 #include "core/cast/caster.h"
 #include "core/cast/chunk.h"
 #include "core/cast/kernels_points.h"
+#include "core/cast/waves.h"
 #include "core/surface.h"
 
 /* Finds how much comes back from the surfaces that rays from `first` on have hit. */
@@ -135,14 +136,14 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     struct beam_return r = {.range_m = p->range_m[i], .energy = p->energy[i], .label = p->label[i]};
     if (isnan(p->range_m[i])) return;
     if (k->texels) r.colour = p->colour[i];
-    if (k->attributes) r.sigma_m = met_sigma(c, s, job, i);
+    if (k->spreads) r.sigma_m = met_sigma(c, s, job, i);
     add_return(c, s, &r, 1.0, p->rho[i]);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t j = b->first[i]; j < b->first[i] + b->count[i]; j++) {
         r.range_m = b->range_m[j];
         r.label = b->label[j];
         if (k->texels) r.colour = b->colour[j];
-        if (k->attributes) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
+        if (k->spreads) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
         uint32_t before = c->sub_rays->n_returns;
         add_return(c, s, &r, b->share[j], b->rho[j]);
         if (b->ghost[j] && c->sub_rays->n_returns > before)
@@ -178,6 +179,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
+    if (k->waves != NULL) waves_take_returns(c, k, job->pulse, w->returns, w->n_returns);
     w->echoes_of[job->pulse].first = w->n_echoes;
     w->echoes_of[job->pulse].n = n;
     w->n_echoes += n;

@@ -24,7 +24,7 @@ struct pool {
     uint8_t body[POOL_ROOM];
     uint32_t n;
     /* of the part that a sub-ray stands for: variances and covariance of x and y; touched only where
-     * attributes are asked for */
+     * returns have a spread */
     float xx[POOL_ROOM], xy[POOL_ROOM], yy[POOL_ROOM];
 };
 

@@ -12,8 +12,7 @@ uint32_t caster_hide(const struct cast_tripod *t, const struct vec3_in *d, uint3
     uint32_t n = 0;
     if (t->cos_opening >= 1.0) return 0;
     for (uint32_t i = 0; i < n_pulses; i++) {
-        const double cosine = d->x[i] * t->down[0] + d->y[i] * t->down[1] + d->z[i] * t->down[2];
-        hidden[i] = cosine > t->cos_opening;
+        hidden[i] = (uint8_t)caster_is_hidden(t, d, i);
         n += hidden[i];
         if (hidden[i]) l->range_m[i] = (double)NAN;
     }

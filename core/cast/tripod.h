@@ -7,6 +7,13 @@
 
 struct echo_list;
 
+/* Whether the beam with direction i of d goes into the cone. */
+static inline int caster_is_hidden(const struct cast_tripod *t, const struct vec3_in *d, uint32_t i)
+{
+    const double cosine = d->x[i] * t->down[0] + d->y[i] * t->down[1] + d->z[i] * t->down[2];
+    return cosine > t->cos_opening;
+}
+
 /* d: directions of n_pulses <= CHUNK, prcs. Returns how many of them are hidden. Called before optics for single rays,
  * so that nothing is followed; for footprints once these have become echoes. */
 uint32_t caster_hide(const struct cast_tripod *t, const struct vec3_in *d, uint32_t n_pulses, struct echo_list *l);

@@ -84,6 +84,11 @@ double detect_amplitude(const struct detect_signal *signal, double range_m, doub
            vec_exp(-log_least(signal, range_m) - signal->extinction2_1_m * range_m);
 }
 
+double detect_reflectance(const struct detect_signal *signal, double range_m, double amplitude)
+{
+    return amplitude * vec_exp(log_least(signal, range_m)) / overlap(signal->per_overlap2, range_m);
+}
+
 double detect_extinction_1_m(double visibility_m, double wavelength_m)
 {
     double v = 1e-3 * visibility_m;

@@ -15,7 +15,7 @@ void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *h
 }
 
 /* Shell's sort, with Ciura's steps: in place; of few returns only the last steps are needed. */
-static void sort(struct beam_return *r, uint32_t n)
+void beam_sort(struct beam_return *r, uint32_t n)
 {
     static const uint32_t steps[] = {301, 132, 57, 23, 10, 4, 1};
     size_t s = n < 10 ? 5 : 0;
@@ -140,7 +140,7 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *r, uint3
 {
     uint32_t found = 0;
     uint8_t number = 0;
-    if (n < MANY || !have_no_gap(how->gap_m, r, n)) sort(r, n);
+    if (n < MANY || !have_no_gap(how->gap_m, r, n)) beam_sort(r, n);
     for (uint32_t i = 0, end; i < n; i = end) {
         for (end = i + 1; end < n && r[end].range_m - r[end - 1].range_m <= how->gap_m;)
             end++;

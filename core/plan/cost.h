@@ -13,6 +13,13 @@
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
 
+/* ---- waveforms (build/bench_waveform) */
+
+#define PLAN_COST_WAVE        150.0  /* a window around one return, */
+#define PLAN_COST_WAVE_SAMPLE 10.0   /* and each of its samples, with noise */
+#define PLAN_COST_FLANK       150.0  /* an echo found by a threshold or a constant fraction, */
+#define PLAN_COST_GAUSSIANS   1000.0 /* by Gaussian decomposition */
+
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
 /* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra near a border, since rays

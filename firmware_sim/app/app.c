@@ -208,7 +208,7 @@ const struct sh_report app_report_stderr = {NULL, print_warning, print_progress,
 const struct sh_report app_report_seconds = {NULL, print_warning, print_each_second, asked_to_stop};
 const struct sh_report app_report_quiet = {NULL, print_warning, NULL, asked_to_stop};
 
-void app_warn_left_out(uint64_t crowded, uint64_t unfit)
+void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples)
 {
     if (crowded != 0)
         sh_warn(&app_report_stderr,
@@ -217,6 +217,9 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
     if (unfit != 0)
         sh_warn(&app_report_stderr, "%llu echoes left out, too far from the anchor for the stream's integers",
                 (unsigned long long)unfit);
+    if (lost_samples != 0)
+        sh_warn(&app_report_stderr, "%llu samples of waveforms left out: their pulses had more than there is room for",
+                (unsigned long long)lost_samples);
 }
 
 int app_ends_in(const char *path, const char *ending)

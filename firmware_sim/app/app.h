@@ -82,7 +82,7 @@ int app_interrupted(void);
 void app_catch_signals(void);
 
 /* Prints a warning for each kind of echoes that the head left out of the stream. */
-void app_warn_left_out(uint64_t crowded, uint64_t unfit);
+void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples);
 
 /* Whether a path ends in that, with something before it; case doesn't count. */
 int app_ends_in(const char *path, const char *ending);

@@ -103,6 +103,15 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
     return code == SH_OK ? SH_OK : sh_fail(err, code, "%s", faults.fault[0].text);
 }
 
+double config_cast_hz(const struct config *cfg)
+{
+    const struct head_settings *h = &cfg->head.settings;
+    const double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
+    double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
+    if (used < 0.0) used += 1.0; /* across azimuth 0 */
+    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0);
+}
+
 uint32_t config_threads(const struct config *cfg)
 {
     long n = cfg->loop.threads != 0 ? (long)cfg->loop.threads : sysconf(_SC_NPROCESSORS_ONLN);

@@ -22,6 +22,7 @@
 #include "core/plan.h"
 #include "core/scene.h"
 #include "core/surface.h"
+#include "core/waveform.h"
 #include "drivers/link/link.h"
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/config/epoch.h"
@@ -70,6 +71,22 @@ struct config_signal {
     double reflectance; /* of surfaces without one of their own */
     double visibility_m, extinction_1_km;
     int has_extinction; /* 0: by visibility_m; where that is 0, too: the air of the data sheet */
+};
+
+/* Waveforms; core/waveform.h. Whether they are sent is a setting of the head. */
+struct config_waveform {
+    enum config_wave_echoes {
+        WAVE_ECHOES_MODEL,
+        WAVE_ECHOES_THRESHOLD,
+        WAVE_ECHOES_FRACTION,
+        WAVE_ECHOES_GAUSSIANS
+    } echoes;
+    enum waveform_shape pulse;
+    char pulse_file[CONFIG_PATH_LEN];
+    double skew, bandwidth_mhz, sample_ns;
+    uint32_t bits;
+    double baseline_counts, full_scale_db, saturation_db, dead_ns; /* dB of power: 10 log10 of thresholds */
+    double keep_db, before_ns, after_ns, near_m, far_m;
 };
 
 /* Instrument errors; core/instrument.h. */
@@ -196,6 +213,7 @@ struct config {
     struct plan_tolerance plan;
     struct config_noise noise;
     struct config_signal signal;
+    struct config_waveform waveform;
     struct surface_rule surface[CONFIG_MAX_SURFACES];
     uint32_t n_surfaces;
     struct config_optics optics;
@@ -233,6 +251,18 @@ static inline int config_has_footprint(const struct config *cfg)
 {
     return cfg->profile.beam_exit_m != 0.0 || cfg->profile.beam_divergence_rad != 0.0;
 }
+
+/* Whether waveforms are made at all, to be sent or to find echoes in them. */
+static inline int config_has_waves(const struct config *cfg)
+{
+    return cfg->head.settings.waves != 0 || cfg->waveform.echoes != WAVE_ECHOES_MODEL;
+}
+/* Samples of a usual pulse: one window around a return of 20 dB on a surface hit head on, or that of near_m and far_m. */
+uint32_t config_wave_samples(const struct config *cfg);
+/* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
+double config_wave_bytes_s(const struct config *cfg);
+/* Pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
+double config_cast_hz(const struct config *cfg);
 
 /* Threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);

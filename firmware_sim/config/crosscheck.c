@@ -286,6 +286,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     check_time(rd, cfg);
     cfg_check_ntp(rd, cfg);
     cfg_check_signal(rd, cfg);
+    cfg_check_waveform(rd, cfg);
     cfg_check_fields(rd, cfg);
     cfg_check_faults(rd, &cfg->faults);
     cfg_check_fault_links(rd, cfg, &cfg->faults);

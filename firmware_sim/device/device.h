@@ -33,6 +33,7 @@ struct device_counters {
     _Atomic uint64_t pulses, echoes, lines;   /* delivered, so released */
     _Atomic uint64_t lost_pulses, lost_ticks; /* not computed in time */
     _Atomic uint64_t crowded, faint, unfit;   /* hits that are not echoes: struct cast_counters */
+    _Atomic uint64_t lost_samples;            /* of waveforms: no room in their block */
     _Atomic uint64_t late_blocks, late_max_ns;
     _Atomic uint64_t reader_lost_frames, reader_lost_pulses; /* left out for readers that were too slow */
     /* live: poses that were extrapolated because none came in time, and poses that could not be used */
@@ -83,6 +84,7 @@ struct device_work {
     uint32_t station_scan; /* number of the scan among that station's since power-up, from 1 */
     size_t stretch;        /* of a trajectory: the one of the last anchor */
     uint32_t echoes;       /* enum beam_select */
+    uint32_t waves;        /* 1: waveforms are sent */
     uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     enum device_power_change power; /* at the tick's start. While it is off the head reports nothing else */

@@ -9,7 +9,8 @@
 #include "firmware_sim/device/frames.h"
 #include "firmware_sim/site/site.h"
 
-void device_fill_descriptor(const struct device_scan *scan, const char *idn, struct native_descriptor *d)
+void device_fill_descriptor(const struct device_scan *scan, const char *idn, uint32_t waves,
+                            struct native_descriptor *d)
 {
     const struct site *site = scan->site;
     const struct config *cfg = site->cfg;
@@ -45,6 +46,8 @@ void device_fill_descriptor(const struct device_scan *scan, const char *idn, str
     d->seed = cfg->noise.seed;
     d->content = cfg->output.attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
     if (cfg->output.colour != COLOUR_NONE) d->content |= NATIVE_HAS_COLOURS;
+    if (waves != 0) d->content |= NATIVE_HAS_WAVES;
+    if (cfg->output.attributes && cfg->waveform.echoes != WAVE_ECHOES_MODEL) d->content |= NATIVE_HAS_DEVIATIONS;
 }
 
 static const uint32_t emit[] = {[EMITTER_LINE] = NATIVE_EMIT_LINE,

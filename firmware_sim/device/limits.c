@@ -42,7 +42,8 @@ static void set_noise_limits(const struct config *cfg, struct head_limits *l)
 {
     static const double BALL_MOST_M = 100.0; /* as noise.ball.radius_m */
     const int may_move = cfg->platform.kind == PLATFORM_STATIC || cfg->noise.ball.local;
-    l->noise_most = cfg->signal.on ? RANGE_NOISE_SIGNAL : RANGE_NOISE_ON;
+    const int finds = cfg->waveform.echoes != WAVE_ECHOES_MODEL; /* then noise is that of samples */
+    l->noise_most = finds ? RANGE_NOISE_OFF : cfg->signal.on ? RANGE_NOISE_SIGNAL : RANGE_NOISE_ON;
     l->angle_most = cfg->profile.mirror_sigma_deg > 0.0 || cfg->profile.pan_sigma_deg > 0.0;
     l->sigma_min_nm = cfg->signal.on ? to_nm(cfg->profile.range_sigma_floor_m) : 0;
     l->ball_max_nm = may_move ? to_nm(BALL_MOST_M) : 0;

@@ -127,6 +127,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->station_scan = device->scan.station_scan;
     work->stretch = device->scan.stretch;
     work->echoes = device->cmd.settings.echoes;
+    work->waves = device->cmd.settings.waves;
     work->pulse0 = device->scan.pulse_next;
     /* After a stop all pulses that fired before this tick go out. Otherwise the cut leaves an incomplete packet for the
      * next tick. */
@@ -183,7 +184,7 @@ void device_describe(struct device *device, struct device_work *work)
 {
     work->describe = 1;
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
-    device_fill_descriptor(&device->scan, device->idn, &work->descriptor);
+    device_fill_descriptor(&device->scan, device->idn, device->cmd.settings.waves, &work->descriptor);
     device_fill_emitter(&device->scan, device->cmd.settings.echoes, &work->emitter, work->beam);
     device_fill_anchor(device->scan.site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;

@@ -9,17 +9,14 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/pump.h"
 
-/* Bytes per second of the points at the present rates, with one echo per pulse: a lower bound. A command can raise the
+/* Bytes per second of the points at the present rates, with one echo per pulse, and one window of its waveform: a lower
+ * bound. A command can raise the
  * rates later. Further echoes and the frames' headers come on top. A link announces what it loses then. */
 static double stream_rate(const struct config *cfg)
 {
-    const struct head_settings *h = &cfg->head.settings;
-    double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
-    double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
-    if (used < 0.0) used += 1.0; /* across azimuth 0 */
     double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0) +
                        (cfg->output.colour != COLOUR_NONE ? NATIVE_COLOUR_LEN : 0);
-    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
+    return config_cast_hz(cfg) * point_len + config_wave_bytes_s(cfg);
 }
 
 /* A link that can't carry the stream is refused before it loses any of it. Other protocols are not checked: their rates
@@ -42,7 +39,8 @@ static int check_capacity(const struct links *links, const struct config *cfg, c
                    place.endpoint, 1e-6 * rate, 1e-6 * capacity,
                    floor(1e-6 * (double)config_rate_below(
                                     &cfg->profile, llround((double)cfg->head.settings.prr_uhz * capacity / rate))),
-                   cfg->output.attributes              ? ", or leave out output.attributes"
+                   cfg->head.settings.waves != 0       ? ", or leave out waveform.send"
+                   : cfg->output.attributes            ? ", or leave out output.attributes"
                    : cfg->output.colour != COLOUR_NONE ? ", or leave out output.colour"
                                                        : "");
 }

@@ -23,6 +23,7 @@ void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
     sum->crowded += more->crowded;
     sum->faint += more->faint;
     sum->unfit += more->unfit;
+    sum->lost_samples += more->lost_samples;
 }
 
 static size_t round_up(size_t bytes)

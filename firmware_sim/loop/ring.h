@@ -30,9 +30,9 @@
  * the two that device_tick_lines adds. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
-/* Counts of hits: echoes, and hits that gave none (struct cast_counters). */
+/* Counts of hits: echoes, and hits that gave none; samples of waveforms without room (struct cast_counters). */
 struct ring_hits {
-    uint32_t echoes, crowded, faint, unfit;
+    uint32_t echoes, crowded, faint, unfit, lost_samples;
 };
 void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more);
 

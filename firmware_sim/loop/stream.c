@@ -138,6 +138,7 @@ static void stream_count(struct stream *stream, const struct ring_tick *tick, in
     atomic_fetch_add(&c->crowded, tick->hits.crowded);
     atomic_fetch_add(&c->faint, tick->hits.faint);
     atomic_fetch_add(&c->unfit, tick->hits.unfit);
+    atomic_fetch_add(&c->lost_samples, tick->hits.lost_samples);
     atomic_fetch_add(&c->lines, tick->n_lines);
     if (tick->n_fired == 0) return;
     if (atomic_load(&stream->first_pulse_ns) == 0) atomic_store(&stream->first_pulse_ns, now_ns);

@@ -7,7 +7,9 @@
 
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
+#include "drivers/protocol/native_waves.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/site/waves.h"
 
 struct worker {
     const struct site *site; /* as it is for the tick at hand */
@@ -17,6 +19,7 @@ struct worker {
     struct caster *caster;
     struct cast_counters counted; /* the caster's counters, as far as slots have them */
     struct line_block block;
+    struct line_waves *waves; /* the block's, which has none while they are not sent */
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
     uint32_t setup_scan;    /* the scan that it is for */
@@ -47,6 +50,8 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
         rc = line_block_alloc(&worker->block, device_tick_pulses(site->cfg) * site_most_points_per_pulse(site), err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&worker->block, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(&worker->block, err);
+    if (rc == SH_OK) rc = site_add_waves(site, device_tick_pulses(site->cfg), worker->caster, &worker->block, err);
+    worker->waves = worker->block.waves;
     if (rc != SH_OK) {
         worker_free(worker);
         return rc;
@@ -59,13 +64,14 @@ void worker_free(struct worker *worker)
 {
     if (worker == NULL) return;
     caster_free(worker->caster);
+    worker->block.waves = worker->waves;
     line_block_free(&worker->block);
     free(worker->tick.bytes);
     free(worker);
 }
 
-/* Bytes of so many points and lines. Each part of a line is a frame of its own. */
-static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t lines)
+/* Bytes of so many points, lines and waveforms. Each part of a line is a frame of its own. */
+static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t lines, struct site_wave_room waves)
 {
     uint32_t bytes =
         (uint32_t)native_points_bound(n_points) + lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
@@ -75,6 +81,9 @@ static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t
     if (cfg->output.colour != COLOUR_NONE)
         bytes +=
             (uint32_t)native_colours_bound(n_points) + lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN);
+    if (waves.windows != 0)
+        bytes += (uint32_t)native_waves_bound(n_points, waves.windows, waves.samples) +
+                 lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_WAVES_HEAD_LEN);
     return bytes;
 }
 
@@ -82,8 +91,10 @@ uint32_t worker_tick_bytes(const struct site *site)
 {
     const struct config *cfg = site->cfg;
     uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
-    uint32_t n_points = device_tick_pulses(cfg) * site_most_points_per_pulse(site);
-    return OVERHEAD_BYTES + poses + line_bytes(cfg, n_points, device_tick_lines(cfg));
+    const uint32_t n_pulses = device_tick_pulses(cfg);
+    return OVERHEAD_BYTES + poses +
+           line_bytes(cfg, n_pulses * site_most_points_per_pulse(site), device_tick_lines(cfg),
+                      site_wave_room(site, n_pulses));
 }
 
 uint32_t worker_usual_bytes(const struct site *site)
@@ -91,7 +102,8 @@ uint32_t worker_usual_bytes(const struct site *site)
     const struct head_settings *set = &site->cfg->head.settings;
     double tick_uhz = 1e6 * site->cfg->loop.tick_hz;
     uint32_t n_points = (uint32_t)ceil((double)set->prr_uhz / tick_uhz) + SCHEDULE_PACKET;
-    return line_bytes(site->cfg, n_points, (uint32_t)ceil((double)set->lines_uhz / tick_uhz));
+    return line_bytes(site->cfg, n_points, (uint32_t)ceil((double)set->lines_uhz / tick_uhz),
+                      site_usual_waves(site, n_points));
 }
 
 static uint8_t *end_of(const struct worker *worker)
@@ -229,7 +241,8 @@ static void count_hits(struct worker *worker, uint32_t echoes)
     const struct ring_hits hits = {.echoes = echoes,
                                    .crowded = (uint32_t)(now.crowded - was->crowded),
                                    .faint = (uint32_t)(now.faint - was->faint),
-                                   .unfit = (uint32_t)(now.unfit - was->unfit)};
+                                   .unfit = (uint32_t)(now.unfit - was->unfit),
+                                   .lost_samples = (uint32_t)(now.lost_samples - was->lost_samples)};
     *was = now;
     ring_hits_add(&worker->tick.hits, &hits);
     ring_hits_add(&worker->tick.tail, &hits);
@@ -333,6 +346,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     worker->anchored = work->stretch;
     worker->setup.sight = worker->site->station[work->station].sight; /* it may be new since the last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
+    worker->block.waves = work->waves != 0 ? worker->waves : NULL;
     site_set_program(work->site, work->prr_uhz, &worker->setup);
     worker->setup.disturbance = work->disturbance.on ? &work->disturbance.cast : NULL;
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);

@@ -22,6 +22,7 @@
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/target.h"
 #include "firmware_sim/site/tripod.h"
+#include "firmware_sim/site/waves.h"
 #include "firmware_sim/site/world.h"
 
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
@@ -182,6 +183,7 @@ static int load_load(struct site *site, const struct sh_report *report, struct s
     if (rc == SH_OK) rc = load_world(site, report, err);
     if (rc == SH_OK) rc = site_name_legs(site, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
+    if (rc == SH_OK) rc = site_set_up_waves(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
     if (rc == SH_OK) rc = site_build_bvhs(site, site->cfg->loop.threads, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
@@ -261,6 +263,7 @@ void site_free(struct site *site)
     georef_geoid_free(site->geoid);
     free(site->stretch);
     site_free_detect(site);
+    site_free_waves(site);
     free(site->legs);
     surface_colours_free(&site->colours.surfaces);
     site_free_warnings(&site->said);

@@ -11,6 +11,7 @@
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/site/rate.h"
 #include "firmware_sim/site/site.h"
+#include "firmware_sim/site/waves.h"
 
 static void name_row(struct plan_row *row, const char *whose)
 {
@@ -150,7 +151,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     bvh_get_info(site->bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 12 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 13 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
     add_emitter(site, plan);
@@ -166,6 +167,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
         plan->row[plan->n++] = plan->beam;
         plan->row[plan->n++] = plan->optics;
     }
+    site_wave_row(site, &plan->row[plan->n++]);
     if (site->cfg->output.layout == LINE_POLAR)
         plan_georef_polar(&plan->row[plan->n++]);
     else
@@ -190,7 +192,7 @@ double site_planned_ns(const struct site *site)
     const size_t n = plan_head(&head, of_head);
     double sum_ns = plan_pulse_ns(site->scene->n_triangles, bvh.packet) + cost_ns(&site->plan.sight, 0.0) +
                     cost_ns(&site->plan.beam, PLAN_COST_OUTLINES + PLAN_COST_CUT) +
-                    cost_ns(&site->plan.optics, methods->depth * PLAN_COST_SUB_RAY);
+                    cost_ns(&site->plan.optics, methods->depth * PLAN_COST_SUB_RAY) + site_wave_ns(site);
     for (uint32_t i = 0; i < site->n_movers; i++)
         sum_ns += plan_pulse_ns(site->mover[i].scene->n_triangles, bvh.packet);
     for (size_t i = 0; i < n; i++)

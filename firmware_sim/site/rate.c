@@ -12,6 +12,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
 #include "firmware_sim/site/site.h"
+#include "firmware_sim/site/waves.h"
 
 /* Processor time for warming the caches, and for measuring. Runs are short enough that one of the most
  * expensive pulses (1,027 sub-rays) ends within a few milliseconds. */
@@ -42,12 +43,15 @@ static int open_gauge(struct gauge *g, const struct site *site, struct sh_err *e
     const uint32_t n_points = RUN * site_points_per_pulse(site);
     *g = (struct gauge){.key = rng_key(1, RNG_PLAN)};
     site_look_open(&g->look, site);
-    g->frame_bytes = native_points_bound(n_points) + native_attributes_bound(n_points) + native_colours_bound(n_points);
+    const struct site_wave_room room = site_wave_room(site, RUN);
+    g->frame_bytes = native_points_bound(n_points) + native_attributes_bound(n_points) +
+                     native_colours_bound(n_points) + native_waves_bound(n_points, room.windows, room.samples);
     g->frame = malloc(g->frame_bytes);
     int rc = g->frame != NULL ? caster_create(&g->caster, err) : sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = line_block_alloc(&g->block, n_points, err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&g->block, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(&g->block, err);
+    if (rc == SH_OK) rc = site_add_waves(site, RUN, g->caster, &g->block, err);
     return rc;
 }
 

@@ -11,6 +11,7 @@
 #include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/profile.h"
+#include "firmware_sim/site/waves.h"
 
 void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec)
 {
@@ -192,6 +193,7 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->pulse_m = site->detect.cast.separation_m;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
+    setup->waves = site->waves != NULL ? &site->waves->cast : NULL;
     setup->colour = site->cfg->output.colour != COLOUR_NONE ? &s->colour : NULL;
 }
 

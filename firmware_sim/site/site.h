@@ -20,6 +20,7 @@
 #include "firmware_sim/site/placement.h"
 
 struct config;
+struct site_waves;
 
 /* Points of the geo layout along one stretch of a head's path: about its centre. */
 struct site_leg {
@@ -139,6 +140,7 @@ struct site {
     uint32_t legs_label;
     uint8_t *silent; /* by label: hides and gives no echo; NULL: none (scene.target) */
     struct site_detect detect;
+    struct site_waves *waves; /* waveforms (waves.h); NULL: none */
     struct site_colours colours;
     struct site_plan plan;
     uint32_t planned_frames; /* of a scan, as the plan counts its pulses; a run may scan on (--duration) */

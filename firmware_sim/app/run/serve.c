@@ -139,6 +139,7 @@ static void put_stats(struct json *json, const void *ctx)
     json_uint(json, "crowded_echoes", c->crowded);
     json_uint(json, "faint_hits", c->faint);
     json_uint(json, "unfit_echoes", c->unfit);
+    json_uint(json, "lost_samples", c->lost_samples);
     json_uint(json, "reader_lost_frames", c->reader_lost_frames);
     json_uint(json, "reader_lost_pulses", c->reader_lost_pulses);
     json_uint(json, "late_blocks", c->late_blocks);
@@ -158,7 +159,7 @@ void run_warn_losses(const struct device_counters *c)
 {
     if (c->lost_pulses != 0)
         sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
-    app_warn_left_out(c->crowded, c->unfit);
+    app_warn_left_out(c->crowded, c->unfit, c->lost_samples);
     app_warn_empty(c->pulses, c->echoes, c->faint);
     if (c->reader_lost_frames != 0)
         sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",

@@ -146,7 +146,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     char order[256];
     if (recording_describe_order(result, order, sizeof order))
         sh_warn(&app_report_stderr, "the stream was not in order: %s", order);
-    app_warn_left_out(result->crowded, result->unfit);
+    app_warn_left_out(result->crowded, result->unfit, result->lost_samples);
     if (rc == SH_OK) warn_of_little(r);
     return rc == SH_OK ? recording_check_complete(result, err) : rc;
 }

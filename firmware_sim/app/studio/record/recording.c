@@ -90,6 +90,12 @@ static void count_line(struct recording *r, const struct scanhead_frame *frame)
     r->result->unfit += end.n_unfit;
 }
 
+static void count_waves(struct recording *r, const struct scanhead_frame *frame)
+{
+    const int64_t lost = scanhead_waves_lost(r->sh, frame);
+    if (lost > 0) r->result->lost_samples += (uint64_t)lost;
+}
+
 static int has_lost_frames(const struct recording *r)
 {
     struct scanhead_stats stats;
@@ -130,6 +136,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
     if (frame->type == SCANHEAD_DESCRIPTOR) r->scan_s = progress_scan_s(frame);
     if (frame->type == SCANHEAD_EMITTER) r->scan_s *= lines_of_frame(r->sh);
     if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
+    if (frame->type == SCANHEAD_WAVES) count_waves(r, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_SCAN_START) {
         r->scan_t0_ns = (int64_t)frame->event_value[1];

@@ -43,6 +43,7 @@ struct recording_result {
     uint64_t with_reflectance;      /* points whose reflectance is modelled */
     struct recording_counts counts; /* of pulses and scans */
     uint64_t crowded, faint, unfit; /* hits that are no echoes, as the line ends count them */
+    uint64_t lost_samples;          /* of waveforms: no room in the head */
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
     double wall_s;                  /* how long the recording took */
     struct scanhead_stats stream;   /* as the client counts */

@@ -20,6 +20,7 @@ void recording_add(struct recording_result *sum, const struct recording_result *
     sum->counts.left_out += more->counts.left_out;
     sum->counts.missing += more->counts.missing;
     sum->crowded += more->crowded;
+    sum->lost_samples += more->lost_samples;
     sum->faint += more->faint;
     sum->unfit += more->unfit;
     sum->replugs += more->replugs;
@@ -56,6 +57,7 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "crowded_echoes", result->crowded);
     json_uint(json, "faint_hits", result->faint);
     json_uint(json, "unfit_echoes", result->unfit);
+    json_uint(json, "lost_samples", result->lost_samples);
     json_uint(json, "replugs", result->replugs);
     json_uint(json, "bus_resets", result->bus_resets);
     json_double(json, "wall_s", result->wall_s);

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to core/cast: this stage samples the light that comes back of pulses (core/waveform.h). Where a head is set
+ * so, it finds the echoes in these samples. Only chunks with waveforms have it. */
+#ifndef CORE_CAST_WAVES_H
+#define CORE_CAST_WAVES_H
+
+#include "core/cast/chunk_arrays.h"
+#include "core/waveform.h"
+
+enum {
+    WAVES_PARTS = 64, /* of a pulse: returns that are told apart */
+    WAVES_ROOM = 4 * WAVEFORM_MAX_SAMPLES,
+};
+
+/* A return of a pulse before it is merged with others. */
+struct wave_part {
+    double range_m, back, extent_m; /* back: as in struct beam_return */
+    uint32_t label, colour;
+    enum waveform_spread spread;
+};
+
+/* Working memory of a thread. */
+struct wave_work {
+    /* Pulses with returns of their own: part[first .. first + n]. All others have the one return that is their entry of
+     * the list. */
+    struct {
+        uint32_t first, n;
+        int own;
+    } of[CHUNK];
+    struct wave_part part[CHUNK * WAVES_PARTS];
+    uint32_t n_parts;
+    uint8_t merged[CHUNK]; /* where echoes are found: how many the returns would have made */
+    /* of the pulse at hand: */
+    struct waveform_return returns[WAVES_PARTS];
+    struct waveform_record record;
+    uint16_t sample[WAVES_ROOM];
+};
+
+struct beam_return;
+struct caster;
+struct chunk;
+
+/* Before the first stage of a chunk. */
+void waves_begin(struct caster *c, const struct chunk *k);
+/* The returns of a pulse with sub-rays, in any order; they may change places. */
+void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse, struct beam_return *returns,
+                        uint32_t n);
+/* The returns of single rays through glass and off mirrors, before the list has them merged. */
+void waves_take_paths(struct caster *c, const struct chunk *k);
+/* The samples go into the block, if it has room for waveforms. Where echoes are found in them, these replace those of
+ * the list. */
+void caster_waves(struct caster *c, const struct chunk *k);
+
+#endif

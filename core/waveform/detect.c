@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: MIT */
+/* The way of a pulse's samples to echoes: counts become signals, windows are searched for maxima, maxima that run into
+ * each other are decomposed together. */
+#include "core/waveform/detect_inside.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/light.h"
+#include "core/waveform/waveform_inside.h"
+
+/* Signals of a window's samples. Returns the largest. */
+static double detect_signals(const struct finder *finder, double baseline, const uint16_t *sample, uint32_t n,
+                             double *y)
+{
+    uint16_t most = 0;
+    for (uint32_t i = 0; i < n; i++)
+        most = sample[i] > most ? sample[i] : most;
+    for (uint32_t i = 0; i < n; i++)
+        y[i] = ((double)sample[i] - baseline) * finder->signal;
+    return ((double)most - baseline) * finder->signal;
+}
+
+/* Marks samples that are limited, and those in which the receiver is blind. *until: number on the pulse's grid of the
+ * first sample that is not blind any more; it goes on from window to window. */
+static void detect_mark(const struct finder *finder, const struct waveform_window *window, double *y, uint8_t *mark,
+                        uint32_t *until)
+{
+    for (uint32_t i = 0; i < window->n; i++) {
+        mark[i] = FINDER_PLAIN;
+        if (y[i] >= finder->limit) {
+            mark[i] = FINDER_LIMITED;
+            *until = window->first + i + 1 + finder->blind;
+        } else if (window->first + i < *until) {
+            mark[i] = FINDER_BLIND;
+            if (i > 0) y[i] = y[i - 1];
+        }
+    }
+}
+
+/* A maximum stands out by 4.2 sigma: of the difference of two samples 3 sigma, so one sample in 700 of noise around a
+ * flat top does. It also stands out by 15 %, which the shape of an echo on a plane never does. */
+static double detect_prominence(const struct finder *finder, double y)
+{
+    return fmax(4.2 * finder->noise, 0.15 * y);
+}
+
+uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most)
+{
+    uint32_t n = 0, top = 0, valley = 0;
+    int rising = 1;
+    for (uint32_t i = 0; i < run->n; i++) {
+        const double y = run->y[i];
+        if (rising) {
+            if (y > run->y[top]) top = i;
+            if (i + 1 < run->n && y > run->y[top] - detect_prominence(run->finder, run->y[top])) continue;
+            rising = 0;
+            /* After a blind start of a window the signal falls: its maximum was not seen. */
+            int hidden = run->mark != NULL && top > 0 && run->mark[top] != FINDER_LIMITED &&
+                         run->mark[top - 1] == FINDER_BLIND;
+            if (run->y[top] >= least && !hidden) {
+                if (n < most) peak[n] = (struct finder_peak){top, valley, run->n};
+                if (n > 0 && n < most) peak[n - 1].to = valley + 1;
+                n++;
+            }
+            valley = i;
+        } else if (y <= run->y[valley]) {
+            valley = i;
+        } else if (y - run->y[valley] > detect_prominence(run->finder, y)) {
+            rising = 1;
+            top = i;
+        }
+    }
+    return n;
+}
+
+/* The crossing of a level between sample a, which is below it, and its neighbour b, which is not. Near half of the peak
+ * a Gaussian bends by 0.193 of its peak over sigma^2 (v^2 - 1 at v^2 = 2 ln 2, times a half). */
+static double detect_crossing(const double *y, uint32_t a, uint32_t b, double level, double bend)
+{
+    double step = y[b] - y[a], u = (level - y[a]) / step;
+    u = fmin(1.0, u + 0.5 * u * (1.0 - u) * bend / step);
+    return (double)a + u * ((double)b - (double)a);
+}
+
+int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2])
+{
+    const double level = 0.5 * height;
+    uint32_t a = peak->top, b = peak->top;
+    while (a > peak->from && run->y[a] >= level)
+        a--;
+    while (b + 1 < peak->to && run->y[b] >= level)
+        b++;
+    int left = run->y[a] < level, right = run->y[b] < level;
+    double sigma = fmax(((double)b - (double)a - 1.0) / FINDER_FWHM, 0.4), bend = 0.193 * height / (sigma * sigma);
+    if (left) side[0] = detect_crossing(run->y, a, a + 1, level, bend);
+    if (right) side[1] = detect_crossing(run->y, b, b - 1, level, bend);
+    if (!left) side[0] = right ? 2.0 * (double)peak->top - side[1] : (double)a;
+    if (!right) side[1] = left ? 2.0 * (double)peak->top - side[0] : (double)b;
+    return left + right;
+}
+
+/* Maxima are one mixture where the signal between them stays above noise, and above 2 % of the smaller one. */
+static int detect_joined(const struct finder_run *run, const struct finder_peak *before, const struct finder_peak *after)
+{
+    double smaller = fmin(run->y[before->top], run->y[after->top]);
+    return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);
+}
+
+static int detect_limited(const struct finder_run *run, const struct finder_peak *peak)
+{
+    return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
+}
+
+static void detect_gaussians(const struct finder_run *run, double level, struct finder_list *list)
+{
+    struct finder_peak peak[FINDER_PEAKS];
+    const struct finder *finder = run->finder;
+    /* Noise may lower all samples of an echo that just reaches the level, and the largest lies half a sample from its top. */
+    double least = level * finder->peak - 3.0 * finder->noise;
+    least = fmax(least, 0.5 * level * finder->peak);
+    uint32_t n = finder_peaks(run, least, peak, FINDER_PEAKS), end;
+    if (n > FINDER_PEAKS) {
+        list->crowded += n - FINDER_PEAKS;
+        n = FINDER_PEAKS;
+    }
+    for (uint32_t i = 0; i < n; i = end) {
+        struct finder_mix mix = {.n = 1};
+        for (end = i + 1; end < n && end - i < FINDER_MIX && detect_joined(run, &peak[end - 1], &peak[end]);)
+            end++;
+        if (end > i + 1 || detect_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
+            finder_decompose(run, &peak[i], end - i, level, &mix);
+        for (uint32_t j = 0; j < mix.n; j++)
+            finder_add_gaussian(run, &mix, j, level, list);
+    }
+}
+
+/* Echoes of all detectors in the order of range. Where there is no room, the weakest is left out. */
+static void detect_put(struct finder_list *list, const struct waveform_echo *echo)
+{
+    if (list->n == list->most) {
+        list->crowded++;
+        uint32_t weakest = 0;
+        for (uint32_t i = 1; i < list->n; i++)
+            if (list->echo[i].amplitude < list->echo[weakest].amplitude) weakest = i;
+        if (list->n == 0 || list->echo[weakest].amplitude >= echo->amplitude) return;
+        list->n--;
+        memmove(list->echo + weakest, list->echo + weakest + 1, (list->n - weakest) * sizeof *echo);
+    }
+    uint32_t at = list->n++;
+    for (; at > 0 && list->echo[at - 1].range_m > echo->range_m; at--)
+        list->echo[at] = list->echo[at - 1];
+    list->echo[at] = *echo;
+}
+
+/* h over its peak, x samples after its centroid. */
+static double detect_shape(const struct finder *finder, double x)
+{
+    double place = (x / finder->width + FINDER_SHAPE_LEAD) / FINDER_SHAPE_STEP;
+    if (!(place >= 0.0 && place < FINDER_SHAPE - 1)) return 0.0;
+    uint32_t k = (uint32_t)place;
+    return finder->shape[k] + (place - k) * (finder->shape[k + 1] - finder->shape[k]);
+}
+
+static double detect_others(const struct finder_mix *mix, uint32_t self, double x)
+{
+    double sum = 0.0;
+    for (uint32_t j = 0; mix != NULL && j < mix->n; j++) {
+        double d = (x - mix->g[j].at) / mix->g[j].sigma;
+        if (j != self && fabs(d) < 6.0) sum += mix->g[j].peak * exp(-0.5 * d * d);
+    }
+    return sum;
+}
+
+/* RMS about h within an echo's width on both sides of its centroid, over its peak. */
+static double detect_deviation(const struct finder_run *run, const struct finder_found *found,
+                               const struct finder_mix *mix, uint32_t self)
+{
+    double lo = fmax(0.0, ceil(found->at - found->width)), hi = fmin(run->n - 1.0, floor(found->at + found->width));
+    double sum = 0.0;
+    uint32_t n = 0;
+    const int alone = mix == NULL || mix->n == 1;
+    for (double x = lo; x <= hi; x += 1.0) {
+        uint32_t i = (uint32_t)x;
+        if (run->mark != NULL && run->mark[i] != FINDER_PLAIN) continue;
+        double rest = run->y[i] - found->peak * detect_shape(run->finder, x - found->at);
+        if (!alone) rest -= detect_others(mix, self, x);
+        sum += rest * rest;
+        n++;
+    }
+    return n > 0 ? sqrt(sum / n) / found->peak : 0.0;
+}
+
+void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
+                uint32_t self, struct finder_list *list)
+{
+    const struct finder *finder = run->finder;
+    const struct waveform_echo echo = {
+        .range_m = (run->first + found->at) * finder->metre,
+        .amplitude = found->peak / finder->peak,
+        .width_s = found->width * 2.0 * finder->metre / LIGHT_SPEED_M_S,
+        .deviation = detect_deviation(run, found, mix, self),
+        .saturated = found->saturated,
+    };
+    detect_put(list, &echo);
+}
+
+void finder_add_gaussian(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+                         struct finder_list *list)
+{
+    const struct finder_gaussian *g = &mix->g[self];
+    struct finder_spread spread;
+    finder_by_sigma(run->finder, g->sigma, &spread);
+    const struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,
+                                       (int)(mix->limited >> self & 1)};
+    if (found.peak >= level * run->finder->peak) finder_add(run, &found, mix, self, list);
+}
+
+uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
+                         const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
+                         uint32_t *n_crowded)
+{
+    const struct finder *finder = &waveform->finder;
+    const double baseline = waveform_spec_of(waveform)->baseline_counts;
+    struct finder_list list = {.echo = echoes, .most = most};
+    double y[WAVEFORM_MAX_SAMPLES];
+    uint8_t mark[WAVEFORM_MAX_SAMPLES];
+    uint32_t until = 0;
+    for (uint32_t w = 0; w < record->n_windows; w++) {
+        const struct waveform_window *window = &record->window[w];
+        struct finder_run run = {finder, y, window->n, NULL, window->first};
+        double top = detect_signals(finder, baseline, record->sample + window->at, window->n, y);
+        if (top >= finder->limit || window->first < until) {
+            detect_mark(finder, window, y, mark, &until);
+            run.mark = mark;
+        }
+        if (top < 0.5 * level * finder->peak) continue;
+        if (detector == WAVEFORM_THRESHOLD) finder_threshold(&run, level, &list);
+        if (detector == WAVEFORM_FRACTION) finder_fraction(&run, level, &list);
+        if (detector == WAVEFORM_GAUSSIANS) detect_gaussians(&run, level, &list);
+    }
+    *n_crowded += list.crowded;
+    return list.n;
+}

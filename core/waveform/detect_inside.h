@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: MIT */
+/* Shared by the detectors: a window as signals, how the pulse's echoes look to a detector, and the echoes found.
+ *
+ * Places and widths count in samples, from the first sample of the window; signals in thresholds. An echo's place is
+ * its centroid, since that is its range (waveform.h).
+ *
+ * Pure, as waveform_detect is. Nothing here allocates. */
+#ifndef CORE_WAVEFORM_DETECT_INSIDE_H
+#define CORE_WAVEFORM_DETECT_INSIDE_H
+
+#include <stdint.h>
+
+#include "core/waveform.h"
+
+enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 385, FINDER_MIX = 8, FINDER_PEAKS = 64 };
+#define FINDER_NEAR       2.5   /* sigmas about its centre: there one Gaussian is fitted */
+#define FINDER_LEAST      0.75  /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
+#define FINDER_ROUGH      0.003 /* of a peak: how far samples at any phase leave the learned misfit */
+#define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
+#define FINDER_LEAD_STEP  0.08
+#define FINDER_SHAPE_STEP (1.0 / 32.0) /* widths of the pulse */
+#define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
+
+struct finder_gaussian {
+    double at, sigma, peak;
+};
+
+/* An echo of a plane that is tilted so far, without noise: its true figures beside those of the Gaussian that fits it
+ * best. A real head is adjusted on such targets. */
+struct finder_spread {
+    double sigma;     /* of that Gaussian */
+    double lag;       /* from the echo's centroid to that Gaussian's centre */
+    double gain;      /* the echo's peak over that Gaussian's */
+    double width;     /* of the echo, full at half maximum */
+    double half_lead; /* from the echo's rising half maximum to its centroid */
+    double misfit;    /* RMS of echo minus Gaussian near its centre, over its peak */
+    double tail;      /* most of echo minus Gaussian further out, over its peak */
+};
+
+/* What detectors know of the pulse h. Constant after finder_learn. */
+struct finder {
+    double peak;    /* of h */
+    double width;   /* of h, full at half maximum */
+    double signal;  /* of one count */
+    double noise;   /* sigma of a sample, digits included */
+    double limit;   /* a sample from here on is limited */
+    uint32_t blind; /* samples without signal after a limited one */
+    double metre;   /* range of one sample */
+    struct finder_spread spread[FINDER_SPREADS]; /* by growing tilt; the first is a plane that is hit head on */
+    double lead[FINDER_LEADS];  /* by v: from the first crossing of exp(-v v / 2) of h's peak to its centroid */
+    double shape[FINDER_SHAPE]; /* h over its peak */
+};
+
+/* Fills `finder` from the signals of a waveform that is otherwise complete. */
+void finder_learn(const struct waveform *waveform, struct finder *finder);
+/* The echo whose Gaussian has this sigma, and the one of this width. */
+void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread);
+void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread);
+
+enum finder_mark { FINDER_PLAIN, FINDER_LIMITED, FINDER_BLIND };
+
+/* The samples of one window. A blind sample has the value of the limit, so that no echo seems to begin after it. */
+struct finder_run {
+    const struct finder *finder;
+    const double *y; /* [n] */
+    uint32_t n;
+    const uint8_t *mark; /* [n] enum finder_mark; NULL: all are plain */
+    double first;        /* number of its first sample on the pulse's grid */
+};
+
+/* A local maximum that noise does not explain. Samples from .. to - 1 reach to the minima on both sides of it. */
+struct finder_peak {
+    uint32_t top, from, to;
+};
+/* Those of at least `least`; at most `most`. Returns their number, with those that found no room. */
+uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most);
+/* Where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side where it
+ * doesn't, that of the other side is mirrored. Returns how many sides were seen. */
+int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2]);
+
+struct finder_list {
+    struct waveform_echo *echo;
+    uint32_t most, n, crowded;
+};
+struct finder_found {
+    double at, peak, width;
+    int saturated;
+};
+/* A sum of Gaussians. `open`: bit j is set where component j is limited, or cut by the window's end. */
+struct finder_mix {
+    uint32_t n, open, limited; /* limited: the same bits, only of those that are limited */
+    struct finder_gaussian g[FINDER_MIX];
+    double chi2;
+};
+
+/* Adds an echo. Its deviation is about h, after the other components of its mixture have been taken away. */
+void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
+                uint32_t self, struct finder_list *list);
+/* Adds what a Gaussian, component `self` of a mixture, stands for, if that reaches the level. */
+void finder_add_gaussian(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+                         struct finder_list *list);
+
+/* One Gaussian through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its last. */
+int finder_fit(const struct finder_run *run, const struct finder_peak *peak, struct finder_gaussian *g);
+/* The plain fit without that decision: -1 where it fails, else the RMS of what is left. */
+double finder_fit_near(const struct finder_run *run, const struct finder_peak *peak, struct finder_gaussian *g);
+
+/* The samples lo .. hi that a mixture is fitted to; variance: of one sample. */
+struct finder_task {
+    const struct finder_run *run;
+    uint32_t lo, hi;
+    double variance;
+};
+/* Moves the components to the least sum of squares near by, which becomes chi2. */
+void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
+/* rest[hi - lo + 1]: what the components leave of the samples. */
+void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
+/* Begins with one component a peak, and adds more while what is left over could be another echo of this level; INFINITY:
+ * adds none. Where a top is not seen, its flanks decide. */
+void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
+                      struct finder_mix *mix);
+
+void finder_threshold(const struct finder_run *run, double level, struct finder_list *list);
+void finder_fraction(const struct finder_run *run, double level, struct finder_list *list);
+
+#endif

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: MIT */
+/* How the pulse's echoes look to the detectors: measured once on signals without noise, as a head is adjusted on targets. */
+#include "core/waveform/detect_inside.h"
+
+#include <math.h>
+
+#include "core/light.h"
+#include "core/waveform/waveform_inside.h"
+
+enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
+/* Extent of each tilt, in widths of the pulse. */
+static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
+
+/* An echo on a grid of its own: y[i] lies `from` + i `step` samples after its centroid. */
+struct learn_echo {
+    double from, step, y[LEARN_ROOM];
+    uint32_t n, top;
+};
+
+/* The signal of an echo of amplitude 1, x samples after its centroid. */
+static double learn_signal(const struct waveform *waveform, double metre, double extent_m, double x)
+{
+    const double far_m = 1024.0 * metre;
+    const struct waveform_return part = {far_m, 1.0, extent_m, extent_m > 0.0 ? WAVEFORM_DISC : WAVEFORM_POINT};
+    return waveform_signal(waveform, &part, 1, far_m + x * metre);
+}
+
+static void learn_sample(const struct waveform *waveform, double metre, double extent_m, struct learn_echo *echo)
+{
+    echo->top = 0;
+    for (uint32_t i = 0; i < echo->n; i++) {
+        echo->y[i] = learn_signal(waveform, metre, extent_m, echo->from + i * echo->step);
+        if (echo->y[i] > echo->y[echo->top]) echo->top = i;
+    }
+}
+
+/* Width and rising half maximum of what was sampled, in its steps. */
+static double learn_half(const struct finder *finder, const struct learn_echo *echo, double *rise)
+{
+    const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
+    const struct finder_peak peak = {echo->top, 0, echo->n};
+    double side[2];
+    (void)finder_half(&run, &peak, echo->y[echo->top], side);
+    *rise = side[0];
+    return side[1] - side[0];
+}
+
+/* Peak and width of h, from the sight of a first guess: its area over its value at the centroid. */
+static void learn_pulse(const struct waveform *waveform, struct finder *finder, struct learn_echo *echo)
+{
+    const double sample_s = waveform_spec_of(waveform)->sample_s, metre = finder->metre;
+    double guess = waveform_pulse_area_s(waveform) / sample_s / learn_signal(waveform, metre, 0.0, 0.0), rise;
+    for (int i = 0; i < 2; i++) {
+        echo->n = LEARN_ROOM;
+        echo->step = 16.0 * guess / LEARN_ROOM;
+        echo->from = -8.0 * guess;
+        learn_sample(waveform, metre, 0.0, echo);
+        guess = finder->width = learn_half(finder, echo, &rise) * echo->step;
+    }
+    finder->peak = echo->y[echo->top];
+}
+
+/* Crossings of falling levels, from the top outward: each is where h is last below the level before its peak. */
+static void learn_leads(struct finder *finder, const struct learn_echo *echo)
+{
+    uint32_t i = echo->top;
+    for (uint32_t k = 0; k < FINDER_LEADS; k++) {
+        const double v = k * FINDER_LEAD_STEP, level = exp(-0.5 * v * v) * echo->y[echo->top];
+        while (i > 0 && echo->y[i] >= level)
+            i--;
+        double below = echo->y[i], above = echo->y[i + 1];
+        double u = k > 0 && above > level && below < level ? (level - below) / (above - below) : 1.0;
+        finder->lead[k] = -(echo->from + (i + u) * echo->step);
+    }
+}
+
+static void learn_shape(const struct waveform *waveform, struct finder *finder)
+{
+    for (uint32_t i = 0; i < FINDER_SHAPE; i++) {
+        double x = (i * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
+        finder->shape[i] = learn_signal(waveform, finder->metre, 0.0, x) / finder->peak;
+    }
+}
+
+/* The Gaussian of an echo, and what it leaves. */
+static void learn_fit(const struct finder *finder, const struct learn_echo *echo, struct finder_spread *spread)
+{
+    const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
+    const struct finder_peak peak = {echo->top, 0, echo->n};
+    const double top = echo->y[echo->top];
+    struct finder_gaussian g;
+    double rms = finder_fit_near(&run, &peak, &g), rise;
+    spread->sigma = g.sigma * echo->step;
+    spread->lag = echo->from + g.at * echo->step;
+    spread->gain = top / g.peak;
+    spread->misfit = fmax(rms, 0.0) / top;
+    spread->width = learn_half(finder, echo, &rise) * echo->step;
+    spread->half_lead = -(echo->from + rise * echo->step);
+    spread->tail = 0.0;
+    for (uint32_t i = 0; i < echo->n; i++) {
+        double d = (i - g.at) / g.sigma, rest = echo->y[i] - g.peak * exp(-0.5 * d * d);
+        if (fabs(d) > FINDER_NEAR) spread->tail = fmax(spread->tail, rest / top);
+    }
+}
+
+void finder_learn(const struct waveform *waveform, struct finder *finder)
+{
+    const struct waveform_spec *spec = waveform_spec_of(waveform);
+    const double most = (double)((1U << spec->bits) - 1);
+    struct learn_echo echo;
+    finder->metre = 0.5 * LIGHT_SPEED_M_S * spec->sample_s;
+    finder->signal = spec->full_scale / (most - spec->baseline_counts);
+    finder->noise = 0.0; /* of what follows */
+    finder->limit = INFINITY;
+    finder->blind = (uint32_t)(spec->dead_s / spec->sample_s + 1e-9);
+    learn_pulse(waveform, finder, &echo);
+    learn_leads(finder, &echo);
+    learn_shape(waveform, finder);
+    for (uint32_t k = 0; k < FINDER_SPREADS; k++) {
+        const double extent = learn_tilts[k] * finder->width;
+        echo.step = finder->width * fmax(1.0, 0.5 * learn_tilts[k]) / LEARN_STEPS;
+        echo.from = -(extent + 3.0 * finder->width);
+        echo.n = (uint32_t)((2.0 * extent + 8.0 * finder->width) / echo.step);
+        learn_sample(waveform, finder->metre, extent * finder->metre, &echo);
+        learn_fit(finder, &echo, &finder->spread[k]);
+    }
+    finder->noise = sqrt(spec->noise * spec->noise + finder->signal * finder->signal / 12.0);
+    finder->limit = (most - spec->baseline_counts - 0.5) * finder->signal;
+    /* Noise comes after the receiver's limit: it lowers one sample in 740 below this. */
+    if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 3.0 * finder->noise);
+}
+
+/* Between tilts k and k + 1 by u. */
+static void learn_between(const struct finder *finder, uint32_t k, double u, struct finder_spread *spread)
+{
+    const struct finder_spread *a = &finder->spread[k], *b = a + 1;
+    *spread = (struct finder_spread){
+        .sigma = a->sigma + u * (b->sigma - a->sigma),
+        .lag = a->lag + u * (b->lag - a->lag),
+        .gain = a->gain + u * (b->gain - a->gain),
+        .width = a->width + u * (b->width - a->width),
+        .half_lead = a->half_lead + u * (b->half_lead - a->half_lead),
+        .misfit = fmax(a->misfit, b->misfit),
+        .tail = fmax(a->tail, b->tail),
+    };
+}
+
+/* Beyond the ends sigma, width and half_lead keep their ratios. */
+static void learn_stretch(const struct finder_spread *end, double ratio, struct finder_spread *spread)
+{
+    *spread = *end;
+    spread->sigma *= ratio;
+    spread->width *= ratio;
+    spread->half_lead *= ratio;
+}
+
+void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread)
+{
+    const struct finder_spread *s = finder->spread, *end = &s[FINDER_SPREADS - 1];
+    uint32_t k = 0;
+    if (sigma <= s->sigma || sigma >= end->sigma) {
+        const struct finder_spread *near = sigma <= s->sigma ? s : end;
+        learn_stretch(near, sigma / near->sigma, spread);
+        return;
+    }
+    while (sigma > s[k + 1].sigma)
+        k++;
+    learn_between(finder, k, (sigma - s[k].sigma) / (s[k + 1].sigma - s[k].sigma), spread);
+}
+
+void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread)
+{
+    const struct finder_spread *s = finder->spread, *end = &s[FINDER_SPREADS - 1];
+    uint32_t k = 0;
+    if (width <= s->width || width >= end->width) {
+        const struct finder_spread *near = width <= s->width ? s : end;
+        learn_stretch(near, width / near->width, spread);
+        return;
+    }
+    while (width > s[k + 1].width)
+        k++;
+    learn_between(finder, k, (width - s[k].width) / (s[k + 1].width - s[k].width), spread);
+}

@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: MIT */
+/* The outgoing pulse, the receiver's bandwidth, and both together as a fine table. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/waveform/waveform_inside.h"
+
+/* sigma of a Gaussian of width 1, full at half maximum */
+#define SIGMA_1 0.42466090014400953
+/* Beyond so many sigmas a Gaussian is below 1e-9 of its peak. */
+#define GAUSSIAN_END 6.5
+/* An asymmetric pulse ends where it has fallen to this: its tail is long. */
+#define TAIL_LEAST 1e-6
+
+enum { MIN_PHASES = 4, MAX_PHASES = 256, STEPS_PER_SCALE = 16, EDGE_STEPS = 4 };
+
+/* The outgoing pulse from .. to, s after its peak; scale: sigma of the shortest in it. */
+struct outgoing {
+    const struct waveform_spec *spec;
+    double from_s, to_s, scale_s;
+};
+
+/* The log-normal pulse with its peak of 1 at 0: exp(-ln 2 (ln(1 + a t) / ln s)^2), a = (s - 1/s) / width. Half of the
+ * peak is reached at ln(1 + a t) = -ln s and ln s, so the time from the peak to the half on the falling side is s times
+ * that on the rising side, and both together are the width. With s -> 1 it is the Gaussian. */
+static double log_normal(double t_s, double width_s, double skew)
+{
+    const double s = fmax(skew, 1.0 + 1e-6), x = (s - 1.0 / s) / width_s * t_s;
+    if (x <= -1.0) return 0.0;
+    const double y = log1p(x) / log(s);
+    return exp(-M_LN2 * y * y);
+}
+
+static double table_at(const struct waveform_spec *spec, double t_s)
+{
+    double at = t_s / spec->table_step_s;
+    if (!(at >= 0.0) || at > spec->n_table - 1) return 0.0;
+    uint32_t i = (uint32_t)at < spec->n_table - 1 ? (uint32_t)at : spec->n_table - 2;
+    return spec->table[i] + (spec->table[i + 1] - spec->table[i]) * (at - i);
+}
+
+static double outgoing_at(const struct outgoing *o, double t_s)
+{
+    const struct waveform_spec *spec = o->spec;
+    if (t_s < o->from_s || t_s > o->to_s) return 0.0;
+    if (spec->shape == WAVEFORM_TABLE) return table_at(spec, t_s);
+    if (spec->shape == WAVEFORM_ASYMMETRIC) return log_normal(t_s, spec->width_s, spec->skew);
+    double x = t_s / (SIGMA_1 * spec->width_s);
+    return exp(-0.5 * x * x);
+}
+
+static void outgoing_init(struct outgoing *o, const struct waveform_spec *spec)
+{
+    const double s = fmax(spec->skew, 1.0 + 1e-6), tail = pow(s, sqrt(-log(TAIL_LEAST) / M_LN2));
+    o->spec = spec;
+    switch (spec->shape) {
+    case WAVEFORM_TABLE: /* How fine its features are is not known. What the sampling resolves counts. */
+        o->from_s = 0.0;
+        o->to_s = (spec->n_table - 1) * spec->table_step_s;
+        o->scale_s = 0.6 * spec->sample_s;
+        break;
+    case WAVEFORM_ASYMMETRIC:
+        o->from_s = (1.0 / tail - 1.0) * spec->width_s / (s - 1.0 / s);
+        o->to_s = (tail - 1.0) * spec->width_s / (s - 1.0 / s);
+        o->scale_s = 2.0 * SIGMA_1 * spec->width_s / (1.0 + s); /* the rising side */
+        break;
+    case WAVEFORM_GAUSSIAN:
+        o->scale_s = SIGMA_1 * spec->width_s;
+        o->to_s = GAUSSIAN_END * o->scale_s;
+        o->from_s = -o->to_s;
+        break;
+    }
+}
+
+/* sigma of the receiver's answer to an impulse. A Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to which chains of many
+ * stages tend; it is centred on what Elmore calls the delay, so it delays nothing here (W. C. Elmore, The transient
+ * response of damped linear networks, J. Appl. Phys. 19, 1948). */
+static double receiver_sigma_s(double bandwidth_hz)
+{
+    return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
+}
+
+/* h on n steps, the first of them at from_s. */
+static int convolve(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
+{
+    const uint32_t half = (uint32_t)ceil(GAUSSIAN_END * sigma_s / step_s), m = 2 * half + 1;
+    double *g = malloc(m * sizeof *g), sum = 0.0;
+    if (g == NULL) return SH_ENOMEM;
+    for (uint32_t j = 0; j < m; j++) {
+        double x = sigma_s > 0.0 ? ((double)j - half) * step_s / sigma_s : 0.0;
+        sum += g[j] = exp(-0.5 * x * x);
+    }
+    memset(h, 0, n * sizeof *h);
+    for (uint32_t i = 0; i < n; i++) {
+        double p = outgoing_at(o, from_s + i * step_s) / sum;
+        if (p == 0.0) continue;
+        for (uint32_t j = i < half ? half - i : 0; j < m && i + j < n + half; j++)
+            h[i + j - half] += p * g[j];
+    }
+    free(g);
+    return SH_OK;
+}
+
+/* The largest deviation of a sum of samples, `apart` steps from each other, from that of all steps, as a part of it. */
+static double ripple(const double *h, uint32_t n, uint32_t apart)
+{
+    double all = 0.0, worst = 0.0;
+    for (uint32_t i = 0; i < n; i++)
+        all += h[i];
+    for (uint32_t phase = 0; phase < apart; phase++) {
+        double sum = 0.0;
+        for (uint32_t i = phase; i < n; i += apart)
+            sum += h[i];
+        worst = fmax(worst, fabs(sum * apart / all - 1.0));
+    }
+    return worst;
+}
+
+static int check_ripple(const struct waveform_spec *spec, const double *h, uint32_t n, uint32_t phases,
+                        struct sh_err *err)
+{
+    const double most = 1e-3, off = ripple(h, n, phases);
+    uint32_t apart = phases;
+    if (off <= most) return SH_OK;
+    while (apart > 1 && ripple(h, n, apart) > most)
+        apart--;
+    return sh_fail(err, SH_EINPUT,
+                   "samples %.4g ns apart are too coarse for this pulse: the energy in them changes by %.2g %% with the "
+                   "range; 0.1 %% is allowed, so at most %.3g ns, or a longer pulse, or a receiver of less bandwidth",
+                   1e9 * spec->sample_s, 1e2 * off, 1e9 * spec->sample_s * apart / phases);
+}
+
+static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, struct waveform_pulse *pulse)
+{
+    double sum = 0.0, moment = 0.0;
+    pulse->h = calloc((size_t)pulse->phases * pulse->pitch, sizeof *pulse->h);
+    if (pulse->h == NULL) return SH_ENOMEM;
+    for (uint32_t i = 0; i < n; i++) {
+        pulse->h[(size_t)(i % pulse->phases) * pulse->pitch + i / pulse->phases] = h[i];
+        sum += h[i];
+        moment += h[i] * i;
+    }
+    pulse->centroid = moment / sum;
+    pulse->area_s = sum * spec->sample_s / pulse->phases;
+    pulse->lead = pulse->centroid / pulse->phases;
+    pulse->lag = (double)n / pulse->phases - pulse->lead;
+    return SH_OK;
+}
+
+int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err)
+{
+    struct outgoing o;
+    const double sigma_s = receiver_sigma_s(spec->bandwidth_hz), end_s = GAUSSIAN_END * sigma_s;
+    outgoing_init(&o, spec);
+    const double scale_s = sqrt(o.scale_s * o.scale_s + sigma_s * sigma_s);
+    const double phases = fmin(MAX_PHASES, fmax(MIN_PHASES, ceil(STEPS_PER_SCALE * spec->sample_s / scale_s)));
+    const double step_s = spec->sample_s / phases, from_s = o.from_s - end_s - EDGE_STEPS * step_s;
+    const double length = ceil((o.to_s + end_s - from_s) / spec->sample_s) + 1.0;
+    if (length > WAVEFORM_MAX_SAMPLES)
+        return sh_fail(err, SH_EINPUT, "the pulse is %.0f samples of %.4g ns long; at most %d are allowed", length,
+                       1e9 * spec->sample_s, WAVEFORM_MAX_SAMPLES);
+    pulse->phases = (uint32_t)phases;
+    pulse->length = (uint32_t)length;
+    pulse->pitch = pulse->length + 1;
+    pulse->scale = scale_s / spec->sample_s;
+    const uint32_t n = pulse->phases * pulse->length;
+    double *h = malloc(n * sizeof *h);
+    int rc = h != NULL ? convolve(&o, from_s, step_s, sigma_s, n, h) : SH_ENOMEM;
+    if (rc == SH_OK) rc = check_ripple(spec, h, n, pulse->phases, err);
+    if (rc == SH_OK) rc = fold(spec, h, n, pulse);
+    free(h);
+    return rc == SH_ENOMEM ? sh_fail(err, rc, "waveform: no memory") : rc;
+}
+
+void waveform_pulse_free(struct waveform_pulse *pulse)
+{
+    free(pulse->h);
+}

@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: MIT */
+/* The samples of one pulse: where its returns reach, which part of that is kept, and what the digitiser makes of it. */
+#include <math.h>
+#include <string.h>
+
+#include "core/rng.h"
+#include "core/vecmath.h"
+#include "core/waveform/waveform_inside.h"
+
+/* Samples begin .. end of the pulse's grid. */
+struct span {
+    int64_t begin, end;
+};
+
+struct sampling {
+    const struct waveform *w;
+    const struct waveform_return *returns;
+    uint32_t n;
+    uint64_t key;
+    struct waveform_record *record;
+    int64_t dead_end; /* samples before it are in a dead time */
+    int limited;      /* the sample before is saturated */
+    double signal[WAVEFORM_MAX_SAMPLES];
+};
+
+/* The windows found in a stretch. */
+struct found {
+    struct span window[WAVEFORM_MAX_WINDOWS];
+    uint32_t n;
+};
+
+/* ---- where there is light */
+
+/* What return i reaches, with what is kept before and behind. Number n is the fixed window, where there is one. */
+static struct span span_of(const struct sampling *s, uint32_t i)
+{
+    const struct waveform *w = s->w;
+    if (i == s->n) return (struct span){w->gate_begin, w->gate_end};
+    const struct waveform_return *r = &s->returns[i];
+    const double centre = r->range_m * w->samples_1_m, reach = waveform_reach(w, r);
+    struct span span = {(int64_t)floor(centre - reach - w->pulse.lead) - w->before,
+                        (int64_t)ceil(centre + reach + w->pulse.lag) + w->after + 1};
+    if (span.begin < 0) span.begin = 0; /* nothing is sampled before the emission */
+    return span;
+}
+
+/* The first stretch from `from` on that returns reach one by one; what begins before `from` is in an earlier one. */
+static int next_stretch(const struct sampling *s, int64_t from, struct span *stretch)
+{
+    const uint32_t n = s->n + (s->w->gate_end > 0);
+    int grown = 1;
+    stretch->begin = INT64_MAX;
+    for (uint32_t i = 0; i < n; i++) {
+        struct span span = span_of(s, i);
+        if (span.begin >= from && span.begin < stretch->begin && span.end > span.begin) *stretch = span;
+    }
+    if (stretch->begin == INT64_MAX) return 0;
+    while (grown) {
+        grown = 0;
+        for (uint32_t i = 0; i < n; i++) {
+            struct span span = span_of(s, i);
+            if (span.begin < stretch->begin || span.begin > stretch->end || span.end <= stretch->end) continue;
+            stretch->end = span.end;
+            grown = 1;
+        }
+    }
+    return 1;
+}
+
+static void sum_returns(struct sampling *s, struct span piece)
+{
+    const uint32_t n = (uint32_t)(piece.end - piece.begin);
+    memset(s->signal, 0, n * sizeof *s->signal);
+    for (uint32_t i = 0; i < s->n; i++)
+        waveform_add(s->w, &s->returns[i], s->returns[i].range_m * s->w->samples_1_m - (double)piece.begin, n,
+                     s->signal);
+}
+
+/* ---- what is kept of it */
+
+static void found_add(struct sampling *s, struct found *found, struct span window)
+{
+    if (window.end <= window.begin) return;
+    if (found->n == WAVEFORM_MAX_WINDOWS)
+        s->record->n_left_out += (uint32_t)(window.end - window.begin);
+    else
+        found->window[found->n++] = window;
+}
+
+/* Windows of a piece of a stretch. Returns where the next piece begins: at a window that this piece cuts, so that the
+ * next has it whole, else so far back that a window can begin there. A window of more samples than a piece is cut. */
+static int64_t find_windows(struct sampling *s, struct span piece, int64_t stretch_end, struct found *found)
+{
+    const struct waveform *w = s->w;
+    const double keep = w->spec.keep;
+    struct span open = {piece.begin, piece.begin};
+    for (int64_t k = piece.begin; k < piece.end; k++) {
+        if (s->signal[k - piece.begin] < keep) continue;
+        struct span at = {k - w->before < piece.begin ? piece.begin : k - w->before, k + w->after + 1};
+        if (at.begin > open.end) {
+            found_add(s, found, open);
+            open.begin = at.begin;
+        }
+        open.end = at.end;
+    }
+    if (piece.end == stretch_end || open.end + w->before < piece.end) {
+        found_add(s, found, open);
+        return piece.end == stretch_end ? stretch_end : piece.end - w->before;
+    }
+    if (open.begin > piece.begin) return open.begin;
+    if (open.end > piece.end) open.end = piece.end;
+    found_add(s, found, open);
+    return open.end;
+}
+
+/* The fixed window, in place of those. */
+static int64_t find_gate(struct sampling *s, struct span piece, struct found *found)
+{
+    const struct span gate = {s->w->gate_begin, s->w->gate_end};
+    if (gate.end <= piece.begin || gate.begin >= piece.end) return piece.end;
+    if (gate.end > piece.end) return gate.begin;
+    found_add(s, found, gate);
+    return piece.end;
+}
+
+/* ---- what the receiver and the digitiser make of it */
+
+/* Limits samples begin .. end of the piece. Saturated samples that follow each other are one saturation, and the dead
+ * time counts from the last of them. */
+static void limit_signal(struct sampling *s, struct span piece, int64_t end)
+{
+    const double most = s->w->spec.saturation;
+    for (int64_t k = piece.begin; k < end && k < piece.end; k++) {
+        double *signal = &s->signal[k - piece.begin];
+        if (k < s->dead_end && !s->limited) {
+            *signal = 0.0;
+        } else if (*signal >= most) {
+            *signal = most;
+            s->limited = 1;
+            s->dead_end = k + 1 + s->w->dead;
+        } else {
+            s->limited = 0;
+            if (k < s->dead_end) *signal = 0.0;
+        }
+    }
+}
+
+VEC_CLONES
+static void digitise(const double *restrict signal, uint32_t n, const double figure[4], uint64_t key,
+                     uint16_t *restrict count)
+{
+    const double baseline = figure[0], counts_1 = figure[1], noise = figure[2], top = figure[3];
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t bits;
+        double x = baseline + counts_1 * (signal[i] + noise * rng_normal_of(rng_mix(key + i * 0x9e3779b97f4a7c15ULL)));
+        x = x > 0.0 ? x : 0.0;
+        vec_round(x < top ? x : top, &bits);
+        count[i] = (uint16_t)bits;
+    }
+}
+
+void waveform_digitise(const struct waveform *w, uint64_t pulse_key, int64_t first, uint32_t n, const double *signal,
+                       uint16_t *count)
+{
+    const double figure[4] = {w->spec.baseline_counts, w->counts_1, w->spec.noise, (double)(1U << w->spec.bits) - 1.0};
+    digitise(signal, n, figure, pulse_key + (uint64_t)first * 0x9e3779b97f4a7c15ULL, count);
+}
+
+static void write_window(struct sampling *s, struct span piece, struct span window)
+{
+    struct waveform_record *record = s->record;
+    const uint32_t n = (uint32_t)(window.end - window.begin);
+    if (record->n_windows == WAVEFORM_MAX_WINDOWS || n > record->capacity - record->n_samples) {
+        record->n_left_out += n;
+        return;
+    }
+    waveform_digitise(s->w, s->key, window.begin, n, s->signal + (window.begin - piece.begin),
+                      record->sample + record->n_samples);
+    record->window[record->n_windows++] = (struct waveform_window){(uint32_t)window.begin, n, record->n_samples};
+    record->n_samples += n;
+}
+
+static void sample_stretch(struct sampling *s, struct span stretch)
+{
+    for (int64_t at = stretch.begin, next; at < stretch.end; at = next) {
+        struct found found = {.n = 0};
+        struct span piece = {at, stretch.end - at > WAVEFORM_MAX_SAMPLES ? at + WAVEFORM_MAX_SAMPLES : stretch.end};
+        sum_returns(s, piece);
+        next = s->w->gate_end > 0 ? find_gate(s, piece, &found) : find_windows(s, piece, stretch.end, &found);
+        if (s->w->spec.saturation > 0.0) limit_signal(s, piece, next);
+        for (uint32_t i = 0; i < found.n; i++)
+            write_window(s, piece, found.window[i]);
+    }
+}
+
+void waveform_sample(const struct waveform *w, uint64_t scan_key, uint64_t pulse, const struct waveform_return *returns,
+                     uint32_t n, struct waveform_record *record)
+{
+    struct sampling s;
+    struct span stretch = {0, 0};
+    s.w = w;
+    s.returns = returns;
+    s.n = n;
+    s.key = rng_u64(w->key ^ scan_key, pulse);
+    s.record = record;
+    s.dead_end = 0;
+    s.limited = 0;
+    record->n_windows = record->n_samples = record->n_left_out = 0;
+    while (next_stretch(&s, stretch.end, &stretch)) {
+        int gated_out = w->gate_end > 0 && (stretch.end <= w->gate_begin || stretch.begin >= w->gate_end);
+        if (!gated_out || w->dead > 0) sample_stretch(&s, stretch);
+    }
+}

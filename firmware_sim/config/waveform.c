@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT */
+/* Full waveforms: checks that concern more than one key, and what they make of a stream. Limits of the digitiser's and
+ * the pulse's figures by themselves are in core/waveform. */
+#include <math.h>
+
+#include "core/light.h"
+#include "drivers/protocol/native_waves.h"
+#include "firmware_sim/config/check_signal.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/table/given.h"
+
+/* What queues of the stream hold of it, 0.3 s and more, must fit into memory. */
+static const double MOST_BYTES_S = 4e8;
+
+static int has_gate(const struct config_waveform *w)
+{
+    return w->near_m < w->far_m;
+}
+
+/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. */
+uint32_t config_wave_samples(const struct config *cfg)
+{
+    const struct config_waveform *w = &cfg->waveform;
+    const double pulse_ns = 3.0 * cfg->profile.pulse_width_ns;
+    const double span_ns =
+        has_gate(w) ? 2e9 / LIGHT_SPEED_M_S * (w->far_m - w->near_m) : w->before_ns + pulse_ns + w->after_ns;
+    return (uint32_t)fmin(floor(span_ns / w->sample_ns) + 1.0, (double)WAVEFORM_MAX_SAMPLES);
+}
+
+double config_wave_bytes_s(const struct config *cfg)
+{
+    if (cfg->head.settings.waves == 0) return 0.0;
+    return config_cast_hz(cfg) * (double)native_wave_len(config_wave_samples(cfg));
+}
+
+/* Keys that only one shape of the pulse has. */
+static void check_pulse(struct cfg_reader *rd, const struct config *cfg)
+{
+    const struct config_waveform *w = &cfg->waveform;
+    const int has_file = w->pulse_file[0] != '\0';
+    if (!CFG_SOUND(rd, 0, "waveform.pulse", "waveform.pulse_file")) return;
+    if (w->pulse == WAVEFORM_TABLE && !has_file)
+        cfg_fail_key(rd, "waveform.pulse", 0, "table, but there is no pulse_file; required is waveform.pulse_file");
+    else if (w->pulse != WAVEFORM_TABLE && has_file)
+        cfg_fail_key(rd, "waveform.pulse_file", 0, "a file, but waveform.pulse is %s; allowed with pulse: table",
+                     cfg_word(rd, "waveform.pulse", (int)w->pulse));
+    else if (w->pulse != WAVEFORM_ASYMMETRIC && cfg_is_given(rd, "waveform.skew", 0))
+        cfg_fail_key(rd, "waveform.skew", 0, "a skew, but waveform.pulse is %s; allowed with pulse: asymmetric",
+                     cfg_word(rd, "waveform.pulse", (int)w->pulse));
+}
+
+static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
+{
+    const double ps = 1e3 * w->sample_ns, steps = 16.0 * w->baseline_counts;
+    if (fabs(ps - rint(ps)) > 1e-6)
+        cfg_fail_key(rd, "waveform.sample_ns", 0, "%.10g is no whole number of ps; allowed 0.05 to 100 in steps of 0.001",
+                     w->sample_ns);
+    if (steps != floor(steps))
+        cfg_fail_key(rd, "waveform.baseline_counts", 0, "%.10g is no multiple of 1/16; allowed 0 to 4095 in such steps",
+                     w->baseline_counts);
+    if (w->dead_ns > 0.0 && w->saturation_db == 0.0 && CFG_SOUND(rd, 0, "waveform.saturation_db"))
+        cfg_fail_key(rd, "waveform.dead_ns", 0,
+                     "a dead time, but saturation_db is 0: nothing saturates; allowed with saturation_db above 0");
+}
+
+static void check_windows(struct cfg_reader *rd, const struct config *cfg)
+{
+    const struct config_waveform *w = &cfg->waveform;
+    const double rate_bytes = config_wave_bytes_s(cfg);
+    const char *key = has_gate(w) ? "waveform.far_m" : "waveform.after_ns";
+    if (!CFG_SOUND(rd, 0, "waveform.near_m", "waveform.far_m", "waveform.before_ns", "waveform.after_ns",
+                   "waveform.sample_ns"))
+        return;
+    if (!has_gate(w) && (w->near_m != 0.0 || w->far_m != 0.0))
+        cfg_fail_key(rd, cfg_is_given(rd, "waveform.far_m", 0) ? "waveform.far_m" : "waveform.near_m", 0,
+                     "a window from %.10g to %.10g m; allowed a far_m above %.10g, or 0 for both", w->near_m, w->far_m,
+                     w->near_m);
+    else if (rate_bytes > MOST_BYTES_S && cfg_has_profile(rd) && CFG_SOUND(rd, 0, "head.prr_hz"))
+        cfg_fail_key(rd, key, 0, "windows of %u samples for %.10g pulses/s are %.4g MB/s; allowed up to %.4g MB/s",
+                     config_wave_samples(cfg), config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
+}
+
+void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg)
+{
+    const struct config_waveform *w = &cfg->waveform;
+    const int finds = w->echoes != WAVE_ECHOES_MODEL;
+    const char *key = cfg->head.settings.waves != 0 ? "waveform.send" : "waveform.echoes";
+    check_pulse(rd, cfg);
+    check_digits(rd, w);
+    if (!config_has_waves(cfg)) return;
+    check_windows(rd, cfg);
+    if (!cfg->signal.on && CFG_SOUND(rd, 0, "signal.model"))
+        cfg_fail_key(rd, key, 0, "%s, but no signal is modelled; required is signal.model: on",
+                     finds && cfg->head.settings.waves == 0 ? cfg_word(rd, key, (int)w->echoes) : "on");
+    if (w->pulse != WAVEFORM_TABLE && cfg_has_profile(rd) && !(cfg->profile.pulse_width_ns > 0.0))
+        cfg_fail_key(rd, key, 0,
+                     "pulse_width_ns of head profile %s is 0; required is a pulse width, or waveform.pulse: table",
+                     cfg->profile.name);
+    if (finds && cfg->noise.range != RANGE_NOISE_OFF && CFG_SOUND(rd, 0, "waveform.echoes"))
+        cfg_fail_key(rd, "noise.range", 0,
+                     "%s, but echoes are found in samples, which have noise already (waveform.echoes); allowed off",
+                     cfg_word(rd, "noise.range", (int)cfg->noise.range));
+}

@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: MIT */
+#include "firmware_sim/site/waves.h"
+#include "firmware_sim/site/site.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "core/csv.h"
+#include "core/plan/cost.h"
+#include "firmware_sim/config/config.h"
+
+/* ---- the outgoing pulse as a table */
+
+struct pulse_table {
+    double power[WAVEFORM_MAX_TABLE];
+    uint32_t n;
+    double t0_ns, step_ns;
+};
+
+/* A line of the file. Times rise by one step, up to the rounding of decimals. */
+static int take_power(struct pulse_table *table, const struct csv *csv, const char *path, struct sh_err *err)
+{
+    const double t_ns = csv->value[0], power = csv->value[1];
+    const unsigned long long line = csv->line;
+    if (table->n == WAVEFORM_MAX_TABLE)
+        return sh_fail(err, SH_EINPUT, "%s:%llu: too many lines; allowed are up to %d", path, line, WAVEFORM_MAX_TABLE);
+    if (!(power >= 0.0))
+        return sh_fail(err, SH_EINPUT, "%s:%llu: a power of %.10g; allowed is 0 or more", path, line, power);
+    if (table->n == 0) table->t0_ns = t_ns;
+    if (table->n == 1) table->step_ns = t_ns - table->t0_ns;
+    const double want_ns = table->t0_ns + table->n * table->step_ns;
+    if (table->n > 0 && !(table->step_ns > 0.0 && fabs(t_ns - want_ns) <= 0.01 * table->step_ns))
+        return sh_fail(err, SH_EINPUT, "%s:%llu: t_ns is %.10g; allowed are times that rise by one step, here %.10g",
+                       path, line, t_ns, want_ns);
+    table->power[table->n++] = power;
+    return SH_OK;
+}
+
+static int read_pulse(const char *path, const struct sh_report *report, struct pulse_table *table, struct sh_err *err)
+{
+    static const char *const known[] = {"t_ns", "power", NULL};
+    struct csv csv;
+    int rc = csv_open(&csv, path, known, report, err), got = 0;
+    if (rc == SH_OK && csv.has != 3)
+        rc = sh_fail(err, SH_EINPUT, "%s: a column is missing; required are t_ns and power", path);
+    while (rc == SH_OK && (got = csv_next(&csv, err)) > 0)
+        rc = take_power(table, &csv, path, err);
+    csv_close(&csv);
+    if (rc == SH_OK) rc = got;
+    if (rc == SH_OK && table->n < 3)
+        rc = sh_fail(err, SH_EINPUT, "%s: %u lines; allowed are 3 to %d", path, table->n, WAVEFORM_MAX_TABLE);
+    return rc;
+}
+
+/* ---- the digitiser */
+
+static double ratio_of(double db)
+{
+    return pow(10.0, 0.1 * db);
+}
+
+static void fill_spec(const struct config *cfg, const struct pulse_table *table, struct waveform_spec *spec)
+{
+    const struct config_waveform *w = &cfg->waveform;
+    *spec = (struct waveform_spec){.shape = w->pulse,
+                                   .width_s = 1e-9 * cfg->profile.pulse_width_ns,
+                                   .skew = w->skew,
+                                   .table = table->power,
+                                   .n_table = table->n,
+                                   .table_step_s = 1e-9 * table->step_ns,
+                                   .bandwidth_hz = 1e6 * w->bandwidth_mhz,
+                                   .sample_s = 1e-9 * w->sample_ns,
+                                   .bits = w->bits,
+                                   .baseline_counts = w->baseline_counts,
+                                   .full_scale = ratio_of(w->full_scale_db),
+                                   .saturation = w->saturation_db > 0.0 ? ratio_of(w->saturation_db) : 0.0,
+                                   .dead_s = 1e-9 * w->dead_ns,
+                                   .noise = cfg->signal.sharp ? 0.0 : 1.0 / cfg->profile.threshold_snr,
+                                   .keep = ratio_of(w->keep_db),
+                                   .before_s = 1e-9 * w->before_ns,
+                                   .after_s = 1e-9 * w->after_ns,
+                                   .near_m = w->near_m,
+                                   .far_m = w->far_m,
+                                   .seed = cfg->noise.seed};
+}
+
+/* Signal of one count, in thresholds. */
+static double count_signal(const struct waveform_spec *spec)
+{
+    return spec->full_scale / (ldexp(1.0, (int)spec->bits) - 1.0 - spec->baseline_counts);
+}
+
+static void warn_digits(const struct config *cfg, const struct waveform_spec *spec, const struct sh_report *report)
+{
+    const double count = count_signal(spec);
+    if (count <= 1.0) return;
+    sh_warn(report,
+            "%s: waveform.full_scale_db: a count of the samples is %.3g times the detection threshold, so they don't show "
+            "weak echoes; with %u bits a full scale up to %.3g dB does",
+            cfg->file, count, spec->bits, 10.0 * log10(spec->full_scale / count));
+}
+
+static int make_waveform(const struct site *site, const struct sh_report *report, struct waveform **out,
+                         struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct pulse_table table = {.n = 0};
+    struct waveform_spec spec;
+    struct sh_err why;
+    int rc = cfg->waveform.pulse == WAVEFORM_TABLE ? read_pulse(cfg->waveform.pulse_file, report, &table, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    fill_spec(cfg, &table, &spec);
+    rc = waveform_create(&spec, out, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: waveform: %.300s", cfg->file, why.text);
+    warn_digits(cfg, &spec, report);
+    return SH_OK;
+}
+
+static const enum waveform_detector detectors[] = {[WAVE_ECHOES_THRESHOLD] = WAVEFORM_THRESHOLD,
+                                                   [WAVE_ECHOES_FRACTION] = WAVEFORM_FRACTION,
+                                                   [WAVE_ECHOES_GAUSSIANS] = WAVEFORM_GAUSSIANS};
+
+int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    if (!config_has_waves(cfg)) return SH_OK;
+    struct site_waves *w = site->waves = calloc(1, sizeof *w);
+    if (w == NULL) return sh_fail(err, SH_ENOMEM, "no memory for waveforms");
+    beam_init(&w->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
+    w->cast.beam = &w->beam;
+    w->cast.finds = cfg->waveform.echoes != WAVE_ECHOES_MODEL;
+    w->cast.detector = detectors[w->cast.finds ? cfg->waveform.echoes : WAVE_ECHOES_THRESHOLD];
+    int rc = make_waveform(site, report, &w->waveform, err);
+    w->cast.waveform = w->waveform;
+    return rc;
+}
+
+void site_free_waves(struct site *site)
+{
+    if (site->waves == NULL) return;
+    waveform_free(site->waves->waveform);
+    free(site->waves);
+}
+
+/* ---- room */
+
+/* So many windows of a pulse have room, on average over a block. */
+enum { MOST_WINDOWS = 4 };
+
+struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)
+{
+    const struct config *cfg = site->cfg;
+    if (cfg->head.settings.waves == 0) return (struct site_wave_room){0, 0};
+    const int gate = cfg->waveform.near_m < cfg->waveform.far_m;
+    const uint32_t points = site_most_points_per_pulse(site), n = config_wave_samples(cfg);
+    const uint32_t each = gate ? 1 : points < MOST_WINDOWS ? points : MOST_WINDOWS;
+    return (struct site_wave_room){n_pulses * each + WAVEFORM_MAX_WINDOWS,
+                                   n_pulses * each * n + 2 * WAVEFORM_MAX_SAMPLES};
+}
+
+struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses)
+{
+    if (site->cfg->head.settings.waves == 0) return (struct site_wave_room){0, 0};
+    return (struct site_wave_room){n_pulses, n_pulses * config_wave_samples(site->cfg)};
+}
+
+static void describe_digitiser(const struct waveform_spec *spec, struct line_waves *waves)
+{
+    waves->sample_ps = (uint32_t)lrint(1e12 * spec->sample_s);
+    waves->baseline_16 = (uint16_t)lrint(16.0 * spec->baseline_counts);
+    waves->bits = (uint8_t)spec->bits;
+    waves->count_signal = (float)count_signal(spec);
+}
+
+int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *caster, struct line_block *block,
+                   struct sh_err *err)
+{
+    const struct site_wave_room room = site_wave_room(site, n_pulses);
+    if (site->waves == NULL) return SH_OK;
+    int rc = caster_add_waves(caster, err);
+    if (rc == SH_OK && room.windows != 0) rc = line_block_alloc_waves(block, room.windows, room.samples, err);
+    if (rc == SH_OK && room.windows != 0) describe_digitiser(waveform_spec_of(site->waves->waveform), block->waves);
+    if (rc == SH_OK && site->waves->cast.finds && block->width_cns != NULL) rc = line_block_alloc_deviations(block, err);
+    return rc;
+}
+
+/* ---- the plan */
+
+static double find_ns(const struct site *site)
+{
+    if (!site->waves->cast.finds) return 0.0;
+    return site->waves->cast.detector == WAVEFORM_GAUSSIANS ? PLAN_COST_GAUSSIANS : PLAN_COST_FLANK;
+}
+
+double site_wave_ns(const struct site *site)
+{
+    if (site->waves == NULL) return 0.0;
+    return PLAN_COST_WAVE + config_wave_samples(site->cfg) * PLAN_COST_WAVE_SAMPLE + find_ns(site);
+}
+
+void site_wave_row(const struct site *site, struct plan_row *row)
+{
+    const struct config *cfg = site->cfg;
+    char why[sizeof row->why];
+    if (site->waves == NULL) {
+        plan_say(row, "waveform", "none", 0.0, 0.0, "waveform.send is off, and waveform.echoes is model");
+        return;
+    }
+    const int rings = site->plan.methods.beam == BEAM_RINGS;
+    size_t used = (size_t)snprintf(why, sizeof why, "%u samples for a usual pulse", config_wave_samples(cfg));
+    if (cfg->head.settings.waves != 0)
+        used += (size_t)snprintf(why + used, sizeof why - used, ", %.3g MB/s", 1e-6 * config_wave_bytes_s(cfg));
+    if (site->waves->cast.finds)
+        snprintf(why + used, sizeof why - used, "; echoes are found in them, with the noise of the samples");
+    plan_say(row, "waveform", rings ? "sub-rays" : "closed form", 0.0, site_wave_ns(site), why);
+}

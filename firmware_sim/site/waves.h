@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* Waveforms of a site's scans: the digitiser of the configuration, made once, and the room that its samples need. */
+#ifndef FIRMWARE_SIM_SITE_WAVES_H
+#define FIRMWARE_SIM_SITE_WAVES_H
+
+#include <stdint.h>
+
+#include "core/cast.h"
+#include "core/plan.h"
+
+struct line_block;
+struct sh_err;
+struct sh_report;
+struct site;
+
+struct site_waves {
+    struct waveform *waveform;
+    struct beam beam; /* of single rays, too */
+    struct cast_waves cast;
+};
+
+/* Makes site->waves; NULL where the configuration has no waveforms. Warns where digits hide what the head detects. */
+int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err);
+void site_free_waves(struct site *site);
+
+/* Windows and samples for which a block of so many pulses has room. What finds none is counted (core/line.h). 0 where
+ * no waveforms are sent. */
+struct site_wave_room {
+    uint32_t windows, samples;
+};
+struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
+/* Those of as many usual pulses. */
+struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
+/* Prepares a caster and a block of so many pulses for the site's waveforms, and for the deviations of echoes that are
+ * found in them. Does nothing where there are none. */
+int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *caster, struct line_block *block,
+                   struct sh_err *err);
+
+/* Cost of a usual pulse's waveform, ns; 0: there are none. */
+double site_wave_ns(const struct site *site);
+/* The plan's row. */
+void site_wave_row(const struct site *site, struct plan_row *row);
+
+#endif

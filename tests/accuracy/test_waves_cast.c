@@ -1,0 +1,295 @@
+/* SPDX-License-Identifier: MIT */
+/* Waveforms of pulses that are cast: their energy beside the link budget, worked out by hand; the windows beside the
+ * points; echoes that are found in them beside the closed forms. */
+#include "core/light.h"
+#include "tests/accuracy/lit_plates.h"
+
+enum { PULSES = 16, ACROSS_LINES = 60, ROOM = 16384 };
+
+/* Two plates with waveforms. Signals are about 1,000 thresholds, so that a count is a tenth of one. */
+struct waves {
+    struct lit lit;
+    struct cast_waves cast;
+    double count_signal;
+};
+
+static const struct waveform_spec SPEC = {.shape = WAVEFORM_GAUSSIAN,
+                                          .width_s = 4e-9,
+                                          .sample_s = 1e-9,
+                                          .bits = 14,
+                                          .baseline_counts = 200.0,
+                                          .full_scale = 2000.0,
+                                          .keep = 0.01,
+                                          .before_s = 12e-9,
+                                          .after_s = 12e-9,
+                                          .seed = 1};
+
+static double least_of(const struct waves *w)
+{
+    return 1e-3 / (w->lit.near_m * w->lit.near_m);
+}
+
+static void open_waves(struct waves *w, const struct beam_view *view, enum beam_mode mode, uint32_t room)
+{
+    struct sh_err err;
+    struct waveform *waveform;
+    struct line_block *b = &w->lit.rig.block;
+    open_lit(&w->lit, plates(w->lit.near_m, w->lit.far_m, 1), view, least_of(w));
+    beam_rig_mode(&w->lit.rig, mode, 4);
+    w->lit.rig.setup.pulse_m = w->lit.rig.beam.beam.resolution_m;
+    w->count_signal = SPEC.full_scale / (16383.0 - SPEC.baseline_counts);
+    if (waveform_create(&SPEC, &waveform, &err) != 0 || caster_add_waves(w->lit.rig.caster, &err) != 0 ||
+        line_block_alloc_attributes(b, &err) != 0 || line_block_alloc_deviations(b, &err) != 0 ||
+        line_block_alloc_waves(b, room, room, &err) != 0)
+        fail_msg("%s", err.text);
+    w->cast.waveform = waveform;
+    w->cast.beam = &w->lit.rig.beam.beam;
+    w->lit.rig.setup.waves = &w->cast;
+}
+
+static void close_waves(struct waves *w)
+{
+    waveform_free((struct waveform *)(uintptr_t)w->cast.waveform);
+    close_lit(&w->lit);
+}
+
+/* The samples of a pulse, as the amplitude that their energy is that of. */
+static double energy_of(const struct waves *w, uint32_t pulse)
+{
+    const struct line_waves *waves = w->lit.rig.block.waves;
+    double sum = 0.0;
+    for (uint32_t i = 0; i < waves->n; i++)
+        for (uint32_t k = 0; k < waves->wave[i].n && waves->wave[i].pulse == pulse; k++)
+            sum += waves->sample[waves->wave[i].at + k] - SPEC.baseline_counts;
+    return sum * w->count_signal * SPEC.sample_s / waveform_pulse_area_s(w->cast.waveform);
+}
+
+/* A of a return: back / (least R^2). */
+static double budget(const struct waves *w, const struct edge *e)
+{
+    const double least = least_of(w);
+    return e->back[FRONT] / (least * e->range_m[FRONT] * e->range_m[FRONT]) +
+           e->back[BACK] / (least * e->range_m[BACK] * e->range_m[BACK]);
+}
+
+static void check_energies(enum beam_mode mode, const struct beam_view *view, double near_m, double slack)
+{
+    struct waves w = {.lit = {.near_m = near_m, .far_m = near_m + 40.0, .rho = {0.8, 0.5}}};
+    double d[3][PULSES];
+    uint32_t cut = 0;
+    open_waves(&w, view, mode, ROOM);
+    for (uint32_t line = 0; line < view->lines; line++) {
+        beam_rig_line(&w.lit.rig, line);
+        beam_rig_directions(&w.lit.rig, line, d[0], d[1], d[2]);
+        for (uint32_t p = 0; p < PULSES; p++) {
+            struct edge e = at_edge(&w.lit, d[0][p], d[1][p]);
+            if (mode == BEAM_SINGLE && e.front > 0.0 && e.front < 1.0) continue; /* one ray meets one of the plates */
+            const double want = budget(&w, &e), told = energy_of(&w, p);
+            const int is_cut = e.front > 0.0 && e.front < 1.0;
+            cut += (uint32_t)is_cut;
+            if (!(fabs(told - want) < 1e-3 * want + (is_cut ? slack * 1000.0 : 0.0)))
+                fail_msg("mode %d, line %u, pulse %u: energy %.4f, link budget %.4f", mode, line, p, told, want);
+        }
+    }
+    assert_true(mode == BEAM_SINGLE || slack == 0.0 || cut > PULSES);
+    assert_int_equal(w.lit.rig.block.waves->n_left_out, 0);
+    close_waves(&w);
+}
+
+/* To 0.1 %: digits at 10,000 counts, and what lies outside of the windows, are less. Plates are hit at up to 44 deg. */
+static void energy_is_the_link_budget(void **state)
+{
+    (void)state;
+    static const struct beam_view OBLIQUE = {0.0, 1.0, -44.0, -10.0, 4, PULSES};
+    for (int mode = BEAM_SINGLE; mode <= BEAM_ADAPTIVE; mode++) {
+        const enum beam_mode m = (enum beam_mode)mode;
+        check_energies(m, &OBLIQUE, 20.0, 0.0);
+        check_energies(m, &ACROSS, 60.0, m == BEAM_RINGS ? 2.0 * RINGS_OFF : 2.0 * PARTS_OFF);
+    }
+}
+
+/* ---- windows */
+
+static void check_beam(const struct waves *w, const struct line_wave *wave, uint32_t point)
+{
+    const struct line_block *b = &w->lit.rig.block;
+    float e[3];
+    assert_int_equal(wave->dt_ns, b->dt_ns[point]);
+    if (b->layout == LINE_POLAR) {
+        assert_int_equal(wave->b, b->b[point]);
+        assert_int_equal(wave->c, b->c[point]);
+        return;
+    }
+    const uint32_t bits[3] = {wave->a, wave->b, wave->c}, at[3] = {b->a[point], b->b[point], b->c[point]};
+    memcpy(e, bits, sizeof e);
+    double length2 = 0.0;
+    for (int i = 0; i < 3; i++)
+        length2 += (double)e[i] * (double)e[i];
+    assert_true(fabs(length2 - 1.0) < 1e-6); /* of floats */
+    for (int i = 0; i < 3; i++) /* a count of 10 um at 20 m and more, and floats */
+        assert_true(fabs((double)e[i] - 1e-5 * (int32_t)at[i] / w->lit.near_m * (double)e[1]) < 2e-6);
+}
+
+/* Each pulse with an echo has a window around it, with the beam and the time of its points. */
+static void windows_belong_to_points(void **state)
+{
+    (void)state;
+    for (int geo = 0; geo < 2; geo++) {
+        struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+        static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 2, PULSES};
+        const struct line_block *b = &w.lit.rig.block;
+        uint32_t at = 0;
+        open_waves(&w, &SIDE, BEAM_ADAPTIVE, ROOM);
+        w.lit.rig.setup.layout = geo ? LINE_GEO : LINE_POLAR;
+        beam_rig_line(&w.lit.rig, 1);
+        assert_int_equal(b->waves->n, PULSES);
+        for (uint32_t p = 0; p < PULSES; p++, at += b->echo[at] >> 4) {
+            const struct line_wave *wave = &b->waves->wave[p];
+            assert_int_equal(wave->pulse, p);
+            assert_int_equal(b->echo[at], 0x11);
+            check_beam(&w, wave, at);
+            if (geo) continue;
+            const double sample = 1e-6 * b->a[at] / (0.5 * LIGHT_SPEED_M_S * SPEC.sample_s);
+            assert_true(wave->first < sample && sample < wave->first + wave->n);
+        }
+        close_waves(&w);
+    }
+}
+
+/* Points are the same, byte by byte, whether there are waveforms or not. */
+static void points_stay_as_they_are(void **state)
+{
+    (void)state;
+    struct waves w = {.lit = {.near_m = 60.0, .far_m = 63.0, .rho = {0.8, 0.5}}};
+    struct line_block *b = &w.lit.rig.block;
+    static uint32_t range[2][ACROSS_LINES][PULSES * LINE_MAX_ECHOES];
+    open_waves(&w, &ACROSS, BEAM_ADAPTIVE, ROOM);
+    for (int with = 0; with < 2; with++)
+        for (uint32_t line = 0; line < ACROSS_LINES; line++) {
+            w.lit.rig.setup.waves = with ? &w.cast : NULL;
+            beam_rig_line(&w.lit.rig, line);
+            assert_true(with == (b->waves->n > 0));
+            for (uint32_t i = 0; i < b->n_points; i++)
+                range[with][line][i] = b->a[i] ^ b->b[i] * 3u ^ b->c[i] * 5u ^ (uint32_t)b->echo[i] * 7u ^
+                                       (uint32_t)b->width_cns[i] * 11u ^ (uint32_t)b->amplitude_cdb[i] * 13u;
+        }
+    assert_memory_equal(range[0], range[1], sizeof range[0]);
+    close_waves(&w);
+}
+
+/* Samples that find no room are counted, and no window is cut. */
+static void lost_samples_are_counted(void **state)
+{
+    (void)state;
+    static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};
+    struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+    struct cast_counters counters;
+    const struct line_block *b = &w.lit.rig.block;
+    open_waves(&w, &SIDE, BEAM_SINGLE, ROOM);
+    beam_rig_line(&w.lit.rig, 0);
+    const uint32_t all = b->waves->n_samples, each = b->waves->wave[0].n;
+    assert_true(all >= PULSES * each / 2 && each > 8);
+    b->waves->sample_capacity = all - 1;
+    beam_rig_line(&w.lit.rig, 0);
+    assert_int_equal(b->waves->n, PULSES - 1);
+    assert_int_equal(b->waves->n_samples + b->waves->n_left_out, all);
+    caster_get_counters(w.lit.rig.caster, &counters);
+    assert_int_equal(counters.lost_samples, b->waves->n_left_out);
+    close_waves(&w);
+}
+
+/* ---- echoes */
+
+/* Without noise, echoes of one plate are where the closed form has them: to 0.2 mm, for digits of 10,000 counts give
+ * 0.26 m / 10,000 of a pulse's sigma, and three times that covers the worst of them and the detectors' own steps. Their
+ * amplitude is the link budget's to 0.02 dB: 0.5 %. */
+static void echoes_are_found_in_samples(void **state)
+{
+    (void)state;
+    static const struct beam_view SIDE = {0.0, 1.0, -40.0, -10.0, 4, PULSES};
+    for (int detector = WAVEFORM_THRESHOLD; detector <= WAVEFORM_GAUSSIANS; detector++)
+        for (uint32_t line = 0; line < 4; line++) {
+            struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+            const struct line_block *b = &w.lit.rig.block;
+            uint32_t range[PULSES];
+            int16_t amplitude_cdb[PULSES], refl_cdb[PULSES];
+            open_waves(&w, &SIDE, BEAM_ADAPTIVE, ROOM);
+            beam_rig_line(&w.lit.rig, line);
+            memcpy(range, b->a, sizeof range);
+            memcpy(amplitude_cdb, b->amplitude_cdb, sizeof amplitude_cdb);
+            memcpy(refl_cdb, b->refl_cdb, sizeof refl_cdb);
+            w.cast.finds = 1;
+            w.cast.detector = (enum waveform_detector)detector;
+            beam_rig_line(&w.lit.rig, line);
+            assert_int_equal(b->n_points, PULSES);
+            for (uint32_t p = 0; p < PULSES; p++) {
+                assert_int_equal(b->echo[p], 0x11);
+                assert_int_equal(b->label[p], FRONT);
+                const double off_m = 1e-6 * ((double)b->a[p] - (double)range[p]);
+                if (!(fabs(off_m) < 2e-4)) fail_msg("detector %d, pulse %u: %.3f mm off", detector, p, 1e3 * off_m);
+                assert_true(abs(b->amplitude_cdb[p] - amplitude_cdb[p]) <= 2);
+                assert_true(abs(b->refl_cdb[p] - refl_cdb[p]) <= 2);
+                assert_true(abs(b->width_cns[p] - 400) <= 8); /* 4 ns, to 2 % */
+                assert_true(b->deviation[p] <= 5);            /* digits: 1 in 10,000, and rounding */
+            }
+            close_waves(&w);
+        }
+}
+
+/* Two plates 40 m apart, of which the edge cuts footprints: as many echoes as the closed forms have, where neither is
+ * near the threshold. */
+static void cut_footprints_have_two_echoes(void **state)
+{
+    (void)state;
+    struct waves w = {.lit = {.near_m = 60.0, .far_m = 100.0, .rho = {0.8, 0.5}}};
+    const struct line_block *b = &w.lit.rig.block;
+    uint8_t echo[2][PULSES * 2];
+    uint32_t label[2][PULSES * 2], several = 0;
+    open_waves(&w, &ACROSS, BEAM_ADAPTIVE, ROOM);
+    w.cast.detector = WAVEFORM_GAUSSIANS;
+    for (uint32_t line = 0; line < ACROSS_LINES; line++) {
+        uint32_t n[2];
+        for (int finds = 0; finds < 2; finds++) {
+            w.cast.finds = finds;
+            beam_rig_line(&w.lit.rig, line);
+            n[finds] = b->n_points;
+            assert_true(b->n_points <= PULSES * 2);
+            for (uint32_t i = 0; i < b->n_points; i++) {
+                echo[finds][i] = b->echo[i];
+                label[finds][i] = b->label[i];
+            }
+        }
+        assert_int_equal(n[0], n[1]);
+        assert_memory_equal(echo[0], echo[1], n[0]);
+        assert_memory_equal(label[0], label[1], n[0] * sizeof label[0][0]);
+        for (uint32_t i = 0; i < n[0]; i++)
+            several += echo[0][i] >> 4 == 2;
+    }
+    assert_true(several > 2 * PULSES);
+    close_waves(&w);
+}
+
+/* A laser that does not fire gives no window. */
+static void dark_pulses_have_no_windows(void **state)
+{
+    (void)state;
+    static const struct beam_view SIDE = {0.0, 1.0, -40.0, -10.0, 1, PULSES};
+    const struct cast_disturbance dark = {.dark = 1, .share = 1.0};
+    struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+    open_waves(&w, &SIDE, BEAM_SINGLE, ROOM);
+    w.lit.rig.setup.disturbance = &dark;
+    beam_rig_line(&w.lit.rig, 0);
+    assert_int_equal(w.lit.rig.block.waves->n, 0);
+    close_waves(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(energy_is_the_link_budget),   cmocka_unit_test(windows_belong_to_points),
+        cmocka_unit_test(points_stay_as_they_are),     cmocka_unit_test(lost_samples_are_counted),
+        cmocka_unit_test(echoes_are_found_in_samples), cmocka_unit_test(cut_footprints_have_two_echoes),
+        cmocka_unit_test(dark_pulses_have_no_windows),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

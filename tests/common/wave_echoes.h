@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/* Waveforms of known returns, and what the detectors find in them. */
+#ifndef TESTS_COMMON_WAVE_ECHOES_H
+#define TESTS_COMMON_WAVE_ECHOES_H
+
+#include "core/waveform.h"
+
+enum { WAVE_MOST = 16, WAVE_DETECTORS = 3 };
+extern const char *const wave_detector_name[WAVE_DETECTORS];
+
+struct wave_echoes {
+    struct waveform *waveform;
+    uint16_t sample[WAVEFORM_MAX_SAMPLES];
+    struct waveform_record record;
+    struct waveform_echo echo[WAVE_MOST];
+    uint32_t most, n, n_crowded;
+};
+
+/* A Gaussian pulse of 4 ns, sampled each ns with 12 bits, noise 1/8 of the threshold, full scale 100 thresholds. */
+struct waveform_spec wave_spec(void);
+/* Room for 16 echoes a pulse. Fails the test where the spec is refused. */
+void wave_open(struct wave_echoes *w, const struct waveform_spec *spec);
+void wave_close(struct wave_echoes *w);
+/* Samples a pulse and detects at level 1. Returns the number of echoes. */
+uint32_t wave_shoot(struct wave_echoes *w, enum waveform_detector detector, uint64_t pulse,
+                    const struct waveform_return *returns, uint32_t n);
+/* The same for samples that the caller has put into w->record. */
+uint32_t wave_detect(struct wave_echoes *w, enum waveform_detector detector);
+
+/* The first echo of many pulses on one return, at as many phases of the sampling. */
+struct wave_figures {
+    uint32_t single;         /* pulses with one echo */
+    double bias_m, sigma_m;  /* of its range about the return's */
+    double amplitude, width_s, deviation, sigma_amplitude; /* means, and the amplitude's deviation */
+};
+void wave_measure(struct wave_echoes *w, enum waveform_detector detector, uint32_t pulses,
+                  const struct waveform_return *part, struct wave_figures *figures);
+
+/* ---- what theory says of the pulse of wave_spec */
+
+/* sigma of a Gaussian by its full width at half maximum. */
+double wave_sigma(double width);
+/* The least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise: its peak and sigma have no part in
+ * it, since their derivatives are even and that of the place is odd. Sum of (A (t - t0) / s^2 g)^2 over samples dt apart:
+ * A^2 sqrt(pi) / (2 s dt). */
+double wave_least_sigma_m(double peak, double noise, double sigma_s, double sample_s);
+
+#endif

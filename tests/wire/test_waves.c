@@ -1,0 +1,276 @@
+/* SPDX-License-Identifier: MIT */
+/* waveform.send and waveform.echoes from the configuration to a client: what stays the same, the energy of what comes
+ * beside it, echoes that are found, what is lost, and what is refused. */
+#include "tests/wire/room.h"
+
+enum { MOST = 40000, POINTS = 4096, WINDOWS = 4096, CONTENT_WAVES = 4 };
+
+/* Walls at 4 to 7 m are up to 41 dB above the threshold. 14 bits of 46 dB have counts of 2.5 thresholds. */
+static const char MORE[] = "beam: {mode: adaptive}\nsignal: {model: on, detection: sharp}\n"
+                           "waveform: {bits: 14, full_scale_db: 46, keep_db: 0}\n"
+                           "output: {attributes: on}\n";
+
+static const struct room_config SCAN = {.profile = "riegl-vz400i",
+                                        .prr_hz = 100000,
+                                        .lines_hz = 50,
+                                        .pan_deg_s = 150,
+                                        .pan_stop_deg = 30,
+                                        .frames = 1,
+                                        .links = "links: []\n",
+                                        .more = MORE};
+
+/* Records the scan with these settings (ends with NULL) to a file. */
+static void record(struct wire *wire, const struct room_config *scan, const char *name, const char *const *sets)
+{
+    char config[352], path[352], stats[352];
+    const char *args[24] = {"record", config, "-o", path, "--stats", stats, "--quiet"};
+    int n = 7;
+    snprintf(config, sizeof config, "%s", room_config_write(wire, scan));
+    snprintf(path, sizeof path, "%s", wire_path(wire, name));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    for (int i = 0; sets[i] != NULL; i++) {
+        args[n++] = "--set";
+        args[n++] = sets[i];
+    }
+    args[n] = NULL;
+    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    if (status != 0) wire_show(wire, "err");
+    assert_int_equal(status, 0);
+}
+
+/* A pulse with one echo, as the stream has it. */
+struct shot {
+    int echoes, windows;
+    double range_m, amplitude, width_ns, energy_ns, from_m, to_m; /* of its windows: signal times time; their place */
+};
+static struct shot shots[2][MOST];
+
+static void take_waves(struct scanhead *sh, const struct scanhead_frame *frame, struct shot *shot)
+{
+    static struct scanhead_wave wave[WINDOWS];
+    const int n = scanhead_waves(sh, frame, 0, wave, WINDOWS);
+    assert_true(n >= 0);
+    for (int i = 0; i < n; i++) {
+        assert_true(wave[i].pulse < MOST);
+        struct shot *s = &shot[wave[i].pulse];
+        s->from_m = s->windows == 0 ? wave[i].range_m : s->from_m;
+        s->to_m = wave[i].range_m + wave[i].n * wave[i].step_m;
+        for (uint32_t k = 0; k < wave[i].n; k++)
+            s->energy_ns += 1e-3 * wave[i].sample_ps * scanhead_wave_signal(&wave[i], k);
+        s->windows++;
+    }
+}
+
+/* Reads a recording. Returns the samples that it says are lost. */
+static uint64_t read_shots(const struct wire *wire, const char *name, struct shot *shot)
+{
+    static struct scanhead_point point[POINTS];
+    static struct scanhead_attribute attribute[POINTS];
+    struct scanhead *sh = client_open(wire_path(wire, name));
+    struct scanhead_frame frame;
+    uint64_t lost = 0;
+    uint32_t n = 0;
+    memset(shot, 0, MOST * sizeof *shot);
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
+        if (frame.type == SCANHEAD_POINTS) {
+            n = frame.n_points;
+            assert_int_equal(scanhead_points(sh, &frame, 0, point, POINTS), n);
+        }
+        if (frame.type == SCANHEAD_WAVES) {
+            lost += (uint64_t)scanhead_waves_lost(sh, &frame);
+            take_waves(sh, &frame, shot);
+        }
+        if (frame.type != SCANHEAD_ATTRIBUTES) continue;
+        assert_int_equal(scanhead_attributes(sh, &frame, 0, attribute, POINTS), n);
+        for (uint32_t i = 0; i < n; i++) {
+            assert_true(point[i].pulse < MOST);
+            struct shot *s = &shot[point[i].pulse];
+            s->echoes = point[i].echo_count;
+            if (point[i].echo > 1 || point[i].echo_count == 0) continue;
+            s->range_m = point[i].range_m;
+            s->amplitude = pow(10.0, 0.1 * attribute[i].amplitude_db);
+            s->width_ns = attribute[i].width_ns;
+        }
+    }
+    scanhead_close(sh);
+    return lost;
+}
+
+/* Takes the next frame that the hash includes and that is no waveform. Returns 0 at the end. */
+static int next_old(struct scanhead *sh, struct scanhead_frame *frame, uint32_t *waves)
+{
+    for (;;) {
+        if (scanhead_next(sh, frame, 0) != SCANHEAD_OK) return 0;
+        *waves += frame->type == SCANHEAD_WAVES;
+        if ((frame->flags & 3) == 0 && frame->type != SCANHEAD_TELEMETRY && frame->type != SCANHEAD_EVENT &&
+            frame->type != SCANHEAD_SURFACES && frame->type != SCANHEAD_WAVES)
+            return 1;
+    }
+}
+
+/* On, all that there is without waveforms is there byte for byte, except the bit in the descriptor's last field but
+ * one that announces them. */
+static void test_off_and_on(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    record(wire, &SCAN, "off.shs", (const char *const[]){NULL});
+    record(wire, &SCAN, "on.shs", (const char *const[]){"waveform.send=on", NULL});
+    struct scanhead *off = client_open(wire_path(wire, "off.shs")), *on = client_open(wire_path(wire, "on.shs"));
+    struct scanhead_frame a, b;
+    uint32_t waves[2] = {0, 0}, points = 0;
+    while (next_old(off, &a, &waves[0])) {
+        assert_true(next_old(on, &b, &waves[1]));
+        assert_int_equal(a.type, b.type);
+        assert_int_equal(a.payload_len, b.payload_len);
+        if (a.type == SCANHEAD_DESCRIPTOR) {
+            assert_int_equal(a.payload[a.payload_len - 8] | CONTENT_WAVES, b.payload[b.payload_len - 8]);
+            assert_memory_equal(a.payload, b.payload, a.payload_len - 8);
+        } else {
+            assert_memory_equal(a.payload, b.payload, a.payload_len);
+        }
+        points += a.type == SCANHEAD_POINTS;
+    }
+    assert_false(next_old(on, &b, &waves[1]));
+    assert_true(points > 50 && waves[0] == 0 && waves[1] >= points);
+    assert_int_equal(scanhead_has_waves(off), 0);
+    assert_int_equal(scanhead_has_waves(on), 1);
+    scanhead_close(off);
+    scanhead_close(on);
+}
+
+/* A Gaussian pulse of 4 ns has an area of 4 ns sqrt(pi / (4 ln 2)). The amplitude is told in 0.01 dB, to 0.12 %, and
+ * the energy is to be its to 0.1 %. */
+static void test_energy(void **state)
+{
+    struct wire *wire = *state;
+    const double area_ns = 4.0 * sqrt(M_PI / (4.0 * M_LN2));
+    uint32_t n = 0;
+    room_write(wire);
+    record(wire, &SCAN, "on.shs", (const char *const[]){"waveform.send=on", NULL});
+    assert_int_equal(read_shots(wire, "on.shs", shots[0]), 0);
+    assert_int_equal(stats_uint(wire, "lost_samples"), 0);
+    for (const struct shot *s = shots[0]; s < shots[0] + MOST; s++) {
+        if (s->echoes == 0) continue;
+        assert_int_equal(s->echoes, 1);
+        assert_int_equal(s->windows, 1);
+        assert_true(s->from_m < s->range_m && s->range_m < s->to_m);
+        const double off = s->energy_ns / (s->amplitude * area_ns) - 1.0;
+        if (!(fabs(off) < 0.0022)) fail_msg("pulse %td: energy is off by %.3f %%", s - shots[0], 100.0 * off);
+        n++;
+    }
+    assert_true(n > 5000);
+}
+
+/* Without noise, echoes that are found are those of the model: their ranges to 0.5 mm, a count of the largest signal
+ * being 1 in 5,000 of it, and a pulse's sigma 0.26 m; amplitudes to 0.5 %, widths to 1 %. */
+static void test_echoes(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const how[] = {"waveform.echoes=threshold", "waveform.echoes=fraction",
+                                      "waveform.echoes=gaussians"};
+    room_write(wire);
+    record(wire, &SCAN, "model.shs", (const char *const[]){NULL});
+    read_shots(wire, "model.shs", shots[0]);
+    for (int i = 0; i < 3; i++) {
+        record(wire, &SCAN, "found.shs", (const char *const[]){how[i], NULL});
+        read_shots(wire, "found.shs", shots[1]);
+        for (int k = 0; k < MOST; k++) {
+            const struct shot *a = &shots[0][k], *b = &shots[1][k];
+            assert_int_equal(b->windows, 0); /* they are not sent */
+            if (a->echoes != b->echoes) fail_msg("%s: pulse %d has %d echoes, not %d", how[i], k, b->echoes, a->echoes);
+            if (a->echoes == 0) continue;
+            if (!(fabs(a->range_m - b->range_m) < 5e-4 && fabs(b->amplitude / a->amplitude - 1.0) < 5e-3 &&
+                  fabs(b->width_ns - a->width_ns) < 0.04))
+                fail_msg("%s: pulse %d: %.4f m, not %.4f; amplitude %.1f, not %.1f; %.2f ns, not %.2f", how[i], k,
+                         b->range_m, a->range_m, b->amplitude, a->amplitude, b->width_ns, a->width_ns);
+        }
+    }
+}
+
+/* On the ground near the horizon footprints are tens of metres deep, and their windows longer than what a block has room
+ * for. What is lost is said by the frames, by the statistics and in a warning, and all agree. */
+static void test_lost(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config scan = SCAN;
+    ground_write(wire);
+    scan.line_start_deg = -0.5;
+    scan.line_stop_deg = -0.2;
+    scan.prr_hz = 1200000;
+    scan.pan_stop_deg = 6;
+    record(wire, &scan, "long.shs",
+           (const char *const[]){"waveform.send=on", "waveform.keep_db=-60", "waveform.sample_ns=0.1", NULL});
+    const uint64_t lost = read_shots(wire, "long.shs", shots[0]);
+    assert_true(lost > 0);
+    assert_int_equal(stats_uint(wire, "lost_samples"), lost);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(err, "samples of waveforms left out"));
+    free(err);
+}
+
+static void refuse(struct wire *wire, const char *const *sets, const char *says)
+{
+    char config[352];
+    const char *args[16] = {"check", config};
+    int n = 2;
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
+    for (int i = 0; sets[i] != NULL; i++) {
+        args[n++] = "--set";
+        args[n++] = sets[i];
+    }
+    args[n] = NULL;
+    wire_expect_usage(wire, args, says);
+}
+
+/* Of figures by themselves, which core/waveform knows. config_cases.h has those that contradict each other. */
+static void test_refused(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    wire_write_text(wire, "few.csv", "t_ns,power\n0,1\n1,2\n");
+    wire_write_text(wire, "uneven.csv", "t_ns,power\n0,1\n1,2\n2.5,1\n");
+    wire_write_text(wire, "dark.csv", "t_ns,power\n0,1\n1,-2\n2,1\n");
+    char few[400], uneven[400], dark[400];
+    snprintf(few, sizeof few, "waveform.pulse_file=%s", wire_path(wire, "few.csv"));
+    snprintf(uneven, sizeof uneven, "waveform.pulse_file=%s", wire_path(wire, "uneven.csv"));
+    snprintf(dark, sizeof dark, "waveform.pulse_file=%s", wire_path(wire, "dark.csv"));
+    const char *table = "waveform.pulse=table", *send = "waveform.send=on";
+    refuse(wire, (const char *const[]){send, table, few, NULL}, "few.csv: 2 lines; allowed are 3 to 1024");
+    refuse(wire, (const char *const[]){send, table, uneven, NULL}, "uneven.csv:4: t_ns is 2.5");
+    refuse(wire, (const char *const[]){send, table, dark, NULL}, "dark.csv:3: a power of -2");
+    refuse(wire, (const char *const[]){send, "waveform.after_ns=3000", NULL}, "waveform: 5 ns kept before an echo");
+    refuse(wire, (const char *const[]){send, "waveform.near_m=1", "waveform.far_m=2000", NULL}, "a window from 1 to 2000 m");
+}
+
+/* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used: 41,667
+ * pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 28 samples, 5 + 3 x 4 + 10 ns and one. */
+static void test_capacity(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config scan = SCAN;
+    char config[352];
+    room_write(wire);
+    scan.links = "links: [{type: usb, port: 0, speed: full}]\n";
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &scan));
+    const char *const args[] = {"run", config, "--duration", "0.01", "--quiet", "--set", "waveform.send=on", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(err, "the stream has 4.50 MB/s, the link carries 1.22 MB/s") == NULL ||
+        strstr(err, ", or leave out waveform.send\n") == NULL)
+        fail_msg("%s", err);
+    free(err);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_off_and_on, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_energy, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_echoes, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_lost, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
