@@ -193,7 +193,7 @@ $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.o $(BUILD)/head.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   head and studio, no main                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves loop_cost loading kernels panorama copies)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waveform waveform_detect waves loop_cost loading kernels panorama copies)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
 LIMIT = tests/common/limit.c
@@ -388,7 +388,7 @@ bench: deps-build
 	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --reach --leaks 1e8 -o $(BUILD)/bench.json
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
-CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam)
+CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam waveform)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
@@ -422,6 +422,10 @@ bench-copies: deps-build
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
+# The samples of a full waveform, ns a pulse by spread and window; with --chart methods beside 100,000 sub-rays.
+bench-waveform: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waveform
+	@$(BUILD)/tests/bench/waveform
 # Waveforms on the wire, ns a window.
 bench-waves: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waves
@@ -453,6 +457,7 @@ chart: deps-build
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv
+	$(BUILD)/tests/bench/waveform --chart >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_moving'" tests/bench/chart_moving.gp
@@ -509,6 +514,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waveform bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

@@ -21,11 +21,11 @@ enum rng_purpose {
     RNG_PAN = 6,
     RNG_BALL = 7, /* ball-shaped noise: direction */
     RNG_BALL_RADIUS = 8,
-    RNG_FAULT = 9,   /* faults on request */
-    RNG_PTP = 10,    /* measurements of the PTP follower */
+    RNG_FAULT = 9,     /* faults on request */
+    RNG_PTP = 10,      /* measurements of the PTP follower */
     RNG_WAVEFORM = 11, /* of the samples of waveforms */
-    RNG_SPARSE = 16, /* points spread over a mesh */
-    RNG_PLAN = 20,   /* which pulses the plan looks at */
+    RNG_SPARSE = 16,   /* points spread over a mesh */
+    RNG_PLAN = 20,     /* which pulses the plan looks at */
 };
 
 VEC_INLINE uint64_t rng_mix(uint64_t x)

@@ -38,11 +38,22 @@ static void detect_mark(const struct finder *finder, const struct waveform_windo
     }
 }
 
-/* A maximum stands out by 4.2 sigma: of the difference of two samples 3 sigma, so one sample in 700 of noise around a
- * flat top does. It also stands out by 15 %, which the shape of an echo on a plane never does. */
+/* A maximum stands out by 15 %, which the shape of an echo on a plane never does, and by 6.5 sigma: the noise of 20 samples
+ * spans more than that once in 1,000. */
 static double detect_prominence(const struct finder *finder, double y)
 {
-    return fmax(4.2 * finder->noise, 0.15 * y);
+    return fmax(6.5 * finder->noise, 0.15 * y);
+}
+
+/* Where the signal is within a sigma of nothing, an echo has ended, however weak it was, and another may begin. */
+static int detect_fell(const struct finder *finder, double high, double y)
+{
+    return y < fmax(high - detect_prominence(finder, high), finder->noise);
+}
+
+static int detect_rose(const struct finder *finder, double low, double y, double least)
+{
+    return y > low + detect_prominence(finder, y) || (low < finder->noise && y >= least);
 }
 
 uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most)
@@ -53,7 +64,7 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
         const double y = run->y[i];
         if (rising) {
             if (y > run->y[top]) top = i;
-            if (i + 1 < run->n && y > run->y[top] - detect_prominence(run->finder, run->y[top])) continue;
+            if (i + 1 < run->n && !detect_fell(run->finder, run->y[top], y)) continue;
             rising = 0;
             /* After a blind start of a window the signal falls: its maximum was not seen. */
             int hidden = run->mark != NULL && top > 0 && run->mark[top] != FINDER_LIMITED &&
@@ -66,12 +77,26 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
             valley = i;
         } else if (y <= run->y[valley]) {
             valley = i;
-        } else if (y - run->y[valley] > detect_prominence(run->finder, y)) {
+        } else if (detect_rose(run->finder, run->y[valley], y, least)) {
             rising = 1;
             top = i;
         }
     }
     return n;
+}
+
+/* The parabola through the logarithms of three samples is exact for a Gaussian. A neighbour of zero or less is noise of a
+ * pulse that is short beside the sampling: it counts as 2 % of the top. */
+double finder_top(const struct finder_run *run, uint32_t top, double *place)
+{
+    const double y = run->y[top], least = 0.02 * y;
+    *place = top;
+    if (top == 0 || top + 1 == run->n) return y;
+    double a = log(fmax(run->y[top - 1], least) / y), b = log(fmax(run->y[top + 1], least) / y);
+    double bend = a + b, slope = b - a;
+    if (!(bend < 0.0)) return y;
+    *place -= 0.5 * slope / bend;
+    return y * exp(-0.125 * slope * slope / bend);
 }
 
 /* The crossing of a level between sample a, which is below it, and its neighbour b, which is not. Near half of the peak
@@ -83,6 +108,7 @@ static double detect_crossing(const double *y, uint32_t a, uint32_t b, double le
     return (double)a + u * ((double)b - (double)a);
 }
 
+/* What is no echo may rise and fall within a sample: no width is below half of one. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2])
 {
     const double level = 0.5 * height;
@@ -95,8 +121,11 @@ int finder_half(const struct finder_run *run, const struct finder_peak *peak, do
     double sigma = fmax(((double)b - (double)a - 1.0) / FINDER_FWHM, 0.4), bend = 0.193 * height / (sigma * sigma);
     if (left) side[0] = detect_crossing(run->y, a, a + 1, level, bend);
     if (right) side[1] = detect_crossing(run->y, b, b - 1, level, bend);
-    if (!left) side[0] = right ? 2.0 * (double)peak->top - side[1] : (double)a;
-    if (!right) side[1] = left ? 2.0 * (double)peak->top - side[0] : (double)b;
+    double place;
+    if (left + right < 2) (void)finder_top(run, peak->top, &place);
+    if (!left) side[0] = right ? fmin(2.0 * place - side[1], place) : (double)a;
+    if (!right) side[1] = left ? fmax(2.0 * place - side[0], place) : (double)b;
+    if (side[1] - side[0] < 0.5) side[1] = (side[0] = 0.5 * (side[0] + side[1]) - 0.25) + 0.5;
     return left + right;
 }
 
@@ -105,11 +134,6 @@ static int detect_joined(const struct finder_run *run, const struct finder_peak 
 {
     double smaller = fmin(run->y[before->top], run->y[after->top]);
     return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);
-}
-
-static int detect_limited(const struct finder_run *run, const struct finder_peak *peak)
-{
-    return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
 }
 
 static void detect_gaussians(const struct finder_run *run, double level, struct finder_list *list)
@@ -128,7 +152,7 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
         struct finder_mix mix = {.n = 1};
         for (end = i + 1; end < n && end - i < FINDER_MIX && detect_joined(run, &peak[end - 1], &peak[end]);)
             end++;
-        if (end > i + 1 || detect_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
+        if (end > i + 1 || finder_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
             finder_decompose(run, &peak[i], end - i, level, &mix);
         for (uint32_t j = 0; j < mix.n; j++)
             finder_add_gaussian(run, &mix, j, level, list);

@@ -52,7 +52,7 @@ static void decompose_begin(const struct finder_run *run, const struct finder_pe
     for (uint32_t j = 0; j < n; j++) {
         struct finder_gaussian *g = &mix->g[j];
         double side[2], height = run->y[peak[j].top];
-        if (run->mark != NULL && run->mark[peak[j].top] != FINDER_PLAIN) {
+        if (finder_limited(run, &peak[j])) {
             mix->limited |= 1U << j;
             mix->open |= 1U << j;
             decompose_limited(run, &peak[j], g);
@@ -124,7 +124,7 @@ static int decompose_split(const struct finder_task *task, struct finder_mix *mi
     return 1;
 }
 
-/* Components that could be echoes: none is below half of the level, or below 2 % of the largest within its reach. */
+/* Components that could be echoes: none is below half of the level, or what the tail of a larger one explains. */
 static int decompose_sound(const struct finder_task *task, const struct finder_mix *mix, double least)
 {
     for (uint32_t j = 0; j < mix->n; j++)
@@ -132,9 +132,11 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
             const struct finder_gaussian *a = &mix->g[j], *b = &mix->g[k];
             if (a->peak < least) return 0;
             if (j == k) continue;
+            struct finder_spread spread;
             double apart = fabs(a->at - b->at);
             if (apart < 0.35 * task->run->finder->spread[0].sigma) return 0;
-            if (apart < 4.0 * b->sigma && a->peak < 0.02 * b->peak) return 0;
+            finder_by_sigma(task->run->finder, b->sigma, &spread);
+            if (apart < 5.0 * b->sigma && a->peak < (2.0 * spread.tail + FINDER_ROUGH) * b->peak) return 0;
         }
     return 1;
 }
@@ -158,7 +160,7 @@ static int decompose_more(const struct finder_task *task, double least, struct f
         if (sound && (best == NULL || tried[i].chi2 < best->chi2)) best = &tried[i];
     }
     /* Three more parameters lower the sum by 3 variances if they mean nothing; 25 by chance in one of 60,000. */
-    if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance) return 0;
+    if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance + decompose_shapes(task, best)) return 0;
     *mix = *best;
     return 1;
 }

@@ -8,33 +8,21 @@
 
 #include <math.h>
 
-/* The largest signal, from the parabola through the logarithms of three samples: exact for a Gaussian. A neighbour of zero
- * or less is noise of a pulse that is short beside the sampling: it counts as 2 % of the top. */
-static double edges_peak(const struct finder_run *run, uint32_t top)
-{
-    const double y = run->y[top], least = 0.02 * y;
-    if (top == 0 || top + 1 == run->n) return y;
-    double a = log(fmax(run->y[top - 1], least) / y), b = log(fmax(run->y[top + 1], least) / y);
-    double bend = a + b, slope = b - a;
-    if (!(bend < 0.0)) return y;
-    return y * exp(-0.125 * slope * slope / bend);
-}
-
-/* How long before its centroid h has `part` of its peak, times `stretch`. */
-static double edges_lead(const struct finder *finder, double part, double stretch)
+/* How long before its centroid h has `part` of its peak. */
+static double edges_lead(const struct finder *finder, double part)
 {
     double v = part < 1.0 ? sqrt(-2.0 * log(part)) / FINDER_LEAD_STEP : 0.0;
     v = fmin(v, FINDER_LEADS - 1.001);
     uint32_t k = (uint32_t)v;
-    return stretch * (finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]));
+    return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
 }
 
 /* The centroid, from the crossing of a level between sample k - 1 and sample k. */
-static double edges_centroid(const struct finder_run *run, uint32_t k, double level, double peak, double stretch)
+static double edges_centroid(const struct finder_run *run, uint32_t k, double level, double peak)
 {
-    double above = k + edges_lead(run->finder, run->y[k] / peak, stretch);
+    double above = k + edges_lead(run->finder, run->y[k] / peak);
     if (k == 0 || run->y[k - 1] < fmax(2.0 * run->finder->noise, 1e-5 * peak)) return above;
-    double below = k - 1.0 + edges_lead(run->finder, run->y[k - 1] / peak, stretch);
+    double below = k - 1.0 + edges_lead(run->finder, run->y[k - 1] / peak);
     double u = (level - run->y[k - 1]) / (run->y[k] - run->y[k - 1]);
     return below + u * (above - below);
 }
@@ -42,8 +30,7 @@ static double edges_centroid(const struct finder_run *run, uint32_t k, double le
 /* A top that is limited, or at the window's end, has no peak to take a part of: its flanks are fitted. */
 static int edges_hidden(const struct finder_run *run, const struct finder_peak *peak, struct finder_list *list)
 {
-    int limited = run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
-    if (!limited && peak->top > 0 && peak->top + 1 < run->n) return 0;
+    if (!finder_limited(run, peak) && peak->top > 0 && peak->top + 1 < run->n) return 0;
     struct finder_mix mix;
     finder_decompose(run, peak, 1, INFINITY, &mix);
     finder_add_gaussian(run, &mix, 0, 0.0, list);
@@ -64,9 +51,9 @@ void finder_threshold(const struct finder_run *run, double level, struct finder_
         for (peak.to = i; peak.to < run->n && y[peak.to] > 0.0 && y[peak.to] < at;)
             peak.to++;
         if (edges_hidden(run, &peak, list)) continue;
-        double height = edges_peak(run, peak.top), side[2];
+        double place, height = finder_top(run, peak.top, &place), side[2];
         (void)finder_half(run, &peak, height, side);
-        const struct finder_found found = {edges_centroid(run, cross, at, height, 1.0), height, side[1] - side[0], 0};
+        const struct finder_found found = {edges_centroid(run, cross, at, height), height, side[1] - side[0], 0};
         finder_add(run, &found, NULL, 0, list);
     }
 }
@@ -81,17 +68,12 @@ void finder_fraction(const struct finder_run *run, double level, struct finder_l
         n = FINDER_PEAKS;
     }
     for (uint32_t i = 0; i < n; i++) {
-        double height = edges_peak(run, peak[i].top), side[2];
+        double place, height = finder_top(run, peak[i].top, &place), side[2];
         if (height < at || edges_hidden(run, &peak[i], list)) continue;
         (void)finder_half(run, &peak[i], height, side);
         struct finder_spread spread;
         finder_by_width(run->finder, side[1] - side[0], &spread);
-        uint32_t k = peak[i].top;
-        while (k > peak[i].from && run->y[k - 1] >= 0.5 * height)
-            k--;
-        double stretch = spread.half_lead / run->finder->spread[0].half_lead;
-        const struct finder_found found = {edges_centroid(run, k, 0.5 * height, height, stretch), height,
-                                           side[1] - side[0], 0};
+        const struct finder_found found = {side[0] + spread.half_lead, height, side[1] - side[0], 0};
         finder_add(run, &found, NULL, 0, list);
     }
 }

@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-enum { FIT_STEPS = 8 };
+enum { FIT_STEPS = 24 }; /* 3 are usual; a pulse that is no Gaussian takes more */
 /* The fit has come to its end where another step would lower the sum of squares by this part of a sample's variance. */
 #define FIT_ENOUGH 0.01
 

@@ -8,6 +8,7 @@
 #ifndef CORE_WAVEFORM_DETECT_INSIDE_H
 #define CORE_WAVEFORM_DETECT_INSIDE_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/waveform.h"
@@ -72,8 +73,15 @@ struct finder_run {
 struct finder_peak {
     uint32_t top, from, to;
 };
+/* Whether its top was limited, so that its height is not known. */
+static inline int finder_limited(const struct finder_run *run, const struct finder_peak *peak)
+{
+    return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
+}
 /* Those of at least `least`; at most `most`. Returns their number, with those that found no room. */
 uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most);
+/* The largest signal about a top sample, and where it is. */
+double finder_top(const struct finder_run *run, uint32_t top, double *place);
 /* Where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side where it
  * doesn't, that of the other side is mirrored. Returns how many sides were seen. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2]);

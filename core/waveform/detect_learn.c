@@ -112,7 +112,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     finder->signal = spec->full_scale / (most - spec->baseline_counts);
     finder->noise = 0.0; /* of what follows */
     finder->limit = INFINITY;
-    finder->blind = (uint32_t)(spec->dead_s / spec->sample_s + 1e-9);
+    finder->blind = spec->saturation > 0.0 ? (uint32_t)waveform->dead : 0;
     learn_pulse(waveform, finder, &echo);
     learn_leads(finder, &echo);
     learn_shape(waveform, finder);

@@ -74,14 +74,14 @@ static void mix_add(const struct mix_walker *walker, const uint32_t *active, uin
     }
 }
 
-/* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.15 where the echo's top is not seen. So a
+/* A sigma is expected to be that of the pulse: within a factor of e^2, or of e^0.03 where the echo's top is not seen. So a
  * flank alone, which many pairs of peak and sigma explain, has one answer. */
 static double mix_expect(const struct finder_task *task, const struct finder_mix *mix, struct mix_normal *normal)
 {
     double chi2 = 0.0;
     for (uint32_t j = 0; j < mix->n; j++) {
         double q = log(mix->g[j].sigma / task->run->finder->spread[0].sigma);
-        double within = mix->open >> j & 1 ? 0.15 : 2.0, weight = task->variance / (within * within);
+        double within = mix->open >> j & 1 ? 0.03 : 2.0, weight = task->variance / (within * within);
         chi2 += weight * q * q;
         normal->h[3 * j + 2][3 * j + 2] += weight;
         normal->r[3 * j + 2] -= weight * q;
@@ -148,14 +148,17 @@ static double mix_within(double x, double least, double most)
     return x < least ? least : x > most ? most : x;
 }
 
-/* A step, shortened: in one, a peak changes by at most a factor of e^2, a centre by 1.5 sigma. */
+/* A step, shortened: in one, a peak changes by at most a factor of e^2, a centre by 1.5 sigma. A centre stays among the
+ * samples, unless the window ends there. */
 static void mix_move(const struct finder_task *task, const double p[MIX_MOST], struct finder_mix *mix)
 {
     const double h = task->run->finder->spread[0].sigma, room = task->hi - task->lo + 1.0;
+    const double first = task->lo > 0 ? task->lo : -3.0 * h;
+    const double last = task->hi + 1 < task->run->n ? task->hi : task->hi + 3.0 * h;
     for (uint32_t j = 0; j < mix->n; j++, p += 3) {
         struct finder_gaussian *g = &mix->g[j];
         g->peak = mix_within(g->peak * exp(mix_within(p[0], -2.0, 2.0)), 1e-9, 1e12);
-        g->at = mix_within(g->at + g->sigma * mix_within(p[1], -1.5, 1.5), task->lo - 3.0 * h, task->hi + 3.0 * h);
+        g->at = mix_within(g->at + g->sigma * mix_within(p[1], -1.5, 1.5), first, last);
         g->sigma = mix_within(g->sigma * exp(mix_within(p[2], -0.7, 0.7)), FINDER_LEAST * h, fmax(h, room));
     }
 }

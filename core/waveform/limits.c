@@ -42,7 +42,7 @@ static int check_ranges(const struct waveform_spec *spec, struct sh_err *err)
         const double value = *(const double *)(const void *)((const char *)spec + l->at);
         if (!(l->shapes & 1 << spec->shape) || (value >= l->low && value <= l->high)) continue;
         if (l->or_zero && value == 0.0) continue;
-        return sh_fail(err, SH_EINPUT, "%s of %.6g %s: %.6g to %.6g%s is allowed", l->what, value * l->scale, l->unit,
+        return sh_fail(err, SH_EINPUT, "%s of %.6g %s: %.6g to %.6g is allowed%s", l->what, value * l->scale, l->unit,
                        l->low * l->scale, l->high * l->scale, l->or_zero ? ", or 0 for none" : "");
     }
     return SH_OK;
@@ -80,7 +80,8 @@ static int check_windows(const struct waveform_spec *spec, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "windows around a signal of %.6g times the threshold: 1e-06 to 1e+09 is allowed",
                        spec->keep);
     if (samples <= most) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%.6g ns kept before an echo and %.6g ns behind it: together at most %.6g ns, %.0f samples",
+    return sh_fail(err, SH_EINPUT,
+                   "%.6g ns kept before an echo and %.6g ns behind it: together at most %.6g ns, %.0f samples",
                    1e9 * spec->before_s, 1e9 * spec->after_s, 1e9 * most * spec->sample_s, most);
 }
 

@@ -50,27 +50,15 @@ static double outgoing_at(const struct outgoing *o, double t_s)
     return exp(-0.5 * x * x);
 }
 
-static void outgoing_init(struct outgoing *o, const struct waveform_spec *spec)
+static struct outgoing outgoing_of(const struct waveform_spec *spec)
 {
     const double s = fmax(spec->skew, 1.0 + 1e-6), tail = pow(s, sqrt(-log(TAIL_LEAST) / M_LN2));
-    o->spec = spec;
-    switch (spec->shape) {
-    case WAVEFORM_TABLE: /* How fine its features are is not known. What the sampling resolves counts. */
-        o->from_s = 0.0;
-        o->to_s = (spec->n_table - 1) * spec->table_step_s;
-        o->scale_s = 0.6 * spec->sample_s;
-        break;
-    case WAVEFORM_ASYMMETRIC:
-        o->from_s = (1.0 / tail - 1.0) * spec->width_s / (s - 1.0 / s);
-        o->to_s = (tail - 1.0) * spec->width_s / (s - 1.0 / s);
-        o->scale_s = 2.0 * SIGMA_1 * spec->width_s / (1.0 + s); /* the rising side */
-        break;
-    case WAVEFORM_GAUSSIAN:
-        o->scale_s = SIGMA_1 * spec->width_s;
-        o->to_s = GAUSSIAN_END * o->scale_s;
-        o->from_s = -o->to_s;
-        break;
-    }
+    const double per_a_s = spec->width_s / (s - 1.0 / s), sigma_s = SIGMA_1 * spec->width_s;
+    if (spec->shape == WAVEFORM_TABLE) /* How fine its features are is not known. What the sampling resolves counts. */
+        return (struct outgoing){spec, 0.0, (spec->n_table - 1) * spec->table_step_s, 0.6 * spec->sample_s};
+    if (spec->shape == WAVEFORM_ASYMMETRIC) /* scale: that of the rising side */
+        return (struct outgoing){spec, (1.0 / tail - 1.0) * per_a_s, (tail - 1.0) * per_a_s, 2.0 * sigma_s / (1.0 + s)};
+    return (struct outgoing){spec, -GAUSSIAN_END * sigma_s, GAUSSIAN_END * sigma_s, sigma_s};
 }
 
 /* sigma of the receiver's answer to an impulse. A Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to which chains of many
@@ -125,10 +113,11 @@ static int check_ripple(const struct waveform_spec *spec, const double *h, uint3
     if (off <= most) return SH_OK;
     while (apart > 1 && ripple(h, n, apart) > most)
         apart--;
-    return sh_fail(err, SH_EINPUT,
-                   "samples %.4g ns apart are too coarse for this pulse: the energy in them changes by %.2g %% with the "
-                   "range; 0.1 %% is allowed, so at most %.3g ns, or a longer pulse, or a receiver of less bandwidth",
-                   1e9 * spec->sample_s, 1e2 * off, 1e9 * spec->sample_s * apart / phases);
+    return sh_fail(
+        err, SH_EINPUT,
+        "samples %.4g ns apart are too coarse for this pulse: the energy in them changes by %.2g %% with the "
+        "range; 0.1 %% is allowed, so at most %.4g ns, or a longer pulse, or a receiver of less bandwidth",
+        1e9 * spec->sample_s, 1e2 * off, 1e-3 * floor(1e12 * spec->sample_s * apart / phases));
 }
 
 static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, struct waveform_pulse *pulse)
@@ -150,9 +139,8 @@ static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, s
 
 int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err)
 {
-    struct outgoing o;
+    const struct outgoing o = outgoing_of(spec);
     const double sigma_s = receiver_sigma_s(spec->bandwidth_hz), end_s = GAUSSIAN_END * sigma_s;
-    outgoing_init(&o, spec);
     const double scale_s = sqrt(o.scale_s * o.scale_s + sigma_s * sigma_s);
     const double phases = fmin(MAX_PHASES, fmax(MIN_PHASES, ceil(STEPS_PER_SCALE * spec->sample_s / scale_s)));
     const double step_s = spec->sample_s / phases, from_s = o.from_s - end_s - EDGE_STEPS * step_s;

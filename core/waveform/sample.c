@@ -130,7 +130,7 @@ static int64_t find_gate(struct sampling *s, struct span piece, struct found *fo
 static void limit_signal(struct sampling *s, struct span piece, int64_t end)
 {
     const double most = s->w->spec.saturation;
-    for (int64_t k = piece.begin; k < end && k < piece.end; k++) {
+    for (int64_t k = piece.begin; k < end; k++) {
         double *signal = &s->signal[k - piece.begin];
         if (k < s->dead_end && !s->limited) {
             *signal = 0.0;
@@ -145,25 +145,34 @@ static void limit_signal(struct sampling *s, struct span piece, int64_t end)
     }
 }
 
-VEC_CLONES
-static void digitise(const double *restrict signal, uint32_t n, const double figure[4], uint64_t key,
-                     uint16_t *restrict count)
+VEC_INLINE uint16_t count_of(const struct waveform_digits *d, double signal, double noise)
 {
-    const double baseline = figure[0], counts_1 = figure[1], noise = figure[2], top = figure[3];
-    for (uint32_t i = 0; i < n; i++) {
-        uint64_t bits;
-        double x = baseline + counts_1 * (signal[i] + noise * rng_normal_of(rng_mix(key + i * 0x9e3779b97f4a7c15ULL)));
-        x = x > 0.0 ? x : 0.0;
-        vec_round(x < top ? x : top, &bits);
-        count[i] = (uint16_t)bits;
-    }
+    uint64_t bits;
+    double x = d->baseline + d->counts_1 * ((signal < d->most ? signal : d->most) + noise);
+    x = x > 0.0 ? x : 0.0;
+    vec_round(x < d->top ? x : d->top, &bits);
+    return (uint16_t)bits;
 }
 
-void waveform_digitise(const struct waveform *w, uint64_t pulse_key, int64_t first, uint32_t n, const double *signal,
-                       uint16_t *count)
+VEC_CLONES
+static void digitise(const struct waveform_digits *d, const double *restrict signal, uint32_t n,
+                     uint16_t *restrict count)
 {
-    const double figure[4] = {w->spec.baseline_counts, w->counts_1, w->spec.noise, (double)(1U << w->spec.bits) - 1.0};
-    digitise(signal, n, figure, pulse_key + (uint64_t)first * 0x9e3779b97f4a7c15ULL, count);
+    const struct waveform_digits digits = *d;
+    for (uint32_t i = 0; i < n; i++)
+        count[i] = count_of(&digits, signal[i], 0.0);
+}
+
+/* The generator of core/rng.h in its plain form: the pulse's key is random already, so that one round is enough. */
+VEC_CLONES
+static void digitise_noisy(const struct waveform_digits *d, const double *restrict signal, uint32_t n, uint64_t key,
+                           uint64_t first, uint16_t *restrict count)
+{
+    const struct waveform_digits digits = *d;
+    for (uint32_t i = 0; i < n; i++) {
+        double noise = digits.noise * rng_normal_of(rng_mix(key + (first + i) * 0x9e3779b97f4a7c15ULL));
+        count[i] = count_of(&digits, signal[i], noise);
+    }
 }
 
 static void write_window(struct sampling *s, struct span piece, struct span window)
@@ -174,8 +183,12 @@ static void write_window(struct sampling *s, struct span piece, struct span wind
         record->n_left_out += n;
         return;
     }
-    waveform_digitise(s->w, s->key, window.begin, n, s->signal + (window.begin - piece.begin),
-                      record->sample + record->n_samples);
+    const double *signal = s->signal + (window.begin - piece.begin);
+    uint16_t *count = record->sample + record->n_samples;
+    if (s->w->digits.noise > 0.0)
+        digitise_noisy(&s->w->digits, signal, n, s->key, (uint64_t)window.begin, count);
+    else
+        digitise(&s->w->digits, signal, n, count);
     record->window[record->n_windows++] = (struct waveform_window){(uint32_t)window.begin, n, record->n_samples};
     record->n_samples += n;
 }
@@ -187,7 +200,7 @@ static void sample_stretch(struct sampling *s, struct span stretch)
         struct span piece = {at, stretch.end - at > WAVEFORM_MAX_SAMPLES ? at + WAVEFORM_MAX_SAMPLES : stretch.end};
         sum_returns(s, piece);
         next = s->w->gate_end > 0 ? find_gate(s, piece, &found) : find_windows(s, piece, stretch.end, &found);
-        if (s->w->spec.saturation > 0.0) limit_signal(s, piece, next);
+        if (s->w->dead > 0) limit_signal(s, piece, next);
         for (uint32_t i = 0; i < found.n; i++)
             write_window(s, piece, found.window[i]);
     }

@@ -28,8 +28,8 @@ static struct waveform_node bell_node(uint32_t i, uint32_t n)
     return (struct waveform_node){x, exp(-0.5 * x * x)};
 }
 
-/* Moments 2 and 4 of each spread, from the finest level. Gauss's three nodes have these and moments up to 5. */
-static void three_nodes(struct waveform_node *node, const struct waveform_node *fine, uint32_t n)
+/* Gauss's three nodes, which have the moments up to 5 that the finest level has. Returns the second. */
+static double three_nodes(struct waveform_node *node, const struct waveform_node *fine, uint32_t n)
 {
     double m2 = 0.0, m4 = 0.0;
     for (uint32_t i = 0; i < n; i++) {
@@ -41,6 +41,7 @@ static void three_nodes(struct waveform_node *node, const struct waveform_node *
     node[0] = (struct waveform_node){-x, side};
     node[1] = (struct waveform_node){0.0, 1.0 - 2.0 * side};
     node[2] = (struct waveform_node){x, side};
+    return m2;
 }
 
 /* Error below 1e-5 of the amplitude (tests/unit/test_waveform.c): the next term of three nodes, and for others what is
@@ -75,7 +76,8 @@ int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, 
         for (uint32_t i = 0; i < n; i++)
             node[i].weight /= sum;
     }
-    three_nodes(rule->node, rule->node + rule->first[WAVEFORM_LEVELS - 1], nodes_of(WAVEFORM_LEVELS - 1));
+    rule->square =
+        three_nodes(rule->node, rule->node + rule->first[WAVEFORM_LEVELS - 1], nodes_of(WAVEFORM_LEVELS - 1));
     return SH_OK;
 }
 
@@ -109,32 +111,46 @@ static void add_pulse(const struct waveform_pulse *pulse, double amplitude, doub
         out[i] += (c[0] * r0[i] + c[1] * r1[i]) + (c[2] * r2[i] + c[3] * r3[i]);
 }
 
-/* Extents beyond the last level count as that. */
+static const struct waveform_rule *rule_of(const struct waveform *w, const struct waveform_return *part)
+{
+    return part->spread == WAVEFORM_DISC ? &w->disc : &w->bell;
+}
+
+/* In samples. Extents beyond the last level count as that. */
 static double extent_of(const struct waveform *w, const struct waveform_return *part)
 {
-    const struct waveform_rule *rule = part->spread == WAVEFORM_DISC ? &w->disc : &w->bell;
-    return part->spread == WAVEFORM_POINT
-               ? 0.0
-               : fmin(part->extent_m * w->samples_1_m, rule->reach[WAVEFORM_LEVELS - 1] * w->pulse.scale);
+    if (part->spread == WAVEFORM_POINT) return 0.0;
+    return fmin(part->extent_m * w->samples_1_m, rule_of(w, part)->reach[WAVEFORM_LEVELS - 1] * w->pulse.scale);
+}
+
+/* The ranges on a plane rise as 1 / (1 - b x) across the disc, b = extent / range where the beam has spread far beyond its
+ * exit. This is b up to the half that core/footprint.h has, for the second term of the series. */
+static double bend_of(const struct waveform_return *part)
+{
+    if (part->spread != WAVEFORM_DISC) return 0.0;
+    return part->extent_m < 0.5 * part->range_m ? part->extent_m / part->range_m : 0.5;
 }
 
 double waveform_reach(const struct waveform *w, const struct waveform_return *part)
 {
-    return extent_of(w, part) * (part->spread == WAVEFORM_BELL ? WAVEFORM_BELL_END : 1.0);
+    return extent_of(w, part) * (part->spread == WAVEFORM_BELL ? WAVEFORM_BELL_END : 1.0 + bend_of(part));
 }
 
 void waveform_add(const struct waveform *w, const struct waveform_return *part, double centre, uint32_t n,
                   double *signal)
 {
-    const double extent = extent_of(w, part);
+    const double extent = extent_of(w, part), bend = bend_of(part);
+    const struct waveform_rule *rule = rule_of(w, part);
+    uint32_t level = 0;
     if (extent == 0.0) {
         add_pulse(&w->pulse, part->amplitude, centre, n, signal);
         return;
     }
-    const struct waveform_rule *rule = part->spread == WAVEFORM_DISC ? &w->disc : &w->bell;
-    uint32_t level = 0;
     while (level + 1 < WAVEFORM_LEVELS && extent > rule->reach[level] * w->pulse.scale)
         level++;
-    for (uint32_t i = rule->first[level]; i < rule->first[level + 1]; i++)
-        add_pulse(&w->pulse, part->amplitude * rule->node[i].weight, centre + extent * rule->node[i].x, n, signal);
+    for (uint32_t i = rule->first[level]; i < rule->first[level + 1]; i++) {
+        const struct waveform_node *node = &rule->node[i];
+        const double x = node->x + bend * (node->x * node->x - rule->square);
+        add_pulse(&w->pulse, part->amplitude * node->weight, centre + extent * x, n, signal);
+    }
 }

@@ -7,14 +7,24 @@
 #include "core/rng.h"
 #include "core/waveform/waveform_inside.h"
 
+/* So many samples cover a time; a time that was meant as whole samples may be a bit more. */
+static int64_t samples_of(double time_s, double sample_s)
+{
+    return (int64_t)ceil(time_s / sample_s - 1e-6);
+}
+
 static void set_up_digits(struct waveform *w)
 {
     const struct waveform_spec *s = &w->spec;
     w->samples_1_m = 2.0 / (LIGHT_SPEED_M_S * s->sample_s);
-    w->counts_1 = ((double)(1U << s->bits) - 1.0 - s->baseline_counts) / s->full_scale;
-    w->before = (int64_t)ceil(s->before_s / s->sample_s);
-    w->after = (int64_t)ceil(s->after_s / s->sample_s);
-    w->dead = (int64_t)ceil(s->dead_s / s->sample_s);
+    w->digits.top = (double)(1U << s->bits) - 1.0;
+    w->digits.baseline = s->baseline_counts;
+    w->digits.counts_1 = (w->digits.top - s->baseline_counts) / s->full_scale;
+    w->digits.noise = s->noise;
+    w->digits.most = s->saturation > 0.0 ? s->saturation : (double)INFINITY;
+    w->before = samples_of(s->before_s, s->sample_s);
+    w->after = samples_of(s->after_s, s->sample_s);
+    w->dead = samples_of(s->dead_s, s->sample_s);
     if (s->near_m < s->far_m) {
         w->gate_begin = (int64_t)ceil(s->near_m * w->samples_1_m);
         w->gate_end = (int64_t)floor(s->far_m * w->samples_1_m) + 1;
@@ -55,6 +65,7 @@ int waveform_create(const struct waveform_spec *spec, struct waveform **out, str
         return rc;
     }
     set_up_digits(w);
+    finder_learn(w, &w->finder);
     *out = w;
     return SH_OK;
 }

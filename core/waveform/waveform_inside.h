@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "core/waveform.h"
+#include "core/waveform/detect_inside.h"
 
 /* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples apart,
  * read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
@@ -33,20 +34,27 @@ struct waveform_rule {
     struct waveform_node *node;
     uint32_t first[WAVEFORM_LEVELS + 1];
     double reach[WAVEFORM_LEVELS];
+    double square; /* mean of x^2 */
 };
 int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err);
 void waveform_rule_free(struct waveform_rule *rule);
+
+/* A count is baseline + counts_1 times the signal, which is `most` at most, and its noise. */
+struct waveform_digits {
+    double baseline, counts_1, noise, most, top;
+};
 
 struct waveform {
     struct waveform_spec spec; /* with a table of its own */
     double *table;
     struct waveform_pulse pulse;
     struct waveform_rule disc, bell;
-    double samples_1_m;               /* of range */
-    double counts_1;                  /* of a signal of 1 */
-    int64_t before, after, dead;      /* in samples */
-    int64_t gate_begin, gate_end;     /* 0 and 0: none */
+    double samples_1_m; /* of range */
+    struct waveform_digits digits;
+    int64_t before, after, dead;  /* in samples */
+    int64_t gate_begin, gate_end; /* 0 and 0: none */
     uint64_t key;
+    struct finder finder;
 };
 
 int waveform_check(const struct waveform_spec *spec, struct sh_err *err);
@@ -55,8 +63,4 @@ void waveform_add(const struct waveform *waveform, const struct waveform_return 
                   double *signal);
 /* How far a return reaches about its centroid beyond the pulse itself, in samples. */
 double waveform_reach(const struct waveform *waveform, const struct waveform_return *part);
-/* Counts of samples first .. first + n of a pulse, whose key is pulse_key. */
-void waveform_digitise(const struct waveform *waveform, uint64_t pulse_key, int64_t first, uint32_t n,
-                       const double *signal, uint16_t *count);
-
 #endif

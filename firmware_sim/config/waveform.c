@@ -17,11 +17,13 @@ static int has_gate(const struct config_waveform *w)
     return w->near_m < w->far_m;
 }
 
-/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. */
+/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. The receiver makes it longer: 312 ns for a
+ * Gaussian response of 1 MHz. */
 uint32_t config_wave_samples(const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;
-    const double pulse_ns = 3.0 * cfg->profile.pulse_width_ns;
+    const double receiver_ns = w->bandwidth_mhz > 0.0 ? 312.0 / w->bandwidth_mhz : 0.0;
+    const double pulse_ns = 3.0 * hypot(cfg->profile.pulse_width_ns, receiver_ns);
     const double span_ns =
         has_gate(w) ? 2e9 / LIGHT_SPEED_M_S * (w->far_m - w->near_m) : w->before_ns + pulse_ns + w->after_ns;
     return (uint32_t)fmin(floor(span_ns / w->sample_ns) + 1.0, (double)WAVEFORM_MAX_SAMPLES);

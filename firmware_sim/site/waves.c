@@ -60,26 +60,27 @@ static double ratio_of(double db)
     return pow(10.0, 0.1 * db);
 }
 
+/* Quotients by 1e9 are the nearest doubles: limits in ns are those in s. */
 static void fill_spec(const struct config *cfg, const struct pulse_table *table, struct waveform_spec *spec)
 {
     const struct config_waveform *w = &cfg->waveform;
     *spec = (struct waveform_spec){.shape = w->pulse,
-                                   .width_s = 1e-9 * cfg->profile.pulse_width_ns,
+                                   .width_s = cfg->profile.pulse_width_ns / 1e9,
                                    .skew = w->skew,
                                    .table = table->power,
                                    .n_table = table->n,
-                                   .table_step_s = 1e-9 * table->step_ns,
+                                   .table_step_s = table->step_ns / 1e9,
                                    .bandwidth_hz = 1e6 * w->bandwidth_mhz,
-                                   .sample_s = 1e-9 * w->sample_ns,
+                                   .sample_s = w->sample_ns / 1e9,
                                    .bits = w->bits,
                                    .baseline_counts = w->baseline_counts,
                                    .full_scale = ratio_of(w->full_scale_db),
                                    .saturation = w->saturation_db > 0.0 ? ratio_of(w->saturation_db) : 0.0,
-                                   .dead_s = 1e-9 * w->dead_ns,
+                                   .dead_s = w->dead_ns / 1e9,
                                    .noise = cfg->signal.sharp ? 0.0 : 1.0 / cfg->profile.threshold_snr,
                                    .keep = ratio_of(w->keep_db),
-                                   .before_s = 1e-9 * w->before_ns,
-                                   .after_s = 1e-9 * w->after_ns,
+                                   .before_s = w->before_ns / 1e9,
+                                   .after_s = w->after_ns / 1e9,
                                    .near_m = w->near_m,
                                    .far_m = w->far_m,
                                    .seed = cfg->noise.seed};

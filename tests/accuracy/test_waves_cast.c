@@ -72,9 +72,9 @@ static double budget(const struct waves *w, const struct edge *e)
            e->back[BACK] / (least * e->range_m[BACK] * e->range_m[BACK]);
 }
 
-static void check_energies(enum beam_mode mode, const struct beam_view *view, double near_m, double slack)
+static void check_energies(enum beam_mode mode, const struct beam_view *view, const double at_m[2], double slack)
 {
-    struct waves w = {.lit = {.near_m = near_m, .far_m = near_m + 40.0, .rho = {0.8, 0.5}}};
+    struct waves w = {.lit = {.near_m = at_m[0], .far_m = at_m[1], .rho = {0.8, 0.5}}};
     double d[3][PULSES];
     uint32_t cut = 0;
     open_waves(&w, view, mode, ROOM);
@@ -103,8 +103,8 @@ static void energy_is_the_link_budget(void **state)
     static const struct beam_view OBLIQUE = {0.0, 1.0, -44.0, -10.0, 4, PULSES};
     for (int mode = BEAM_SINGLE; mode <= BEAM_ADAPTIVE; mode++) {
         const enum beam_mode m = (enum beam_mode)mode;
-        check_energies(m, &OBLIQUE, 20.0, 0.0);
-        check_energies(m, &ACROSS, 60.0, m == BEAM_RINGS ? 2.0 * RINGS_OFF : 2.0 * PARTS_OFF);
+        check_energies(m, &OBLIQUE, (const double[]){20.0, 200.0}, 0.0);
+        check_energies(m, &ACROSS, (const double[]){60.0, 100.0}, m == BEAM_RINGS ? 2.0 * RINGS_OFF : 2.0 * PARTS_OFF);
     }
 }
 
@@ -135,7 +135,7 @@ static void windows_belong_to_points(void **state)
 {
     (void)state;
     for (int geo = 0; geo < 2; geo++) {
-        struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+        struct waves w = {.lit = {.near_m = 20.0, .far_m = 200.0, .rho = {0.8, 0.5}}};
         static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 2, PULSES};
         const struct line_block *b = &w.lit.rig.block;
         uint32_t at = 0;
@@ -182,7 +182,7 @@ static void lost_samples_are_counted(void **state)
 {
     (void)state;
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};
-    struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+    struct waves w = {.lit = {.near_m = 20.0, .far_m = 200.0, .rho = {0.8, 0.5}}};
     struct cast_counters counters;
     const struct line_block *b = &w.lit.rig.block;
     open_waves(&w, &SIDE, BEAM_SINGLE, ROOM);
@@ -200,16 +200,19 @@ static void lost_samples_are_counted(void **state)
 
 /* ---- echoes */
 
-/* Without noise, echoes of one plate are where the closed form has them: to 0.2 mm, for digits of 10,000 counts give
- * 0.26 m / 10,000 of a pulse's sigma, and three times that covers the worst of them and the detectors' own steps. Their
- * amplitude is the link budget's to 0.02 dB: 0.5 %. */
+/* Without noise, echoes of one plate are where the closed form has them, but for digits. Half a count is 0.06 thresholds.
+ * The signal rises by sqrt(2 ln 800) / 1.7 ns = 2.2 a ns where it crosses the threshold, so there it is 4 mm; by 300 a ns
+ * at half of the peak, 0.03 mm. Both samples around a crossing may be so much off. The amplitude is the link budget's to 0.02 dB:
+ * 0.5 %. */
 static void echoes_are_found_in_samples(void **state)
 {
     (void)state;
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -10.0, 4, PULSES};
+    static const double most_m[] = {
+        [WAVEFORM_THRESHOLD] = 10e-3, [WAVEFORM_FRACTION] = 2e-4, [WAVEFORM_GAUSSIANS] = 2e-4};
     for (int detector = WAVEFORM_THRESHOLD; detector <= WAVEFORM_GAUSSIANS; detector++)
         for (uint32_t line = 0; line < 4; line++) {
-            struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+            struct waves w = {.lit = {.near_m = 20.0, .far_m = 200.0, .rho = {0.8, 0.5}}};
             const struct line_block *b = &w.lit.rig.block;
             uint32_t range[PULSES];
             int16_t amplitude_cdb[PULSES], refl_cdb[PULSES];
@@ -226,44 +229,65 @@ static void echoes_are_found_in_samples(void **state)
                 assert_int_equal(b->echo[p], 0x11);
                 assert_int_equal(b->label[p], FRONT);
                 const double off_m = 1e-6 * ((double)b->a[p] - (double)range[p]);
-                if (!(fabs(off_m) < 2e-4)) fail_msg("detector %d, pulse %u: %.3f mm off", detector, p, 1e3 * off_m);
+                if (!(fabs(off_m) < most_m[detector])) fail_msg("detector %d, pulse %u: %.3f mm off", detector, p, 1e3 * off_m);
                 assert_true(abs(b->amplitude_cdb[p] - amplitude_cdb[p]) <= 2);
                 assert_true(abs(b->refl_cdb[p] - refl_cdb[p]) <= 2);
                 assert_true(abs(b->width_cns[p] - 400) <= 8); /* 4 ns, to 2 % */
-                assert_true(b->deviation[p] <= 5);            /* digits: 1 in 10,000, and rounding */
+                /* digits: 1 in 10,000, and rounding; 4 mm of range are 0.016 of a pulse's sigma */
+                assert_true(b->deviation[p] <= (detector == WAVEFORM_THRESHOLD ? 20 : 3));
             }
             close_waves(&w);
         }
 }
 
-/* Two plates 40 m apart, of which the edge cuts footprints: as many echoes as the closed forms have, where neither is
- * near the threshold. */
+/* The echoes of a pulse: how many, their surfaces and ranges. */
+struct seen {
+    uint32_t n, label[LINE_MAX_ECHOES];
+    double range_m[LINE_MAX_ECHOES];
+};
+
+static void look(const struct line_block *b, struct seen seen[PULSES])
+{
+    uint32_t p = UINT32_MAX;
+    for (uint32_t i = 0; i < b->n_points; i++) {
+        const uint32_t number = b->echo[i] & 15;
+        if (number <= 1) seen[++p].n = b->echo[i] >> 4;
+        if (number == 0) continue;
+        seen[p].label[number - 1] = b->label[i];
+        seen[p].range_m[number - 1] = 1e-6 * b->a[i];
+    }
+    assert_int_equal(p, PULSES - 1);
+}
+
+/* An edge cuts footprints on two plates 40 m apart. Where each has 2 % of the light or more, or nothing, the echoes are
+ * those of the closed forms: 2 % are 8 thresholds and more, of which half a count is 1 %, and that of a pulse's sigma 3
+ * mm. (Of less the model makes no echo below 1 %, and the detector none below the threshold.) */
 static void cut_footprints_have_two_echoes(void **state)
 {
     (void)state;
     struct waves w = {.lit = {.near_m = 60.0, .far_m = 100.0, .rho = {0.8, 0.5}}};
-    const struct line_block *b = &w.lit.rig.block;
-    uint8_t echo[2][PULSES * 2];
-    uint32_t label[2][PULSES * 2], several = 0;
+    struct seen seen[2][PULSES];
+    double d[3][PULSES];
+    uint32_t several = 0;
     open_waves(&w, &ACROSS, BEAM_ADAPTIVE, ROOM);
     w.cast.detector = WAVEFORM_GAUSSIANS;
     for (uint32_t line = 0; line < ACROSS_LINES; line++) {
-        uint32_t n[2];
-        for (int finds = 0; finds < 2; finds++) {
-            w.cast.finds = finds;
+        beam_rig_directions(&w.lit.rig, line, d[0], d[1], d[2]);
+        for (w.cast.finds = 0; w.cast.finds < 2; w.cast.finds++) {
             beam_rig_line(&w.lit.rig, line);
-            n[finds] = b->n_points;
-            assert_true(b->n_points <= PULSES * 2);
-            for (uint32_t i = 0; i < b->n_points; i++) {
-                echo[finds][i] = b->echo[i];
-                label[finds][i] = b->label[i];
+            look(&w.lit.rig.block, seen[w.cast.finds]);
+        }
+        for (uint32_t p = 0; p < PULSES; p++) {
+            const struct edge e = at_edge(&w.lit, d[0][p], d[1][p]);
+            const struct seen *a = &seen[0][p], *b = &seen[1][p];
+            if (e.front > 0.0 && e.front < 1.0 && !(e.front > 0.02 && e.front < 0.98)) continue;
+            assert_int_equal(a->n, b->n);
+            several += a->n == 2;
+            for (uint32_t i = 0; i < a->n; i++) {
+                assert_int_equal(a->label[i], b->label[i]);
+                assert_true(fabs(a->range_m[i] - b->range_m[i]) < 3e-3);
             }
         }
-        assert_int_equal(n[0], n[1]);
-        assert_memory_equal(echo[0], echo[1], n[0]);
-        assert_memory_equal(label[0], label[1], n[0] * sizeof label[0][0]);
-        for (uint32_t i = 0; i < n[0]; i++)
-            several += echo[0][i] >> 4 == 2;
     }
     assert_true(several > 2 * PULSES);
     close_waves(&w);
@@ -275,7 +299,7 @@ static void dark_pulses_have_no_windows(void **state)
     (void)state;
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -10.0, 1, PULSES};
     const struct cast_disturbance dark = {.dark = 1, .share = 1.0};
-    struct waves w = {.lit = {.near_m = 20.0, .far_m = 60.0, .rho = {0.8, 0.5}}};
+    struct waves w = {.lit = {.near_m = 20.0, .far_m = 200.0, .rho = {0.8, 0.5}}};
     open_waves(&w, &SIDE, BEAM_SINGLE, ROOM);
     w.lit.rig.setup.disturbance = &dark;
     beam_rig_line(&w.lit.rig, 0);

@@ -82,6 +82,16 @@ void wave_measure(struct wave_echoes *w, enum waveform_detector detector, uint32
     *figures = f;
 }
 
+void wave_near(double got, double want, double most)
+{
+    if (!(fabs(got - want) <= most)) fail_msg("%.9g differs from %.9g by more than %.3g", got, want, most);
+}
+
+void wave_between(double got, double least, double most)
+{
+    if (!(got >= least && got <= most)) fail_msg("%.6g is not within %.6g .. %.6g", got, least, most);
+}
+
 double wave_sigma(double width)
 {
     return width / (2.0 * sqrt(2.0 * M_LN2));

@@ -36,6 +36,9 @@ struct wave_figures {
 void wave_measure(struct wave_echoes *w, enum waveform_detector detector, uint32_t pulses,
                   const struct waveform_return *part, struct wave_figures *figures);
 
+void wave_near(double got, double want, double most);
+void wave_between(double got, double least, double most);
+
 /* ---- what theory says of the pulse of wave_spec */
 
 /* sigma of a Gaussian by its full width at half maximum. */

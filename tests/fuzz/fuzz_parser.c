@@ -4,7 +4,7 @@
  * be in one item, or be counted as bad. */
 #include <string.h>
 
-#include "drivers/protocol/native.h"
+#include "drivers/protocol/native_waves.h"
 #include "tests/fuzz/rig.h"
 #include "tests/fuzz/seal.h"
 
@@ -37,6 +37,20 @@ static void name(void *ctx, uint32_t label, const char *object, const char *mate
     *sum = mix(*sum, &label, sizeof label) + strlen(object) + strlen(material);
 }
 
+/* The last sample of each window of a payload that was found right. */
+static uint64_t last_samples(const uint8_t *payload, size_t len, uint32_t n_windows)
+{
+    uint64_t sum = 0;
+    size_t at = NATIVE_WAVES_HEAD_LEN;
+    for (uint32_t i = 0; i < n_windows; i++) {
+        struct native_wave w;
+        at = native_decode_wave(payload, at, &w);
+        fuzz_must(at <= len && w.n > 0, "a window within its payload");
+        sum += le_get16(w.sample + NATIVE_SAMPLE_LEN * (size_t)(w.n - 1));
+    }
+    return sum;
+}
+
 /* Decodes the payload in every way, whatever its type, because decoders check for themselves. */
 static uint64_t decode(const uint8_t *payload, size_t len)
 {
@@ -55,6 +69,7 @@ static uint64_t decode(const uint8_t *payload, size_t len)
         struct native_attribute attribute;
         uint8_t rgb[3];
     } u;
+    struct native_waves waves;
     uint32_t n = 0;
     uint64_t sum = 0;
     native_decode_descriptor(payload, len, &u.descriptor);
@@ -70,6 +85,10 @@ static uint64_t decode(const uint8_t *payload, size_t len)
         native_decode_attribute(payload, n - 1, &u.attribute);
     if (native_decode_colours(payload, len, &u.attributes) == SH_OK && (n = u.attributes.n_points) > 0)
         native_decode_colour(payload, n - 1, u.rgb);
+    if (native_decode_attributes(payload, len, &u.attributes) == SH_OK && (n = u.attributes.n_points) > 0 &&
+        native_check_deviations(len, n) == SH_OK)
+        sum += native_decode_deviation(payload, n, n - 1);
+    if (native_decode_waves(payload, len, &waves) == SH_OK) sum += last_samples(payload, len, waves.n_windows);
     if (native_decode_poses(payload, len, &n) == SH_OK) native_decode_pose(payload, n - 1, &u.pose);
     native_decode_surfaces(payload, len, name, &sum);
     return sum;

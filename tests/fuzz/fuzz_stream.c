@@ -77,6 +77,7 @@ static void ask(struct scanhead *sh, const struct scanhead_frame *frame)
     static struct scanhead_point point[SOME_POINTS];
     static struct scanhead_attribute attribute[SOME_POINTS];
     static struct scanhead_colour colour[SOME_POINTS];
+    static struct scanhead_wave wave[SOME_POINTS];
     static struct scanhead_pose pose[4];
     static struct scanhead_emitter emitter;
     struct scanhead_info info;
@@ -90,6 +91,11 @@ static void ask(struct scanhead *sh, const struct scanhead_frame *frame)
     if (frame->n_points > SOME_POINTS) scanhead_points(sh, frame, frame->n_points - 1, point, SOME_POINTS);
     scanhead_attributes(sh, frame, 0, attribute, SOME_POINTS);
     scanhead_colours(sh, frame, 0, colour, SOME_POINTS);
+    scanhead_deviations(sh, frame, 0, scalar, SOME_POINTS);
+    const int windows = scanhead_waves(sh, frame, 0, wave, SOME_POINTS);
+    for (int i = 0; i < windows; i++)
+        scanhead_wave_signal(&wave[i], wave[i].n - 1);
+    scanhead_waves_lost(sh, frame);
     scanhead_poses(sh, frame, 1, pose, 4);
     scanhead_line_end(sh, frame, &end);
     scanhead_get_info(sh, &info);

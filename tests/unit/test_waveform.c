@@ -7,7 +7,8 @@
 
 #define METRES_1_S (0.5 * 299792458.0)
 
-static const double measured[] = {0.0, 0.02, 0.1, 0.35, 0.8, 1.3, 1.5, 1.35, 1.0, 0.62, 0.35, 0.2, 0.1, 0.05, 0.02, 0.0};
+static const double measured[] = {0.0, 0.02, 0.1,  0.35, 0.8, 1.3,  1.5,  1.35,
+                                  1.0, 0.62, 0.35, 0.2,  0.1, 0.05, 0.02, 0.0};
 
 /* The shapes that the tests go through. The last have receivers that are slower than the pulse. */
 static struct waveform_spec shape_of(int k)
@@ -16,10 +17,10 @@ static struct waveform_spec shape_of(int k)
     static const struct {
         enum waveform_shape shape;
         double width_s, skew, bandwidth_hz;
-    } shapes[] = {{WAVEFORM_GAUSSIAN, 4e-9, 1.0, 0.0},      {WAVEFORM_GAUSSIAN, 1.6e-9, 1.0, 0.0},
-                  {WAVEFORM_GAUSSIAN, 0.5e-9, 1.0, 150e6},  {WAVEFORM_ASYMMETRIC, 4e-9, 1.5, 0.0},
-                  {WAVEFORM_ASYMMETRIC, 5e-9, 2.0, 200e6},  {WAVEFORM_ASYMMETRIC, 4e-9, 1.0, 0.0},
-                  {WAVEFORM_ASYMMETRIC, 6e-9, 3.0, 0.0},    {WAVEFORM_TABLE, 0.0, 1.0, 0.0},
+    } shapes[] = {{WAVEFORM_GAUSSIAN, 4e-9, 1.0, 0.0},     {WAVEFORM_GAUSSIAN, 1.6e-9, 1.0, 0.0},
+                  {WAVEFORM_GAUSSIAN, 0.5e-9, 1.0, 150e6}, {WAVEFORM_ASYMMETRIC, 4e-9, 1.5, 0.0},
+                  {WAVEFORM_ASYMMETRIC, 5e-9, 2.0, 200e6}, {WAVEFORM_ASYMMETRIC, 4e-9, 1.0, 0.0},
+                  {WAVEFORM_ASYMMETRIC, 15e-9, 3.0, 0.0},  {WAVEFORM_TABLE, 0.0, 1.0, 0.0},
                   {WAVEFORM_TABLE, 0.0, 1.0, 180e6}};
     spec.shape = shapes[k].shape;
     spec.width_s = shapes[k].width_s;
@@ -27,7 +28,7 @@ static struct waveform_spec shape_of(int k)
     spec.bandwidth_hz = shapes[k].bandwidth_hz;
     spec.table = measured;
     spec.n_table = sizeof measured / sizeof *measured;
-    spec.table_step_s = 0.8e-9;
+    spec.table_step_s = 1.6e-9;
     return spec;
 }
 enum { SHAPES = 9 };
@@ -51,8 +52,16 @@ static double samples_area_s(const struct waveform *w, const struct waveform_rec
     return sum * spec->full_scale / ((1U << spec->bits) - 1.0 - spec->baseline_counts) * spec->sample_s;
 }
 
+static double peak_of(const struct waveform *w, const struct waveform_return *r)
+{
+    double peak = 0.0;
+    for (int i = -100; i <= 100; i++)
+        peak = fmax(peak, waveform_signal(w, r, 1, r->range_m + 0.05 * i));
+    return peak;
+}
+
 /* Sums of samples against the link budget: 0.1 % for each shape, spread and place between the samples. Rounding adds at
- * most half a count each, against a peak near 16,000. */
+ * most half a count each, against a peak near 14,000. */
 static void samples_have_the_energy(void **state)
 {
     (void)state;
@@ -65,14 +74,15 @@ static void samples_have_the_energy(void **state)
         spec.keep = 0.01;
         spec.before_s = spec.after_s = 60e-9;
         struct waveform *w = waveform_rig_open(&spec);
-        assert_true(fabs(waveform_pulse_area_s(w) / area_s(&spec) - 1.0) < 1e-3);
+        if (!(fabs(waveform_pulse_area_s(w) / area_s(&spec) - 1.0) < 1e-4))
+            fail_msg("shape %d: area %g", k, waveform_pulse_area_s(w) / area_s(&spec) - 1.0);
         for (int phase = 0; phase < 12; phase++)
             for (int e = 0; e < 6; e++)
                 for (int spread = 0; spread < 3; spread++) {
-                    /* a wide return has less of a peak */
-                    const double amplitude = 800.0 * (1.0 + extents_m[e]);
-                    const struct waveform_return r = {(200.0 + phase / 12.0) * SAMPLE_M, amplitude, extents_m[e],
-                                                      (enum waveform_spread)spread};
+                    struct waveform_return r = {(200.0 + phase / 12.0) * SAMPLE_M, 1.0, extents_m[e],
+                                                (enum waveform_spread)spread};
+                    const double amplitude = 900.0 / peak_of(w, &r);
+                    r.amplitude = amplitude;
                     struct waveform_record record = {.sample = sample, .capacity = 4096};
                     waveform_sample(w, 0, 5, &r, 1, &record);
                     double want_s = amplitude * area_s(&spec), off = samples_area_s(w, &record) / want_s - 1.0;
@@ -86,27 +96,27 @@ static void samples_have_the_energy(void **state)
 }
 
 /* h against the closed form: a Gaussian with the receiver's sigma added, or the log-normal with its centroid at 0. Cubics
- * through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. The log-normal's peak bends up
- * to 20 times as much, and its tail ends at 1e-6 of the peak. */
+ * through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. A log-normal's peak bends more.
+ * Its tail is cut at 1e-6 of the peak, 48 widths behind it with a skew of 3, which moves the centroid by 4e-4 widths. */
 static void shapes_are_the_closed_forms(void **state)
 {
     (void)state;
     for (int k = 0; k < SHAPES; k++) {
         struct waveform_spec spec = shape_of(k);
-        if (spec.shape == WAVEFORM_TABLE || (spec.shape == WAVEFORM_ASYMMETRIC && spec.bandwidth_hz > 0.0)) continue;
+        if (spec.shape == WAVEFORM_TABLE || (spec.skew > 1.0 && spec.bandwidth_hz > 0.0)) continue;
         struct waveform *w = waveform_rig_open(&spec);
         const struct waveform_return r = {500.0, 2.0, 0.0, WAVEFORM_POINT};
-        double sigma = spec.width_s / sqrt(8.0 * M_LN2), receiver = waveform_rig_receiver_s(&spec), worst = 0.0;
-        double both = sqrt(sigma * sigma + receiver * receiver);
+        const double sigma = spec.width_s / sqrt(8.0 * M_LN2), receiver = waveform_rig_receiver_s(&spec);
+        const double both = sqrt(sigma * sigma + receiver * receiver);
+        const double most = spec.skew > 2.0 ? 5e-4 : spec.skew > 1.0 ? 2e-5 : 1.2e-6;
+        double worst = 0.0;
         for (int i = -900; i <= 900; i++) {
-            double t_s = i * 0.0173e-9, want = spec.shape == WAVEFORM_GAUSSIAN
-                                                   ? 2.0 * sigma / both * exp(-0.5 * pow(t_s / both, 2))
-                                                   : 2.0 * waveform_rig_pulse(&spec, spec.skew == 1.0 ? t_s : t_s);
-            if (spec.skew == 1.0 && spec.shape == WAVEFORM_ASYMMETRIC) want = 2.0 * exp(-0.5 * pow(t_s / both, 2));
-            worst = fmax(worst, fabs(waveform_signal(w, &r, 1, 500.0 + t_s * METRES_1_S) - want));
+            double t_s = i * 0.0173e-9, want = 2.0 * waveform_rig_pulse(&spec, t_s);
+            if (spec.skew == 1.0) want = 2.0 * sigma / both * exp(-0.5 * (t_s / both) * (t_s / both));
+            worst = fmax(worst, 0.5 * fabs(waveform_signal(w, &r, 1, 500.0 + t_s * METRES_1_S) - want));
         }
-        print_message("# shape %d: within %.2g of its peak\n", k, 0.5 * worst);
-        assert_true(worst < 2.0 * (spec.skew > 1.0 ? 2e-5 : 2.5e-6));
+        print_message("# shape %d: within %.2g of its peak\n", k, worst);
+        assert_true(worst < most);
         waveform_free(w);
     }
 }
@@ -121,8 +131,8 @@ static void the_centroid_is_the_range(void **state)
         for (int spread = 0; spread < 3; spread++) {
             const struct waveform_return r = {80.0, 1.0, 0.4, (enum waveform_spread)spread};
             double sum = 0.0, moment = 0.0;
-            for (int i = -40000; i < 80000; i++) {
-                double r_m = 80.0 + i * 0.0004321, p = waveform_signal(w, &r, 1, r_m);
+            for (int i = -3000; i < 14000; i++) {
+                double r_m = 80.0 + i * 0.008642, p = waveform_signal(w, &r, 1, r_m);
                 sum += p;
                 moment += p * (r_m - 80.0);
             }
@@ -170,19 +180,21 @@ static double spread_of(const struct waveform_spec *spec, enum waveform_spread s
 static void spreads_are_the_closed_forms(void **state)
 {
     (void)state;
-    static const double extents[] = {0.003, 0.05, 0.19, 0.21, 0.49, 0.51, 0.9, 1.1, 1.3, 2.5, 4.0, 7.0, 15.0, 40.0, 150.0};
-    const double sigma_s = 4e-9 / sqrt(8.0 * M_LN2);
+    static const double extents[] = {0.003, 0.05, 0.19, 0.21, 0.49, 0.51, 0.9,  1.1,
+                                     1.3,   2.5,  4.0,  7.0,  15.0, 40.0, 150.0};
+    const double sigma_s = 4e-9 / sqrt(8.0 * M_LN2), far_m = 1e7; /* so far that ranges are even across the disc */
     struct waveform_spec spec = waveform_rig_spec();
     struct waveform *w = waveform_rig_open(&spec);
     cut_the_disc();
     for (int spread = WAVEFORM_DISC; spread <= WAVEFORM_BELL; spread++)
         for (size_t e = 0; e < sizeof extents / sizeof *extents; e++) {
             const double extent_s = extents[e] * sigma_s, end_s = 7.0 * sigma_s + 5.0 * extent_s;
-            const struct waveform_return r = {1000.0, 1.0, extent_s * METRES_1_S, (enum waveform_spread)spread};
+            const struct waveform_return r = {far_m, 1.0, extent_s * METRES_1_S, (enum waveform_spread)spread};
             double worst = 0.0;
             for (int i = -60; i <= 60; i++) {
                 double t_s = end_s * i / 60.0;
-                double off = waveform_signal(w, &r, 1, 1000.0 + t_s * METRES_1_S) - spread_of(&spec, r.spread, extent_s, t_s);
+                double off =
+                    waveform_signal(w, &r, 1, far_m + t_s * METRES_1_S) - spread_of(&spec, r.spread, extent_s, t_s);
                 worst = fmax(worst, fabs(off));
             }
             print_message("# spread %d, extent %g sigma: within %.2g\n", spread, extents[e], worst);
@@ -210,6 +222,7 @@ static void no_extent_is_a_point(void **state)
 }
 
 /* Each change makes the plain spec wrong; the text has the figure, and what is allowed. */
+/* clang-format off */
 static void change(struct waveform_spec *s, int k)
 {
     static const double negative[] = {0.0, 1.0, -0.5}, zeros[] = {0.0, 0.0};
@@ -231,18 +244,20 @@ static void change(struct waveform_spec *s, int k)
     case 14: s->near_m = 10.0, s->far_m = 700.0; break;
     case 15: s->near_m = 10.0, s->far_m = 10.1; break;
     case 16: s->near_m = -1.0; break;
-    case 17: s->shape = WAVEFORM_TABLE; break;
+    case 17: s->shape = WAVEFORM_TABLE, s->table_step_s = 1e-9; break;
     case 18: s->shape = WAVEFORM_TABLE, s->table = negative, s->n_table = 3, s->table_step_s = 1e-9; break;
     case 19: s->shape = WAVEFORM_TABLE, s->table = zeros, s->n_table = 2, s->table_step_s = 1e-9; break;
     case 20: s->shape = WAVEFORM_TABLE, s->table = measured, s->n_table = 16, s->table_step_s = 0.0; break;
     case 21: s->width_s = 1e-9; break;
     case 22: s->width_s = 900e-9, s->sample_s = 0.1e-9; break;
     case 23: s->noise = (double)NAN; break;
-    case 24: s->shape = WAVEFORM_TABLE, s->table = measured, s->n_table = 2000; break;
+    case 24: s->shape = WAVEFORM_TABLE, s->table = measured, s->n_table = 2000, s->table_step_s = 1e-9; break;
     case 25: s->after_s = 1e-4; break;
     default: break;
     }
 }
+
+/* clang-format on */
 
 static void limits_are_told(void **state)
 {
@@ -270,7 +285,7 @@ static void limits_are_told(void **state)
         "a pulse's table of zeros: some value must be above 0",
         "the step of a pulse's table of 0 ns: 0.001 to 100 is allowed",
         "samples 1 ns apart are too coarse for this pulse: the energy in them changes by 5.7 % with the range; 0.1 % is "
-        "allowed, so at most 0.667 ns, or a longer pulse, or a receiver of less bandwidth",
+        "allowed, so at most 0.684 ns, or a longer pulse, or a receiver of less bandwidth",
         "samples of 0.1 ns long; at most 4096 are allowed",
         "noise of nan times the threshold: 0 to 1e+06 is allowed",
         "a pulse's table of 2000 values: 2 to 1024 are allowed",
@@ -305,9 +320,9 @@ static void the_coarsest_sampling_is_taken(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_have_the_energy),      cmocka_unit_test(shapes_are_the_closed_forms),
-        cmocka_unit_test(the_centroid_is_the_range),    cmocka_unit_test(spreads_are_the_closed_forms),
-        cmocka_unit_test(no_extent_is_a_point),         cmocka_unit_test(limits_are_told),
+        cmocka_unit_test(samples_have_the_energy),       cmocka_unit_test(shapes_are_the_closed_forms),
+        cmocka_unit_test(the_centroid_is_the_range),     cmocka_unit_test(spreads_are_the_closed_forms),
+        cmocka_unit_test(no_extent_is_a_point),          cmocka_unit_test(limits_are_told),
         cmocka_unit_test(the_coarsest_sampling_is_taken)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -31,7 +31,7 @@ struct waveform *waveform_rig_open(const struct waveform_spec *spec)
  * mean of 1 + a t is exp(3 k^2 / 2). */
 double waveform_rig_pulse(const struct waveform_spec *spec, double t_s)
 {
-    if (spec->shape == WAVEFORM_GAUSSIAN) return pow(0.5, 4.0 * t_s * t_s / (spec->width_s * spec->width_s));
+    if (spec->skew == 1.0) return pow(0.5, 4.0 * t_s * t_s / (spec->width_s * spec->width_s));
     const double a = (spec->skew - 1.0 / spec->skew) / spec->width_s, k2 = pow(log(spec->skew), 2) / (2.0 * M_LN2);
     const double x = exp(1.5 * k2) + a * t_s;
     return x > 0.0 ? pow(0.5, pow(log(x) / log(spec->skew), 2)) : 0.0;
@@ -39,7 +39,7 @@ double waveform_rig_pulse(const struct waveform_spec *spec, double t_s)
 
 double waveform_rig_area_s(const struct waveform_spec *spec)
 {
-    if (spec->shape == WAVEFORM_GAUSSIAN) return 0.5 * spec->width_s * sqrt(M_PI / M_LN2);
+    if (spec->skew == 1.0) return 0.5 * spec->width_s * sqrt(M_PI / M_LN2);
     const double a = (spec->skew - 1.0 / spec->skew) / spec->width_s, k2 = pow(log(spec->skew), 2) / (2.0 * M_LN2);
     return sqrt(2.0 * M_PI * k2) * exp(0.5 * k2) / a;
 }

@@ -12,7 +12,7 @@
 /* A Gaussian pulse of 4 ns, 12 bits, nothing limited, no noise. */
 struct waveform_spec waveform_rig_spec(void);
 struct waveform *waveform_rig_open(const struct waveform_spec *spec);
-/* The pulse that the spec asks for, without the receiver, t after its centroid: Gaussian and log-normal. */
+/* The pulse that the spec asks for, without the receiver, t after its centroid: Gaussian (skew 1), or log-normal. */
 double waveform_rig_pulse(const struct waveform_spec *spec, double t_s);
 double waveform_rig_area_s(const struct waveform_spec *spec);
 /* sigma of the receiver, from the definition: half of the power at the bandwidth. */

@@ -5,9 +5,10 @@
 
 enum { MOST = 40000, POINTS = 4096, WINDOWS = 4096, CONTENT_WAVES = 4 };
 
-/* Walls at 4 to 7 m are up to 41 dB above the threshold. 14 bits of 46 dB have counts of 2.5 thresholds. */
+/* Walls of 2 % at 2.7 to 7 m are up to 33 dB above the threshold. 14 bits of 36 dB have counts of a quarter of it. */
 static const char MORE[] = "beam: {mode: adaptive}\nsignal: {model: on, detection: sharp}\n"
-                           "waveform: {bits: 14, full_scale_db: 46, keep_db: 0}\n"
+                           "surfaces: [{reflectance: 0.02}]\n"
+                           "waveform: {bits: 14, full_scale_db: 36, keep_db: 0}\n"
                            "output: {attributes: on}\n";
 
 static const struct room_config SCAN = {.profile = "riegl-vz400i",
@@ -68,12 +69,13 @@ static uint64_t read_shots(const struct wire *wire, const char *name, struct sho
     static struct scanhead_attribute attribute[POINTS];
     struct scanhead *sh = client_open(wire_path(wire, name));
     struct scanhead_frame frame;
-    uint64_t lost = 0;
+    uint64_t lost = 0, pulse = 0;
     uint32_t n = 0;
     memset(shot, 0, MOST * sizeof *shot);
     while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
         if (frame.type == SCANHEAD_POINTS) {
             n = frame.n_points;
+            pulse = frame.pulse0;
             assert_int_equal(scanhead_points(sh, &frame, 0, point, POINTS), n);
         }
         if (frame.type == SCANHEAD_WAVES) {
@@ -83,10 +85,11 @@ static uint64_t read_shots(const struct wire *wire, const char *name, struct sho
         if (frame.type != SCANHEAD_ATTRIBUTES) continue;
         assert_int_equal(scanhead_attributes(sh, &frame, 0, attribute, POINTS), n);
         for (uint32_t i = 0; i < n; i++) {
-            assert_true(point[i].pulse < MOST);
-            struct shot *s = &shot[point[i].pulse];
+            if (point[i].echo > 1) continue;
+            assert_true(pulse < MOST);
+            struct shot *s = &shot[pulse++];
             s->echoes = point[i].echo_count;
-            if (point[i].echo > 1 || point[i].echo_count == 0) continue;
+            if (s->echoes == 0) continue;
             s->range_m = point[i].range_m;
             s->amplitude = pow(10.0, 0.1 * attribute[i].amplitude_db);
             s->width_ns = attribute[i].width_ns;
@@ -140,7 +143,7 @@ static void test_off_and_on(void **state)
 }
 
 /* A Gaussian pulse of 4 ns has an area of 4 ns sqrt(pi / (4 ln 2)). The amplitude is told in 0.01 dB, to 0.12 %, and
- * the energy is to be its to 0.1 %. */
+ * the energy is to be its to 0.1 %. A dozen samples of the pulse are rounded, to a count of a quarter: 1 ns at most. */
 static void test_energy(void **state)
 {
     struct wire *wire = *state;
@@ -156,14 +159,16 @@ static void test_energy(void **state)
         assert_int_equal(s->windows, 1);
         assert_true(s->from_m < s->range_m && s->range_m < s->to_m);
         const double off = s->energy_ns / (s->amplitude * area_ns) - 1.0;
-        if (!(fabs(off) < 0.0022)) fail_msg("pulse %td: energy is off by %.3f %%", s - shots[0], 100.0 * off);
+        if (!(fabs(off) < 0.0022 + 1.0 / (s->amplitude * area_ns))) fail_msg("pulse %td: energy is off by %.3f %%", s - shots[0], 100.0 * off);
         n++;
     }
     assert_true(n > 5000);
 }
 
-/* Without noise, echoes that are found are those of the model: their ranges to 0.5 mm, a count of the largest signal
- * being 1 in 5,000 of it, and a pulse's sigma 0.26 m; amplitudes to 0.5 %, widths to 1 %. */
+/* Without noise, echoes that are found are those of the model, but for digits: half a count is an eighth of a threshold.
+ * The signal rises by sqrt(2 ln A) / 1.7 ns = 2 a ns where it crosses the threshold, so there it is 9 mm; by A / 3 a ns
+ * at half of the peak, which is 100 or more: 0.6 mm. Both samples around a crossing may be so much off. Amplitudes to 1 %,
+ * widths to 2 %. */
 static void test_echoes(void **state)
 {
     struct wire *wire = *state;
@@ -180,27 +185,30 @@ static void test_echoes(void **state)
             assert_int_equal(b->windows, 0); /* they are not sent */
             if (a->echoes != b->echoes) fail_msg("%s: pulse %d has %d echoes, not %d", how[i], k, b->echoes, a->echoes);
             if (a->echoes == 0) continue;
-            if (!(fabs(a->range_m - b->range_m) < 5e-4 && fabs(b->amplitude / a->amplitude - 1.0) < 5e-3 &&
-                  fabs(b->width_ns - a->width_ns) < 0.04))
+            if (!(fabs(a->range_m - b->range_m) < (i == 0 ? 20e-3 : 1.2e-3) &&
+                  fabs(b->amplitude / a->amplitude - 1.0) < 0.01 && fabs(b->width_ns - a->width_ns) < 0.08))
                 fail_msg("%s: pulse %d: %.4f m, not %.4f; amplitude %.1f, not %.1f; %.2f ns, not %.2f", how[i], k,
                          b->range_m, a->range_m, b->amplitude, a->amplitude, b->width_ns, a->width_ns);
         }
     }
 }
 
-/* On the ground near the horizon footprints are tens of metres deep, and their windows longer than what a block has room
- * for. What is lost is said by the frames, by the statistics and in a warning, and all agree. */
+/* A pulse of 1,000 ns, where the profile says 4, has windows longer than what a block has room for. What is lost is said
+ * by the frames, by the statistics and in a warning, and all agree. */
 static void test_lost(void **state)
 {
     struct wire *wire = *state;
-    struct room_config scan = SCAN;
-    ground_write(wire);
-    scan.line_start_deg = -0.5;
-    scan.line_stop_deg = -0.2;
-    scan.prr_hz = 1200000;
-    scan.pan_stop_deg = 6;
-    record(wire, &scan, "long.shs",
-           (const char *const[]){"waveform.send=on", "waveform.keep_db=-60", "waveform.sample_ns=0.1", NULL});
+    char pulse[400];
+    room_write(wire);
+    FILE *f = fopen(wire_path(wire, "long.csv"), "w");
+    assert_non_null(f);
+    fputs("t_ns,power\n", f);
+    for (int i = 0; i <= 15; i++)
+        fprintf(f, "%d,%d\n", 100 * i, i > 0 && i < 15 ? 1 : 0);
+    assert_int_equal(fclose(f), 0);
+    snprintf(pulse, sizeof pulse, "waveform.pulse_file=%s", wire_path(wire, "long.csv"));
+    record(wire, &SCAN, "long.shs",
+           (const char *const[]){"waveform.send=on", "waveform.pulse=table", pulse, "beam.mode=single", NULL});
     const uint64_t lost = read_shots(wire, "long.shs", shots[0]);
     assert_true(lost > 0);
     assert_int_equal(stats_uint(wire, "lost_samples"), lost);

@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: MIT */
+/* Echoes found in samples, one property at a time: places at windows' ends, room, flags, levels, windows of noise. */
+#include <math.h>
+#include <string.h>
+
+#include "tests/common/cases.h"
+#include "tests/common/thorough.h"
+#include "tests/common/wave_echoes.h"
+
+#include "core/light.h"
+
+static const enum waveform_detector all[WAVE_DETECTORS] = {WAVEFORM_THRESHOLD, WAVEFORM_FRACTION, WAVEFORM_GAUSSIANS};
+
+static double sample_m(const struct wave_echoes *w)
+{
+    return 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(w->waveform)->sample_s;
+}
+
+/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a Gaussian of
+ * 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
+static void a_plain_echo_is_where_it_is(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.noise = 0.0;
+    spec.bits = 14;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (int k = 0; k < 50; k++) {
+            const struct waveform_return r = {100.0 + 0.02 * k * sample_m(&w), 50.0, 0.0, WAVEFORM_POINT};
+            assert_int_equal(wave_shoot(&w, all[d], 1, &r, 1), 1);
+            wave_near(w.echo[0].range_m, r.range_m, 1.5e-3);
+            wave_near(w.echo[0].amplitude, 50.0, 0.5);
+            wave_near(w.echo[0].width_s, 4e-9, 0.05e-9);
+            assert_true(w.echo[0].deviation < 0.005);
+            assert_int_equal(w.echo[0].saturated, 0);
+        }
+    wave_close(&w);
+}
+
+/* The receiver's bandwidth lowers the pulse, but a surface that is hit head on still has its A. */
+static void the_amplitude_is_that_of_the_link_budget(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.noise = 0.0;
+    spec.bandwidth_hz = 100e6;
+    wave_open(&w, &spec);
+    const struct waveform_return r = {50.0, 20.0, 0.0, WAVEFORM_POINT};
+    assert_true(waveform_signal(w.waveform, &r, 1, 50.0) < 18.0);
+    for (int d = 0; d < WAVE_DETECTORS; d++) {
+        assert_int_equal(wave_shoot(&w, all[d], 1, &r, 1), 1);
+        wave_near(w.echo[0].amplitude, 20.0, 0.3);
+        wave_near(w.echo[0].range_m, 50.0, 2e-3);
+    }
+    wave_close(&w);
+}
+
+/* Samples that a caller has: counts of a Gaussian on a window of its own. */
+static void put_window(struct wave_echoes *w, uint32_t first, uint32_t n, double at, double peak)
+{
+    const struct waveform_spec *spec = waveform_spec_of(w->waveform);
+    const double most = (double)((1 << spec->bits) - 1), sigma = wave_sigma(spec->width_s / spec->sample_s);
+    struct waveform_record *r = &w->record;
+    struct waveform_window *window = &r->window[r->n_windows++];
+    *window = (struct waveform_window){first, n, r->n_samples};
+    for (uint32_t i = 0; i < n; i++) {
+        double d = (first + i - at) / sigma, y = peak * exp(-0.5 * d * d);
+        double count = spec->baseline_counts + y * (most - spec->baseline_counts) / spec->full_scale;
+        r->sample[r->n_samples++] = (uint16_t)fmin(most, floor(count + 0.5));
+    }
+}
+
+static void clear(struct wave_echoes *w)
+{
+    w->record.n_windows = w->record.n_samples = 0;
+}
+
+/* Windows that begin or end within an echo: where a flank and the top are seen, the range holds. Where the top is cut
+ * off, the flank of a pulse of known width still gives it to a quarter of a sample. */
+static void an_echo_at_a_border_is_found(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.noise = 0.02;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (int cut = -2; cut <= 8; cut++)
+            for (int side = 0; side < 2; side++) {
+                clear(&w);
+                if (side == 0) put_window(&w, (uint32_t)(1000 + cut), 40, 1002.3, 30.0);
+                if (side == 1) put_window(&w, 960, (uint32_t)(47 - cut), 1003.7, 30.0);
+                int hidden = cut >= 3;
+                uint32_t n = wave_detect(&w, all[d]);
+                if (cut > 4) { /* a rest of a flank alone */
+                    assert_true(n <= 1);
+                    continue;
+                }
+                assert_int_equal(n, 1);
+                double want = (side == 0 ? 1002.3 : 1003.7) * sample_m(&w);
+                wave_near(w.echo[0].range_m, want, hidden ? 0.25 * sample_m(&w) : 0.02);
+            }
+    wave_close(&w);
+}
+
+/* Each window counts, wherever its samples lie in the array; echoes come in the order of range. */
+static void windows_are_one_pulse(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++) {
+        clear(&w);
+        put_window(&w, 100, 40, 120.25, 20.0);
+        put_window(&w, 5000, 64, 5030.5, 5.0);
+        put_window(&w, 90000, 30, 90015.0, 40.0);
+        assert_int_equal(wave_detect(&w, all[d]), 3);
+        static const double at[3] = {120.25, 5030.5, 90015.0};
+        for (int k = 0; k < 3; k++)
+            wave_near(w.echo[k].range_m, at[k] * sample_m(&w), 2e-3);
+    }
+    wave_close(&w);
+}
+
+static void the_weakest_are_left_out(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    static const double peak[5] = {20.0, 5.0, 30.0, 3.0, 10.0};
+    struct wave_echoes w;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++) {
+        clear(&w);
+        for (uint32_t k = 0; k < 5; k++)
+            put_window(&w, 1000 * (k + 1), 40, 1000.0 * (k + 1) + 20.0, peak[k]);
+        w.most = 3;
+        assert_int_equal(wave_detect(&w, all[d]), 3);
+        assert_int_equal(w.n_crowded, 2);
+        static const double left[3] = {20.0, 30.0, 10.0};
+        for (int k = 0; k < 3; k++)
+            wave_near(w.echo[k].amplitude, left[k], 0.3);
+        w.most = 0;
+        assert_int_equal(wave_detect(&w, all[d]), 0);
+        assert_int_equal(w.n_crowded, 5);
+    }
+    wave_close(&w);
+}
+
+/* 400 windows of 400 samples of noise. A sample exceeds 8 sigma once in 10^15; a fit of several has less noise. */
+static void noise_is_no_echo(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.far_m = 60.0;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (uint64_t p = 0; p < 400; p++) {
+            assert_int_equal(wave_shoot(&w, all[d], p, NULL, 0), 0);
+            assert_true(w.record.n_samples >= 400);
+        }
+    wave_close(&w);
+}
+
+/* Half of the pulses see a target at the level; twice the level is 8 sigma above it, half of it 4 below. A fit has less
+ * noise than a sample; a sample near the top is up to 3 % lower. */
+static void the_level_decides(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    const uint32_t n = (uint32_t)fewer(4000);
+    struct wave_echoes w;
+    struct wave_figures f;
+    wave_open(&w, &spec);
+    struct waveform_return r = {30.0, 1.0, 0.0, WAVEFORM_POINT};
+    wave_measure(&w, WAVEFORM_GAUSSIANS, n, &r, &f);
+    /* 4.75 standard errors, and the 3 % of noise that a width of its own lets into the peak */
+    wave_near(f.single / (double)n, 0.5, 4.75 * 0.5 / sqrt(n) + 0.08);
+    for (int d = 0; d < WAVE_DETECTORS; d++) {
+        r.amplitude = 2.0;
+        wave_measure(&w, all[d], n, &r, &f);
+        assert_true(f.single >= n - 3);
+        r.amplitude = 0.4;
+        wave_measure(&w, all[d], n, &r, &f);
+        assert_true(f.single <= n / 1000 + 2);
+    }
+    wave_close(&w);
+}
+
+/* Two pulses apart become two echoes; how far apart they have to be depends on the detector. */
+static void two_surfaces_are_two_echoes(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    static const double apart_widths[WAVE_DETECTORS] = {3.0, 1.5, 1.2};
+    struct wave_echoes w;
+    wave_open(&w, &spec);
+    const double width_m = 0.5 * LIGHT_SPEED_M_S * spec.width_s;
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (uint64_t p = 0; p < 40; p++) {
+            const double near_m = 20.0 + 0.025 * (double)p * sample_m(&w);
+            const struct waveform_return r[2] = {{near_m, 30.0, 0.0, WAVEFORM_POINT},
+                                                 {near_m + apart_widths[d] * width_m, 20.0, 0.0, WAVEFORM_POINT}};
+            assert_int_equal(wave_shoot(&w, all[d], p, r, 2), 2);
+            wave_near(w.echo[0].range_m, r[0].range_m, 0.05);
+            wave_near(w.echo[1].range_m, r[1].range_m, 0.05);
+        }
+    wave_close(&w);
+}
+
+/* RIEGL's pulse shape deviation: small on one flat surface, large where two surfaces make one echo. */
+static void the_deviation_shows_mixed_echoes(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    wave_open(&w, &spec);
+    const double width_m = 0.5 * LIGHT_SPEED_M_S * spec.width_s;
+    for (int d = 0; d < WAVE_DETECTORS; d++) {
+        const struct waveform_return r[2] = {{20.0, 40.0, 0.0, WAVEFORM_POINT},
+                                             {20.0 + 0.8 * width_m, 25.0, 0.0, WAVEFORM_POINT}};
+        assert_int_equal(wave_shoot(&w, all[d], 1, r, 1), 1);
+        /* Noise of 1/8 in 40. A wrong place adds the slope of h times that, at most 1.4 / width. */
+        const double off = fabs(w.echo[0].range_m - r[0].range_m) / width_m;
+        assert_true(w.echo[0].deviation < 2.0 * 0.125 / 40.0 + 1.4 * off);
+        if (all[d] == WAVEFORM_GAUSSIANS) continue; /* separates them */
+        assert_int_equal(wave_shoot(&w, all[d], 1, r, 2), 1);
+        assert_true(w.echo[0].deviation > 0.1);
+    }
+    wave_close(&w);
+}
+
+/* Limited by the digits, by the receiver, and by a receiver that is then blind. The echo says so, and its range holds. */
+static void a_saturated_echo_is_flagged_and_ranged(void **state)
+{
+    (void)state;
+    static const struct {
+        double saturation, dead_s;
+    } how[3] = {{0.0, 0.0}, {60.0, 0.0}, {60.0, 20e-9}};
+    for (int h = 0; h < 3; h++) {
+        struct waveform_spec spec = wave_spec();
+        struct wave_echoes w;
+        spec.saturation = how[h].saturation;
+        spec.dead_s = how[h].dead_s;
+        wave_open(&w, &spec);
+        for (int d = 0; d < WAVE_DETECTORS; d++)
+            for (uint64_t p = 0; p < 50; p++) {
+                const struct waveform_return r = {20.0 + 0.02 * (double)p * sample_m(&w), 1000.0, 0.0, WAVEFORM_POINT};
+                assert_int_equal(wave_shoot(&w, all[d], p, &r, 1), 1);
+                assert_int_equal(w.echo[0].saturated, 1);
+                wave_near(w.echo[0].range_m, r.range_m, h < 2 ? 0.01 : 0.05);
+            }
+        wave_close(&w);
+    }
+}
+
+/* The result depends on the samples alone, and on nothing left from before. */
+static void detection_is_pure(void **state)
+{
+    (void)state;
+    const struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    struct waveform_echo before[WAVE_MOST];
+    wave_open(&w, &spec);
+    struct waveform_return r[6];
+    uint64_t seed = 5;
+    for (int turn = 0; turn < 50; turn++) {
+        for (int k = 0; k < 6; k++)
+            r[k] = (struct waveform_return){20.0 + 6.0 * case_unit(&seed), 1.0 + 30.0 * case_unit(&seed), 0.0,
+                                            WAVEFORM_POINT};
+        uint32_t n = wave_shoot(&w, WAVEFORM_GAUSSIANS, (uint64_t)turn, r, 6);
+        memcpy(before, w.echo, sizeof before);
+        memset(w.echo, 0x5a, sizeof w.echo);
+        assert_int_equal(wave_detect(&w, WAVEFORM_GAUSSIANS), n);
+        for (uint32_t i = 0; i < n; i++) {
+            assert_true(before[i].range_m == w.echo[i].range_m && before[i].amplitude == w.echo[i].amplitude &&
+                        before[i].width_s == w.echo[i].width_s && before[i].deviation == w.echo[i].deviation);
+            assert_true(i == 0 || w.echo[i].range_m >= w.echo[i - 1].range_m);
+            assert_true(isfinite(w.echo[i].range_m) && w.echo[i].amplitude >= 1.0 && isfinite(w.echo[i].width_s) &&
+                        isfinite(w.echo[i].deviation));
+        }
+    }
+    wave_close(&w);
+}
+
+/* Any counts at all: random walks, spikes, all the largest, all nothing. Figures stay finite. */
+static void any_samples_are_taken(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    uint64_t seed = 9;
+    spec.saturation = 80.0;
+    spec.dead_s = 7e-9;
+    wave_open(&w, &spec);
+    for (int turn = 0; turn < fewer(3000); turn++) {
+        uint32_t n = (uint32_t)case_between(&seed, 1, turn % 50 == 0 ? WAVEFORM_MAX_SAMPLES : 60);
+        int kind = (int)case_between(&seed, 0, 4);
+        double level = 200.0;
+        clear(&w);
+        w.record.window[w.record.n_windows++] = (struct waveform_window){(uint32_t)turn, n, 0};
+        for (uint32_t i = 0; i < n; i++) {
+            level = fmin(4095.0, fmax(0.0, level + 400.0 * (case_unit(&seed) - 0.5)));
+            const double count[5] = {level, 4095.0 * case_unit(&seed), case_unit(&seed) < 0.1 ? 4095.0 : 200.0, 4095.0,
+                                     0.0};
+            w.sample[i] = (uint16_t)count[kind];
+        }
+        for (int d = 0; d < WAVE_DETECTORS; d++) {
+            uint32_t found = wave_detect(&w, all[d]);
+            assert_true(found <= WAVE_MOST);
+            for (uint32_t i = 0; i < found; i++) {
+                const struct waveform_echo *e = &w.echo[i];
+                if(!(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0)) print_message("DBG %d %d %u %g %g %g %g\n", kind, d, n, e->range_m, e->amplitude, e->width_s, e->deviation);
+                assert_true(isfinite(e->range_m) && isfinite(e->amplitude) && isfinite(e->width_s));
+                assert_true(isfinite(e->deviation) && e->width_s > 0.0 && e->amplitude > 0.0);
+            }
+        }
+    }
+    wave_close(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_plain_echo_is_where_it_is),
+        cmocka_unit_test(the_amplitude_is_that_of_the_link_budget),
+        cmocka_unit_test(an_echo_at_a_border_is_found),
+        cmocka_unit_test(windows_are_one_pulse),
+        cmocka_unit_test(the_weakest_are_left_out),
+        cmocka_unit_test(noise_is_no_echo),
+        cmocka_unit_test(the_level_decides),
+        cmocka_unit_test(two_surfaces_are_two_echoes),
+        cmocka_unit_test(the_deviation_shows_mixed_echoes),
+        cmocka_unit_test(a_saturated_echo_is_flagged_and_ranged),
+        cmocka_unit_test(detection_is_pure),
+        cmocka_unit_test(any_samples_are_taken),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
