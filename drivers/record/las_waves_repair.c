@@ -31,14 +31,13 @@ static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
     return rc;
 }
 
+/* A completed record says its length. One that is being written says 0. */
 static int read_len(struct las_packets *p, struct sh_err *err)
 {
     uint8_t at[8];
     if (p->len < LAS_WAVES_HEAD_LEN) return SH_OK;
     const int rc = repair_read(&p->file, p->begin + LAS_WAVES_LEN_AT, at, sizeof at, err);
-    const uint64_t len = le_get64(at);
-    p->is_complete = rc == SH_OK && len > 0 && len <= p->len - LAS_WAVES_HEAD_LEN;
-    if (p->is_complete) p->end = LAS_WAVES_HEAD_LEN + len;
+    if (rc == SH_OK && le_get64(at) <= p->len - LAS_WAVES_HEAD_LEN) p->end = LAS_WAVES_HEAD_LEN + le_get64(at);
     return rc;
 }
 
@@ -115,7 +114,7 @@ void las_packets_take(struct las_packets *p, const uint8_t *record)
     if (!refers(p, record, &end)) return;
     if (end > p->len)
         p->n_without++;
-    else if (end > p->end && !p->is_complete)
+    else if (end > p->end)
         p->end = end;
 }
 

@@ -14,7 +14,6 @@ struct las_packets {
     uint64_t begin;      /* of the record of packets in its file */
     uint64_t len;        /* bytes of it that are there */
     uint64_t end;        /* of its packets: as the completed record says, else as points refer to them */
-    int is_complete;     /* the record says its length, and all of it is there */
     size_t wave_at;      /* in a point's record */
     uint64_t n_without;  /* points whose packets are not there */
 };
