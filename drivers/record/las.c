@@ -112,6 +112,7 @@ static int las_scan(void *rec, struct sh_err *err)
                        las->base.file.path, f->scale[0]);
     f->waves = &las->waves;
     const int rc = f->has_waves && !las->waves.is_open ? las_waves_open(&las->waves, las->base.file.path, err) : 0;
+    las->waves.file.may_be_direct = las->base.options.may_wait;
     return rc == 0 ? put_front(las, err) : rc;
 }
 

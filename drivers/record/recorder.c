@@ -118,9 +118,10 @@ static void report_waves(const struct recorder *rec)
     recorder_report(rec, m->n_waves_alone, "waveforms left out without a point in them; .waves.csv holds them, too");
     recorder_report(rec, m->n_samples_lost, "samples of waveforms that found no room in the head");
     recorder_report(rec, m->n_without_waves, "points without a waveform: the head kept none there, or it was lost");
-    recorder_report(rec, m->n_without_ranges,
-                    "of these points are of a moving head in the geo layout, without ranges; output.layout: polar has "
-                    "them");
+    recorder_report(
+        rec, m->n_without_ranges,
+        "of these points are of a moving head in the geo layout, without ranges; allowed are output.layout: "
+        "polar, or output.crs: local");
 }
 
 static void report_losses(const struct recorder *rec)

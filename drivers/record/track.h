@@ -55,7 +55,7 @@ struct track_missing {
     uint64_t n_waves_alone;    /* windows without a point in them */
     uint64_t n_samples_lost;   /* samples that found no room in the head */
     uint64_t n_without_waves;  /* echoes in no window */
-    uint64_t n_without_ranges; /* of these, echoes of a moving head in the geo layout, whose ranges are not known */
+    uint64_t n_without_ranges; /* of these, echoes of a moving head on the Earth, whose ranges are not known */
 };
 
 /* The place of the stream in its scan; only track.c uses it. */

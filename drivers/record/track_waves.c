@@ -10,6 +10,8 @@
 /* Of one frame of points. A head has at most as many windows as 64 MiB of samples fill; a broken stream might have more. */
 enum { WAVES_MOST_BYTES = 64 << 20, WAVES_AT_ONCE = 64 };
 
+static const double EARTH_M = 6.371e6;
+
 struct kept_wave {
     struct scanhead_wave wave;
     size_t sample_at;
@@ -67,25 +69,37 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 /* The length of one unit of each axis on the ground, m. */
 static void units_m(const struct scanhead_info *info, double to[3])
 {
-    const double degree_m = 6371000 * NATIVE_RAD_PER_DEG;
+    const double degree_m = EARTH_M * NATIVE_RAD_PER_DEG;
     const int in_degrees = info->crs == NATIVE_CRS_GEODETIC;
     to[0] = in_degrees ? degree_m : 1;
     to[1] = in_degrees ? degree_m * cos(info->anchor[0] * NATIVE_RAD_PER_DEG) : 1;
     to[2] = 1;
 }
 
+/* Where the head was in the CRS when it fired. Poses are in the scene's frame, which is the local CRS; of other systems only the
+ * head knows how they lie to each other along its way. 0: not known. */
+static int find_head(const struct track *t, const struct scanhead_point *p, double at[3])
+{
+    struct scanhead_pose pose;
+    memcpy(at, t->info.anchor, sizeof t->info.anchor);
+    if (!t->info.moving) return 1;
+    if (t->info.crs != NATIVE_CRS_LOCAL || scanhead_pose(t->sh, p->t_ns, &pose) != SCANHEAD_OK) return 0;
+    memcpy(at, pose.position_m, sizeof pose.position_m);
+    return 1;
+}
+
 /* In the geo layout a point has no range, but its window says how coordinates change along a metre of it: the range is the
- * share of the way from the anchor to the point that lies along the beam. A beam that the CRS bends leaves the tangent
- * sideways, so its range is right to the second order. */
-static double range_along(const struct scanhead_info *info, const struct scanhead_point *p,
-                          const struct scanhead_wave *wave)
+ * share of the way from the head to the point that lies along the beam. A beam that the CRS bends leaves the tangent
+ * sideways, so its range is right to the second order. NaN: the head's place is not known. */
+static double range_along(const struct track *t, const struct scanhead_point *p, const struct scanhead_wave *wave)
 {
     const double xyz[3] = {p->x, p->y, p->z};
-    double unit_m[3], along = 0, square = 0;
-    units_m(info, unit_m);
+    double head[3], unit_m[3], along = 0, square = 0;
+    if (!find_head(t, p, head)) return (double)NAN;
+    units_m(&t->info, unit_m);
     for (int i = 0; i < 3; i++) {
-        double way = xyz[i] - info->anchor[i];
-        if (i == 1 && info->crs == NATIVE_CRS_GEODETIC) way = remainder(way, 360);
+        double way = xyz[i] - head[i];
+        if (i == 1 && t->info.crs == NATIVE_CRS_GEODETIC) way = remainder(way, 360);
         const double step_m = wave->direction[i] * unit_m[i];
         along += way * unit_m[i] * step_m;
         square += step_m * step_m;
@@ -96,7 +110,7 @@ static double range_along(const struct scanhead_info *info, const struct scanhea
 const struct scanhead_wave *track_find_wave(struct track *t, const struct scanhead_point *p, uint64_t pulse, double *at)
 {
     struct track_waves *w = t->waves;
-    if (t->info.geo && t->info.moving) {
+    if (t->info.geo && t->info.moving && t->info.crs != NATIVE_CRS_LOCAL) {
         t->missing.n_without_ranges++;
         return NULL;
     }
@@ -104,7 +118,7 @@ const struct scanhead_wave *track_find_wave(struct track *t, const struct scanhe
         w->at++;
     for (size_t i = w != NULL ? w->at : 0; w != NULL && i < w->n && w->wave[i].wave.pulse == pulse; i++) {
         struct kept_wave *k = &w->wave[i];
-        const double range_m = t->info.geo ? range_along(&t->info, p, &k->wave) : p->range_m;
+        const double range_m = t->info.geo ? range_along(t, p, &k->wave) : p->range_m;
         *at = (range_m - k->wave.range_m) / k->wave.step_m;
         if (!(*at >= -0.5 && *at < k->wave.n - 0.5)) continue;
         k->is_used = 1;

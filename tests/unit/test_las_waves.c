@@ -278,7 +278,7 @@ static void test_geodetic(void **state)
 static void test_lengths(void **state)
 {
     (void)state;
-    enum { N = 600 };
+    enum { N = 300 };
     static struct rig_point many[N];
     static struct rig_window window[N];
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
@@ -351,6 +351,62 @@ static void test_unheld(void **state)
     assert_non_null(strstr(rig_notes, "1 points without a waveform"));
 }
 
+/* A head that goes along y by 1 m/s fires 2 ms after the scan's start, 5 m along x. Where its ranges are not known, its
+ * points have no waveform. */
+static void test_moving(void **state)
+{
+    (void)state;
+    static uint8_t out[1024];
+    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const struct native_pose pose[2] = {{.position_m = {10, 20, 30}, .quat = {1, 0, 0, 0}},
+                                        {.t_ns = 1000000000, .position_m = {10, 21, 30}, .quat = {1, 0, 0, 0}}};
+    for (int kind = 0; kind < 3; kind++) { /* polar; geo, local; geo, UTM */
+        struct native_anchor a = rig_anchor_of(kind == 2 ? NATIVE_CRS_UTM : NATIVE_CRS_LOCAL, kind == 2 ? 32632 : 0, 1);
+        const struct rig_point empty = {0, 0, 0, INT16_MIN, 0xffff, 0, 0}, polar = {5000, 0, 900, 0, 1, 1, 1};
+        const struct rig_point geo = {5000, 2, 0, 0, 1, 1, 1}; /* from the anchor, which is where the way begins */
+        const struct rig_window w = {2, 30, 8, {kind > 0 ? rig_float_bits(1) : 0, 0, 0}};
+        a.moving = NATIVE_MOVING;
+        memcpy(a.anchor, pose[0].position_m, sizeof a.anchor);
+        memcpy(a.rotation, unit, sizeof unit);
+        rig_begin();
+        rig_wave_descriptor(kind > 0, 1, 4);
+        rig_anchor(&a);
+        rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
+        rig_points(0, 0, 0, (struct rig_point[]){empty, empty, kind > 0 ? geo : polar}, 3);
+        rig_waves(0, 0, &rig_12_bits, &w, 1);
+        record((struct recorder_options){0});
+        assert_int_equal(rig_uint(las + 247, 8), 1);
+        assert_int_equal(wave_at(0)[0], kind < 2);
+        if (kind == 2) assert_non_null(strstr(rig_notes, "1 of these points are of a moving head"));
+        if (kind == 2) continue;
+        check_packet(0, &rig_12_bits, 2, 30, 8);
+        check_first(0, (double[]){10 + 30 * RIG_C_M_S * 0.5e-9, 20.002, 30}, (double[]){1e-3, 1e-3, 1e-3});
+    }
+}
+
+/* Scans of different digitisers have descriptors of their own, and no packet is taken for that of an earlier scan. */
+static void test_digitisers(void **state)
+{
+    (void)state;
+    static const struct rig_digitiser other = {500, 8 * 16, 8, 0.5f, 0};
+    const struct rig_digitiser *of[3] = {&rig_12_bits, &other, &rig_12_bits};
+    static const struct rig_window w = {0, 60, 20, {0, 0, 0}}, coarse = {0, 30, 20, {0, 0, 0}};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    rig_begin();
+    for (uint32_t scan = 0; scan < 3; scan++) {
+        rig_wave_descriptor(0, scan + 1, 4);
+        rig_anchor(&a);
+        rig_points(0, 0, 0, points, 1);
+        rig_waves(0, 0, of[scan], scan == 1 ? &w : &coarse, 1);
+    }
+    record((struct recorder_options){0});
+    for (size_t i = 0; i < 3; i++)
+        check_packet(i, of[i], 0, i == 1 ? 60 : 30, 20);
+    assert_true(wave_at(0)[0] != wave_at(1)[0] && wave_at(0)[0] == wave_at(2)[0]);
+    assert_int_equal(rig_uint(wave_at(2) + 1, 8), EVLR + 40 + 20);
+    assert_int_equal(rig_uint(las + 100, 4), 2 + 2);
+}
+
 static int tear_down(void **state)
 {
     free(las);
@@ -361,9 +417,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_inside),   cmocka_unit_test(test_outside), cmocka_unit_test(test_colour),
-        cmocka_unit_test(test_8_bits),   cmocka_unit_test(test_none),    cmocka_unit_test(test_utm),
-        cmocka_unit_test(test_geodetic), cmocka_unit_test(test_lengths), cmocka_unit_test(test_unheld),
+        cmocka_unit_test(test_inside),   cmocka_unit_test(test_outside),    cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_8_bits),   cmocka_unit_test(test_none),       cmocka_unit_test(test_utm),
+        cmocka_unit_test(test_geodetic), cmocka_unit_test(test_lengths),    cmocka_unit_test(test_unheld),
+        cmocka_unit_test(test_moving),   cmocka_unit_test(test_digitisers),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
