@@ -202,12 +202,13 @@ static void set_socs(const struct track *t, double p[3])
 }
 
 /* 0.01 dB and 0.01 ns, as on the wire. */
-static void set_attribute(struct las_point *to, const struct scanhead_attribute *a)
+static void set_attribute(struct las_point *to, const struct scanhead_attribute *a, double deviation)
 {
     int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
     int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
     to->amplitude = (uint16_t)amplitude;
     to->width = (uint16_t)width;
+    to->deviation = isnan(deviation) ? UINT16_MAX : (uint16_t)lrint(1000 * fmin(deviation, 65.534));
 }
 
 /* LAS 1.2 counts to five. */
@@ -285,7 +286,7 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
     if (rc != 0) return rc;
     set_returns(las, &las_point, point);
     if (!t->info.moving && las->facts.minor != 2) las_point.scan_angle = scan_angle(las, p_socs);
-    if (t->has_attributes) set_attribute(&las_point, &t->attribute[i]);
+    if (t->has_attributes) set_attribute(&las_point, &t->attribute[i], t->deviation[i]);
     if (t->has_colours) memcpy(las_point.rgb, t->rgb[i], sizeof las_point.rgb);
     if (las->facts.has_waves) set_wave(las, &las_point, i);
     las_put_point(&las->facts, &las_point, to);

@@ -48,13 +48,16 @@ static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t n
     return to + LAS_EXTRA_LEN;
 }
 
-static uint8_t *put_extra_vlr(uint8_t *to, int attributes)
+static uint8_t *put_extra_vlr(uint8_t *to, const struct track *t)
 {
-    to = put_vlr_head(to, "LASF_Spec", 4, (attributes ? 3 : 1) * LAS_EXTRA_LEN, "extra bytes of a point");
+    const int attributes = t->has_attributes, n = 1 + (attributes ? 2 : 0) + (t->has_deviations ? 1 : 0);
+    to = put_vlr_head(to, "LASF_Spec", 4, (uint16_t)(n * LAS_EXTRA_LEN), "extra bytes of a point");
     to = put_extra(to, EXTRA_UINT16, "label", 0xffff, 0.0, "surface hit; 65535: none");
     if (!attributes) return to;
     to = put_extra(to, EXTRA_INT16, "amplitude", -32768, 0.01, "dB above detection threshold");
-    return put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns FWHM; 655.35: that or more");
+    to = put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns FWHM; 655.35: that or more");
+    if (!t->has_deviations) return to;
+    return put_extra(to, EXTRA_UINT16, "deviation", 0xffff, 0.001, "of shape; 65.534: that or more");
 }
 
 static uint8_t *put_note_vlr(uint8_t *to, const struct las_facts *f)
@@ -235,7 +238,7 @@ size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
     const struct track *t = f->track;
     uint8_t *end = to + header_len(f);
-    if (f->minor != 2) end = put_extra_vlr(end, t->has_attributes);
+    if (f->minor != 2) end = put_extra_vlr(end, t);
     end = put_note_vlr(end, f);
     uint8_t *crs = end;
     end = f->minor == 2 ? put_keys_vlr(end, t->epsg, t->geoid_heights) : put_crs_vlr(end, t->epsg, t->geoid_heights);
@@ -257,7 +260,9 @@ static size_t own_len(const struct las_facts *f)
 
 size_t las_point_len(const struct las_facts *f)
 {
-    size_t extra = LAS_LABEL_LEN + (f->track->has_attributes ? LAS_ATTRIBUTES_LEN : 0u);
+    const struct track *t = f->track;
+    size_t extra = LAS_LABEL_LEN + (t->has_attributes ? LAS_ATTRIBUTES_LEN : 0u);
+    if (t->has_deviations) extra += LAS_DEVIATION_LEN;
     return own_len(f) + (f->minor == 2 ? 0 : extra);
 }
 
@@ -300,6 +305,7 @@ static void put_point_14(const struct las_facts *f, const struct las_point *p, u
     if (!f->track->has_attributes) return;
     le_put16(extra + 2, p->amplitude);
     le_put16(extra + 4, p->width);
+    if (f->track->has_deviations) le_put16(extra + 6, p->deviation);
 }
 
 void las_put_point(const struct las_facts *f, const struct las_point *p, uint8_t *to)

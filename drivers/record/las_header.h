@@ -20,13 +20,14 @@ enum {
     LAS_EXTRA_LEN = 192,
     LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own */
     LAS_ATTRIBUTES_LEN = 4, /* and after these */
-    LAS_WAVE_LEN = 29,      /* a point's reference to its waveform; formats 9 and 10 end in it */
-    LAS_POINT_LEN_MAX = 38 + LAS_WAVE_LEN + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN,
+    LAS_DEVIATION_LEN = 2,
+    LAS_WAVE_LEN = 29, /* a point's reference to its waveform; formats 9 and 10 end in it */
+    LAS_POINT_LEN_MAX = 38 + LAS_WAVE_LEN + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN + LAS_DEVIATION_LEN,
     LAS_RETURNS = 15,
     LAS_12_RETURNS = 5,
     LAS_NOTE_MAX = 1024,
     LAS_KIND_LEN = LAS_VLR_HEAD_LEN + 26,
-    LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 3 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX +
+    LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 4 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX +
                     LAS_KINDS * LAS_KIND_LEN,
     /* the header's places for waveforms */
     LAS_ENCODING_AT = 6,
@@ -61,7 +62,7 @@ struct las_point {
     uint16_t intensity, scan_angle, station, label;
     uint8_t echo, echo_count; /* within the version's returns */
     double time_s;
-    uint16_t amplitude, width; /* with attributes */
+    uint16_t amplitude, width, deviation; /* with attributes */
     uint8_t rgb[3];
     /* With waveforms: the packet, the return's time after the packet's first sample, and how coordinates change along a
      * picosecond back to the head. */

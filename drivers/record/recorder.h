@@ -32,8 +32,9 @@ enum ply_column {
     PLY_ATTRIBUTES = 1 << 7, /* where the head sends them */
     PLY_COLOUR = 1 << 8,     /* where there are colours */
     PLY_ALL = (1 << 9) - 1,
-    PLY_FLOAT = 1 << 9, /* no column: x, y, z and range as float */
-    PLY_XYZ = 1 << 10,  /* no column: nothing else is asked for */
+    PLY_FLOAT = 1 << 9,      /* no column: x, y, z and range as float */
+    PLY_XYZ = 1 << 10,       /* no column: nothing else is asked for */
+    PLY_DEVIATION = 1 << 11, /* no word: with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
 /* Such words with commas between them; "xyz" stands for none. 0: one is not known, or comes twice. */

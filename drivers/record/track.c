@@ -23,6 +23,32 @@ static int will_have_colours(const struct track *t)
     return t->colour.given ? t->colour.scale.mode != COLOUR_NONE : scanhead_has_colours(t->sh) == 1;
 }
 
+static int check_sent(const struct track *t, int did, int does, const char *what, struct sh_err *err)
+{
+    if (!t->begun || did == does) return SH_OK;
+    return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s %s; a file holds one kind", t->path,
+                   did ? "without" : "with", what);
+}
+
+/* What is wanted and sent beside the points. */
+static int take_sent(struct track *t, struct sh_err *err)
+{
+    const struct scanhead *sh = t->sh;
+    const int attributes = t->ops->wants_attributes && scanhead_has_attributes(sh) == 1;
+    const int deviations = attributes && scanhead_has_deviations(sh) == 1;
+    const int colours = will_have_colours(t), waves = t->ops->wants_waves && scanhead_has_waves(sh) == 1;
+    int rc = check_sent(t, t->has_attributes, attributes, "attributes", err);
+    if (rc == SH_OK) rc = check_sent(t, t->has_deviations, deviations, "deviations", err);
+    if (rc == SH_OK) rc = check_sent(t, t->has_colours, colours, "colours", err);
+    if (rc == SH_OK) rc = check_sent(t, t->has_waves, waves, "waveforms", err);
+    if (rc != SH_OK) return rc;
+    t->has_attributes = attributes;
+    t->has_deviations = deviations;
+    t->has_colours = colours;
+    t->has_waves = waves;
+    return SH_OK;
+}
+
 static int check_info(struct track *t, struct sh_err *err)
 {
     const struct scanhead_info *info = &t->info;
@@ -39,25 +65,15 @@ static int check_info(struct track *t, struct sh_err *err)
                        info->moving ? "moves"
                        : info->stop ? "stops on a trajectory"
                                     : "stands still");
-    if (t->begun && t->ops->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s attributes; a file holds one kind", t->path,
-                       t->has_attributes ? "without" : "with");
-    if (t->begun && t->has_colours != will_have_colours(t))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s colours; a file holds one kind", t->path,
-                       t->has_colours ? "without" : "with");
-    if (t->begun && t->ops->wants_waves && t->has_waves != (scanhead_has_waves(t->sh) == 1))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s waveforms; a file holds one kind", t->path,
-                       t->has_waves ? "without" : "with");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
+    const int rc = take_sent(t, err);
+    if (rc != SH_OK) return rc;
     t->crs = crs;
     t->epsg = epsg;
     t->geoid_heights = geoid;
     t->moving = info->moving;
     t->stops = info->stop;
-    t->has_attributes = t->ops->wants_attributes && scanhead_has_attributes(t->sh) == 1;
-    t->has_colours = will_have_colours(t);
-    t->has_waves = t->ops->wants_waves && scanhead_has_waves(t->sh) == 1;
     t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
     t->begun = 1;
     if (t->named == NULL || info->n_surfaces > t->n_named) {

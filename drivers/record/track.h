@@ -97,7 +97,9 @@ struct track {
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     int has_attributes;        /* wanted, and sent: */
     struct scanhead_attribute attribute[TRACK_BATCH];
-    int has_colours; /* wanted, and sent or made here: */
+    int has_deviations;            /* attributes, and sent with them: */
+    double deviation[TRACK_BATCH]; /* scanhead_deviations; NaN: lost */
+    int has_colours;               /* wanted, and sent or made here: */
     uint8_t rgb[TRACK_BATCH][3];
     int has_waves;                                 /* wanted, and sent: */
     const struct scanhead_wave *wave[TRACK_BATCH]; /* the window that each point lies in; NULL: none. They are there as

@@ -13,6 +13,7 @@ struct track_waiting {
     uint64_t pulse0, first_row; /* of the frame's first pulse */
     int have_attributes, have_colours;
     struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
+    double deviation[NATIVE_MAX_POINTS];
     struct scanhead_colour colour[NATIVE_MAX_POINTS];
     struct waiting_point {
         struct scanhead_point point;
@@ -80,6 +81,7 @@ static void take_along(struct track *t, uint32_t k, int n)
     const int is_echo = p->point.echo_count != 0;
     if (t->has_attributes) {
         t->attribute[n] = w->have_attributes ? w->attribute[p->index] : none;
+        t->deviation[n] = w->have_attributes && t->has_deviations ? w->deviation[p->index] : (double)NAN;
         t->missing.n_without_attributes += (uint64_t)(is_echo && !w->have_attributes);
     }
     if (!waits_for_colours(t)) return;
@@ -128,6 +130,7 @@ int track_attributes(struct track *t, const struct scanhead_frame *frame, struct
     struct track_waiting *w = t->waiting;
     if (w == NULL || w->n == 0 || !t->has_attributes) return 0;
     if (scanhead_attributes(t->sh, frame, 0, w->attribute, NATIVE_MAX_POINTS) < 0) return 0;
+    if (t->has_deviations && scanhead_deviations(t->sh, frame, 0, w->deviation, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_attributes = 1;
     return waits_for_colours(t) || t->has_waves ? 0 : hand_out(t, err);
 }
