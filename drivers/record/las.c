@@ -53,7 +53,7 @@ static int put_front(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
     las->begun = 1;
-    las->facts.incomplete = 1;
+    las->facts.incomplete = las->facts.is_growing = 1;
     las->front_len = las_front(&las->facts, front);
     return outfile_write(&las->base.file, front, las->front_len, err);
 }
@@ -357,6 +357,7 @@ static int las_finish(void *rec, struct sh_err *err)
     struct las *las = rec;
     int rc = outfile_check(&las->base.file, err); /* then the header goes on saying that the file is incomplete */
     if (rc == 0 && !las->begun) rc = put_front(las, err);
+    las->facts.is_growing = 0;
     if (rc == 0 && las->facts.has_waves) rc = end_waves(las, err);
     las->facts.incomplete = 0;
     if (rc == 0) rc = write_front(las, err);

@@ -231,7 +231,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
         le_put64(to + LAS_EVLRS_AT, f->waves_at);
         le_put32(to + LAS_EVLRS_AT + 8, 1);
     }
-    las_put_counts(f, to);
+    if (!f->is_growing) las_put_counts(f, to);
 }
 
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])

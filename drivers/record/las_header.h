@@ -46,6 +46,7 @@ struct las_facts {
     int has_colour;
     const struct track *track; /* whose CRS, movement and attributes are the file's */
     int incomplete;            /* the recording goes on: the header says so */
+    int is_growing;            /* more points may come: the header has no counts yet */
     int gps_time;              /* times are adjusted standard GPS time */
     char profile[32];
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */

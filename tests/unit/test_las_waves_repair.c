@@ -32,8 +32,11 @@ static void put_stream(uint32_t lines, uint16_t n_samples)
     rig_wave_descriptor(0, 1, 4);
     rig_anchor(&a);
     for (uint32_t line = 0; line < lines; line++) {
+        /* Another digitiser needs a new descriptor: the header is written again while points come. */
+        struct rig_digitiser d = rig_12_bits;
+        if (line > 0) d.baseline_16++;
         rig_points(line, line * N, line * N, p, N);
-        rig_waves(line, line * N, &rig_12_bits, w, N);
+        rig_waves(line, line * N, &d, w, N);
         put_line_end(line);
     }
 }
