@@ -79,12 +79,26 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
     return rc == SH_OK ? read_len(p, err) : rc;
 }
 
+/* Inside, the record begins where a point ends. A repair leaves a header that says neither: there are no packets. */
+static int check_place(const struct repair *r, const uint8_t *header, struct sh_err *err)
+{
+    const uint64_t begin = le_get64(header + LAS_WAVES_AT), front = le_get32(header + 96);
+    const int where = header[LAS_ENCODING_AT] & (LAS_WAVES_INSIDE | LAS_WAVES_OUTSIDE);
+    const int is_at_point = begin >= front && (begin - front) % le_get16(header + 105) == 0;
+    if (where == LAS_WAVES_INSIDE ? is_at_point : begin == 0 && where != (LAS_WAVES_INSIDE | LAS_WAVES_OUTSIDE))
+        return SH_OK;
+    return repair_fail_damaged(r, LAS_WAVES_AT, err);
+}
+
 int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
 {
     *p = (struct las_packets){.file = {.fd = -1, .report = r->report}, .end = LAS_WAVES_HEAD_LEN};
     p->wave_at = header[104] == 9 ? 30 : 38;
     p->begin = le_get64(header + LAS_WAVES_AT);
-    if (p->begin == 0) return find_outside(p, r, err);
+    const int rc = check_place(r, header, err);
+    if (rc != SH_OK) return rc;
+    if ((header[LAS_ENCODING_AT] & LAS_WAVES_OUTSIDE) != 0) return find_outside(p, r, err);
+    if (p->begin == 0) return SH_OK;
     p->file = *r;
     p->len = r->len > p->begin ? r->len - p->begin : 0;
     return read_len(p, err);
@@ -93,8 +107,7 @@ int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_
 uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, const uint8_t *header)
 {
     const uint64_t n = le_get64(header + LAS_POINTS_AT), front = le_get32(header + 96), len = le_get16(header + 105);
-    if (is_inside(p) && p->begin < front) return front;
-    if (is_inside(p)) return p->begin < r->len ? p->begin : r->len;
+    if (p->begin != 0) return p->begin < r->len ? p->begin : r->len;
     /* Packets that were being copied may follow the points; the points were counted before that. */
     return n != 0 && n < (r->len - front) / len ? front + n * len : r->len;
 }
@@ -148,11 +161,10 @@ static int set_len(struct las_packets *p, struct sh_err *err)
 }
 
 /* Not even the head of an inner record is there. */
-static int leave_out_record(uint8_t *header)
+static void leave_out_record(uint8_t *header)
 {
     header[LAS_ENCODING_AT] &= (uint8_t)~LAS_WAVES_INSIDE;
     memset(header + LAS_WAVES_AT, 0, LAS_POINTS_AT - LAS_WAVES_AT);
-    return 1;
 }
 
 int las_packets_repair(struct las_packets *p, struct repair *r, const struct repair_rows *points, uint8_t *header,
@@ -162,7 +174,10 @@ int las_packets_repair(struct las_packets *p, struct repair *r, const struct rep
     if (p->n_without > 0)
         sh_warn(r->report, "%s: %llu points have no waveform: it did not reach the disk", r->path,
                 (unsigned long long)p->n_without);
-    if (rc == SH_OK && is_inside(p) && p->len < LAS_WAVES_HEAD_LEN) return leave_out_record(header);
+    if (rc == SH_OK && is_inside(p) && p->len < LAS_WAVES_HEAD_LEN) {
+        leave_out_record(header);
+        return p->n_without > 0;
+    }
     if (rc == SH_OK) rc = set_len(p, err);
     if (rc < 0) return rc;
     changed |= rc;

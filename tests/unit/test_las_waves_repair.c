@@ -197,8 +197,11 @@ static void test_cut_inside(void **state)
         assert_int_equal(rig_uint(got.data + 6, 2), 1 << 4 | (n_bytes < EVLR ? 0 : 1 << 1));
         if (n_bytes >= EVLR) assert_int_equal(rig_uint(got.data + first + 20, 8), packets * PACKET);
         for (size_t i = 0; i < n; i++)
-            assert_int_equal(got.data[front_of(&got) + i * POINT + WAVE_AT], i < packets);
+            assert_int_equal(got.data[front_of(&got) + i * POINT + WAVE_AT] != 0, i < packets);
         free(got.data);
+        if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        assert_true(file.was_whole);
+        repair_free(&file);
     }
     struct repaired file;
     repair_write_file(repair_path, whole.data, whole.len);
@@ -233,6 +236,18 @@ static void test_refused(void **state)
     unlink(repair_path);
     unlink(repair_part);
     unlink(wdp_part);
+    /* A record that begins within a point, and one that is both inside and outside. */
+    for (int i = 0; i < 2; i++) {
+        struct bytes wrong = {malloc(whole.len), whole.len};
+        memcpy(wrong.data, whole.data, whole.len);
+        wrong.data[i == 0 ? 227 : 6] ^= i == 0 ? 1 : 1 << 2;
+        repair_write_file(repair_path, wrong.data, wrong.len);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EFORMAT);
+        assert_non_null(strstr(repair_err.text, "is damaged at byte 227"));
+        assert_int_equal(left_len(repair_path), wrong.len);
+        free(wrong.data);
+        unlink(repair_path);
+    }
 }
 
 /* A limit on the files' size stands for a full disk. What is left is repaired: so many points, so many of them with
