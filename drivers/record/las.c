@@ -385,7 +385,7 @@ static int las_finish(void *rec, struct sh_err *err)
 static int las_save(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    const int rc = las->waves.is_open ? outfile_save(&las->waves.file, err) : 0;
+    const int rc = las_waves_flush(&las->waves, err); /* before the points, which refer to them */
     return rc == 0 ? outfile_save(&las->base.file, err) : rc;
 }
 

@@ -251,7 +251,7 @@ size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
     return (size_t)(end - to);
 }
 
-/* Of a point's record, without extra bytes. */
+/* The length of a point's record, without extra bytes. */
 static size_t own_len(const struct las_facts *f)
 {
     static const uint8_t own[11] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67}; /* by format */

@@ -23,7 +23,7 @@ int las_packets_find(struct las_packets *packets, const struct repair *repair, c
                      struct sh_err *err);
 /* Takes each point's record that is kept. */
 void las_packets_take(struct las_packets *packets, const uint8_t *record);
-/* Where the points end at the latest. */
+/* Returns where the points end at the latest. */
 uint64_t las_packets_limit(const struct las_packets *packets, const struct repair *repair, const uint8_t *header);
 /* Makes points and packets whole, and says in the header where these are. 1: something was changed; 0: nothing had to be;
  * or a negative error. */

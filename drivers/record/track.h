@@ -50,7 +50,7 @@ struct track_missing {
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
     uint64_t n_without_colours;    /* echoes whose colour was lost */
     uint64_t n_waves_unheld;       /* windows of waveforms that the recorder has no place for */
-    /* Of a recorder that wants waveforms: */
+    /* These count for recorders that want waveforms. */
     uint64_t n_waves_unplaced; /* windows whose points were lost, or which memory had no room for */
     uint64_t n_waves_alone;    /* windows without a point in them */
     uint64_t n_samples_lost;   /* samples that found no room in the head */

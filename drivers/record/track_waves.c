@@ -7,7 +7,7 @@
 #include "drivers/protocol/native.h"
 #include "drivers/record/track_inside.h"
 
-/* Of one frame of points. A head has at most as many windows as 64 MiB of samples fill; a broken stream might have more. */
+/* This much is kept for one frame of points. A head has at most as many windows as 64 MiB of samples fill; a broken stream might have more. */
 enum { WAVES_MOST_BYTES = 64 << 20, WAVES_AT_ONCE = 64 };
 
 static const double EARTH_M = 6.371e6;
@@ -76,8 +76,8 @@ static void units_m(const struct scanhead_info *info, double to[3])
     to[2] = 1;
 }
 
-/* Where the head was in the CRS when it fired. Poses are in the scene's frame, which is the local CRS; of other systems only the
- * head knows how they lie to each other along its way. 0: not known. */
+/* Where the head was in the CRS when it fired. Poses are in the scene's frame, which is the local CRS. How that frame lies
+ * in other systems along the way, only the head knows. 0: not known. */
 static int find_head(const struct track *t, const struct scanhead_point *p, double at[3])
 {
     struct scanhead_pose pose;
