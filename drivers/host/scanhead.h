@@ -282,7 +282,7 @@ struct scanhead_wave {
     const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
     double range_m, step_m; /* of the first sample; from one to the next */
     /* Polar: the beam in the head's frame SOCS, of length one. Geo: the change of x, y and z in the CRS along a metre of
-     * range. An echo at p and r metres has the sample at range r_k at p + (r_k - r) direction. */
+     * range. So range times direction goes from the head (geo: the anchor, where the head stands) to the sample. */
     double direction[3];
     uint32_t sample_ps, bits; /* time between samples; bits of a count */
     double baseline;          /* the count without light */

@@ -192,7 +192,7 @@ struct encode_cut {
     int64_t t_ns; /* in the headers */
 };
 
-/* Attributes. 0, here and below: no room. */
+/* Writes attributes. Here and below, 0 means that there is no room. */
 static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
     const struct line_block *block = cut->block;
@@ -222,7 +222,7 @@ static size_t put_colours(uint8_t *dst, size_t cap, const struct encode_cut *cut
     return put_header(dst, NATIVE_COLOURS, 0, payload_len, cut->t_ns);
 }
 
-/* A window of samples, whose length is checked. */
+/* Writes a window, whose length is checked. */
 static void put_wave(uint8_t *restrict at, const struct line_waves *waves, const struct line_wave *w,
                      const struct encode_cut *cut)
 {
@@ -247,7 +247,8 @@ static int has_waves(const struct encode_cut *cut)
     return cut->wave < waves->n && (cut->is_last || waves->wave[cut->wave].pulse - cut->pulse0 < cut->head.n_pulses);
 }
 
-/* The next windows of these pulses, as many as one frame holds. 0 also where a window has no or too many samples. */
+/* Writes the next windows of these pulses, as many as one frame holds. It returns 0 also where a window has no samples,
+ * or too many. */
 static size_t put_waves(uint8_t *dst, size_t cap, struct encode_cut *cut)
 {
     const struct line_waves *waves = cut->block->waves;
@@ -274,7 +275,7 @@ static size_t put_waves(uint8_t *dst, size_t cap, struct encode_cut *cut)
     return put_header(dst, NATIVE_WAVES, 0, len, cut->t_ns);
 }
 
-/* Attributes, colours and waveforms behind a points frame. *len: their bytes. SH_ENOMEM: there is no room. */
+/* Writes what follows a points frame: *len bytes. SH_ENOMEM: there is no room. */
 static int put_beside(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *len)
 {
     size_t done = 0, more = 1;

@@ -8,7 +8,7 @@ import {crc32c, Decoder, Parser, LOCAL, REPEAT, TYPES} from '../../drivers/link/
 import {Losses} from '../../drivers/link/web/losses.js';
 import {CommandError, Replies} from '../../drivers/link/web/replies.js';
 import {PointHash} from '../../drivers/link/web/native_points.js';
-import {readWaves, Waves} from '../../drivers/link/web/native_waves.js';
+import {readWaves} from '../../drivers/link/web/native_waves.js';
 import {Poses} from '../../drivers/link/web/native_poses.js';
 import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
 import {runTests, test} from './page_tap.mjs';
@@ -291,64 +291,6 @@ test('payloads shorter than their tables, and longer', () => {
     equal(longer.refused.length, 0, `type ${bytes[1]}, longer`);
     for (const n of [0, 7]) equal(readAll([resized(n)]).refused.length, 1, `type ${bytes[1]} of ${n} bytes`);
   }
-});
-
-// ---- waveforms
-
-const wavesSample = samples.find(({bytes}) => bytes[1] === 12).bytes.subarray(28);
-
-test('the windows of a pulse: ranges, and samples in thresholds', () => {
-  const {decoder} = readAll([stream]), [near, far, ...more] = decoder.wavesOf(0);
-  const step_m = 0.5 * 0.299792458; // of 1 ns
-  equal(more.length, 0, 'windows');
-  [[near, 18, [201, 388, 1623, 702, 211]], [far, 28, [203, 529, 598, 207]],
-    [decoder.wavesOf(1)[0], 11, [200, 212, 446, 451, 205, 201]]].forEach(([w, first, counts]) => {
-    equal(w.stepM, step_m, 'step');
-    equal(w.rangeM0, first * step_m, 'range');
-    equal([...w.samples].join(), counts.map((c) => (c - 200.5) * 0.125).join(), 'samples');
-  });
-  equal(decoder.wavesOf(2).length, 0, 'of a shot without echo');
-  equal(decoder.stats.lost_samples, 7, 'lost');
-});
-
-test('waveforms that do not fit into their frame are refused', () => {
-  const whole = new Waves(), bytes = Buffer.from(wavesSample);
-  const isRefused = (part) => {
-    try {
-      whole.add(viewOf(part), 1);
-      return false;
-    } catch {
-      return true;
-    }
-  };
-  for (let n = 0; n < bytes.length; n++) equal(isRefused(Buffer.from(bytes.subarray(0, n))), true, `${n} bytes`);
-  equal(isRefused(bytes), false, 'whole');
-  for (const [at, value] of [[12, 4], [15, 255], [16 + 28 + 12, 0], [32 + 13, 16], [22, 7], [22, 15], [27, 191]]) {
-    const hurt = Buffer.from(bytes);
-    hurt[at] = value;
-    if (at === 56) hurt.writeUInt16LE(0, 32 + 12);
-    equal(isRefused(hurt), true, `byte ${at} is ${value}`);
-  }
-  const noStep = Buffer.from(bytes);
-  noStep.writeUInt32LE(0, 16);
-  equal(isRefused(noStep), true, 'no time between samples');
-});
-
-test('the last waveforms of a scan are kept, up to a limit', () => {
-  const waves = new Waves(2100 * wavesSample.length);
-  const at = (pulse0) => {
-    const frame = Buffer.from(wavesSample);
-    frame.writeBigUInt64LE(BigInt(pulse0));
-    return viewOf(frame);
-  };
-  const high = 2 ** 32; // pulse numbers of more than 32 bits
-  for (let i = 0; i < 5000; i++) waves.add(at(high + 2 * i), 1);
-  equal(waves.of(high + 2 * 2899).length, 0, 'gone');
-  for (const i of [2900, 3000, 4999]) equal(`${waves.of(high + 2 * i).length} ${waves.of(high + 2 * i + 1).length}`, '2 1', `frame ${i}`);
-  waves.add(at(high + 9998), 1); // one more of the same points
-  equal(waves.of(high + 9998).length, 4, 'in two frames');
-  waves.add(at(0), 2);
-  equal(`${waves.of(high + 9998).length} ${waves.of(0).length}`, '0 2', 'another scan');
 });
 
 test('points before their anchor are counted and not placed', () => {

@@ -3,10 +3,8 @@
 #ifndef TESTS_WIRE_DISSECTED_FRAMES_H
 #define TESTS_WIRE_DISSECTED_FRAMES_H
 
+#include "tests/wire/dissected_fields.h"
 #include "tests/wire/wireshark_rig.h"
-
-/* Ends with NULL. */
-extern const char *const all_fields[];
 
 /* Takes all values of the frames in a file of the test's folder, and fails where one differs. Returns the types of the
  * frames, as bits. */

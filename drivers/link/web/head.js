@@ -28,7 +28,7 @@ export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ?
  * - `lost` {by, frames, pulses}, by 'head' (not computed in time), 'link' (this page was too slow), 'wire' (damaged) or
  *   'page' (dropped here)
  * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
- * - `waves` {pulse, windows}: what askWaves asked for
+ * - `waves` {pulse, scan, windows}: what askWaves asked for
  * - `points`, `descriptor`, `anchor`, `emitter`, `names`, `line-end`, `telemetry`, `event`, `poses` as the Decoder has
  *   them; `refused`, the words for a frame that was refused
  */
@@ -83,10 +83,10 @@ export class Head extends EventTarget {
     return this.#replies.ask(line, timeout_s);
   }
 
-  /** Asks for the waveform of a pulse of the scan at hand; the answer is an event `waves`. Only the last ones are kept
-   * (native_waves.js). */
-  askWaves(pulse) {
-    this.#wire.post({wavesOf: pulse});
+  /** Asks for the waveform of a pulse of a scan; the answer is an event `waves`. Only the last ones of the last scan are
+   * kept (native_waves.js). */
+  askWaves(pulse, scan) {
+    this.#wire.post({wavesOf: pulse, scan});
   }
 
   /** Takes control and changes nothing else. It throws -203 where another session has it. */

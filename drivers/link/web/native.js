@@ -67,9 +67,9 @@ export class Decoder {
     }
   }
 
-  /** The windows of a pulse of this scan: as Waves.of has them. */
-  wavesOf(pulse) {
-    return this.waves.of(pulse);
+  /** The windows of a pulse, as Waves.of has them. */
+  wavesOf(pulse, scan) {
+    return this.waves.of(pulse, scan);
   }
 
   /** Hands on the points that are there. A frame whose attributes or colours are still to come stays, unless `all`. */

@@ -75,11 +75,11 @@ export class Waves {
     }
   }
 
-  /** The windows of a pulse of the scan, in order of range: [{rangeM0, stepM, samples: Float32Array in units of the
+  /** The windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples: Float32Array in units of the
    * detection threshold, without the baseline}]. Empty where the head kept none, or they are no longer here. */
-  of(pulse) {
-    const found = [], frames = this.#frames;
-    let low = this.#begin, high = frames.length; // the first frame that ends with this pulse or later
+  of(pulse, scan = this.#scan) {
+    const found = [], frames = scan === this.#scan ? this.#frames : [];
+    let low = Math.min(this.#begin, frames.length), high = frames.length; // the first frame that ends with this pulse or later
     while (low < high) {
       const middle = (low + high) >> 1;
       if (frames[middle].to < pulse) low = middle + 1;

@@ -42,11 +42,11 @@ export class Wire {
   }
 
   /** The owner sends {connect: url, past: url of earlier points, or null}, {send: line}, {close: true}, {ack: true}, or
-   * {wavesOf: pulse}, which is answered by a thing `waves` {pulse, windows}. */
+   * {wavesOf: pulse, scan}, which is answered by a thing `waves` {pulse, scan, windows}. */
   take(message) {
     if (message.connect !== undefined) this.#connect(message.connect, message.past ?? null);
     if (message.send !== undefined) this.#socket?.send(message.send);
-    if (message.wavesOf !== undefined) this.#addNow('waves', {pulse: message.wavesOf, windows: this.decoder.wavesOf(message.wavesOf)});
+    if (message.wavesOf !== undefined) this.#answerWaves(message.wavesOf, message.scan);
     if (message.close) this.#close();
     if (message.ack) this.#taken();
   }
@@ -135,6 +135,10 @@ export class Wire {
     const held = this.decoder.columns.n;
     if (this.#points + held >= MESSAGE_POINTS || this.#things.length >= MESSAGE_THINGS) this.#send();
     else if (held > 0 || this.decoder.shots > 0) this.#later();
+  }
+
+  #answerWaves(pulse, scan) {
+    this.#addNow('waves', {pulse, scan, windows: this.decoder.wavesOf(pulse, scan)});
   }
 
   // Takes one or more reply lines, with or without CR LF.
