@@ -168,13 +168,13 @@ struct cast_setup {
 
 /* Counts of what became of pulses. */
 struct cast_counters {
-    uint64_t decided;    /* struct bvh_counters */
-    uint64_t few, asked; /* with a sight: struct sight_counters */
-    uint64_t unfit;      /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
-    uint64_t faint;      /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
+    uint64_t decided;      /* struct bvh_counters */
+    uint64_t few, asked;   /* with a sight: struct sight_counters */
+    uint64_t unfit;        /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
+    uint64_t faint;        /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
                           * without echo, or fewer echoes */
-    uint64_t crowded;    /* echoes beyond max_echoes: the weakest, left out */
-    uint64_t hidden;     /* pulses into the tripod's cone: shots without echo */
+    uint64_t crowded;      /* echoes beyond max_echoes: the weakest, left out */
+    uint64_t hidden;       /* pulses into the tripod's cone: shots without echo */
     uint64_t lost_samples; /* of waveforms, for which a block had no room */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */

@@ -125,18 +125,41 @@ static void hide(struct caster *c, const struct chunk *k)
     c->counters.hidden += caster_hide(k->s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
 }
 
+/* Returns NULL where there are no waveforms. */
+static const struct wave_chunk *begin_waves(struct caster *c, const struct chunk *k, struct wave_chunk *waves)
+{
+    if (c->waves == NULL || k->s->waves == NULL) return NULL;
+    *waves = (struct wave_chunk){.s = k->s,
+                                 .how = k->s->waves,
+                                 .work = c->waves,
+                                 .list = &c->list,
+                                 .counters = &c->counters,
+                                 .block = k->block,
+                                 .d = VEC3_IN(c->d, 0),
+                                 .dt_ns = k->dt_ns,
+                                 .pulse0 = k->pulse0,
+                                 .first = k->first,
+                                 .n = k->n,
+                                 .linear = k->linear,
+                                 .texels = k->texels};
+    waves_begin(waves);
+    return waves;
+}
+
 /* Returns the number of echoes. */
 static uint32_t cast_chunk(struct caster *c, struct chunk *k)
 {
     const struct cast_setup *s = k->s;
+    struct wave_chunk waves;
     const int central = s->beam == NULL || s->beam->mode == BEAM_ADAPTIVE; /* rings have no ray for the centre */
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
-    if (k->waves != NULL) waves_begin(c, k);
+    k->waves = begin_waves(c, k, &waves);
+    k->spreads = k->attributes || k->waves != NULL;
     if (s->disturbance != NULL && s->disturbance->dark) {
         caster_darken(&c->list);
-        if (k->waves != NULL) caster_waves(c, k);
+        if (k->waves != NULL) caster_waves(k->waves);
         return caster_points(c, k);
     }
     const struct met met = centres(c, k);
@@ -167,8 +190,6 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     struct chunk chunk = {.s = setup, .run = run, .block = block, .attributes = block->width_cns != NULL};
     chunk.colours = block->rgb != NULL && setup->colour != NULL;
     chunk.texels = chunk.colours && setup->colour->scale.mode == COLOUR_TEXTURE;
-    chunk.waves = caster->waves != NULL ? setup->waves : NULL;
-    chunk.spreads = chunk.attributes || chunk.waves != NULL;
     uint32_t echoes = 0;
     begin_block(block, setup, run);
     /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the

@@ -124,7 +124,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
         if (caster_is_bare(k->s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
     for (uint32_t i = k->n; i < l->n; i++)
         l->label[i] += l->ghost[i] ? d->ghost_label : 0;
-    if (k->waves != NULL) waves_take_paths(c, k);
+    if (k->waves != NULL) waves_take_paths(k->waves);
     for (uint32_t g = 0; g < l->n_secondary && d->separation_m > 0.0; g++)
         l->secondary[g].n = merge_pulse(l, &how, &l->secondary[g], k->texels);
 }
@@ -140,7 +140,7 @@ static uint32_t count_echoes(const struct echo_list *l)
 /* Whether echoes are those that were found in waveforms: detected, and with noise. */
 static int finds_echoes(const struct chunk *k)
 {
-    return k->waves != NULL && k->waves->finds;
+    return k->waves != NULL && k->waves->how->finds;
 }
 
 /* Ranges of what is not detected become NaN. */
@@ -314,7 +314,7 @@ void caster_echoes(struct caster *c, const struct chunk *k)
     kernel_limit(l->range_m, s->range_min_m, s->range_max_m, l->n);
     if (s->silent != NULL) silence(c, s);
     if (s->beam == NULL && s->detect != NULL) weigh_returns(c, k);
-    if (k->waves != NULL) caster_waves(c, k);
+    if (k->waves != NULL) caster_waves(k->waves);
     if (s->detect != NULL || s->noise_on) make_keys(l, k);
     if (s->detect != NULL) detect(c, k);
     bvh_stage_ends(c->profile, CAST_DETECT);

@@ -179,7 +179,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
-    if (k->waves != NULL) waves_take_returns(c, k, job->pulse, w->returns, w->n_returns);
+    if (k->waves != NULL) waves_take_returns(k->waves, job->pulse, w->returns, w->n_returns);
     w->echoes_of[job->pulse].first = w->n_echoes;
     w->echoes_of[job->pulse].n = n;
     w->n_echoes += n;

@@ -4,7 +4,7 @@
 #ifndef CORE_CAST_WAVES_H
 #define CORE_CAST_WAVES_H
 
-#include "core/cast/chunk_arrays.h"
+#include "core/cast/echoes.h"
 #include "core/waveform.h"
 
 enum {
@@ -36,19 +36,29 @@ struct wave_work {
     uint16_t sample[WAVES_ROOM];
 };
 
-struct beam_return;
-struct caster;
-struct chunk;
+/* A chunk, as far as this stage needs it. */
+struct wave_chunk {
+    const struct cast_setup *s;
+    const struct cast_waves *how;
+    struct wave_work *work;
+    struct echo_list *list;
+    struct cast_counters *counters;
+    struct line_block *block;
+    struct vec3_in d; /* directions of the beams, prcs */
+    const uint32_t *dt_ns;
+    uint64_t pulse0;
+    uint32_t first, n;
+    int linear, texels; /* as in struct chunk */
+};
 
-/* Before the first stage of a chunk. */
-void waves_begin(struct caster *c, const struct chunk *k);
+/* Before returns are taken. */
+void waves_begin(const struct wave_chunk *k);
 /* The returns of a pulse with sub-rays, in any order; they may change places. */
-void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse, struct beam_return *returns,
-                        uint32_t n);
+void waves_take_returns(const struct wave_chunk *k, uint32_t pulse, struct beam_return *returns, uint32_t n);
 /* The returns of single rays through glass and off mirrors, before the list has them merged. */
-void waves_take_paths(struct caster *c, const struct chunk *k);
+void waves_take_paths(const struct wave_chunk *k);
 /* The samples go into the block, if it has room for waveforms. Where echoes are found in them, these replace those of
  * the list. */
-void caster_waves(struct caster *c, const struct chunk *k);
+void caster_waves(const struct wave_chunk *k);
 
 #endif

@@ -13,12 +13,12 @@
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
 
-/* ---- waveforms (build/bench_waveform) */
+/* ---- waveforms (make bench-waveform, build/tests/bench/waveform_detect): of pulses with one return */
 
-#define PLAN_COST_WAVE        150.0  /* a window around one return, */
-#define PLAN_COST_WAVE_SAMPLE 10.0   /* and each of its samples, with noise */
-#define PLAN_COST_FLANK       150.0  /* an echo found by a threshold or a constant fraction, */
-#define PLAN_COST_GAUSSIANS   1000.0 /* by Gaussian decomposition */
+#define PLAN_COST_WAVE        160.0 /* its window, */
+#define PLAN_COST_WAVE_SAMPLE 2.5   /* and each sample, with noise */
+#define PLAN_COST_FLANK       300.0 /* the echo, found by a threshold or a fraction of its peak, */
+#define PLAN_COST_GAUSSIANS   520.0 /* or by Gaussian decomposition */
 
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 

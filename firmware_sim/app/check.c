@@ -83,6 +83,13 @@ static void print_output(const struct config *cfg, const struct site *site, FILE
                                                   : ", heights above the ellipsoid");
 }
 
+static void print_waves(const struct config *cfg, FILE *out)
+{
+    if (cfg->head.settings.waves == 0) return;
+    fprintf(out, "waveforms %u samples for a usual pulse, %.4g MB/s\n", config_wave_samples(cfg),
+            1e-6 * config_wave_bytes_s(cfg));
+}
+
 static void print_links(const struct config *cfg, FILE *out)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
@@ -136,6 +143,7 @@ static int print_summary(const struct config *cfg, const struct sites *sites, FI
         rc = check_print_station(sites_of(sites, i), i, out, err);
     print_platform(site, out);
     print_output(cfg, site, out);
+    print_waves(cfg, out);
     print_links(cfg, out);
     return rc;
 }

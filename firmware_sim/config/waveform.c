@@ -5,6 +5,7 @@
 
 #include "core/light.h"
 #include "drivers/protocol/native_waves.h"
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
@@ -55,8 +56,8 @@ static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
 {
     const double ps = 1e3 * w->sample_ns, steps = 16.0 * w->baseline_counts;
     if (fabs(ps - rint(ps)) > 1e-6)
-        cfg_fail_key(rd, "waveform.sample_ns", 0, "%.10g is no whole number of ps; allowed 0.05 to 100 in steps of 0.001",
-                     w->sample_ns);
+        cfg_fail_key(rd, "waveform.sample_ns", 0,
+                     "%.10g is no whole number of ps; allowed 0.05 to 100 in steps of 0.001", w->sample_ns);
     if (steps != floor(steps))
         cfg_fail_key(rd, "waveform.baseline_counts", 0, "%.10g is no multiple of 1/16; allowed 0 to 4095 in such steps",
                      w->baseline_counts);
@@ -82,6 +83,15 @@ static void check_windows(struct cfg_reader *rd, const struct config *cfg)
                      config_wave_samples(cfg), config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
 }
 
+static void check_waveform_links(struct cfg_reader *rd, const struct config *cfg)
+{
+    if (cfg->head.settings.waves == 0 || cfg->n_links == 0 || config_speaks(cfg, PROTOCOL_NATIVE)) return;
+    if (CFG_SOUND(rd, 0, "links"))
+        cfg_fail_key(rd, "waveform.send", 0,
+                     "on, but no link has the protocol native, which alone has waveforms; allowed with such a link, or "
+                     "without links");
+}
+
 void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;
@@ -91,6 +101,7 @@ void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg)
     check_digits(rd, w);
     if (!config_has_waves(cfg)) return;
     check_windows(rd, cfg);
+    check_waveform_links(rd, cfg);
     if (!cfg->signal.on && CFG_SOUND(rd, 0, "signal.model"))
         cfg_fail_key(rd, key, 0, "%s, but no signal is modelled; required is signal.model: on",
                      finds && cfg->head.settings.waves == 0 ? cfg_word(rd, key, (int)w->echoes) : "on");

@@ -96,10 +96,11 @@ static void warn_digits(const struct config *cfg, const struct waveform_spec *sp
 {
     const double count = count_signal(spec);
     if (count <= 1.0) return;
-    sh_warn(report,
-            "%s: waveform.full_scale_db: a count of the samples is %.3g times the detection threshold, so they don't show "
-            "weak echoes; with %u bits a full scale up to %.3g dB does",
-            cfg->file, count, spec->bits, 10.0 * log10(spec->full_scale / count));
+    sh_warn(
+        report,
+        "%s: waveform.full_scale_db: a count of the samples is %.3g times the detection threshold, so they don't show "
+        "weak echoes; with %u bits a full scale up to %.3g dB does",
+        cfg->file, count, spec->bits, 10.0 * log10(spec->full_scale / count));
 }
 
 static int make_waveform(const struct site *site, const struct sh_report *report, struct waveform **out,
@@ -183,7 +184,8 @@ int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *ca
     int rc = caster_add_waves(caster, err);
     if (rc == SH_OK && room.windows != 0) rc = line_block_alloc_waves(block, room.windows, room.samples, err);
     if (rc == SH_OK && room.windows != 0) describe_digitiser(waveform_spec_of(site->waves->waveform), block->waves);
-    if (rc == SH_OK && site->waves->cast.finds && block->width_cns != NULL) rc = line_block_alloc_deviations(block, err);
+    if (rc == SH_OK && site->waves->cast.finds && block->width_cns != NULL)
+        rc = line_block_alloc_deviations(block, err);
     return rc;
 }
 

@@ -265,6 +265,10 @@ const struct bad bad[] = {
      "allowed a far_m above 9"},
     {AT_16("signal: {model: on}\nwaveform: {send: on, sample_ns: 0.05, after_ns: 100}"), 17, "waveform.after_ns",
      "allowed up to 400 MB/s"},
+    {"heading_deg: 90\nlinks:\n  - type: tcp\n    port: 0\noutput:",
+     "heading_deg: 90\n    lat_deg: 1\n    lon_deg: 2\n    height_m: 0\nlinks: [{type: tcp, port: 0, protocol: nmea}]\n"
+     "time: {epoch: utc}\nsignal: {model: on}\nwaveform: {send: on}\noutput:",
+     19, "waveform.send", "no link has the protocol native"},
     {AT_16("signal: {model: on}\nwaveform: {echoes: fraction}\nnoise: {range: on}"), 18, "noise.range",
      "echoes are found in samples"},
     {AT_16("surfaces: {material: a}"), 16, "surfaces", "allowed a list of 0 to 64"},
