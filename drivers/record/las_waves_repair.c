@@ -152,7 +152,6 @@ static int clear_points(struct las_packets *p, struct repair *r, const struct re
 static int set_len(struct las_packets *p, struct sh_err *err)
 {
     uint8_t len[8], was[8];
-    if (p->len < LAS_WAVES_HEAD_LEN) return 0;
     int rc = repair_read(&p->file, p->begin + LAS_WAVES_LEN_AT, was, sizeof was, err);
     le_put64(len, p->end - LAS_WAVES_HEAD_LEN);
     if (rc != SH_OK || memcmp(len, was, sizeof len) == 0) return rc;
@@ -160,10 +159,10 @@ static int set_len(struct las_packets *p, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-/* Not even the head of an inner record is there. */
+/* Not even the head of the record is there, so no point has a packet. */
 static void leave_out_record(uint8_t *header)
 {
-    header[LAS_ENCODING_AT] &= (uint8_t)~LAS_WAVES_INSIDE;
+    header[LAS_ENCODING_AT] &= (uint8_t) ~(LAS_WAVES_INSIDE | LAS_WAVES_OUTSIDE);
     memset(header + LAS_WAVES_AT, 0, LAS_POINTS_AT - LAS_WAVES_AT);
 }
 
@@ -174,7 +173,7 @@ int las_packets_repair(struct las_packets *p, struct repair *r, const struct rep
     if (p->n_without > 0)
         sh_warn(r->report, "%s: %llu points have no waveform: it did not reach the disk", r->path,
                 (unsigned long long)p->n_without);
-    if (rc == SH_OK && is_inside(p) && p->len < LAS_WAVES_HEAD_LEN) {
+    if (rc == SH_OK && p->len < LAS_WAVES_HEAD_LEN) {
         leave_out_record(header);
         return p->n_without > 0;
     }
@@ -192,6 +191,10 @@ int las_packets_repair(struct las_packets *p, struct repair *r, const struct rep
 int las_packets_settle(struct las_packets *p, struct sh_err *err)
 {
     if (p->target == NULL) return SH_OK;
+    if (p->len < LAS_WAVES_HEAD_LEN) { /* nothing refers to it any more */
+        unlink(p->path);
+        return SH_OK;
+    }
     const int rc = newfile_settle_free(p->target, p->path, p->file.fd, err);
     if (rc == SH_OK) p->file.fd = -1;
     return rc;
