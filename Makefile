@@ -422,10 +422,6 @@ bench-copies: deps-build
 bench-velodyne: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
 	@$(BUILD)/tests/bench/velodyne
-# The samples of a full waveform, ns a pulse by spread and window; with --chart methods beside 100,000 sub-rays.
-bench-waveform: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waveform
-	@$(BUILD)/tests/bench/waveform
 # Waveforms on the wire, ns a window.
 bench-waves: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waves
@@ -461,6 +457,7 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_more'" tests/bench/chart_more.gp
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_moving'" tests/bench/chart_moving.gp
+	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)_waveform'" tests/bench/chart_waveform.gp
 objects: $(EVERYTHING)
 test-unit-programs test-programs: $(BUILD)/tests/joined
 test-programs: all $(BUILD)/bench $(call PROGRAMS,guest) $(FIGURES)
@@ -514,6 +511,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waveform bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

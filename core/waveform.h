@@ -107,7 +107,7 @@ enum waveform_detector {
 
 struct waveform_echo {
     double range_m;
-    double amplitude; /* in thresholds, without the baseline */
+    double amplitude; /* peak of its signal over that of h, in thresholds: A of a surface that is hit head on */
     double width_s;   /* full at half maximum */
     double deviation; /* RMS of the samples about the echo's model, in counts per count of its amplitude; RIEGL's "pulse
                         * shape deviation" has this meaning */
@@ -115,7 +115,7 @@ struct waveform_echo {
 };
 
 /* Finds at most `most` echoes in the order of range; level: amplitude, in thresholds, below which nothing is an echo (1: as
- * detect.h). Returns how many; *n_crowded counts those that found no room (the weakest are left out). Pure. */
+ * detect.h). Returns how many, and adds to *n_crowded those that found no room (the weakest are left out). Pure. */
 uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded);

@@ -60,6 +60,11 @@ VEC_INLINE uint32_t count_of(double turn, double counts)
     return (uint32_t)bits;
 }
 
+uint32_t kernel_count(double turn, double counts)
+{
+    return count_of(turn, counts);
+}
+
 VEC_CLONES
 void kernel_polar(const struct cast_setup *setup, const double *restrict range_m, const struct kernel_turns *turns,
                   const struct kernel_wire *out)

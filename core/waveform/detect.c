@@ -67,8 +67,8 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
             if (i + 1 < run->n && !detect_fell(run->finder, run->y[top], y)) continue;
             rising = 0;
             /* After a blind start of a window the signal falls: its maximum was not seen. */
-            int hidden = run->mark != NULL && top > 0 && run->mark[top] != FINDER_LIMITED &&
-                         run->mark[top - 1] == FINDER_BLIND;
+            int hidden =
+                run->mark != NULL && top > 0 && run->mark[top] != FINDER_LIMITED && run->mark[top - 1] == FINDER_BLIND;
             if (run->y[top] >= least && !hidden) {
                 if (n < most) peak[n] = (struct finder_peak){top, valley, run->n};
                 if (n > 0 && n < most) peak[n - 1].to = valley + 1;
@@ -130,7 +130,8 @@ int finder_half(const struct finder_run *run, const struct finder_peak *peak, do
 }
 
 /* Maxima are one mixture where the signal between them stays above noise, and above 2 % of the smaller one. */
-static int detect_joined(const struct finder_run *run, const struct finder_peak *before, const struct finder_peak *after)
+static int detect_joined(const struct finder_run *run, const struct finder_peak *before,
+                         const struct finder_peak *after)
 {
     double smaller = fmin(run->y[before->top], run->y[after->top]);
     return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);
@@ -155,7 +156,7 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
         if (end > i + 1 || finder_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
             finder_decompose(run, &peak[i], end - i, level, &mix);
         for (uint32_t j = 0; j < mix.n; j++)
-            finder_add_gaussian(run, &mix, j, level, list);
+            finder_add_term(run, &mix, j, level, list);
     }
 }
 
@@ -177,21 +178,12 @@ static void detect_put(struct finder_list *list, const struct waveform_echo *ech
     list->echo[at] = *echo;
 }
 
-/* h over its peak, x samples after its centroid. */
-static double detect_shape(const struct finder *finder, double x)
-{
-    double place = (x / finder->width + FINDER_SHAPE_LEAD) / FINDER_SHAPE_STEP;
-    if (!(place >= 0.0 && place < FINDER_SHAPE - 1)) return 0.0;
-    uint32_t k = (uint32_t)place;
-    return finder->shape[k] + (place - k) * (finder->shape[k + 1] - finder->shape[k]);
-}
-
-static double detect_others(const struct finder_mix *mix, uint32_t self, double x)
+static double detect_others(const struct finder *finder, const struct finder_mix *mix, uint32_t self, double x)
 {
     double sum = 0.0;
     for (uint32_t j = 0; mix != NULL && j < mix->n; j++) {
         double d = (x - mix->g[j].at) / mix->g[j].sigma;
-        if (j != self && fabs(d) < 6.0) sum += mix->g[j].peak * exp(-0.5 * d * d);
+        if (j != self) sum += mix->g[j].peak * finder_value(finder, d);
     }
     return sum;
 }
@@ -203,12 +195,13 @@ static double detect_deviation(const struct finder_run *run, const struct finder
     double lo = fmax(0.0, ceil(found->at - found->width)), hi = fmin(run->n - 1.0, floor(found->at + found->width));
     double sum = 0.0;
     uint32_t n = 0;
+    const double per_width = 1.0 / run->finder->width;
     const int alone = mix == NULL || mix->n == 1;
     for (double x = lo; x <= hi; x += 1.0) {
         uint32_t i = (uint32_t)x;
         if (run->mark != NULL && run->mark[i] != FINDER_PLAIN) continue;
-        double rest = run->y[i] - found->peak * detect_shape(run->finder, x - found->at);
-        if (!alone) rest -= detect_others(mix, self, x);
+        double rest = run->y[i] - found->peak * finder_table(run->finder->shape, (x - found->at) * per_width);
+        if (!alone) rest -= detect_others(run->finder, mix, self, x);
         sum += rest * rest;
         n++;
     }
@@ -229,10 +222,10 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
     detect_put(list, &echo);
 }
 
-void finder_add_gaussian(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
-                         struct finder_list *list)
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+                     struct finder_list *list)
 {
-    const struct finder_gaussian *g = &mix->g[self];
+    const struct finder_term *g = &mix->g[self];
     struct finder_spread spread;
     finder_by_sigma(run->finder, g->sigma, &spread);
     const struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,

@@ -19,43 +19,85 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     while (hi + 1 < last->to && run->y[hi] > fmax(noise, 0.005 * run->y[last->top]))
         hi++;
     task->run = run;
-    task->lo = lo > margin ? lo - (uint32_t)margin : 0;
-    task->hi = hi + margin < run->n ? hi + (uint32_t)margin : run->n - 1;
+    task->lo = (uint32_t)fmax(lo - margin, peak->from);
+    task->hi = (uint32_t)fmin(hi + margin, last->to - 1.0);
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* A top that is limited. With both flanks seen, the pulse is as high as it has to be to stay above the limit for so long.
- * Where the receiver went blind, the rising flank's last two samples have to do: the log of a Gaussian has the slope
- * (at - x) / sigma^2. */
-static void decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_gaussian *g)
+/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is above it
+ * for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
+static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
-    const double sigma = run->finder->spread[0].sigma, noise = run->finder->noise, limit = run->finder->limit;
+    const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
+    uint32_t a = 0, b;
+    while (a + 2 < FINDER_SHAPE && (h[a] < h[a + 1] || h[a] < 0.5))
+        a++;
+    for (b = a; b - a < steps && a > 0 && b + 1 < FINDER_SHAPE;) {
+        if (h[a - 1] > h[b + 1])
+            a--;
+        else
+            b++;
+    }
+    *centroid = (FINDER_SHAPE_LEAD - a * FINDER_SHAPE_STEP) * finder->width;
+    return finder->limit / fmax(fmax(h[a], h[b]), 1e-6);
+}
+
+/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies between
+ * what they are of it. *centroid: from the sample of y1. */
+static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
+{
+    double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
+    for (int i = 0; i < 20; i++) {
+        double half = 0.5 * (least + most), part = exp(-half);
+        if (finder_lead(finder, part * y0 / y1) - finder_lead(finder, part) > 1.0)
+            least = half;
+        else
+            most = half;
+    }
+    *centroid = finder_lead(finder, exp(-least));
+    return y1 * exp(least);
+}
+
+/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do; returns 1
+ * then, since a fit to these has nothing to add. */
+static int decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
+{
+    const struct finder *finder = run->finder;
     uint32_t a = peak->top, b = peak->top;
     while (a > peak->from && run->mark[a - 1] == FINDER_LIMITED)
         a--;
     while (b + 1 < peak->to && run->mark[b + 1] == FINDER_LIMITED)
         b++;
     int blind = b + 1 < peak->to && run->mark[b + 1] == FINDER_BLIND;
-    double at = 0.5 * ((double)a + (double)b);
-    if (blind) at = (double)a + sigma;
-    if (blind && a >= peak->from + 2 && run->y[a - 2] > 3.0 * noise)
-        at = (double)a - 1.5 + sigma * sigma * log(run->y[a - 1] / run->y[a - 2]);
-    at = fmax(at, (double)a - 0.5);
-    double d = (at - ((double)a - 0.5)) / sigma;
-    *g = (struct finder_gaussian){at, sigma, limit * exp(fmin(0.5 * d * d, 20.0))};
+    double centroid, height, from = (double)a - 0.5;
+    if (!blind) {
+        height = decompose_height(finder, (double)b - (double)a + 1.0, &centroid);
+    } else {
+        /* Half of what could be told from noise stands for a sample that can't. */
+        const double least = 1.5 * finder->noise;
+        uint32_t k = a > peak->from && run->y[a - 1] > 2.0 * least ? a - 1 : a;
+        height = decompose_flank(finder, k > peak->from ? fmax(run->y[k - 1], least) : least,
+                                 fmin(run->y[k], finder->limit), &centroid);
+        from = k;
+    }
+    const double at = from + centroid + finder->spread[0].lag;
+    *g = (struct finder_term){at, finder->spread[0].sigma, fmax(height, finder->limit)};
+    return blind;
 }
 
-static void decompose_begin(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
-                            struct finder_mix *mix)
+/* Returns 1 where nothing is left to fit. */
+static int decompose_begin(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
+                           struct finder_mix *mix)
 {
+    int blind = 0;
     *mix = (struct finder_mix){.n = n};
     for (uint32_t j = 0; j < n; j++) {
-        struct finder_gaussian *g = &mix->g[j];
+        struct finder_term *g = &mix->g[j];
         double side[2], height = run->y[peak[j].top];
         if (finder_limited(run, &peak[j])) {
             mix->limited |= 1U << j;
             mix->open |= 1U << j;
-            decompose_limited(run, &peak[j], g);
+            blind |= decompose_limited(run, &peak[j], g);
             continue;
         }
         int seen = finder_half(run, &peak[j], height, side);
@@ -66,6 +108,7 @@ static void decompose_begin(const struct finder_run *run, const struct finder_pe
         g->sigma = usable ? sigma : run->finder->spread[0].sigma;
         g->peak = height;
     }
+    return n == 1 && blind;
 }
 
 /* What the shapes of echoes on planes leave when Gaussians fit them, as a sum of squares. */
@@ -84,19 +127,19 @@ static double decompose_shapes(const struct finder_task *task, const struct find
 static int decompose_enough(const struct finder_task *task, const struct finder_mix *mix)
 {
     double n = fmax(1.0, task->hi - task->lo + 1.0 - 3.0 * mix->n);
-    return mix->chi2 <= n * task->variance * (1.0 + 4.0 * sqrt(2.0 / n)) + decompose_shapes(task, mix);
+    return mix->chi2 <= n * finder_noise2(task->run->finder, n) + decompose_shapes(task, mix);
 }
 
 /* The pulse that explains most of the rest: its amplitude by least squares at each place. */
-static struct finder_gaussian decompose_largest(const struct finder_task *task, const double *rest)
+static struct finder_term decompose_largest(const struct finder_task *task, const double *rest)
 {
     const double sigma = task->run->finder->spread[0].sigma;
     const int32_t reach = (int32_t)ceil(2.0 * sigma), n = (int32_t)(task->hi - task->lo + 1);
-    struct finder_gaussian best = {0.0, sigma, 0.0};
+    struct finder_term best = {0.0, sigma, 0.0};
     double kernel[2 * DECOMPOSE_REACH + 1];
     const int32_t side = reach < DECOMPOSE_REACH ? reach : DECOMPOSE_REACH;
     for (int32_t k = -side; k <= side; k++)
-        kernel[k + side] = exp(-0.5 * (k / sigma) * (k / sigma));
+        kernel[k + side] = finder_value(task->run->finder, k / sigma);
     for (int32_t i = 0; i < n; i++) {
         double by = 0.0, squares = 0.0;
         for (int32_t k = -side; k <= side; k++)
@@ -104,7 +147,7 @@ static struct finder_gaussian decompose_largest(const struct finder_task *task, 
                 by += kernel[k + side] * rest[i + k];
                 squares += kernel[k + side] * kernel[k + side];
             }
-        if (by > best.peak * squares) best = (struct finder_gaussian){(double)task->lo + i, sigma, by / squares};
+        if (by > best.peak * squares) best = (struct finder_term){(double)task->lo + i, sigma, by / squares};
     }
     return best;
 }
@@ -116,11 +159,11 @@ static int decompose_split(const struct finder_task *task, struct finder_mix *mi
     uint32_t widest = 0;
     for (uint32_t j = 1; j < mix->n; j++)
         if (mix->g[j].sigma > mix->g[widest].sigma) widest = j;
-    struct finder_gaussian *g = &mix->g[widest];
+    struct finder_term *g = &mix->g[widest];
     if (g->sigma < 1.05 * sigma || mix->open >> widest & 1) return 0;
     double apart = sqrt(g->sigma * g->sigma - sigma * sigma), peak = 0.5 * g->peak * g->sigma / sigma;
-    mix->g[mix->n++] = (struct finder_gaussian){g->at + apart, sigma, peak};
-    *g = (struct finder_gaussian){g->at - apart, sigma, peak};
+    mix->g[mix->n++] = (struct finder_term){g->at + apart, sigma, peak};
+    *g = (struct finder_term){g->at - apart, sigma, peak};
     return 1;
 }
 
@@ -129,7 +172,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
 {
     for (uint32_t j = 0; j < mix->n; j++)
         for (uint32_t k = 0; k < mix->n; k++) {
-            const struct finder_gaussian *a = &mix->g[j], *b = &mix->g[k];
+            const struct finder_term *a = &mix->g[j], *b = &mix->g[k];
             if (a->peak < least) return 0;
             if (j == k) continue;
             struct finder_spread spread;
@@ -141,23 +184,28 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
     return 1;
 }
 
-/* One more component, in the two ways that there are. Returns 1 where a better mixture came of it. */
-static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
+/* A component for what is left over. */
+static int decompose_extra(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     double rest[WAVEFORM_MAX_SAMPLES];
-    struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
     finder_mix_rest(task, mix, rest);
-    struct finder_gaussian more = decompose_largest(task, rest);
-    int n = 0;
-    if (more.peak >= least) {
-        tried[n].g[tried[n].n++] = more;
-        n++;
-    }
-    n += decompose_split(task, &tried[n]);
-    for (int i = 0; i < n; i++) {
+    struct finder_term more = decompose_largest(task, rest);
+    if (more.peak < least) return 0;
+    mix->g[mix->n++] = more;
+    return 1;
+}
+
+/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1 where
+ * a better mixture came of it. */
+static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
+{
+    struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
+    for (int i = 0; i < 2; i++) {
+        if (!(i == 0 ? decompose_split(task, &tried[i]) : decompose_extra(task, least, &tried[i]))) continue;
         finder_mix_fit(task, &tried[i]);
-        int sound = decompose_sound(task, &tried[i], least);
-        if (sound && (best == NULL || tried[i].chi2 < best->chi2)) best = &tried[i];
+        if (!decompose_sound(task, &tried[i], least) || (best != NULL && tried[i].chi2 >= best->chi2)) continue;
+        best = &tried[i];
+        if (decompose_enough(task, best)) break;
     }
     /* Three more parameters lower the sum by 3 variances if they mean nothing; 25 by chance in one of 60,000. */
     if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance + decompose_shapes(task, best)) return 0;
@@ -165,14 +213,48 @@ static int decompose_more(const struct finder_task *task, double least, struct f
     return 1;
 }
 
+/* Two pulses with the energy, the mean, the variance and the third moment of the samples. Shares p and q, d apart: the
+ * variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
+static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
+{
+    const struct finder *finder = task->run->finder;
+    const double sigma = finder->spread[0].sigma, lag = finder->spread[0].lag;
+    double m[4] = {0.0}, middle = 0.5 * ((double)task->lo + (double)task->hi);
+    for (uint32_t i = task->lo; i <= task->hi; i++) {
+        double x = i - middle, y = task->run->y[i];
+        m[0] += y;
+        m[1] += y * x;
+        m[2] += y * x * x;
+        m[3] += y * x * x * x;
+    }
+    const double mean = m[1] / m[0], square = m[2] / m[0] - mean * mean, more = square - finder->variance;
+    const double third = m[3] / m[0] - 3.0 * mean * m[2] / m[0] + 2.0 * mean * mean * mean - finder->third;
+    if (!(m[0] > 0.0 && more > 0.05 * sigma * sigma)) return 0;
+    const double skew = third / (more * sqrt(more)), p = 0.5 + 0.5 * skew / sqrt(skew * skew + 4.0);
+    const double apart = sqrt(more / (p * (1.0 - p))), at = middle + mean + lag;
+    const double height = m[0] * finder->peak / finder->area;
+    *mix = (struct finder_mix){
+        .n = 2, .g = {{at - (1.0 - p) * apart, sigma, p * height}, {at + p * apart, sigma, (1.0 - p) * height}}};
+    return 1;
+}
+
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
                       struct finder_mix *mix)
 {
+    const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
     struct finder_task task;
     decompose_range(run, peak, n, &task);
-    decompose_begin(run, peak, n, mix);
+    if (decompose_begin(run, peak, n, mix)) return;
+    /* One Gaussian was not enough already. Mostly two are. */
+    struct finder_mix two;
+    if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
+        finder_mix_fit(&task, &two);
+        if (decompose_sound(&task, &two, least) && decompose_enough(&task, &two)) {
+            *mix = two;
+            return;
+        }
+    }
     finder_mix_fit(&task, mix);
-    const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
     while (mix->n < FINDER_MIX && !decompose_enough(&task, mix) && decompose_more(&task, least, mix)) {
     }
 }

@@ -8,21 +8,12 @@
 
 #include <math.h>
 
-/* How long before its centroid h has `part` of its peak. */
-static double edges_lead(const struct finder *finder, double part)
-{
-    double v = part < 1.0 ? sqrt(-2.0 * log(part)) / FINDER_LEAD_STEP : 0.0;
-    v = fmin(v, FINDER_LEADS - 1.001);
-    uint32_t k = (uint32_t)v;
-    return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
-}
-
 /* The centroid, from the crossing of a level between sample k - 1 and sample k. */
 static double edges_centroid(const struct finder_run *run, uint32_t k, double level, double peak)
 {
-    double above = k + edges_lead(run->finder, run->y[k] / peak);
+    double above = k + finder_lead(run->finder, run->y[k] / peak);
     if (k == 0 || run->y[k - 1] < fmax(2.0 * run->finder->noise, 1e-5 * peak)) return above;
-    double below = k - 1.0 + edges_lead(run->finder, run->y[k - 1] / peak);
+    double below = k - 1.0 + finder_lead(run->finder, run->y[k - 1] / peak);
     double u = (level - run->y[k - 1]) / (run->y[k] - run->y[k - 1]);
     return below + u * (above - below);
 }
@@ -33,13 +24,15 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
     if (!finder_limited(run, peak) && peak->top > 0 && peak->top + 1 < run->n) return 0;
     struct finder_mix mix;
     finder_decompose(run, peak, 1, INFINITY, &mix);
-    finder_add_gaussian(run, &mix, 0, 0.0, list);
+    finder_add_term(run, &mix, 0, 0.0, list);
     return 1;
 }
 
+/* Another echo may begin once the signal is 5 sigma below the level: noise on a slow tail would cross it again. */
 void finder_threshold(const struct finder_run *run, double level, struct finder_list *list)
 {
-    const double *y = run->y, at = level * run->finder->peak, again = at - fmin(3.0 * run->finder->noise, 0.5 * at);
+    const double *y = run->y, at = level * run->finder->peak;
+    const double again = fmax(at - 5.0 * run->finder->noise, run->finder->noise);
     for (uint32_t i = 0; i < run->n; i++) {
         if (y[i] < at) continue;
         const uint32_t cross = i;

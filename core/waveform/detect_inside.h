@@ -13,48 +13,69 @@
 
 #include "core/waveform.h"
 
-enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 385, FINDER_MIX = 8, FINDER_PEAKS = 64 };
-#define FINDER_NEAR       2.5   /* sigmas about its centre: there one Gaussian is fitted */
-#define FINDER_LEAST      0.75  /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
-#define FINDER_ROUGH      0.003 /* of a peak: how far samples at any phase leave the learned misfit */
+enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 8, FINDER_PEAKS = 64 };
+#define FINDER_NEAR       2.5                /* sigmas about its centre: there one Gaussian is fitted */
+#define FINDER_LEAST      0.75               /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
+#define FINDER_ROUGH      0.001              /* of a peak: how far samples at any phase leave the learned misfit */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
-#define FINDER_SHAPE_STEP (1.0 / 32.0) /* widths of the pulse */
+#define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
 
-struct finder_gaussian {
+/* What fits put together: a Gaussian, or where h is none, h stretched. Its middle is between its half maxima, its sigma what
+ * a Gaussian of its width has. */
+struct finder_term {
     double at, sigma, peak;
 };
 
-/* An echo of a plane that is tilted so far, without noise: its true figures beside those of the Gaussian that fits it
- * best. A real head is adjusted on such targets. */
+/* An echo of a plane that is tilted so far, without noise: its true figures beside those of the term that fits it best. A
+ * real head is adjusted on such targets. */
 struct finder_spread {
-    double sigma;     /* of that Gaussian */
-    double lag;       /* from the echo's centroid to that Gaussian's centre */
-    double gain;      /* the echo's peak over that Gaussian's */
+    double sigma;     /* of that term */
+    double lag;       /* from the echo's centroid to that term's middle */
+    double gain;      /* the echo's peak over that term's */
     double width;     /* of the echo, full at half maximum */
     double half_lead; /* from the echo's rising half maximum to its centroid */
-    double misfit;    /* RMS of echo minus Gaussian near its centre, over its peak */
-    double tail;      /* most of echo minus Gaussian further out, over its peak */
+    double misfit;    /* RMS of echo minus term near its middle, over its peak */
+    double tail;      /* most of echo minus term further out, over its peak */
 };
 
 /* What detectors know of the pulse h. Constant after finder_learn. */
 struct finder {
-    double peak;    /* of h */
-    double width;   /* of h, full at half maximum */
-    double signal;  /* of one count */
-    double noise;   /* sigma of a sample, digits included */
-    double limit;   /* a sample from here on is limited */
-    uint32_t blind; /* samples without signal after a limited one */
-    double metre;   /* range of one sample */
+    double peak;                                 /* of h */
+    double width;                                /* of h, full at half maximum */
+    double signal;                               /* of one count */
+    double noise;                                /* sigma of a sample, digits included */
+    double limit;                                /* a sample from here on is limited */
+    uint32_t blind;                              /* samples without signal after a limited one */
+    double metre;                                /* range of one sample */
     struct finder_spread spread[FINDER_SPREADS]; /* by growing tilt; the first is a plane that is hit head on */
-    double lead[FINDER_LEADS];  /* by v: from the first crossing of exp(-v v / 2) of h's peak to its centroid */
-    double shape[FINDER_SHAPE]; /* h over its peak */
+    double lead[FINDER_LEADS];    /* by v: from the first crossing of exp(-v v / 2) of h's peak to its centroid */
+    int gaussian;                 /* h is one */
+    double middle;                /* from the centroid of h to its middle, in widths */
+    double reach[2];              /* sigmas: before and after them a term is nothing */
+    double area, variance, third; /* of h: its sum over the samples, and central moments */
+    double shape[FINDER_SHAPE];   /* h over its peak */
+    double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
 };
+
+/* A table of h, so many widths after its centroid. */
+static inline double finder_table(const double table[FINDER_SHAPE], double widths)
+{
+    double place = (widths + FINDER_SHAPE_LEAD) * (1.0 / FINDER_SHAPE_STEP);
+    if (!(place >= 0.0 && place < FINDER_SHAPE - 1)) return 0.0;
+    uint32_t k = (uint32_t)place;
+    return table[k] + (place - k) * (table[k + 1] - table[k]);
+}
+/* A term of peak 1, d of its sigmas after its middle: its value, and minus its derivative by d there. */
+double finder_value(const struct finder *finder, double d);
+double finder_fall(const struct finder *finder, double d, double value);
+/* How long before its centroid h has `part` of its peak. */
+double finder_lead(const struct finder *finder, double part);
 
 /* Fills `finder` from the signals of a waveform that is otherwise complete. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);
-/* The echo whose Gaussian has this sigma, and the one of this width. */
+/* The echo whose term has this sigma, and the one of this width. */
 void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread);
 void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread);
 
@@ -94,24 +115,27 @@ struct finder_found {
     double at, peak, width;
     int saturated;
 };
+/* A mean of n squares of noise is larger than this once in 30,000 times. */
+double finder_noise2(const struct finder *finder, double n);
+
 /* A sum of Gaussians. `open`: bit j is set where component j is limited, or cut by the window's end. */
 struct finder_mix {
     uint32_t n, open, limited; /* limited: the same bits, only of those that are limited */
-    struct finder_gaussian g[FINDER_MIX];
+    struct finder_term g[FINDER_MIX];
     double chi2;
 };
 
 /* Adds an echo. Its deviation is about h, after the other components of its mixture have been taken away. */
 void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
                 uint32_t self, struct finder_list *list);
-/* Adds what a Gaussian, component `self` of a mixture, stands for, if that reaches the level. */
-void finder_add_gaussian(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
-                         struct finder_list *list);
+/* Adds the echo that term `self` of a mixture stands for, if that reaches the level. */
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+                     struct finder_list *list);
 
-/* One Gaussian through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its last. */
-int finder_fit(const struct finder_run *run, const struct finder_peak *peak, struct finder_gaussian *g);
+/* One term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its last. */
+int finder_fit(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g);
 /* The plain fit without that decision: -1 where it fails, else the RMS of what is left. */
-double finder_fit_near(const struct finder_run *run, const struct finder_peak *peak, struct finder_gaussian *g);
+double finder_fit_near(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g);
 
 /* The samples lo .. hi that a mixture is fitted to; variance: of one sample. */
 struct finder_task {

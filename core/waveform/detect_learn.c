@@ -5,11 +5,16 @@
 #include <math.h>
 
 #include "core/light.h"
+#include "core/vecmath.h"
 #include "core/waveform/waveform_inside.h"
 
 enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
 /* Extent of each tilt, in widths of the pulse. */
 static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
+
+/* Of the peak: 4e-6 is 5 sigmas of a Gaussian. */
+#define LEARN_LEAST   4e-6
+#define LEARN_NOTHING 1e-12
 
 /* An echo on a grid of its own: y[i] lies `from` + i `step` samples after its centroid. */
 struct learn_echo {
@@ -20,7 +25,7 @@ struct learn_echo {
 /* The signal of an echo of amplitude 1, x samples after its centroid. */
 static double learn_signal(const struct waveform *waveform, double metre, double extent_m, double x)
 {
-    const double far_m = 1024.0 * metre;
+    const double far_m = 1e6 * metre; /* no bend of a near plane */
     const struct waveform_return part = {far_m, 1.0, extent_m, extent_m > 0.0 ? WAVEFORM_DISC : WAVEFORM_POINT};
     return waveform_signal(waveform, &part, 1, far_m + x * metre);
 }
@@ -58,6 +63,7 @@ static void learn_pulse(const struct waveform *waveform, struct finder *finder, 
         guess = finder->width = learn_half(finder, echo, &rise) * echo->step;
     }
     finder->peak = echo->y[echo->top];
+    finder->middle = (echo->from + rise * echo->step) / finder->width + 0.5;
 }
 
 /* Crossings of falling levels, from the top outward: each is where h is last below the level before its peak. */
@@ -76,19 +82,57 @@ static void learn_leads(struct finder *finder, const struct learn_echo *echo)
 
 static void learn_shape(const struct waveform *waveform, struct finder *finder)
 {
+    const double step = FINDER_SHAPE_STEP * finder->width;
+    double m[4] = {0.0};
     for (uint32_t i = 0; i < FINDER_SHAPE; i++) {
-        double x = (i * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
-        finder->shape[i] = learn_signal(waveform, finder->metre, 0.0, x) / finder->peak;
+        const double x = (i * FINDER_SHAPE_STEP - FINDER_SHAPE_LEAD) * finder->width;
+        const double y = learn_signal(waveform, finder->metre, 0.0, x) / finder->peak;
+        const double before = learn_signal(waveform, finder->metre, 0.0, x - 0.5 * step) / finder->peak;
+        const double after = learn_signal(waveform, finder->metre, 0.0, x + 0.5 * step) / finder->peak;
+        finder->shape[i] = y;
+        finder->log_shape[i] = log(fmax(y, LEARN_NOTHING));
+        finder->log_slope[i] = log(fmax(after, LEARN_NOTHING) / fmax(before, LEARN_NOTHING)) / FINDER_SHAPE_STEP;
+        m[0] += y;
+        m[2] += y * x * x;
+        m[3] += y * x * x * x;
+        if (y > LEARN_LEAST) finder->reach[1] = (x / finder->width - finder->middle) * FINDER_FWHM;
     }
+    finder->area = waveform_pulse_area_s(waveform) / waveform_spec_of(waveform)->sample_s;
+    finder->variance = m[2] / m[0];
+    finder->third = m[3] / m[0];
+    finder->reach[0] = (FINDER_SHAPE_LEAD + finder->middle) * FINDER_FWHM;
+    if (finder->gaussian) finder->reach[0] = finder->reach[1] = 5.0;
 }
 
-/* The Gaussian of an echo, and what it leaves. */
+/* Logarithms are interpolated: flanks of saturated pulses are far below the peak. */
+double finder_value(const struct finder *finder, double d)
+{
+    if (finder->gaussian) return exp(-0.5 * d * d);
+    const double widths = finder->middle + d * (1.0 / FINDER_FWHM), value = finder_table(finder->log_shape, widths);
+    return value < 0.0 ? vec_exp(value) : finder_table(finder->shape, widths);
+}
+
+double finder_fall(const struct finder *finder, double d, double value)
+{
+    if (finder->gaussian) return d * value;
+    return finder_table(finder->log_slope, finder->middle + d * (1.0 / FINDER_FWHM)) * (-1.0 / FINDER_FWHM) * value;
+}
+
+double finder_lead(const struct finder *finder, double part)
+{
+    double v = part < 1.0 ? sqrt(-2.0 * log(part)) / FINDER_LEAD_STEP : 0.0;
+    v = fmin(v, FINDER_LEADS - 1.001);
+    uint32_t k = (uint32_t)v;
+    return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
+}
+
+/* The term of an echo, and what it leaves. */
 static void learn_fit(const struct finder *finder, const struct learn_echo *echo, struct finder_spread *spread)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
     const struct finder_peak peak = {echo->top, 0, echo->n};
     const double top = echo->y[echo->top];
-    struct finder_gaussian g;
+    struct finder_term g;
     double rms = finder_fit_near(&run, &peak, &g), rise;
     spread->sigma = g.sigma * echo->step;
     spread->lag = echo->from + g.at * echo->step;
@@ -98,7 +142,7 @@ static void learn_fit(const struct finder *finder, const struct learn_echo *echo
     spread->half_lead = -(echo->from + rise * echo->step);
     spread->tail = 0.0;
     for (uint32_t i = 0; i < echo->n; i++) {
-        double d = (i - g.at) / g.sigma, rest = echo->y[i] - g.peak * exp(-0.5 * d * d);
+        double d = (i - g.at) / g.sigma, rest = echo->y[i] - g.peak * finder_value(finder, d);
         if (fabs(d) > FINDER_NEAR) spread->tail = fmax(spread->tail, rest / top);
     }
 }
@@ -111,6 +155,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     finder->metre = 0.5 * LIGHT_SPEED_M_S * spec->sample_s;
     finder->signal = spec->full_scale / (most - spec->baseline_counts);
     finder->noise = 0.0; /* of what follows */
+    finder->gaussian = spec->shape == WAVEFORM_GAUSSIAN;
     finder->limit = INFINITY;
     finder->blind = spec->saturation > 0.0 ? (uint32_t)waveform->dead : 0;
     learn_pulse(waveform, finder, &echo);
@@ -126,8 +171,8 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     }
     finder->noise = sqrt(spec->noise * spec->noise + finder->signal * finder->signal / 12.0);
     finder->limit = (most - spec->baseline_counts - 0.5) * finder->signal;
-    /* Noise comes after the receiver's limit: it lowers one sample in 740 below this. */
-    if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 3.0 * finder->noise);
+    /* Noise comes after the receiver's limit: it lowers one sample in 3 million below this. */
+    if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 5.0 * finder->noise);
 }
 
 /* Between tilts k and k + 1 by u. */

@@ -13,12 +13,13 @@
 /* An asymmetric pulse ends where it has fallen to this: its tail is long. */
 #define TAIL_LEAST 1e-6
 
-enum { MIN_PHASES = 4, MAX_PHASES = 256, STEPS_PER_SCALE = 16, EDGE_STEPS = 4 };
+enum { MIN_PHASES = 4, STEPS_PER_SCALE = 16, EDGE_STEPS = 4, FINEST = 64 };
 
-/* The outgoing pulse from .. to, s after its peak; scale: sigma of the shortest in it. */
+/* The outgoing pulse from .. to, s after its peak. Sums over it take as many steps, of at most fine_s, in each of its
+ * pieces. */
 struct outgoing {
     const struct waveform_spec *spec;
-    double from_s, to_s, scale_s;
+    double from_s, to_s, fine_s, pieces;
 };
 
 /* The log-normal pulse with its peak of 1 at 0: exp(-ln 2 (ln(1 + a t) / ln s)^2), a = (s - 1/s) / width. Half of the
@@ -54,11 +55,17 @@ static struct outgoing outgoing_of(const struct waveform_spec *spec)
 {
     const double s = fmax(spec->skew, 1.0 + 1e-6), tail = pow(s, sqrt(-log(TAIL_LEAST) / M_LN2));
     const double per_a_s = spec->width_s / (s - 1.0 / s), sigma_s = SIGMA_1 * spec->width_s;
-    if (spec->shape == WAVEFORM_TABLE) /* How fine its features are is not known. What the sampling resolves counts. */
-        return (struct outgoing){spec, 0.0, (spec->n_table - 1) * spec->table_step_s, 0.6 * spec->sample_s};
-    if (spec->shape == WAVEFORM_ASYMMETRIC) /* scale: that of the rising side */
-        return (struct outgoing){spec, (1.0 / tail - 1.0) * per_a_s, (tail - 1.0) * per_a_s, 2.0 * sigma_s / (1.0 + s)};
-    return (struct outgoing){spec, -GAUSSIAN_END * sigma_s, GAUSSIAN_END * sigma_s, sigma_s};
+    const double step_s = spec->table_step_s, lines = spec->n_table - 1.0;
+    if (spec->shape == WAVEFORM_TABLE) return (struct outgoing){spec, 0.0, lines * step_s, 0.25 * step_s, lines};
+    if (spec->shape == WAVEFORM_ASYMMETRIC)
+        return (struct outgoing){spec, (1.0 / tail - 1.0) * per_a_s, (tail - 1.0) * per_a_s, 0.25 * sigma_s / s, 1.0};
+    return (struct outgoing){spec, -GAUSSIAN_END * sigma_s, GAUSSIAN_END * sigma_s, 0.25 * sigma_s, 1.0};
+}
+
+/* How many steps of at most fine_s the pulse is taken in. */
+static double parts_of(const struct outgoing *o, double fine_s)
+{
+    return o->pieces * ceil((o->to_s - o->from_s) / o->pieces / fine_s);
 }
 
 /* sigma of the receiver's answer to an impulse. A Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to which chains of many
@@ -69,25 +76,49 @@ static double receiver_sigma_s(double bandwidth_hz)
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
 }
 
-/* h on n steps, the first of them at from_s. */
-static int convolve(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
+/* The spectrum of h at an angular frequency, by its value at 0. */
+static double spectrum(const struct outgoing *o, double sigma_s, double per_s)
 {
-    const uint32_t half = (uint32_t)ceil(GAUSSIAN_END * sigma_s / step_s), m = 2 * half + 1;
-    double *g = malloc(m * sizeof *g), sum = 0.0;
-    if (g == NULL) return SH_ENOMEM;
-    for (uint32_t j = 0; j < m; j++) {
-        double x = sigma_s > 0.0 ? ((double)j - half) * step_s / sigma_s : 0.0;
-        sum += g[j] = exp(-0.5 * x * x);
+    const double parts = parts_of(o, fmin(o->fine_s, 0.1 * o->spec->sample_s)), part_s = (o->to_s - o->from_s) / parts;
+    double all = 0.0, even = 0.0, odd = 0.0;
+    for (double j = 0.0; j <= parts; j += 1.0) {
+        const double t_s = o->from_s + j * part_s, p = outgoing_at(o, t_s);
+        all += p;
+        even += p * cos(per_s * t_s);
+        odd += p * sin(per_s * t_s);
     }
-    memset(h, 0, n * sizeof *h);
-    for (uint32_t i = 0; i < n; i++) {
-        double p = outgoing_at(o, from_s + i * step_s) / sum;
-        if (p == 0.0) continue;
-        for (uint32_t j = i < half ? half - i : 0; j < m && i + j < n + half; j++)
-            h[i + j - half] += p * g[j];
+    return sqrt(even * even + odd * odd) / all * exp(-0.5 * per_s * per_s * sigma_s * sigma_s);
+}
+
+/* sigma of the Gaussian whose spectrum ends, at 1e-5, where that of h does. A table's straight lines have no such end:
+ * what the sampling does not resolve does not count. */
+static double scale_of(const struct outgoing *o, double sigma_s)
+{
+    const double end = 4.798526, least_s = 0.3 * o->spec->sample_s; /* exp(-end^2 / 2) = 1e-5 */
+    double scale_s = least_s;
+    while (spectrum(o, sigma_s, end / (1.05 * scale_s)) < 1e-5)
+        scale_s *= 1.05;
+    return scale_s;
+}
+
+/* h on n steps, the first of them at from_s: the receiver's answers to all of the pulse lie within them. The pulse is
+ * taken finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by less than
+ * 1e-6. */
+static void fill_steps(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
+{
+    const double fine_s = fmin(o->fine_s, sigma_s), reach_s = GAUSSIAN_END * sigma_s;
+    for (uint32_t i = 0; i < n; i++)
+        h[i] = sigma_s < step_s / FINEST ? outgoing_at(o, from_s + i * step_s) : 0.0;
+    if (sigma_s < step_s / FINEST) return;
+    const double parts = parts_of(o, fine_s), part_s = (o->to_s - o->from_s) / parts;
+    for (double j = 0.0; j <= parts; j += 1.0) {
+        const double t_s = o->from_s + j * part_s, share = part_s / (sigma_s * sqrt(2.0 * M_PI)) * outgoing_at(o, t_s);
+        const uint32_t first = (uint32_t)ceil((t_s - reach_s - from_s) / step_s);
+        for (uint32_t i = first; i < n && from_s + i * step_s <= t_s + reach_s; i++) {
+            const double x = (from_s + i * step_s - t_s) / sigma_s;
+            h[i] += share * exp(-0.5 * x * x);
+        }
     }
-    free(g);
-    return SH_OK;
 }
 
 /* The largest deviation of a sum of samples, `apart` steps from each other, from that of all steps, as a part of it. */
@@ -96,6 +127,7 @@ static double ripple(const double *h, uint32_t n, uint32_t apart)
     double all = 0.0, worst = 0.0;
     for (uint32_t i = 0; i < n; i++)
         all += h[i];
+    if (all == 0.0) return 1.0; /* All of it falls between the steps. */
     for (uint32_t phase = 0; phase < apart; phase++) {
         double sum = 0.0;
         for (uint32_t i = phase; i < n; i += apart)
@@ -120,19 +152,19 @@ static int check_ripple(const struct waveform_spec *spec, const double *h, uint3
         1e9 * spec->sample_s, 1e2 * off, 1e-3 * floor(1e12 * spec->sample_s * apart / phases));
 }
 
-static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, struct waveform_pulse *pulse)
+static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, struct waveform_pulse *pulse,
+                struct sh_err *err)
 {
     double sum = 0.0, moment = 0.0;
     pulse->h = calloc((size_t)pulse->phases * pulse->pitch, sizeof *pulse->h);
-    if (pulse->h == NULL) return SH_ENOMEM;
+    if (pulse->h == NULL) return sh_fail(err, SH_ENOMEM, "waveform: no memory");
     for (uint32_t i = 0; i < n; i++) {
         pulse->h[(size_t)(i % pulse->phases) * pulse->pitch + i / pulse->phases] = h[i];
         sum += h[i];
         moment += h[i] * i;
     }
-    pulse->centroid = moment / sum;
     pulse->area_s = sum * spec->sample_s / pulse->phases;
-    pulse->lead = pulse->centroid / pulse->phases;
+    pulse->lead = moment / sum / pulse->phases;
     pulse->lag = (double)n / pulse->phases - pulse->lead;
     return SH_OK;
 }
@@ -141,24 +173,26 @@ int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse 
 {
     const struct outgoing o = outgoing_of(spec);
     const double sigma_s = receiver_sigma_s(spec->bandwidth_hz), end_s = GAUSSIAN_END * sigma_s;
-    const double scale_s = sqrt(o.scale_s * o.scale_s + sigma_s * sigma_s);
-    const double phases = fmin(MAX_PHASES, fmax(MIN_PHASES, ceil(STEPS_PER_SCALE * spec->sample_s / scale_s)));
-    const double step_s = spec->sample_s / phases, from_s = o.from_s - end_s - EDGE_STEPS * step_s;
-    const double length = ceil((o.to_s + end_s - from_s) / spec->sample_s) + 1.0;
+    const double length =
+        ceil((o.to_s - o.from_s + 2.0 * end_s) / spec->sample_s) + 2.0; /* the edge is a sample or less */
     if (length > WAVEFORM_MAX_SAMPLES)
         return sh_fail(err, SH_EINPUT, "the pulse is %.0f samples of %.4g ns long; at most %d are allowed", length,
                        1e9 * spec->sample_s, WAVEFORM_MAX_SAMPLES);
+    const double scale_s = scale_of(&o, sigma_s);
+    const double phases = fmax(MIN_PHASES, ceil(STEPS_PER_SCALE * spec->sample_s / scale_s));
+    const double step_s = spec->sample_s / phases, from_s = o.from_s - end_s - EDGE_STEPS * step_s;
     pulse->phases = (uint32_t)phases;
     pulse->length = (uint32_t)length;
     pulse->pitch = pulse->length + 1;
     pulse->scale = scale_s / spec->sample_s;
     const uint32_t n = pulse->phases * pulse->length;
     double *h = malloc(n * sizeof *h);
-    int rc = h != NULL ? convolve(&o, from_s, step_s, sigma_s, n, h) : SH_ENOMEM;
-    if (rc == SH_OK) rc = check_ripple(spec, h, n, pulse->phases, err);
-    if (rc == SH_OK) rc = fold(spec, h, n, pulse);
+    if (h == NULL) return sh_fail(err, SH_ENOMEM, "waveform: no memory");
+    fill_steps(&o, from_s, step_s, sigma_s, n, h);
+    int rc = check_ripple(spec, h, n, pulse->phases, err);
+    if (rc == SH_OK) rc = fold(spec, h, n, pulse, err);
     free(h);
-    return rc == SH_ENOMEM ? sh_fail(err, rc, "waveform: no memory") : rc;
+    return rc;
 }
 
 void waveform_pulse_free(struct waveform_pulse *pulse)

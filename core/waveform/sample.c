@@ -18,6 +18,7 @@ struct sampling {
     uint32_t n;
     uint64_t key;
     struct waveform_record *record;
+    int64_t kept_end; /* a window that was cut goes on up to here */
     int64_t dead_end; /* samples before it are in a dead time */
     int limited;      /* the sample before is saturated */
     double signal[WAVEFORM_MAX_SAMPLES];
@@ -38,10 +39,9 @@ static struct span span_of(const struct sampling *s, uint32_t i)
     if (i == s->n) return (struct span){w->gate_begin, w->gate_end};
     const struct waveform_return *r = &s->returns[i];
     const double centre = r->range_m * w->samples_1_m, reach = waveform_reach(w, r);
-    struct span span = {(int64_t)floor(centre - reach - w->pulse.lead) - w->before,
-                        (int64_t)ceil(centre + reach + w->pulse.lag) + w->after + 1};
-    if (span.begin < 0) span.begin = 0; /* nothing is sampled before the emission */
-    return span;
+    const double from = centre - reach - w->pulse.lead - (double)w->before;
+    /* nothing is sampled before the emission */
+    return (struct span){from > 0.0 ? (int64_t)from : 0, (int64_t)(centre + reach + w->pulse.lag) + w->after + 2};
 }
 
 /* The first stretch from `from` on that returns reach one by one; what begins before `from` is in an earlier one. */
@@ -93,7 +93,7 @@ static int64_t find_windows(struct sampling *s, struct span piece, int64_t stret
 {
     const struct waveform *w = s->w;
     const double keep = w->spec.keep;
-    struct span open = {piece.begin, piece.begin};
+    struct span open = {piece.begin, s->kept_end > piece.begin ? s->kept_end : piece.begin};
     for (int64_t k = piece.begin; k < piece.end; k++) {
         if (s->signal[k - piece.begin] < keep) continue;
         struct span at = {k - w->before < piece.begin ? piece.begin : k - w->before, k + w->after + 1};
@@ -108,6 +108,7 @@ static int64_t find_windows(struct sampling *s, struct span piece, int64_t stret
         return piece.end == stretch_end ? stretch_end : piece.end - w->before;
     }
     if (open.begin > piece.begin) return open.begin;
+    s->kept_end = open.end;
     if (open.end > piece.end) open.end = piece.end;
     found_add(s, found, open);
     return open.end;
@@ -216,6 +217,7 @@ void waveform_sample(const struct waveform *w, uint64_t scan_key, uint64_t pulse
     s.n = n;
     s.key = rng_u64(w->key ^ scan_key, pulse);
     s.record = record;
+    s.kept_end = 0;
     s.dead_end = 0;
     s.limited = 0;
     record->n_windows = record->n_samples = record->n_left_out = 0;

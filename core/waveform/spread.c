@@ -6,15 +6,16 @@
 #include "core/vecmath.h"
 #include "core/waveform/waveform_inside.h"
 
-/* 3, 8, 12, 16, 24, 32, ... */
+/* 3, 5, 12, 16, 24, 32, ... */
 static uint32_t nodes_of(uint32_t level)
 {
-    if (level == 0) return 3;
+    if (level < 2) return 3 + 2 * level;
     return level % 2 == 1 ? 8U << level / 2 : 12U << (level / 2 - 1);
 }
 
-/* The marginal of the irradiance exp(-2 r^2) within the unit disc, by sqrt(1 - x^2), times the weight sin^2 of Gauss's
- * and Chebyshev's nodes (second kind) at x = cos a: their weight function is the square root, and the rest is entire. */
+/* The marginal of the irradiance exp(-2 r^2) within the unit disc, divided by sqrt(1 - x^2), times the weight sin^2 of
+ * Gauss's and Chebyshev's nodes (second kind) at x = cos a: their weight function is the square root, and the rest is
+ * entire. */
 static struct waveform_node disc_node(uint32_t i, uint32_t n)
 {
     const double a = M_PI * (i + 1) / (n + 1), x = cos(a), y = sin(a);
@@ -28,30 +29,43 @@ static struct waveform_node bell_node(uint32_t i, uint32_t n)
     return (struct waveform_node){x, exp(-0.5 * x * x)};
 }
 
-/* Gauss's three nodes, which have the moments up to 5 that the finest level has. Returns the second. */
-static double three_nodes(struct waveform_node *node, const struct waveform_node *fine, uint32_t n)
+/* Gauss's nodes for a spread that is even in x, by its moments m: 3 have those up to 5, 5 those up to 9. Their squares
+ * are the roots of the polynomials x (x^2 - a) and x (x^4 - a x^2 + b), which are orthogonal to all of lower degree. */
+static void gauss_nodes(struct waveform_node three[3], struct waveform_node five[5], const double m[10])
 {
-    double m2 = 0.0, m4 = 0.0;
-    for (uint32_t i = 0; i < n; i++) {
-        double x2 = fine[i].x * fine[i].x;
-        m2 += fine[i].weight * x2;
-        m4 += fine[i].weight * x2 * x2;
-    }
-    const double side = 0.5 * m2 * m2 / m4, x = sqrt(m4 / m2);
-    node[0] = (struct waveform_node){-x, side};
-    node[1] = (struct waveform_node){0.0, 1.0 - 2.0 * side};
-    node[2] = (struct waveform_node){x, side};
-    return m2;
+    const double a = (m[8] * m[2] - m[6] * m[4]) / (m[6] * m[2] - m[4] * m[4]), b = (a * m[4] - m[6]) / m[2];
+    const double root = sqrt(a * a - 4.0 * b), near2 = 0.5 * (a - root), far2 = 0.5 * (a + root);
+    const double near = 0.5 * (m[4] - far2 * m[2]) / (near2 * (near2 - far2));
+    const double far = 0.5 * (m[4] - near2 * m[2]) / (far2 * (far2 - near2));
+    const double only2 = m[4] / m[2], only = 0.5 * m[2] / only2;
+    for (int side = -1; side <= 1; side++)
+        three[side + 1] = (struct waveform_node){side * sqrt(only2), side == 0 ? 1.0 - 2.0 * only : only};
+    five[0] = (struct waveform_node){-sqrt(far2), far};
+    five[1] = (struct waveform_node){-sqrt(near2), near};
+    five[2] = (struct waveform_node){0.0, 1.0 - 2.0 * (near + far)};
+    five[3] = (struct waveform_node){sqrt(near2), near};
+    five[4] = (struct waveform_node){sqrt(far2), far};
 }
 
-/* Error below 1e-5 of the amplitude (tests/unit/test_waveform.c): the next term of three nodes, and for others what is
- * left of h's spectrum where the nodes no longer follow it. */
+/* Error below 1e-5 of the amplitude (tests/unit/test_waveform.c). Of Gauss's nodes that is the next moment times the
+ * next derivative of h. Of others it is what is left of h's spectrum where the nodes no longer follow it. */
 static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;
-    if (spread == WAVEFORM_DISC) return (n - 5.0) / 2.6;
-    const double steps = n / 8.0;
-    return steps > 1.0 ? sqrt(steps * steps - 1.0) : 0.0;
+    if (n == 5) return spread == WAVEFORM_DISC ? 1.5 : 0.42;
+    if (spread == WAVEFORM_DISC) return (n - 4.0) / 2.25;
+    return n / 6.5 - 1.0;
+}
+
+static void even_nodes(enum waveform_spread spread, uint32_t n, struct waveform_node *node)
+{
+    double sum = 0.0;
+    for (uint32_t i = 0; i < n; i++) {
+        node[i] = spread == WAVEFORM_DISC ? disc_node(i, n) : bell_node(i, n);
+        sum += node[i].weight;
+    }
+    for (uint32_t i = 0; i < n; i++)
+        node[i].weight /= sum;
 }
 
 int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err)
@@ -65,19 +79,15 @@ int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, 
     rule->first[WAVEFORM_LEVELS] = total;
     rule->node = malloc(total * sizeof *rule->node);
     if (rule->node == NULL) return sh_fail(err, SH_ENOMEM, "waveform: no memory");
-    for (uint32_t k = 1; k < WAVEFORM_LEVELS; k++) {
-        struct waveform_node *node = rule->node + rule->first[k];
-        const uint32_t n = nodes_of(k);
-        double sum = 0.0;
-        for (uint32_t i = 0; i < n; i++) {
-            node[i] = spread == WAVEFORM_DISC ? disc_node(i, n) : bell_node(i, n);
-            sum += node[i].weight;
-        }
-        for (uint32_t i = 0; i < n; i++)
-            node[i].weight /= sum;
-    }
-    rule->square =
-        three_nodes(rule->node, rule->node + rule->first[WAVEFORM_LEVELS - 1], nodes_of(WAVEFORM_LEVELS - 1));
+    for (uint32_t k = 2; k < WAVEFORM_LEVELS; k++)
+        even_nodes(spread, nodes_of(k), rule->node + rule->first[k]);
+    const struct waveform_node *fine = rule->node + rule->first[WAVEFORM_LEVELS - 1];
+    double m[10] = {0.0};
+    for (uint32_t i = 0; i < WAVEFORM_MOST_NODES; i++)
+        for (int k = 2; k < 10; k += 2)
+            m[k] += fine[i].weight * pow(fine[i].x, k);
+    gauss_nodes(rule->node, rule->node + rule->first[1], m);
+    rule->square = m[2];
     return SH_OK;
 }
 
@@ -91,23 +101,22 @@ VEC_CLONES
 static void add_pulse(const struct waveform_pulse *pulse, double amplitude, double centre, uint32_t n,
                       double *restrict signal)
 {
-    const double at = pulse->centroid - centre * pulse->phases, whole = floor(at), f = at - whole;
-    const int64_t phases = pulse->phases, step = (int64_t)whole - 1;
-    const int64_t k = step >= 0 ? step / phases : -((phases - 1 - step) / phases), phase = step - k * phases;
+    const double at = pulse->lead - centre, whole = floor(at), fine = (at - whole) * pulse->phases;
+    const int64_t phases = pulse->phases, phase = (int64_t)fine, k = (int64_t)whole - (phase == 0);
     const int64_t from = k < 0 ? -k : 0, to = (int64_t)pulse->length - k < n ? (int64_t)pulse->length - k : n;
+    const double f = fine - (double)phase;
     const double c[4] = {-amplitude * f * (f - 1.0) * (f - 2.0) / 6.0,
                          amplitude * (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0,
                          -amplitude * (f + 1.0) * f * (f - 2.0) / 2.0, amplitude * (f + 1.0) * f * (f - 1.0) / 6.0};
     const double *row[4];
     if (from >= to) return;
-    for (int64_t j = 0; j < 4; j++) {
-        int64_t over = phase + j >= phases;
-        row[j] = pulse->h + (phase + j - over * phases) * pulse->pitch + k + over + from;
+    for (int64_t j = 0; j < 4; j++) { /* steps phase - 1 .. phase + 2 of this sample, or of its neighbours */
+        const int64_t step = phase - 1 + j, over = step < 0 ? -1 : step >= phases;
+        row[j] = pulse->h + ((step - over * phases) * pulse->pitch + (int64_t)whole + over + from);
     }
     const double *restrict r0 = row[0], *restrict r1 = row[1], *restrict r2 = row[2], *restrict r3 = row[3];
     double *restrict out = signal + from;
-    const int64_t m = to - from;
-    for (int64_t i = 0; i < m; i++)
+    for (int64_t i = 0; i < to - from; i++)
         out[i] += (c[0] * r0[i] + c[1] * r1[i]) + (c[2] * r2[i] + c[3] * r3[i]);
 }
 
@@ -123,8 +132,8 @@ static double extent_of(const struct waveform *w, const struct waveform_return *
     return fmin(part->extent_m * w->samples_1_m, rule_of(w, part)->reach[WAVEFORM_LEVELS - 1] * w->pulse.scale);
 }
 
-/* The ranges on a plane rise as 1 / (1 - b x) across the disc, b = extent / range where the beam has spread far beyond its
- * exit. This is b up to the half that core/footprint.h has, for the second term of the series. */
+/* The ranges on a plane rise as 1 / (1 - b x) across the disc, b = extent / range where the beam has spread far beyond
+ * its exit. This is b up to the half that core/footprint.h has, for the second term of the series. */
 static double bend_of(const struct waveform_return *part)
 {
     if (part->spread != WAVEFORM_DISC) return 0.0;

@@ -28,7 +28,6 @@ static void set_up_digits(struct waveform *w)
     if (s->near_m < s->far_m) {
         w->gate_begin = (int64_t)ceil(s->near_m * w->samples_1_m);
         w->gate_end = (int64_t)floor(s->far_m * w->samples_1_m) + 1;
-        w->before = w->after = 0;
     }
     w->key = rng_key(s->seed, RNG_WAVEFORM);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private: a waveform's tables, and the steps from returns to samples. Times are counted in samples of the digitiser, or
- * in steps, which are sample_s / phases. */
+/* Private: a waveform's tables, and the steps from returns to samples. Times are counted in samples of the digitiser,
+ * or in steps, which are sample_s / phases. */
 #ifndef CORE_WAVEFORM_WAVEFORM_INSIDE_H
 #define CORE_WAVEFORM_WAVEFORM_INSIDE_H
 
@@ -9,17 +9,16 @@
 #include "core/waveform.h"
 #include "core/waveform/detect_inside.h"
 
-/* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples apart,
- * read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
+/* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples
+ * apart, read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
-    double centroid;                /* in steps */
-    double lead, lag;               /* its first and last sample, before and after the centroid */
-    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest that is in h */
+    double lead, lag;               /* its first and last step before and behind the centroid, in samples */
+    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest in h */
     double area_s;
 };
-/* Where the spec's limits are kept. Frees nothing on failure: waveform_pulse_free. */
+/* For a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a failure. */
 int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err);
 void waveform_pulse_free(struct waveform_pulse *pulse);
 
@@ -63,4 +62,5 @@ void waveform_add(const struct waveform *waveform, const struct waveform_return 
                   double *signal);
 /* How far a return reaches about its centroid beyond the pulse itself, in samples. */
 double waveform_reach(const struct waveform *waveform, const struct waveform_return *part);
+
 #endif

@@ -217,5 +217,6 @@ void site_wave_row(const struct site *site, struct plan_row *row)
         used += (size_t)snprintf(why + used, sizeof why - used, ", %.3g MB/s", 1e-6 * config_wave_bytes_s(cfg));
     if (site->waves->cast.finds)
         snprintf(why + used, sizeof why - used, "; echoes are found in them, with the noise of the samples");
-    plan_say(row, "waveform", rings ? "sub-rays" : "closed form", 0.0, site_wave_ns(site), why);
+    const double error_m = site->waves->cast.finds ? (double)NAN : 0.0; /* of ranges: those of the detector */
+    plan_say(row, "waveform", rings ? "sub-rays" : "closed form", error_m, site_wave_ns(site), why);
 }

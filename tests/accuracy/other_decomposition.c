@@ -96,8 +96,8 @@ static int other_is_maximum(const double *y, uint32_t n, uint32_t i, uint32_t si
     return 1;
 }
 
-uint32_t other_decompose(const double *y, uint32_t n, double least, uint32_t side, uint32_t fit, struct other_echo *echo,
-                         uint32_t most)
+uint32_t other_decompose(const double *y, uint32_t n, double least, uint32_t side, uint32_t fit,
+                         struct other_echo *echo, uint32_t most)
 {
     uint32_t found = 0;
     for (uint32_t i = 0; i < n && found < most; i++) {

@@ -9,12 +9,12 @@
 #include <stdint.h>
 
 struct other_echo {
-    uint32_t sample;          /* of the maximum */
+    uint32_t sample;                      /* of the maximum */
     double offset, peak, centre, width_e; /* a, b, c, d; in samples and in the signal's units */
 };
 
 /* n samples; side: the window reaches so many to each side; fit: about so many of these are fitted. */
-uint32_t other_decompose(const double *y, uint32_t n, double least, uint32_t side, uint32_t fit, struct other_echo *echo,
-                         uint32_t most);
+uint32_t other_decompose(const double *y, uint32_t n, double least, uint32_t side, uint32_t fit,
+                         struct other_echo *echo, uint32_t most);
 
 #endif

@@ -86,7 +86,7 @@ static void the_jitter_is_that_of_the_closed_form(void **state)
         r.amplitude = detect_amplitude(&signal, range_m[k], 0.9);
         wave_measure(&w, WAVEFORM_GAUSSIANS, pulses(), &r, &f);
         wave_between(f.sigma_m * r.amplitude / sqrt(signal.jitter2), 1.0 - 1.5 * ERRORS / sqrt(pulses()),
-                1.05 + 1.5 * ERRORS / sqrt(pulses()));
+                     1.05 + 1.5 * ERRORS / sqrt(pulses()));
     }
     wave_close(&w);
 }
@@ -162,7 +162,10 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
         for (int d = 0; d < WAVE_DETECTORS; d++) {
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
             assert_int_equal(f[d].single, pulses() / 4);
-            wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
+            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape through it
+             * lies off the centroid: by less than the third of what the rims are off. */
+            const double skew_m = extent * extent / RANGE_M / 3.0;
+            wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
         struct beam beam;
         float width_m;
@@ -191,7 +194,7 @@ static void planes_are_ranged_by_their_centroid(void **state)
     spec.skew = 2.0;
     spec.sample_s = 0.5e-9;
     most_m[WAVEFORM_FRACTION] = 10e-3;
-    most_m[WAVEFORM_GAUSSIANS] = 3e-3;
+    most_m[WAVEFORM_GAUSSIANS] = 2e-3;
     planes(&spec, "asymmetric", most_m);
 }
 
@@ -222,9 +225,8 @@ static void two(const struct waveform_spec *spec, const char *name, double secon
                     off[k] += w.echo[k].range_m - r[k].range_m;
             }
             if (found == 0) printf("  0.00      -       -");
-            if (found > 0)
-                printf("  %4.2f %7.1f %7.1f", (double)found / n, 1e3 * off[0] / found, 1e3 * off[1] / found);
-            if (d != WAVEFORM_GAUSSIANS || spec->shape != WAVEFORM_GAUSSIAN) continue;
+            if (found > 0) printf("  %4.2f %7.1f %7.1f", (double)found / n, 1e3 * off[0] / found, 1e3 * off[1] / found);
+            if (d != WAVEFORM_GAUSSIANS) continue;
             if (apart[a] >= 1.0) assert_int_equal(found, n);
             if (apart[a] >= 1.0) wave_between(fabs(off[0] / n) + fabs(off[1] / n), 0.0, 0.010);
         }
@@ -253,7 +255,8 @@ static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *ec
     const struct waveform_window *window = &w->record.window[0];
     double y[WAVEFORM_MAX_SAMPLES];
     for (uint32_t i = 0; i < window->n; i++)
-        y[i] = (w->sample[window->at + i] - spec->baseline_counts) * spec->full_scale / (4095.0 - spec->baseline_counts);
+        y[i] =
+            (w->sample[window->at + i] - spec->baseline_counts) * spec->full_scale / (4095.0 - spec->baseline_counts);
     return other_decompose(y, window->n, 1.0, 4, 12, echo, WAVE_MOST);
 }
 
@@ -284,7 +287,8 @@ static void another_decomposition_agrees(void **state)
             if (n > 1) continue; /* one Gaussian through two echoes */
             worst[1] = fmax(worst[1], fabs(w.echo[k].range_m - (first + other[k].centre) * sample_m));
             worst[2] = fmax(worst[2], fabs(w.echo[k].amplitude - other[k].peak - other[k].offset));
-            worst[3] = fmax(worst[3], fabs(w.echo[k].width_s / (other[k].width_e * 2.0 * sqrt(M_LN2) * spec.sample_s) - 1.0));
+            worst[3] =
+                fmax(worst[3], fabs(w.echo[k].width_s / (other[k].width_e * 2.0 * sqrt(M_LN2) * spec.sample_s) - 1.0));
         }
     }
     printf("# another decomposition: ranges by %.2f samples, centres by %.2f mm, peaks by %.3f, widths by %.2f %%\n",

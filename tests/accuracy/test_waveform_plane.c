@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms of planes, steps, wedges, spheres and foliage against 100,000 sub-rays, which are summed here with a pulse of
- * the test's own. A figure is the RMS of all samples of a window, in counts of 12 bits, with full scale at the peak. */
+/* Waveforms of planes, steps, wedges, spheres and foliage against 100,000 sub-rays, which are summed here with a pulse
+ * of the test's own. Figures are the RMS of all samples of a window, in counts of 12 bits, full scale at the peak. */
 #include <math.h>
 #include <string.h>
 
@@ -121,7 +121,8 @@ static void planes_are_the_closed_form(void **state)
 /* ---- what fills a footprint in other ways */
 
 /* A sub-ray of n stands for 1/n of the energy. An edge may take half a row of them, of about the root of n, to either
- * side: so 0.5 / sqrt(n) of the light lies elsewhere, or is a bit nearer or further. Leaves have many edges: twice that. */
+ * side: so 0.5 / sqrt(n) of the light lies elsewhere, or is a bit nearer or further. Leaves have many edges: twice
+ * that. */
 static void rings_come_nearer(void **state)
 {
     (void)state;
@@ -162,9 +163,10 @@ static double skewness(double h)
     return cube / n - 3.0 * mean * square / n + 2.0 * mean * mean * mean;
 }
 
-/* Both sides of a line as two returns. On a step that is hit head on they are exact: the reference has an error of half a
- * row of its sub-rays, 0.5 / sqrt(100,000). On a wedge a bell stands for half of a disc with the same energy, centre and
- * spread. Its third moment is 0, which counts times a sixth of the pulse's third derivative, 1.38 / sigma^3 at most. */
+/* Both sides of a line as two returns. On a step that is hit head on they are exact: the reference has an error of half
+ * a row of its sub-rays, 0.5 / sqrt(100,000). On a wedge a bell stands for half of a disc with the same energy, centre
+ * and spread. Its third moment is 0, which counts times a sixth of the pulse's third derivative, 1.38 / sigma^3 at
+ * most. */
 static void parts_are_nearly_exact(void **state)
 {
     (void)state;

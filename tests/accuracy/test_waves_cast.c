@@ -10,6 +10,7 @@ enum { PULSES = 16, ACROSS_LINES = 60, ROOM = 16384 };
 struct waves {
     struct lit lit;
     struct cast_waves cast;
+    double gain; /* of all signals; 0: 1 */
     double count_signal;
 };
 
@@ -26,7 +27,7 @@ static const struct waveform_spec SPEC = {.shape = WAVEFORM_GAUSSIAN,
 
 static double least_of(const struct waves *w)
 {
-    return 1e-3 / (w->lit.near_m * w->lit.near_m);
+    return 1e-3 / (w->lit.near_m * w->lit.near_m) / (w->gain > 0.0 ? w->gain : 1.0);
 }
 
 static void open_waves(struct waves *w, const struct beam_view *view, enum beam_mode mode, uint32_t room)
@@ -106,6 +107,54 @@ static void energy_is_the_link_budget(void **state)
         check_energies(m, &OBLIQUE, (const double[]){20.0, 200.0}, 0.0);
         check_energies(m, &ACROSS, (const double[]){60.0, 100.0}, m == BEAM_RINGS ? 2.0 * RINGS_OFF : 2.0 * PARTS_OFF);
     }
+}
+
+/* The signal by sample of the pulse's grid, from the first one that is kept in `like`. */
+static void spread_samples(const struct line_waves *waves, uint32_t pulse, uint32_t from, double out[512])
+{
+    for (uint32_t i = 0; i < 512; i++)
+        out[i] = SPEC.baseline_counts;
+    for (uint32_t i = 0; i < waves->n; i++)
+        for (uint32_t k = 0; k < waves->wave[i].n && waves->wave[i].pulse == pulse; k++) {
+            const uint32_t at = waves->wave[i].first + k - from;
+            if (at < 512) out[at] = waves->sample[waves->wave[i].at + k];
+        }
+}
+
+/* A plane at 80 deg, 300 m away, is 0.6 m deep within a footprint, as long as the pulse. The closed form agrees with 1,027
+ * sub-rays to a count of 12 bits, RMS: 4 counts here. It neglects that the far side is hit more steeply, by 0.3 % at the
+ * rim. */
+static void closed_form_agrees_with_sub_rays(void **state)
+{
+    (void)state;
+    static const struct beam_view GRAZING = {0.0, 0.1, -80.1, -80.0, 1, PULSES};
+    struct waves w = {.lit = {.near_m = 52.0, .far_m = 5200.0, .rho = {0.8, 0.5}}, .gain = 300.0};
+    const struct line_waves *waves;
+    double closed[PULSES][512], rings[512], sum2 = 0.0, most = 0.0;
+    uint32_t from[PULSES], n = 0;
+    open_waves(&w, &GRAZING, BEAM_ADAPTIVE, ROOM);
+    waves = w.lit.rig.block.waves;
+    beam_rig_line(&w.lit.rig, 0);
+    assert_int_equal(waves->n, PULSES);
+    for (uint32_t p = 0; p < PULSES; p++) {
+        from[p] = waves->wave[p].first - 8;
+        spread_samples(waves, p, from[p], closed[p]);
+    }
+    beam_rig_mode(&w.lit.rig, BEAM_RINGS, BEAM_MAX_RINGS);
+    beam_rig_line(&w.lit.rig, 0);
+    assert_int_equal(waves->n_left_out, 0);
+    for (uint32_t p = 0; p < PULSES; p++) {
+        spread_samples(waves, p, from[p], rings);
+        for (uint32_t k = 0; k < waves->wave[p].n; k++, n++) {
+            most = fmax(most, closed[p][k]);
+            sum2 += (closed[p][k] - rings[k]) * (closed[p][k] - rings[k]);
+        }
+    }
+    assert_true(most > 4000.0 && most < 16000.0);
+    if (!(sqrt(sum2 / n) < 4.0)) fail_msg("RMS %.2f counts, of up to %.0f", sqrt(sum2 / n), most);
+    print_message("    a plane at 80 deg: %.2f counts of 14 bits RMS from 1,027 sub-rays, of up to %.0f\n",
+                  sqrt(sum2 / n), most);
+    close_waves(&w);
 }
 
 /* ---- windows */
@@ -310,10 +359,10 @@ static void dark_pulses_have_no_windows(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(energy_is_the_link_budget),   cmocka_unit_test(windows_belong_to_points),
-        cmocka_unit_test(points_stay_as_they_are),     cmocka_unit_test(lost_samples_are_counted),
-        cmocka_unit_test(echoes_are_found_in_samples), cmocka_unit_test(cut_footprints_have_two_echoes),
-        cmocka_unit_test(dark_pulses_have_no_windows),
+        cmocka_unit_test(energy_is_the_link_budget),      cmocka_unit_test(closed_form_agrees_with_sub_rays),
+        cmocka_unit_test(windows_belong_to_points),       cmocka_unit_test(points_stay_as_they_are),
+        cmocka_unit_test(lost_samples_are_counted),       cmocka_unit_test(echoes_are_found_in_samples),
+        cmocka_unit_test(cut_footprints_have_two_echoes), cmocka_unit_test(dark_pulses_have_no_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,7 +6,8 @@
  *   build/tests/bench/waveform_detect --chart    rows of the chart's table (tests/bench/README.md)
  *
  * `single` is one return on a plane that is hit head on, `tilted` at 80 degrees, `pair` are two a pulse's width apart,
- * `foliage` is 40 returns over 3 m, `limited` is one 30 dB above the full scale, and `nothing` is noise. */
+ * `foliage` is 40 returns over 3 m, `limited` is one 30 dB above the full scale, and `nothing` is noise. `skew` is `single` with an asymmetric pulse, whose
+ * samples are 0.5 ns apart. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,8 +18,8 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
 
-enum { PULSES = 2000, ROUNDS = 11, MOST_RETURNS = 40, MOST_ECHOES = 15, SAMPLES = 160, SCENES = 6 };
-static const char *const SCENE[SCENES] = {"single", "tilted", "pair", "foliage", "limited", "nothing"};
+enum { PULSES = 2000, ROUNDS = 11, MOST_RETURNS = 40, MOST_ECHOES = 15, SAMPLES = 160, SCENES = 7 };
+static const char *const SCENE[SCENES] = {"single", "tilted", "pair", "foliage", "limited", "nothing", "skew"};
 static const char *const METHOD[3] = {"threshold", "fraction", "gaussians"};
 static const double WIDTH_M = 0.6;
 
@@ -42,11 +43,12 @@ static void aim(int scene, uint64_t p, struct pulse *pulse)
     pulse->n = 1;
     r[0] = (struct waveform_return){at_m, amplitude, 0.0, WAVEFORM_POINT};
     if (scene == 1) r[0] = (struct waveform_return){at_m, amplitude, 0.2, WAVEFORM_DISC};
-    if (scene == 2) r[pulse->n++] = (struct waveform_return){at_m + WIDTH_M, 40.0 - 0.5 * amplitude, 0.0, WAVEFORM_POINT};
+    if (scene == 2)
+        r[pulse->n++] = (struct waveform_return){at_m + WIDTH_M, 40.0 - 0.5 * amplitude, 0.0, WAVEFORM_POINT};
     if (scene == 3)
         for (pulse->n = 0; pulse->n < MOST_RETURNS; pulse->n++)
-            r[pulse->n] = (struct waveform_return){at_m + 3.0 * even(p, 10 + pulse->n), 4.0 * even(p, 90 + pulse->n), 0.0,
-                                                   WAVEFORM_POINT};
+            r[pulse->n] = (struct waveform_return){at_m + 3.0 * even(p, 10 + pulse->n), 4.0 * even(p, 90 + pulse->n),
+                                                   0.0, WAVEFORM_POINT};
     if (scene == 4) r[0].amplitude = 1e5;
     if (scene == 5) pulse->n = 0;
 }
@@ -68,6 +70,11 @@ static struct waveform *make(int scene)
     if (scene == 5) {
         spec.near_m = 60.0;
         spec.far_m = 69.5;
+    }
+    if (scene == 6) {
+        spec.shape = WAVEFORM_ASYMMETRIC;
+        spec.skew = 2.0;
+        spec.sample_s = 0.5e-9;
     }
     struct waveform *waveform = NULL;
     struct sh_err err;
@@ -164,7 +171,7 @@ int main(int argc, char **argv)
             if (!chart)
                 printf("%-10s %-10s %9.0f %7.2f %8.2f %9.2f %7.2f\n", SCENE[scene], METHOD[m], f.ns, f.echoes,
                        1e3 * f.rms_m, 1e3 * f.p999_m, 1e3 * f.max_m);
-            else if (scene < 3)
+            else if (scene < 3 || scene == 6)
                 printf("detection,%s,%s,%.3f,%.3g,%.3g,0,%d,%.3g,\n", METHOD[m], SCENE[scene], f.ns, f.p999_m, f.max_m,
                        m == WAVEFORM_GAUSSIANS, f.rms_m);
         }

@@ -66,8 +66,8 @@ void wave_measure(struct wave_echoes *w, enum waveform_detector detector, uint32
         r.range_m += (p + 0.5) / pulses * sample_m;
         if (wave_shoot(w, detector, p, &r, 1) != 1) continue;
         const struct waveform_echo *e = &w->echo[0];
-        double off = e->range_m - r.range_m, figure[6] = {off,           off * off,    e->amplitude,
-                                                          e->width_s, e->deviation, e->amplitude * e->amplitude};
+        double off = e->range_m - r.range_m,
+               figure[6] = {off, off * off, e->amplitude, e->width_s, e->deviation, e->amplitude * e->amplitude};
         for (int k = 0; k < 6; k++)
             sum[k] += figure[k];
         f.single++;

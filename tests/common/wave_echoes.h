@@ -29,8 +29,8 @@ uint32_t wave_detect(struct wave_echoes *w, enum waveform_detector detector);
 
 /* The first echo of many pulses on one return, at as many phases of the sampling. */
 struct wave_figures {
-    uint32_t single;         /* pulses with one echo */
-    double bias_m, sigma_m;  /* of its range about the return's */
+    uint32_t single;                                       /* pulses with one echo */
+    double bias_m, sigma_m;                                /* of its range about the return's */
     double amplitude, width_s, deviation, sigma_amplitude; /* means, and the amplitude's deviation */
 };
 void wave_measure(struct wave_echoes *w, enum waveform_detector detector, uint32_t pulses,

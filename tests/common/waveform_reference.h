@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms by many sub-rays, summed one by one with a Gaussian pulse of their own, and shapes that fill a footprint. */
+/* Waveforms by many sub-rays, summed one by one with a Gaussian pulse of its own, and shapes that fill a footprint. */
 #ifndef TESTS_COMMON_WAVEFORM_REFERENCE_H
 #define TESTS_COMMON_WAVEFORM_REFERENCE_H
 
@@ -52,7 +52,7 @@ extern const struct waveref_shape waveref_shape[WAVEREF_SHAPES];
 void waveref_by_rays(const struct waveref_shape *shape, struct waveref_window *out);
 /* The pattern's sub-rays as points. Returns how many. */
 uint32_t waveref_rings(const struct waveref_shape *shape, uint32_t rings, struct waveform_return *r);
-/* A shape without sub-rays: a plane as one return, the step or the wedge as its two sides. Returns how many; 0: others. */
+/* A shape without sub-rays: a plane as one return, a step or wedge as its two sides. Returns how many; 0: others. */
 uint32_t waveref_parts(int shape, struct waveform_return r[2]);
 
 #endif

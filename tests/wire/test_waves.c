@@ -273,8 +273,8 @@ static void test_capacity(void **state)
     free(err);
 }
 
-/* Takes frames up to a new descriptor that says so, and then up to the end of a line. Returns the frames of waveforms
- * since that descriptor. */
+/* Takes frames up to a new descriptor that says so, and then up to the end of a whole line. Returns the frames of
+ * waveforms since that descriptor. */
 static uint32_t count_waves(struct scanhead *sh, int has)
 {
     struct scanhead_frame frame;
@@ -284,10 +284,10 @@ static uint32_t count_waves(struct scanhead *sh, int has)
         client_next(sh, &frame);
         wire_soon(&since_ns, frame.t_ns, "a descriptor");
     } while (frame.type != SCANHEAD_DESCRIPTOR || scanhead_has_waves(sh) != has);
-    do {
+    for (int lines = 0; lines < 2; lines += frame.type == SCANHEAD_LINE_END) {
         client_next(sh, &frame);
         n += frame.type == SCANHEAD_WAVES;
-    } while (frame.type != SCANHEAD_LINE_END);
+    }
     return n;
 }
 
@@ -310,6 +310,68 @@ static void test_switched(void **state)
     assert_true(count_waves(sh, 1) > 0);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
+}
+
+/* In UTM the head stands at the anchor. A window's direction, times the range of its pulse's echo, leads to the point. Over
+ * the room's 9 m the ellipsoid falls away by 6 um. Floats leave 0.5 um, counts of coordinates 1 um. */
+static void test_directions(void **state)
+{
+    struct wire *wire = *state;
+    static struct scanhead_point point[POINTS];
+    static struct scanhead_wave wave[WINDOWS];
+    struct scanhead_info info;
+    struct scanhead_frame frame, points = {0};
+    uint32_t n = 0;
+    room_write(wire);
+    record(wire, &SCAN, "utm.shs",
+           (const char *const[]){"waveform.send=on", "output.layout=geo", "output.crs=utm", "stations.0.lat_deg=48.2",
+                                 "stations.0.lon_deg=6.1", "stations.0.height_m=300", NULL});
+    struct scanhead *sh = client_open(wire_path(wire, "utm.shs"));
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
+        if (frame.type == SCANHEAD_POINTS) {
+            points = frame;
+            assert_int_equal(scanhead_points(sh, &frame, 0, point, POINTS), frame.n_points);
+        }
+        if (frame.type != SCANHEAD_WAVES) continue;
+        assert_int_equal(scanhead_get_info(sh, &info), SCANHEAD_OK);
+        const int windows = scanhead_waves(sh, &frame, 0, wave, WINDOWS);
+        for (int i = 0; i < windows; i++, n++) {
+            const struct scanhead_point *p = &point[wave[i].pulse - points.pulse0]; /* one echo each */
+            const double *d = wave[i].direction,
+                         at[3] = {p->x - info.anchor[0], p->y - info.anchor[1], p->z - info.anchor[2]};
+            const double range_m =
+                sqrt((at[0] * at[0] + at[1] * at[1] + at[2] * at[2]) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+            for (int a = 0; a < 3; a++)
+                assert_true(fabs(at[a] - range_m * d[a]) < 1e-5);
+        }
+    }
+    assert_true(n > 5000);
+    scanhead_close(sh);
+}
+
+/* The plan has a row for waveforms. */
+static void test_plan_row(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *set, *row;
+    } cases[] = {{"waveform.send=off", "\"method\": \"none\""},
+                 {"waveform.send=on", "\"method\": \"closed form\""},
+                 {"beam.mode=rings", "\"method\": \"sub-rays\""}};
+    char config[352];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
+    for (int i = 0; i < 3; i++) {
+        const char *const args[] = {"plan", config, "--json", "--set", "waveform.send=on", "--set", cases[i].set, NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        char *out = wire_read(wire_path(wire, "out"), NULL);
+        const char *row = strstr(out, "\"stage\": \"waveform\"");
+        assert_non_null(row);
+        const char *method = strstr(row, "\"method\"");
+        assert_non_null(method);
+        if (strncmp(method, cases[i].row, strlen(cases[i].row)) != 0) fail_msg("%.80s", row);
+        free(out);
+    }
 }
 
 /* A recording that runs as a head sends the frames of waveforms on as they are. */
@@ -338,6 +400,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_switched, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_directions, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_plan_row, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_replayed, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
