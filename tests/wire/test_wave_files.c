@@ -2,6 +2,7 @@
 /* Waveforms from a configuration to files: each point's packet in LAS, as a reader of its own takes it from the
  * specification, and each row of .waves.csv are those of the stream. */
 #include "tests/wire/python_rig.h"
+#include "tests/wire/readers.h"
 
 static const struct room_config SCAN = {.profile = "riegl-vz400i",
                                         .prr_hz = 100000,
@@ -92,7 +93,7 @@ static void read_stream(const char *path)
     assert_true(n_echoes > 1000 && n_windows > 1000 && n_more > 10);
 }
 
-static void run(struct wire *wire, const char *const *args)
+static void run_program(const char *const *args)
 {
     const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
     if (status != 0) wire_show(wire, "err");
@@ -100,7 +101,7 @@ static void run(struct wire *wire, const char *const *args)
 }
 
 /* What the reader prints of a LAS file. */
-static char *read_las(struct wire *wire, const char *las)
+static char *read_las(const char *las)
 {
     char script[PATH_MAX], path[352], text[352];
     if (realpath("tests/readers/las_waves.py", script) == NULL) fail_msg("tests/readers/las_waves.py is not there");
@@ -156,9 +157,9 @@ static void check_line(const char *line, size_t i, size_t *w, double tolerance_m
 }
 
 /* A count on three axes, as the first sample's place is computed from the point's. */
-static void check_las(struct wire *wire, const char *name, double tolerance_m)
+static void check_las(const char *name, double tolerance_m)
 {
-    char *text = read_las(wire, name), *at = text, *end;
+    char *text = read_las(name), *at = text, *end;
     size_t n = 0, w = 0;
     for (; (end = strchr(at, '\n')) != NULL; at = end + 1, n++) {
         *end = '\0';
@@ -170,7 +171,7 @@ static void check_las(struct wire *wire, const char *name, double tolerance_m)
 }
 
 /* Rows are the stream's windows, in order. */
-static void check_csv(struct wire *wire)
+static void check_csv(void)
 {
     char *text = wire_read(wire_path(wire, "a.waves.csv"), NULL), *at = strchr(text, '\n') + 1, *end;
     size_t n = 0;
@@ -193,7 +194,7 @@ static void check_csv(struct wire *wire)
 }
 
 /* A board before the wall, whose edges cut footprints: pulses with two returns. */
-static void write_scene(struct wire *wire)
+static void write_scene(void)
 {
     room_write(wire);
     FILE *f = fopen(wire_path(wire, "room.obj"), "a");
@@ -202,40 +203,66 @@ static void write_scene(struct wire *wire)
     assert_int_equal(fclose(f), 0);
 }
 
-static void record_all(struct wire *wire, const char *keys)
+static void record_all(const char *keys)
 {
     char config[352], path[4][352];
     static const char *const name[] = {"a.shs", "in.las", "a.waves.csv", "out.las"};
-    write_scene(wire);
+    write_scene();
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
     for (int i = 0; i < 4; i++)
         snprintf(path[i], sizeof path[i], "%s", wire_path(wire, name[i]));
-    run(wire, (const char *const[]){"record", config, "--quiet", "--set", keys, "--set", "output.crs=local", "-o",
-                                    path[0], "-o", path[1], "-o", path[2], NULL});
-    run(wire, (const char *const[]){"record", path[0], "--quiet", "--wdp", "--colour", "label", "-o", path[3], NULL});
+    run_program((const char *const[]){"record", config, "--quiet", "--set", keys, "--set", "output.crs=local", "-o",
+                                      path[0], "-o", path[1], "-o", path[2], NULL});
+    run_program((const char *const[]){"record", path[0], "--quiet", "--wdp", "--colour", "label", "-o", path[3], NULL});
 }
 
-static void check_layout(struct wire *wire, const char *keys)
+static void check_layout(const char *keys)
 {
     need_python();
-    record_all(wire, keys);
+    record_all(keys);
     read_stream(wire_path(wire, "a.shs"));
     /* A point is half a count wrong on each axis, and so is the sample's place: sqrt(3) / 2 of the scale, 1 mm at most. */
-    check_las(wire, "in.las", 1e-3);
-    check_las(wire, "out.las", 1e-3);
+    check_las("in.las", 1e-3);
+    check_las("out.las", 1e-3);
     assert_int_equal(access(wire_path(wire, "out.wdp"), F_OK), 0);
     assert_int_equal(access(wire_path(wire, "in.wdp"), F_OK), -1);
-    check_csv(wire);
+    check_csv();
 }
 
 static void test_polar(void **state)
 {
-    check_layout(*state, "output.layout=polar");
+    wire = *state;
+    check_layout("output.layout=polar");
 }
 
 static void test_geo(void **state)
 {
-    check_layout(*state, "output.layout=geo");
+    wire = *state;
+    check_layout("output.layout=geo");
+}
+
+/* npm's reader takes the points of formats 9 and 10 as they are. */
+static void test_npm(void **state)
+{
+    static const char *const name[] = {"in.las", "out.las"};
+    wire = *state;
+    record_all("output.layout=polar");
+    read_stream(wire_path(wire, "a.shs"));
+    for (int i = 0; i < 2; i++) {
+        char las[352], xyz[352];
+        snprintf(las, sizeof las, "%s", wire_path(wire, name[i]));
+        snprintf(xyz, sizeof xyz, "%s", wire_path(wire, "las.xyz"));
+        run_reader("las.mjs", las, xyz);
+        char *text = wire_read(xyz, NULL), *at = strchr(strchr(text, '\n') + 1, '\n') + 1;
+        assert_int_equal(strtoull(text, NULL, 10), n_echoes);
+        for (size_t k = 0; k < n_echoes; k++) {
+            double p[3];
+            for (int axis = 0; axis < 3; axis++)
+                p[axis] = strtod(at, &at);
+            assert_true(far_from(p, echo[k].xyz) < 1e-3);
+        }
+        free(text);
+    }
 }
 
 /* --wdp is for LAS 1.4. */
@@ -245,7 +272,7 @@ static void test_options(void **state)
         const char *args[6], *says;
     } cases[] = {{{"-o", "a.ply"}, "--wdp: no .las is among the files"},
                  {{"-o", "a.las", "--las-version", "1.2"}, "--wdp: LAS 1.2 has no waveforms"}};
-    struct wire *wire = *state;
+    wire = *state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const char *args[12] = {"record", "a.shs", "--wdp"};
         for (int k = 0; k < 6; k++)
@@ -262,6 +289,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_polar, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_geo, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_npm, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
