@@ -37,14 +37,13 @@ struct las {
 static int las_begin(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    (void)err;
     las->facts.track = &las->base.track;
     las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
     las->facts.has_colour = las->base.track.has_colours;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
-    return 0;
+    return las->base.options.las_wdp ? las_waves_check(las->base.file.path, err) : 0;
 }
 
 /* Writes header and records before the points. Their counts are overwritten at the end. Until then they mark the file

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/bytes.h"
+#include "core/newfile.h"
 
 enum { EXACT_KINDS = 128 };
 
@@ -16,6 +17,15 @@ char *las_waves_path(const char *path)
 {
     char *wdp;
     return asprintf(&wdp, "%.*s.wdp", (int)strlen(path) - 4, path) >= 0 ? wdp : NULL; /* in place of .las */
+}
+
+int las_waves_check(const char *path, struct sh_err *err)
+{
+    char *wdp = las_waves_path(path);
+    const int rc =
+        wdp != NULL ? newfile_check(wdp, err) : sh_fail(err, SH_ENOMEM, "%s: no memory to write its waveforms", path);
+    free(wdp);
+    return rc;
 }
 
 static int put_head(struct las_waves *w, struct sh_err *err)

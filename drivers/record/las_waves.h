@@ -48,6 +48,8 @@ struct las_waves {
     struct las_packet last;
 };
 
+/* Before the first scan: whether X.wdp of a recording at `path` can be written. Errors as of newfile_check. */
+int las_waves_check(const char *path, struct sh_err *err);
 /* A recording at `path` makes its file of packets; 1 in is_open. Errors as of outfile_open. */
 int las_waves_open(struct las_waves *waves, const char *path, struct sh_err *err);
 /* To be flushed before points that refer to its packets. */

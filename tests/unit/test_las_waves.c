@@ -224,6 +224,21 @@ static void test_none(void **state)
     assert_int_equal(access(rig_path("a.wdp.part"), F_OK), -1);
 }
 
+/* A .wdp that can't be written is refused before the first scan, and no file is made. */
+static void test_no_wdp(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    char path[128];
+    snprintf(path, sizeof path, "%s", rig_path("a.wdp"));
+    assert_int_equal(symlink("elsewhere", path), 0);
+    put_polar(&rig_12_bits, 0);
+    assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){.las_wdp = 1}, 1, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "a.wdp: is a symbolic link"));
+    assert_int_equal(access(rig_path("a.las.part"), F_OK), -1);
+    unlink(path);
+}
+
 /* A point 40 m along a beam of which a metre changes the coordinates by per_m. Half a count of the point on each axis is its
  * error, and that of its range; tolerance is a whole one. */
 static void check_geo(const struct native_anchor *a, const double per_m[3], const double tolerance[3])
@@ -417,10 +432,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_inside),   cmocka_unit_test(test_outside),    cmocka_unit_test(test_colour),
-        cmocka_unit_test(test_8_bits),   cmocka_unit_test(test_none),       cmocka_unit_test(test_utm),
-        cmocka_unit_test(test_geodetic), cmocka_unit_test(test_lengths),    cmocka_unit_test(test_unheld),
-        cmocka_unit_test(test_moving),   cmocka_unit_test(test_digitisers),
+        cmocka_unit_test(test_inside), cmocka_unit_test(test_outside),  cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_8_bits), cmocka_unit_test(test_none),     cmocka_unit_test(test_no_wdp),
+        cmocka_unit_test(test_utm),    cmocka_unit_test(test_geodetic), cmocka_unit_test(test_lengths),
+        cmocka_unit_test(test_unheld), cmocka_unit_test(test_moving),   cmocka_unit_test(test_digitisers),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
