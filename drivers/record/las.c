@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. On
- * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. The
- * file itself describes its numbers (las_header.c).
+/* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. Where the head
+ * sends waveforms it is format 9 (10), and packets of samples follow (las_waves.c). On request LAS 1.2 for older
+ * readers: format 1 (3), five returns, no labels, scan angles, attributes or waveforms. The file itself describes its
+ * numbers (las_header.c).
  *
  * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
  * are the numbers of the stream. Those of other stations are rounded once, by half a count at most. Nothing
@@ -17,7 +18,10 @@
 #include "drivers/record/las_repair.h"
 #include "drivers/record/recorder.h"
 
+#define M_PER_PS                  (0.5 * 299792458e-12) /* range, of a pulse's way out and back */
 #define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / NATIVE_RAD_PER_DEG / 0.006)
+
+enum { LAS_BATCH_LEN = TRACK_BATCH * LAS_POINT_LEN_MAX };
 
 struct las {
     struct recorder base;
@@ -25,20 +29,21 @@ struct las {
     int begun, time_came_late;
     size_t front_len;
     uint64_t n_empty, n_no_angle;
-    uint64_t n_beyond_returns, n_returns_cut; /* LAS 1.2 */
+    uint64_t n_beyond_returns, n_returns_cut, n_waves_left_out; /* LAS 1.2 */
+    struct las_waves waves;
+    struct las_packet packet[TRACK_BATCH]; /* of the points of the batch */
 };
 
 static int las_begin(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    (void)err;
     las->facts.track = &las->base.track;
     las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
     las->facts.has_colour = las->base.track.has_colours;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
-    return 0;
+    return las->base.options.las_wdp ? las_waves_check(las->base.file.path, err) : 0;
 }
 
 /* Writes header and records before the points. Their counts are overwritten at the end. Until then they mark the file
@@ -47,7 +52,7 @@ static int put_front(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
     las->begun = 1;
-    las->facts.incomplete = 1;
+    las->facts.incomplete = las->facts.is_growing = 1;
     las->front_len = las_front(&las->facts, front);
     return outfile_write(&las->base.file, front, las->front_len, err);
 }
@@ -55,7 +60,8 @@ static int put_front(struct las *las, struct sh_err *err)
 static int write_front(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
-    const int rc = outfile_flush(&las->base.file, err);
+    int rc = las_waves_flush(&las->waves, err);
+    if (rc == 0) rc = outfile_flush(&las->base.file, err);
     return rc != 0 ? rc : outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
 }
 
@@ -97,12 +103,16 @@ static int las_scan(void *rec, struct sh_err *err)
     if (las->begun) return 0;
     set_counts(las);
     f->has_colour = t->has_colours;
+    f->has_waves = t->has_waves && f->minor != 2;
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
     if (!(f->scale[0] > 0 && f->scale[1] > 0 && f->scale[2] > 0))
         return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g; a LAS file needs one above 0",
                        las->base.file.path, f->scale[0]);
-    return put_front(las, err);
+    f->waves = &las->waves;
+    const int rc = f->has_waves && !las->waves.is_open ? las_waves_open(&las->waves, las->base.file.path, err) : 0;
+    las->waves.file.may_be_direct = las->base.options.may_wait;
+    return rc == 0 ? put_front(las, err) : rc;
 }
 
 /* Refuses stations whose points are all too far from the first one. In degrees that is found when the points come. */
@@ -191,12 +201,13 @@ static void set_socs(const struct track *t, double p[3])
 }
 
 /* 0.01 dB and 0.01 ns, as on the wire. */
-static void set_attribute(struct las_point *to, const struct scanhead_attribute *a)
+static void set_attribute(struct las_point *to, const struct scanhead_attribute *a, double deviation)
 {
     int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
     int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
     to->amplitude = (uint16_t)amplitude;
     to->width = (uint16_t)width;
+    to->deviation = isnan(deviation) ? UINT16_MAX : (uint16_t)lrint(1000 * fmin(deviation, 65.534));
 }
 
 /* LAS 1.2 counts to five. */
@@ -207,6 +218,53 @@ static void set_returns(struct las *las, struct las_point *to, const struct scan
     if (las->facts.minor != 2 || to->echo_count <= LAS_12_RETURNS) return;
     to->echo_count = LAS_12_RETURNS;
     las->n_returns_cut++;
+}
+
+/* ---- waveforms */
+
+/* The packets of the batch are written before its points, as a new descriptor changes what comes before all points. */
+static int put_packets(struct las *las, int n, struct sh_err *err)
+{
+    const struct track *t = &las->base.track;
+    int rc = 0, is_new, any_new = 0;
+    for (int i = 0; rc == 0 && i < n; i++) {
+        las->packet[i] = (struct las_packet){0};
+        if (t->wave[i] == NULL) continue;
+        rc = las_waves_put(&las->waves, t->n_scans, t->wave[i], &las->packet[i], &is_new, err);
+        any_new |= is_new;
+    }
+    return rc == 0 && any_new ? write_front(las, err) : rc;
+}
+
+/* The specification puts a packet's first sample at point + location * (dx, dy, dz), which is nearer to the head than the
+ * point. So (dx, dy, dz) leads back to the head, as readers take it. */
+static void set_wave(struct las *las, struct las_point *to, int i)
+{
+    struct track *t = &las->base.track;
+    double beam[3];
+    if (las->packet[i].kind == 0) return;
+    if (!track_beam(t, i, beam)) {
+        t->missing.n_without_waves++;
+        return;
+    }
+    if (is_swapped(las)) swap(beam);
+    to->packet = las->packet[i];
+    to->location_ps = (float)(t->wave_at[i] * t->wave[i]->sample_ps);
+    for (int k = 0; k < 3; k++)
+        to->back_ps[k] = (float)(-beam[k] * M_PER_PS);
+}
+
+/* Completes the packets. Inside, they follow the points. Until they all do, the header says that they are outside, and
+ * how many points there are: so a repair finds the end of the points. */
+static int end_waves(struct las *las, struct sh_err *err)
+{
+    int rc = las_waves_end(&las->waves, err);
+    if (rc != 0 || las->base.options.las_wdp) return rc;
+    rc = write_front(las, err);
+    const uint64_t at = las->base.file.written;
+    if (rc == 0) rc = las_waves_copy(&las->waves, &las->base.file, las->base.options.report, err);
+    las->facts.waves_at = at;
+    return rc;
 }
 
 /* Point i of the batch. */
@@ -227,8 +285,9 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
     if (rc != 0) return rc;
     set_returns(las, &las_point, point);
     if (!t->info.moving && las->facts.minor != 2) las_point.scan_angle = scan_angle(las, p_socs);
-    if (t->has_attributes) set_attribute(&las_point, &t->attribute[i]);
+    if (t->has_attributes) set_attribute(&las_point, &t->attribute[i], t->deviation[i]);
     if (t->has_colours) memcpy(las_point.rgb, t->rgb[i], sizeof las_point.rgb);
+    if (las->facts.has_waves) set_wave(las, &las_point, i);
     las_put_point(&las->facts, &las_point, to);
     return 0;
 }
@@ -252,23 +311,44 @@ static int check_count(const struct las *las, struct sh_err *err)
 static int las_points(void *rec, int n, struct sh_err *err)
 {
     struct las *las = rec;
-    uint8_t *to = outfile_room(&las->base.file, TRACK_BATCH * LAS_POINT_LEN_MAX, err), *at = to;
-    if (to == NULL) return SH_EIO;
-    int rc = 0;
+    struct outfile *file = &las->base.file;
     double s;
+    int rc = las->facts.has_waves ? put_packets(las, n, err) : 0;
+    if (rc == 0 && OUTFILE_BUFFER - file->len < LAS_BATCH_LEN) rc = las_waves_flush(&las->waves, err);
+    if (rc != 0) return rc;
+    uint8_t *to = outfile_room(file, LAS_BATCH_LEN, err), *at = to;
+    if (to == NULL) return SH_EIO;
     if (!las->facts.gps_time && !las->time_came_late)
         las->time_came_late = scanhead_gps_time(las->base.track.sh, 0, &s) == 0;
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &las->base.track.point[i];
         if (is_left_out(las, p)) continue;
+        las->n_waves_left_out += las->base.track.has_waves && !las->facts.has_waves && las->base.track.wave[i] != NULL;
         rc = check_count(las, err);
         if (rc == 0) rc = put_point(las, at, i, err);
         if (rc != 0) break;
         las_count_record(&las->facts, at);
         at += las_point_len(&las->facts);
     }
-    outfile_used(&las->base.file, (size_t)(at - to)); /* also before a failure: the file may be kept */
+    outfile_used(file, (size_t)(at - to)); /* also before a failure: the file may be kept */
     return rc;
+}
+
+static void report_waves(struct las *las)
+{
+    const struct recorder *r = &las->base;
+    const struct las_waves *w = &las->waves;
+    char what[160];
+    recorder_report(r, las->n_waves_left_out, "points whose waveforms are left out; LAS 1.2 has no place for them");
+    if (las->facts.has_waves) {
+        snprintf(what, sizeof what,
+                 "waveforms filled up with %llu samples without light: LAS allows 255 lengths of waveforms",
+                 (unsigned long long)w->n_fill);
+        recorder_report(r, w->n_filled, what);
+        recorder_report(r, w->n_kindless, "waveforms left out: LAS allows 255 lengths of waveforms, of all digitisers");
+    } else if (r->options.las_wdp) {
+        sh_warn(r->options.report, "%s: no .wdp is written: the head sends no waveforms (waveform.send)", r->file.path);
+    }
 }
 
 static int las_finish(void *rec, struct sh_err *err)
@@ -276,9 +356,13 @@ static int las_finish(void *rec, struct sh_err *err)
     struct las *las = rec;
     int rc = outfile_check(&las->base.file, err); /* then the header goes on saying that the file is incomplete */
     if (rc == 0 && !las->begun) rc = put_front(las, err);
+    las->facts.is_growing = 0;
+    if (rc == 0 && las->facts.has_waves) rc = end_waves(las, err);
     las->facts.incomplete = 0;
     if (rc == 0) rc = write_front(las, err);
+    if (rc == 0 && las->facts.has_waves && las->base.options.las_wdp) rc = las_waves_keep(&las->waves, err);
     if (rc != 0) return rc;
+    report_waves(las);
     recorder_report(rec, las->n_empty, "shots without echo left out; LAS has no place for them");
     recorder_report(rec, las->n_beyond_returns,
                     "echoes left out: the sixth and later ones of a pulse; LAS 1.2 holds five");
@@ -297,12 +381,26 @@ static int las_finish(void *rec, struct sh_err *err)
     return 0;
 }
 
+static int las_save(void *rec, struct sh_err *err)
+{
+    struct las *las = rec;
+    const int rc = las_waves_flush(&las->waves, err); /* before the points, which refer to them */
+    return rc == 0 ? outfile_save(&las->base.file, err) : rc;
+}
+
+static void las_release(void *rec)
+{
+    las_waves_close(&((struct las *)rec)->waves);
+}
+
 const struct recorder_ops recorder_las = {
     .ending = ".las",
     .size = sizeof(struct las),
-    .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1, .wants_colours = 1},
+    .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1, .wants_colours = 1, .wants_waves = 1},
     .fits = las_fits,
     .begin = las_begin,
     .finish = las_finish,
+    .save = las_save,
+    .release = las_release,
     .repair = las_repair,
 };

@@ -48,13 +48,16 @@ static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t n
     return to + LAS_EXTRA_LEN;
 }
 
-static uint8_t *put_extra_vlr(uint8_t *to, int attributes)
+static uint8_t *put_extra_vlr(uint8_t *to, const struct track *t)
 {
-    to = put_vlr_head(to, "LASF_Spec", 4, (attributes ? 3 : 1) * LAS_EXTRA_LEN, "extra bytes of a point");
+    const int attributes = t->has_attributes, n = 1 + (attributes ? 2 : 0) + (t->has_deviations ? 1 : 0);
+    to = put_vlr_head(to, "LASF_Spec", 4, (uint16_t)(n * LAS_EXTRA_LEN), "extra bytes of a point");
     to = put_extra(to, EXTRA_UINT16, "label", 0xffff, 0.0, "surface hit; 65535: none");
     if (!attributes) return to;
     to = put_extra(to, EXTRA_INT16, "amplitude", -32768, 0.01, "dB above detection threshold");
-    return put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns FWHM; 655.35: that or more");
+    to = put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns FWHM; 655.35: that or more");
+    if (!t->has_deviations) return to;
+    return put_extra(to, EXTRA_UINT16, "deviation", 0xffff, 0.001, "of shape; 65.534: that or more");
 }
 
 static uint8_t *put_note_vlr(uint8_t *to, const struct las_facts *f)
@@ -64,13 +67,18 @@ static uint8_t *put_note_vlr(uint8_t *to, const struct las_facts *f)
     int n =
         snprintf(note, sizeof note,
                  "GPS time: %s. Intensity: 32768 + 100 times the reflectance in dB (0 dB: a white Lambertian "
-                 "target), 0: not modelled. Scan angle: %s. Point source ID: station.%s",
+                 "target), 0: not modelled. Scan angle: %s. Point source ID: station.%s%s",
                  gps_time ? "adjusted standard GPS time" : "seconds since the scan's start, of no absolute clock",
                  f->minor == 2 ? "not given"
                  : moving      ? "not given, the head moves"
                           : "in the head's frame, from straight down (0) over the horizon (90 degrees) to straight up "
                             "(180)",
-                 f->minor == 2 ? "" : " Label: surface hit.");
+                 f->minor == 2 ? "" : " Label: surface hit.",
+                 !f->has_waves ? ""
+                               : " Waveforms: digitizer offset + gain * sample is the signal in units of the detection "
+                                 "threshold. Sample k of a packet lies at point + (location - k * spacing) * (dx, dy, "
+                                 "dz): (dx, dy, dz) leads back to the head. A packet may end in samples without light, "
+                                 "which fill it up.");
     to = put_vlr_head(to, "LASF_Spec", 3, (size_t)n + 1, "text area description");
     memcpy(to, note, (size_t)n + 1);
     return to + n + 1;
@@ -121,6 +129,23 @@ static uint8_t *put_keys_vlr(uint8_t *to, int epsg, int geoid)
     return at;
 }
 
+/* Their room is always the same; unused room lies between the records and the points. */
+static uint8_t *put_kinds(uint8_t *to, const struct las_waves *waves)
+{
+    memset(to, 0, LAS_KINDS * LAS_KIND_LEN);
+    for (uint32_t i = 0; i < waves->n_kinds; i++) {
+        const struct las_kind *k = &waves->kind[i];
+        uint8_t *at = put_vlr_head(to + i * LAS_KIND_LEN, "LASF_Spec", (uint16_t)(LAS_KIND_FIRST_RECORD + i),
+                                   LAS_KIND_LEN - LAS_VLR_HEAD_LEN, "waveform packet descriptor");
+        at[0] = (uint8_t)k->bits;
+        le_put32(at + 2, k->n);
+        le_put32(at + 6, k->sample_ps);
+        le_put_double(at + 10, k->gain);
+        le_put_double(at + 18, k->offset);
+    }
+    return to + LAS_KINDS * LAS_KIND_LEN;
+}
+
 /* Day of the year and year, in GPS time: leap seconds don't matter to a day but for seconds. */
 static void put_date(uint8_t *to, const struct las_facts *f)
 {
@@ -133,13 +158,14 @@ static void put_date(uint8_t *to, const struct las_facts *f)
 
 static uint8_t format_of(const struct las_facts *f)
 {
-    return (uint8_t)(f->minor == 2 ? (f->has_colour ? 3 : 1) : (f->has_colour ? 7 : 6));
+    if (f->minor == 2) return f->has_colour ? 3 : 1;
+    return (uint8_t)((f->has_waves ? 9 : 6) + (f->has_colour != 0));
 }
 
 /* The places of the counts differ by version; formats 6 and 7 leave the counts of 32 bits 0. */
 static void put_numbers(uint8_t *to, const struct las_facts *f)
 {
-    if (f->minor != 2) le_put64(to + 247, f->n_points);
+    if (f->minor != 2) le_put64(to + LAS_POINTS_AT, f->n_points);
     if (f->minor == 2) le_put32(to + 107, (uint32_t)f->n_points);
     for (int i = 0; i < (f->minor == 2 ? LAS_12_RETURNS : LAS_RETURNS); i++) {
         if (f->minor == 2)
@@ -175,11 +201,17 @@ static size_t header_len(const struct las_facts *f)
     return f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
 }
 
+static int encoding_of(const struct las_facts *f)
+{
+    const int waves = !f->has_waves ? 0 : f->waves_at != 0 ? LAS_WAVES_INSIDE : LAS_WAVES_OUTSIDE;
+    return (f->minor == 2 ? 0 : ENCODING_WKT) | (f->gps_time ? ENCODING_GPS_STANDARD : 0) | waves;
+}
+
 static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len, uint32_t n_vlrs)
 {
     memset(to, 0, header_len(f));
     memcpy(to, "LASF", 4);
-    le_put16(to + 6, (uint16_t)((f->minor == 2 ? 0 : ENCODING_WKT) | (f->gps_time ? ENCODING_GPS_STANDARD : 0)));
+    le_put16(to + LAS_ENCODING_AT, (uint16_t)encoding_of(f));
     to[24] = 1;
     to[25] = (uint8_t)f->minor;
     put_text(to + 26, 32, f->profile);
@@ -194,26 +226,44 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
         le_put_double(to + 131 + 8 * i, f->scale[i]);
         le_put_double(to + 155 + 8 * i, f->offset[i]);
     }
-    las_put_counts(f, to);
+    if (f->waves_at != 0) {
+        le_put64(to + LAS_WAVES_AT, f->waves_at);
+        le_put64(to + LAS_EVLRS_AT, f->waves_at);
+        le_put32(to + LAS_EVLRS_AT + 8, 1);
+    }
+    if (!f->is_growing) las_put_counts(f, to);
 }
 
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
     const struct track *t = f->track;
     uint8_t *end = to + header_len(f);
-    if (f->minor != 2) end = put_extra_vlr(end, t->has_attributes);
+    if (f->minor != 2) end = put_extra_vlr(end, t);
     end = put_note_vlr(end, f);
     uint8_t *crs = end;
     end = f->minor == 2 ? put_keys_vlr(end, t->epsg, t->geoid_heights) : put_crs_vlr(end, t->epsg, t->geoid_heights);
-    put_header(to, f, (size_t)(end - to), (f->minor != 2) + 1u + (end > crs));
+    uint32_t n_records = (f->minor != 2) + 1u + (end > crs);
+    if (f->has_waves) {
+        end = put_kinds(end, f->waves);
+        n_records += f->waves->n_kinds;
+    }
+    put_header(to, f, (size_t)(end - to), n_records);
     return (size_t)(end - to);
+}
+
+/* The length of a point's record, without extra bytes. */
+static size_t own_len(const struct las_facts *f)
+{
+    static const uint8_t own[11] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67}; /* by format */
+    return own[format_of(f)];
 }
 
 size_t las_point_len(const struct las_facts *f)
 {
-    static const uint8_t own[8] = {20, 28, 26, 34, 57, 63, 30, 36}; /* by format */
-    size_t extra = LAS_LABEL_LEN + (f->track->has_attributes ? LAS_ATTRIBUTES_LEN : 0u);
-    return own[format_of(f)] + (f->minor == 2 ? 0 : extra);
+    const struct track *t = f->track;
+    size_t extra = LAS_LABEL_LEN + (t->has_attributes ? LAS_ATTRIBUTES_LEN : 0u);
+    if (t->has_deviations) extra += LAS_DEVIATION_LEN;
+    return own_len(f) + (f->minor == 2 ? 0 : extra);
 }
 
 static void put_colour(uint8_t *to, const uint8_t rgb[3])
@@ -231,7 +281,17 @@ static void put_point_12(const struct las_facts *f, const struct las_point *p, u
     if (f->has_colour) put_colour(to + 28, p->rgb);
 }
 
-/* Format 6 or 7, and the extra bytes. */
+static void put_wave(uint8_t *to, const struct las_point *p)
+{
+    to[0] = p->packet.kind;
+    le_put64(to + 1, p->packet.at);
+    le_put32(to + 9, p->packet.len);
+    le_put_float(to + 13, p->location_ps);
+    for (int i = 0; i < 3; i++)
+        le_put_float(to + 17 + 4 * i, p->back_ps[i]);
+}
+
+/* Format 6, 7, 9 or 10, and the extra bytes. The near infrared of format 10 stays 0. */
 static void put_point_14(const struct las_facts *f, const struct las_point *p, uint8_t *to)
 {
     to[14] = (uint8_t)(p->echo | p->echo_count << 4);
@@ -239,11 +299,13 @@ static void put_point_14(const struct las_facts *f, const struct las_point *p, u
     le_put16(to + 20, p->station);
     le_put_double(to + 22, p->time_s);
     if (f->has_colour) put_colour(to + 30, p->rgb);
-    uint8_t *extra = to + (f->has_colour ? 36 : 30);
+    uint8_t *extra = to + own_len(f);
+    if (f->has_waves) put_wave(extra - LAS_WAVE_LEN, p);
     le_put16(extra, p->label);
     if (!f->track->has_attributes) return;
     le_put16(extra + 2, p->amplitude);
     le_put16(extra + 4, p->width);
+    if (f->track->has_deviations) le_put16(extra + 6, p->deviation);
 }
 
 void las_put_point(const struct las_facts *f, const struct las_point *p, uint8_t *to)

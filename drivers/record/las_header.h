@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The header and the variable length records of a LAS file, and one point's record. LAS 1.4 (ASPRS LAS 1.4 R15)
- * with point data record format 6, or 7 with colour; LAS 1.2 with format 1, or 3. Facts go in (las.c gathers
- * them), bytes come out. Pure. */
+ * with point data record format 6, or 7 with colour; with waveforms 9, or 10. LAS 1.2 with format 1, or 3. Facts go in
+ * (las.c gathers them), bytes come out. Pure. */
 #ifndef DRIVERS_RECORD_LAS_HEADER_H
 #define DRIVERS_RECORD_LAS_HEADER_H
 
@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "drivers/record/crs_wkt.h"
+#include "drivers/record/las_waves.h"
 #include "drivers/record/track.h"
 
 enum {
@@ -19,11 +20,22 @@ enum {
     LAS_EXTRA_LEN = 192,
     LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own */
     LAS_ATTRIBUTES_LEN = 4, /* and after these */
-    LAS_POINT_LEN_MAX = 36 + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN,
+    LAS_DEVIATION_LEN = 2,
+    LAS_WAVE_LEN = 29, /* a point's reference to its waveform; formats 9 and 10 end in it */
+    LAS_POINT_LEN_MAX = 38 + LAS_WAVE_LEN + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN + LAS_DEVIATION_LEN,
     LAS_RETURNS = 15,
     LAS_12_RETURNS = 5,
-    LAS_NOTE_MAX = 512,
-    LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 3 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX,
+    LAS_NOTE_MAX = 1024,
+    LAS_KIND_LEN = LAS_VLR_HEAD_LEN + 26,
+    LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 4 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX +
+                    LAS_KINDS * LAS_KIND_LEN,
+    /* the header's places for waveforms */
+    LAS_ENCODING_AT = 6,
+    LAS_WAVES_AT = 227,  /* where the record of packets begins in the file; 0: in a .wdp */
+    LAS_EVLRS_AT = 235,  /* where records behind the points begin, u64, and how many they are, u32 */
+    LAS_POINTS_AT = 247, /* number of points */
+    LAS_WAVES_INSIDE = 1 << 1,
+    LAS_WAVES_OUTSIDE = 1 << 2,
 };
 
 #define LAS_SOFTWARE            "scanhead"
@@ -34,12 +46,16 @@ struct las_facts {
     int has_colour;
     const struct track *track; /* whose CRS, movement and attributes are the file's */
     int incomplete;            /* the recording goes on: the header says so */
+    int is_growing;            /* more points may come: the header has no counts yet */
     int gps_time;              /* times are adjusted standard GPS time */
     char profile[32];
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
     double created_gps_s;       /* adjusted standard GPS time of the first point, with gps_time */
     uint64_t n_points, n_by_return[LAS_RETURNS];
     int32_t min[3], max[3]; /* counts; only with points */
+    int has_waves;
+    const struct las_waves *waves; /* with waveforms: their descriptors */
+    uint64_t waves_at;             /* where the record of packets begins in the file; 0: it is in the .wdp */
 };
 
 struct las_point {
@@ -47,8 +63,12 @@ struct las_point {
     uint16_t intensity, scan_angle, station, label;
     uint8_t echo, echo_count; /* within the version's returns */
     double time_s;
-    uint16_t amplitude, width; /* with attributes */
+    uint16_t amplitude, width, deviation; /* with attributes */
     uint8_t rgb[3];
+    /* With waveforms: the packet, the return's time after the packet's first sample, and how coordinates change along a
+     * picosecond back to the head. */
+    struct las_packet packet;
+    float location_ps, back_ps[3];
 };
 
 /* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
@@ -60,8 +80,8 @@ void las_count_record(struct las_facts *facts, const uint8_t *record);
 /* Writes the number of points, of returns, and the bounds into a header that has the rest. */
 void las_put_counts(const struct las_facts *facts, uint8_t *header);
 
-/* Everything before the points. Returns its length, which depends only on the CRS, the kind of time and the
- * attributes. So it can be written again when the counts are known. */
+/* Everything before the points. Returns its length, which depends only on the CRS, the kind of time, the attributes and
+ * whether there are waveforms. So it can be written again when the counts, or more descriptors, are known. */
 size_t las_front(const struct las_facts *facts, uint8_t to[LAS_FRONT_MAX]);
 
 #endif

@@ -5,6 +5,7 @@
 
 #include "core/bytes.h"
 #include "drivers/record/las_header.h"
+#include "drivers/record/las_waves_repair.h"
 #include "drivers/record/scan_count.h"
 
 struct records {
@@ -12,6 +13,8 @@ struct records {
     size_t len, time_at, station_at;
     uint64_t n_zero; /* at the end, of zeros alone */
     struct point_scans scans;
+    int has_waves;
+    struct las_packets packets; /* with waveforms */
 };
 
 /* A power cut leaves zeros; no record of ours has return 0. */
@@ -27,6 +30,7 @@ static void take_record(void *ctx, const uint8_t *record)
         las_count_record(&r->facts, zero);
     }
     las_count_record(&r->facts, record);
+    if (r->has_waves) las_packets_take(&r->packets, record);
     point_scans_take(&r->scans, le_get16(record + r->station_at), le_get_double(record + r->time_at));
 }
 
@@ -38,17 +42,18 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
     const int is_las = len >= LAS_HEADER_12_LEN && memcmp(header, "LASF", 4) == 0 && header[24] == 1 &&
                        strncmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE, sizeof LAS_SOFTWARE - 1) == 0;
     if (!is_las) return repair_fail_none(repair, "LAS file of scanhead", err);
+    static const uint8_t own_14[] = {30, 36, 38, 59, 67}; /* of formats 6 to 10 */
     const int format = header[104];
     f->minor = header[25];
     const size_t header_len = f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
     r->len = le_get16(header + 105);
     *front_len = le_get32(header + 96);
-    const int known = f->minor == 2
-                          ? (format == 1 && r->len == 28) || (format == 3 && r->len == 34)
-                          : f->minor == 4 && ((format == 6 && r->len >= 30) || (format == 7 && r->len >= 36)) &&
-                                r->len <= LAS_POINT_LEN_MAX;
+    const int known = f->minor == 2 ? (format == 1 && r->len == 28) || (format == 3 && r->len == 34)
+                                    : f->minor == 4 && format >= 6 && format <= 10 && format != 8 &&
+                                          r->len >= own_14[format - 6] && r->len <= LAS_POINT_LEN_MAX;
     if (!known || len < header_len || *front_len < header_len || *front_len > LAS_FRONT_MAX || *front_len > repair->len)
         return repair_fail_none(repair, "LAS file of scanhead", err);
+    r->has_waves = f->minor == 4 && format >= 9;
     r->station_at = f->minor == 2 ? 18 : 20;
     r->time_at = f->minor == 2 ? 20 : 22;
     for (int i = 0; i < 3; i++) {
@@ -62,33 +67,46 @@ static int make_whole(struct repair *repair, uint8_t *header, struct records *r,
 {
     uint8_t renewed[LAS_HEADER_LEN];
     const size_t len = r->facts.minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
-    const uint64_t end = front_len + r->facts.n_points * r->len;
+    const struct repair_rows points = {front_len, r->facts.n_points, r->len};
+    uint64_t end = front_len + points.n * points.len;
     if (r->facts.minor == 2 && r->facts.n_points > UINT32_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; the file is unchanged",
                        repair->path);
     memcpy(renewed, header, len);
     las_put_counts(&r->facts, renewed);
-    repair->was_whole = end == repair->len && memcmp(renewed, header, len) == 0;
+    int rc = r->has_waves ? las_packets_repair(&r->packets, repair, &points, renewed, err) : 0;
+    if (rc < 0) return rc;
+    if (r->has_waves && le_get64(renewed + LAS_WAVES_AT) != 0) end = r->packets.begin + r->packets.end;
+    repair->was_whole = rc == 0 && end == repair->len && memcmp(renewed, header, len) == 0;
     if (repair->was_whole) return SH_OK;
     memset(renewed + LAS_SOFTWARE_AT, 0, 32);
     strcpy((char *)renewed + LAS_SOFTWARE_AT, LAS_SOFTWARE_INCOMPLETE);
-    const int rc = repair_cut(repair, end, err);
+    rc = repair_cut(repair, end, err);
     return rc == SH_OK ? repair_write(repair, 0, renewed, len, err) : rc;
+}
+
+static int las_repair_all(struct repair *repair, uint8_t header[LAS_HEADER_LEN], struct records *r, struct sh_err *err)
+{
+    uint32_t front_len = 0;
+    const size_t len = repair->len < LAS_HEADER_LEN ? (size_t)repair->len : LAS_HEADER_LEN;
+    int rc = repair_read(repair, 0, header, len, err);
+    if (rc == SH_OK) rc = parse_header(repair, header, len, r, &front_len, err);
+    if (rc == SH_OK && r->has_waves) rc = las_packets_find(&r->packets, repair, header, err);
+    if (rc == SH_OK) {
+        const uint64_t end = r->has_waves ? las_packets_limit(&r->packets, repair, header) : repair->len;
+        const struct repair_rows rows = {front_len, (end - front_len) / r->len, r->len};
+        rc = repair_rows(repair, &rows, take_record, r, err);
+    }
+    if (rc == SH_OK) rc = make_whole(repair, header, r, front_len, err);
+    return rc == SH_OK && r->has_waves ? las_packets_settle(&r->packets, err) : rc;
 }
 
 int las_repair(struct repair *repair, struct sh_err *err)
 {
     uint8_t header[LAS_HEADER_LEN];
     struct records r = {0};
-    uint32_t front_len = 0;
-    const size_t len = repair->len < sizeof header ? (size_t)repair->len : sizeof header;
-    int rc = repair_read(repair, 0, header, len, err);
-    if (rc == SH_OK) rc = parse_header(repair, header, len, &r, &front_len, err);
-    if (rc == SH_OK) {
-        const struct repair_rows rows = {front_len, (repair->len - front_len) / r.len, r.len};
-        rc = repair_rows(repair, &rows, take_record, &r, err);
-    }
-    if (rc == SH_OK) rc = make_whole(repair, header, &r, front_len, err);
+    const int rc = las_repair_all(repair, header, &r, err);
+    if (r.has_waves) las_packets_free(&r.packets);
     repair->unit = "points";
     repair->n_kept = r.facts.n_points;
     repair->n_scans = r.scans.n;

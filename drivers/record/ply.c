@@ -88,6 +88,7 @@ struct vertex {
     unsigned station;
     double frame;
     const struct scanhead_attribute *attribute;
+    double deviation;
     const uint8_t *rgb;
 };
 
@@ -138,6 +139,10 @@ static uint8_t *put_binary(uint8_t *to, const struct vertex *v, unsigned columns
         le_put_float(to + 4, (float)v->attribute->width_ns);
         to += 8;
     }
+    if ((columns & PLY_DEVIATION) != 0) {
+        le_put_float(to, (float)v->deviation);
+        to += 4;
+    }
     if ((columns & PLY_COLOUR) == 0) return to;
     memcpy(to, v->rgb, 3);
     return to + 3;
@@ -180,6 +185,7 @@ static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns
     k = 0;
     TAKE(PLY_ATTRIBUTES, v->attribute->amplitude_db, 2);
     TAKE(PLY_ATTRIBUTES, v->attribute->width_ns, 2);
+    TAKE(PLY_DEVIATION, v->deviation, 3);
 #undef TAKE
     for (size_t i = 0; i < k && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
@@ -303,6 +309,7 @@ static uint8_t *put_any_rows(struct ply *ply, int n, uint8_t **to, struct sh_err
         if (!take_vertex(ply, i, &v)) continue;
         v.frame = t->info.moving ? t->frame[i] : t->info.frame;
         v.attribute = &t->attribute[i];
+        v.deviation = t->deviation[i];
         v.rgb = t->rgb[i];
         uint8_t *end = ply->facts.ascii ? put_ascii(*to, &v, columns, degrees) : put_binary(*to, &v, columns);
         if (end == NULL) {

@@ -185,6 +185,7 @@ static const struct column {
     {PLY_FRAME, "double", "frame", 0},
     {PLY_ATTRIBUTES, "float", "amplitude", 0},
     {PLY_ATTRIBUTES, "float", "width", 0},
+    {PLY_DEVIATION, "float", "deviation", 0},
     {PLY_COLOUR, "uchar", "red", 1},
     {PLY_COLOUR, "uchar", "green", 1},
     {PLY_COLOUR, "uchar", "blue", 1},
@@ -196,6 +197,7 @@ unsigned ply_columns_there(const struct track *track, unsigned asked)
     asked &= ~(unsigned)PLY_XYZ;
     if (!track->moving && !track->stops) asked &= ~(unsigned)PLY_FRAME;
     if (!track->has_attributes) asked &= ~(unsigned)PLY_ATTRIBUTES;
+    if ((asked & PLY_ATTRIBUTES) != 0 && track->has_deviations) asked |= PLY_DEVIATION;
     if (!track->has_colours) asked &= ~(unsigned)PLY_COLOUR;
     return asked;
 }

@@ -11,10 +11,10 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/native.h"
+#include "drivers/record/csv_repair.h"
 #include "drivers/record/recorder.h"
 
 enum { BATCH = 64, LINE = 512 };
@@ -31,7 +31,8 @@ enum title { STATIONS, STOPS, MOVING };
 static const char *const title[] = {[STATIONS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
                                     [STOPS] =
                                         "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
-                                    [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
+                                    [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n",
+                                    NULL};
 
 static int put_title(struct pose_file *file, enum title which, struct sh_err *err)
 {
@@ -129,61 +130,10 @@ static int pose_file_finish(void *rec, struct sh_err *err)
 
 /* ---- repair */
 
-static const char INCOMPLETE[] = "# incomplete: the recording was not completed; data may be missing after this\n";
-
-struct rows {
-    int titled, n_columns;
-    int is_marked; /* the last line says that the file is incomplete */
-    long scan;     /* of the last row */
-    uint64_t n, n_scans;
-};
-
-static int count_columns(const char *line)
-{
-    int n = 1;
-    for (; *line != '\0'; line++)
-        n += *line == ',';
-    return n;
-}
-
-static int take_title(struct rows *rows, const char *line, size_t len)
-{
-    for (size_t i = 0; i < sizeof title / sizeof title[0]; i++)
-        rows->titled |= strlen(title[i]) == len + 1 && memcmp(title[i], line, len) == 0;
-    rows->n_columns = count_columns(line);
-    return rows->titled;
-}
-
-static int take_row(void *ctx, const char *line, size_t len)
-{
-    struct rows *rows = ctx;
-    if (strlen(line) != len) return 0;
-    if (!rows->titled) return take_title(rows, line, len);
-    rows->is_marked = len == sizeof INCOMPLETE - 2 && memcmp(line, INCOMPLETE, len) == 0;
-    if (line[0] == '#') return 1;
-    if (strspn(line, "0123456789+-.einfa,") != len || count_columns(line) != rows->n_columns) return 0;
-    const long scan = strtol(line, NULL, 10);
-    rows->n_scans += (uint64_t)(rows->n == 0 || scan != rows->scan);
-    rows->scan = scan;
-    rows->n++;
-    return 1;
-}
-
 static int pose_file_repair(struct repair *r, struct sh_err *err)
 {
-    struct rows rows = {0};
-    uint64_t end;
-    int rc = repair_lines(r, 0, take_row, &rows, &end, err);
-    if (rc == SH_OK && !rows.titled) rc = repair_fail_none(r, "file of poses", err);
-    if (rc == SH_OK) rc = repair_check_rest(r, end, LINE, err);
-    if (rc != SH_OK) return rc;
-    r->unit = "poses";
-    r->n_kept = rows.n;
-    r->n_scans = rows.n_scans;
-    r->was_whole = end == r->len && (!repair_is_part(r) || rows.is_marked);
-    rc = repair_cut(r, end, err);
-    if (rc == SH_OK && !r->was_whole && !rows.is_marked) repair_append_note(r, end, INCOMPLETE, sizeof INCOMPLETE - 1);
-    return rc;
+    static const struct csv_format format = {title, "0123456789+-.einfa,", "poses", "file of poses", LINE};
+    return csv_repair(r, &format, err);
 }
 
 const struct recorder_ops recorder_poses = {

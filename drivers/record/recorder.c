@@ -11,11 +11,11 @@
 #include "core/newfile.h"
 
 /* The one list of formats. */
-extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses,
+extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses, recorder_waves,
     recorder_pcapng, recorder_shs, recorder_mesh_ply, recorder_obj, recorder_gltf, recorder_glb, recorder_fbx;
-static const struct recorder_ops *const recorders[] = {&recorder_ply,   &recorder_las,    &recorder_ptx, &recorder_e57,
-                                                       &recorder_poses, &recorder_pcapng, &recorder_shs, &recorder_obj,
-                                                       &recorder_gltf,  &recorder_glb,    &recorder_fbx};
+static const struct recorder_ops *const recorders[] = {
+    &recorder_ply,    &recorder_las, &recorder_ptx, &recorder_e57,  &recorder_poses, &recorder_waves,
+    &recorder_pcapng, &recorder_shs, &recorder_obj, &recorder_gltf, &recorder_glb,   &recorder_fbx};
 
 enum { N_RECORDERS = sizeof recorders / sizeof recorders[0] };
 
@@ -109,6 +109,21 @@ int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_
                    rec->file.path, p[0], p[1], p[2]);
 }
 
+static void report_waves(const struct recorder *rec)
+{
+    const struct track_missing *m = &rec->track.missing;
+    recorder_report(rec, m->n_waves_unheld,
+                    "waveforms left out; this format has no place for them, allowed are .las .waves.csv .shs .pcapng");
+    recorder_report(rec, m->n_waves_unplaced, "waveforms left out whose points were lost, or which memory can't hold");
+    recorder_report(rec, m->n_waves_alone, "waveforms left out without a point in them; .waves.csv holds them, too");
+    recorder_report(rec, m->n_samples_lost, "samples of waveforms that found no room in the head");
+    recorder_report(rec, m->n_without_waves, "points without a waveform: the head kept none there, or it was lost");
+    recorder_report(
+        rec, m->n_without_ranges,
+        "of these points are of a moving head in the geo layout, without ranges; allowed are output.layout: "
+        "polar, or output.crs: local");
+}
+
 static void report_losses(const struct recorder *rec)
 {
     const struct track *t = &rec->track;
@@ -122,6 +137,7 @@ static void report_losses(const struct recorder *rec)
                     "points whose amplitude and width are left out; this format has no place for them");
     recorder_report(rec, t->missing.n_without_attributes, "points without amplitude and width, which were lost");
     recorder_report(rec, t->missing.n_without_colours, "points that are grey, since their colours were lost");
+    report_waves(rec);
 }
 
 /* After a failure what is on the disk stays, where a repair can use it. A file that the user gave up is removed. */

@@ -32,8 +32,9 @@ enum ply_column {
     PLY_ATTRIBUTES = 1 << 7, /* where the head sends them */
     PLY_COLOUR = 1 << 8,     /* where there are colours */
     PLY_ALL = (1 << 9) - 1,
-    PLY_FLOAT = 1 << 9, /* no column: x, y, z and range as float */
-    PLY_XYZ = 1 << 10,  /* no column: nothing else is asked for */
+    PLY_FLOAT = 1 << 9,      /* no column: x, y, z and range as float */
+    PLY_XYZ = 1 << 10,       /* no column: nothing else is asked for */
+    PLY_DEVIATION = 1 << 11, /* no word: with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
 /* Such words with commas between them; "xyz" stands for none. 0: one is not known, or comes twice. */
@@ -48,6 +49,7 @@ struct recorder_options {
     uint32_t n_heads;            /* heads that scan one after the other in one scene; 0: one, as far as known */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
+    int las_wdp;   /* waveforms of .las go to a .wdp beside it */
     int mesh;      /* .ply is a mesh of the scan's grid */
     double long_edge;     /* of meshes: leaves out triangles with an edge longer than so many mean edges; 0: none */
     double sparse_per_m2; /* > 0: .ply has points spread over the mesh, so many per square metre */

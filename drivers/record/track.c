@@ -23,6 +23,32 @@ static int will_have_colours(const struct track *t)
     return t->colour.given ? t->colour.scale.mode != COLOUR_NONE : scanhead_has_colours(t->sh) == 1;
 }
 
+static int check_sent(const struct track *t, int did, int does, const char *what, struct sh_err *err)
+{
+    if (!t->begun || did == does) return SH_OK;
+    return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s %s; a file holds one kind", t->path,
+                   did ? "without" : "with", what);
+}
+
+/* What is wanted and sent beside the points. */
+static int take_sent(struct track *t, struct sh_err *err)
+{
+    const struct scanhead *sh = t->sh;
+    const int attributes = t->ops->wants_attributes && scanhead_has_attributes(sh) == 1;
+    const int deviations = attributes && scanhead_has_deviations(sh) == 1;
+    const int colours = will_have_colours(t), waves = t->ops->wants_waves && scanhead_has_waves(sh) == 1;
+    int rc = check_sent(t, t->has_attributes, attributes, "attributes", err);
+    if (rc == SH_OK) rc = check_sent(t, t->has_deviations, deviations, "deviations", err);
+    if (rc == SH_OK) rc = check_sent(t, t->has_colours, colours, "colours", err);
+    if (rc == SH_OK) rc = check_sent(t, t->has_waves, waves, "waveforms", err);
+    if (rc != SH_OK) return rc;
+    t->has_attributes = attributes;
+    t->has_deviations = deviations;
+    t->has_colours = colours;
+    t->has_waves = waves;
+    return SH_OK;
+}
+
 static int check_info(struct track *t, struct sh_err *err)
 {
     const struct scanhead_info *info = &t->info;
@@ -39,21 +65,15 @@ static int check_info(struct track *t, struct sh_err *err)
                        info->moving ? "moves"
                        : info->stop ? "stops on a trajectory"
                                     : "stands still");
-    if (t->begun && t->ops->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s attributes; a file holds one kind", t->path,
-                       t->has_attributes ? "without" : "with");
-    if (t->begun && t->has_colours != will_have_colours(t))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream continued %s colours; a file holds one kind", t->path,
-                       t->has_colours ? "without" : "with");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
+    const int rc = take_sent(t, err);
+    if (rc != SH_OK) return rc;
     t->crs = crs;
     t->epsg = epsg;
     t->geoid_heights = geoid;
     t->moving = info->moving;
     t->stops = info->stop;
-    t->has_attributes = t->ops->wants_attributes && scanhead_has_attributes(t->sh) == 1;
-    t->has_colours = will_have_colours(t);
     t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
     t->begun = 1;
     if (t->named == NULL || info->n_surfaces > t->n_named) {
@@ -265,8 +285,8 @@ static int track_take_points(struct track *t, const struct scanhead_frame *frame
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
     t->state.last_scan = t->info.scan;
-    if (rc == 0) rc = track_begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
+    if (rc == 0) rc = track_begin_waiting(t, frame, row, err);
     if (rc == 0 && row > UINT32_MAX - frame->n_points)
         rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
     return rc == 0 && t->ops->points != NULL ? take_batches(t, frame, row, err) : rc;
@@ -287,7 +307,11 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     if (frame->type == SCANHEAD_POINTS) return track_take_points(t, frame, err);
     if (frame->type == SCANHEAD_ATTRIBUTES) return track_attributes(t, frame, err);
     if (frame->type == SCANHEAD_COLOURS) return track_colours(t, frame, err);
-    if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
+    if (frame->type == SCANHEAD_WAVES) return track_waves(t, frame, err);
+    if (frame->type == SCANHEAD_LINE_END) {
+        take_line_end(t, frame);
+        return t->has_waves ? track_flush(t, err) : 0;
+    }
     struct native_descriptor d;
     if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
         set_limits(t, &d);

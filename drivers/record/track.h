@@ -10,6 +10,8 @@
  * Where a recorder wants attributes or colours and the head sends them, points wait for the frames that follow theirs.
  * Where one of these was lost, the points come out with the next ones, or at the end. Their attributes are then NaN,
  * their colour is grey, and they are counted. Colours that the head does not send are computed here from the points.
+ * Where a recorder wants waveforms and the head sends them, points wait until their line ends or other points come: no
+ * frame of waveforms says that it is the last one.
  *
  * In a zeroed struct the owner sets path, ops and rec, and colour where it wants another one than the head's. One
  * thread per track. */
@@ -24,6 +26,7 @@
 enum { TRACK_BATCH = 256 };
 
 struct track_waiting;
+struct track_waves;
 
 struct track_ops {
     /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
@@ -35,6 +38,7 @@ struct track_ops {
     int grid;             /* 1: a file of rows and columns: refuses heads that fire beams in turn or along a list */
     int wants_attributes; /* 1: it has a place for amplitude and width */
     int wants_colours;    /* 1: it has a place for a colour */
+    int wants_waves;      /* 1: it has a place for waveforms beside a point */
 };
 
 /* Points that are not in the recording, or not with all that was sent. */
@@ -45,6 +49,13 @@ struct track_missing {
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
     uint64_t n_without_colours;    /* echoes whose colour was lost */
+    uint64_t n_waves_unheld;       /* windows of waveforms that the recorder has no place for */
+    /* These count for recorders that want waveforms. */
+    uint64_t n_waves_unplaced; /* windows whose points were lost, or which memory had no room for */
+    uint64_t n_waves_alone;    /* windows without a point in them */
+    uint64_t n_samples_lost;   /* samples that found no room in the head */
+    uint64_t n_without_waves;  /* echoes in no window */
+    uint64_t n_without_ranges; /* of these, echoes of a moving head on the Earth, whose ranges are not known */
 };
 
 /* The place of the stream in its scan; only track.c uses it. */
@@ -86,19 +97,26 @@ struct track {
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     int has_attributes;        /* wanted, and sent: */
     struct scanhead_attribute attribute[TRACK_BATCH];
-    int has_colours; /* wanted, and sent or made here: */
+    int has_deviations;            /* attributes, and sent with them: */
+    double deviation[TRACK_BATCH]; /* scanhead_deviations; NaN: lost */
+    int has_colours;               /* wanted, and sent or made here: */
     uint8_t rgb[TRACK_BATCH][3];
+    int has_waves;                                 /* wanted, and sent: */
+    const struct scanhead_wave *wave[TRACK_BATCH]; /* the window that each point lies in; NULL: none. They are there as
+                                                    * long as the batch is */
+    double wave_at[TRACK_BATCH];                   /* the point's place in it, in samples from its first one */
     int waited;                /* the points of the batch waited: later frames may have come, so gps_s holds */
     double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
     /* inner state */
     uint32_t index[TRACK_BATCH]; /* of each point in its frame, where it may wait */
     struct track_waiting *waiting;
+    struct track_waves *waves;
     struct track_state state;
 };
 
 /* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
- * kind of heights, a head that begins or ceases to move or to send (wanted) attributes or colours, a station
- * number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
+ * kind of heights, a head that begins or ceases to move or to send (wanted) attributes, colours or waveforms, a
+ * station number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* 1 where an echo's position is infinite or NaN, as in a broken stream. It is counted, and the caller leaves it out.
@@ -110,7 +128,11 @@ static inline int track_is_nowhere(struct track *track, double x, double y, doub
     return 1;
 }
 
-/* At the end: gives out the points that still wait for attributes or colours. */
+/* The change of the recording's coordinates along a metre of range, for point i of the batch, which has a window. 1; 0: the
+ * pose of a moving head is lost. */
+int track_beam(const struct track *track, int i, double beam[3]);
+
+/* At the end: gives out the points that still wait. */
 int track_flush(struct track *track, struct sh_err *err);
 void track_free(struct track *track);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to drivers/record/track*.c: points that wait for attributes and colours. */
+/* Private to drivers/record/track*.c: points that wait for attributes, colours and waveforms. */
 #ifndef DRIVERS_RECORD_TRACK_INSIDE_H
 #define DRIVERS_RECORD_TRACK_INSIDE_H
 
@@ -7,8 +7,10 @@
 
 /* Whether frames that follow the points are wanted, and sent. */
 int track_waits(const struct track *track);
-/* To be called before the points of a frame, when no points wait any more. SH_ENOMEM. */
-int track_begin_waiting(struct track *track, struct sh_err *err);
+/* To be called before the points of a frame, when no points wait any more; first_row: that of its first pulse.
+ * SH_ENOMEM. */
+int track_begin_waiting(struct track *track, const struct scanhead_frame *frame, uint64_t first_row,
+                        struct sh_err *err);
 /* Keeps the n points of the batch. */
 void track_keep(struct track *track, int n);
 /* Gives out the n points of the batch, with the colours that are made here. */
@@ -17,5 +19,17 @@ int track_give(struct track *track, int n, struct sh_err *err);
  * colours of lost points are skipped. */
 int track_attributes(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 int track_colours(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
+
+/* ---- windows of waveforms (track_waves.c) */
+
+/* Takes a frame of waveforms; a recorder without a place for them counts them. SH_ENOMEM, SH_EFORMAT. */
+int track_waves(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
+/* The window that an echo of this pulse lies in, and its place in it; NULL: in none. Pulses never go back between two
+ * calls of track_clear_waves. */
+const struct scanhead_wave *track_find_wave(struct track *track, const struct scanhead_point *point, uint64_t pulse,
+                                            double *at);
+/* Forgets all windows, and counts those that no point was in. */
+void track_clear_waves(struct track *track);
+void track_free_waves(struct track *track);
 
 #endif

@@ -10,8 +10,10 @@
 /* Points of a frame whose attributes or colours may follow, and which of these have come. */
 struct track_waiting {
     uint32_t n;
+    uint64_t pulse0, first_row; /* of the frame's first pulse */
     int have_attributes, have_colours;
     struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
+    double deviation[NATIVE_MAX_POINTS];
     struct scanhead_colour colour[NATIVE_MAX_POINTS];
     struct waiting_point {
         struct scanhead_point point;
@@ -27,15 +29,17 @@ static int waits_for_colours(const struct track *t)
 
 int track_waits(const struct track *t)
 {
-    return t->has_attributes || waits_for_colours(t);
+    return t->has_attributes || waits_for_colours(t) || t->has_waves;
 }
 
-int track_begin_waiting(struct track *t, struct sh_err *err)
+int track_begin_waiting(struct track *t, const struct scanhead_frame *frame, uint64_t first_row, struct sh_err *err)
 {
     if (!track_waits(t)) return 0;
     if (t->waiting == NULL) t->waiting = malloc(sizeof *t->waiting);
     if (t->waiting == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a frame of points", t->path);
     t->waiting->n = 0;
+    t->waiting->pulse0 = frame->pulse0;
+    t->waiting->first_row = first_row;
     t->waiting->have_attributes = t->waiting->have_colours = 0;
     return 0;
 }
@@ -58,6 +62,16 @@ int track_give(struct track *t, int n, struct sh_err *err)
     return t->ops->points(t->rec, n, err);
 }
 
+/* Gives point n of the batch the window of waveforms that waiting point k lies in. */
+static void take_wave(struct track *t, const struct waiting_point *p, int n)
+{
+    const struct track_waiting *w = t->waiting;
+    t->wave[n] = NULL;
+    if (!t->has_waves || p->point.echo_count == 0) return;
+    t->wave[n] = track_find_wave(t, &p->point, w->pulse0 + (p->row - w->first_row), &t->wave_at[n]);
+    t->missing.n_without_waves += t->wave[n] == NULL;
+}
+
 /* Gives point n of the batch the attributes and the colour of waiting point k, and counts lost ones. */
 static void take_along(struct track *t, uint32_t k, int n)
 {
@@ -67,6 +81,7 @@ static void take_along(struct track *t, uint32_t k, int n)
     const int is_echo = p->point.echo_count != 0;
     if (t->has_attributes) {
         t->attribute[n] = w->have_attributes ? w->attribute[p->index] : none;
+        t->deviation[n] = w->have_attributes && t->has_deviations ? w->deviation[p->index] : (double)NAN;
         t->missing.n_without_attributes += (uint64_t)(is_echo && !w->have_attributes);
     }
     if (!waits_for_colours(t)) return;
@@ -87,12 +102,14 @@ static int hand_out(struct track *t, struct sh_err *err)
         t->frame[n] = p->frame;
         t->gps_s[n] = p->gps_s;
         take_along(t, k, n);
+        take_wave(t, p, n);
         if (++n < TRACK_BATCH && k + 1 < w->n) continue;
         t->waited = 1;
         rc = track_give(t, n, err);
         n = 0;
     }
     if (w != NULL) w->n = 0;
+    track_clear_waves(t);
     return rc;
 }
 
@@ -105,6 +122,7 @@ void track_free(struct track *t)
 {
     free(t->waiting);
     t->waiting = NULL;
+    track_free_waves(t);
 }
 
 int track_attributes(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
@@ -112,8 +130,9 @@ int track_attributes(struct track *t, const struct scanhead_frame *frame, struct
     struct track_waiting *w = t->waiting;
     if (w == NULL || w->n == 0 || !t->has_attributes) return 0;
     if (scanhead_attributes(t->sh, frame, 0, w->attribute, NATIVE_MAX_POINTS) < 0) return 0;
+    if (t->has_deviations && scanhead_deviations(t->sh, frame, 0, w->deviation, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_attributes = 1;
-    return waits_for_colours(t) ? 0 : hand_out(t, err);
+    return waits_for_colours(t) || t->has_waves ? 0 : hand_out(t, err);
 }
 
 int track_colours(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
@@ -122,5 +141,5 @@ int track_colours(struct track *t, const struct scanhead_frame *frame, struct sh
     if (w == NULL || w->n == 0 || !waits_for_colours(t)) return 0;
     if (scanhead_colours(t->sh, frame, 0, w->colour, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_colours = 1;
-    return hand_out(t, err);
+    return t->has_waves ? 0 : hand_out(t, err);
 }

@@ -14,7 +14,7 @@
 enum { MAX_STREAM = 1 << 15, MAX_RECORDERS = 3, SOME_POINTS = 64, MAX_CHECKS = 4 };
 
 static const char *const names[] = {"out.ply", "out.las", "out.ptx",  "out.e57", "out.poses.csv", "out.pcapng",
-                                    "out.shs", "out.obj", "out.gltf", "out.glb", "out.fbx"};
+                                    "out.shs", "out.obj", "out.gltf", "out.glb", "out.fbx",       "out.waves.csv"};
 enum { N_NAMES = sizeof names / sizeof names[0] };
 
 /* A piece of work between two checks may be long: --sparse makes millions of points of a damaged grid that is
@@ -42,6 +42,7 @@ static struct recorder_options options_of(unsigned how)
                                      .empty_shots = how >> 1 & 1,
                                      .mesh = how >> 2 & 1,
                                      .las_minor = how & 8 ? 2 : 4,
+                                     .las_wdp = how & 1,
                                      .scalar_names = how >> 4 & 1,
                                      .columns = how & 32 ? PLY_ALL | PLY_FLOAT : 0,
                                      .long_edge = how & 64 ? 2.0 : 0.0,
@@ -68,6 +69,10 @@ static void close_output(struct output *out, int keep)
     if (out->rec != NULL && recorder_close(out->rec, keep, &err) != SH_OK && keep) fuzz_must_be_line(&err);
     snprintf(part, sizeof part, "%s.part", out->path);
     unlink(out->path);
+    unlink(part);
+    snprintf(part, sizeof part, "%s/out.wdp.part", fuzz_folder());
+    unlink(part);
+    snprintf(part, sizeof part, "%s/out.wdp", fuzz_folder());
     unlink(part);
 }
 

@@ -91,7 +91,7 @@ static void test_no_file(void **state)
     }
     snprintf(path, sizeof path, "%s", wire_path(wire, "a.xyz"));
     expect_refusal(wire, (const char *const[]){"record", config, "-o", path, NULL},
-                   "allowed are .ply .las .ptx .e57 .poses.csv .pcapng .shs");
+                   "allowed are .ply .las .ptx .e57 .poses.csv .waves.csv .pcapng .shs");
 }
 
 /* Formats with rigid poses take no degrees, and report that before the scan. */

@@ -158,7 +158,10 @@ static int check_options(const struct record_line *r)
     const char *option = o->scalar_names && !ply     ? "--ply-names: no .ply"
                          : o->columns != 0 && !ply   ? "--ply-columns: no .ply"
                          : o->las_minor != 0 && !las ? "--las-version: no .las"
+                         : o->las_wdp && !las        ? "--wdp: no .las"
                                                      : NULL;
+    if (o->las_wdp && o->las_minor == 2)
+        return app_usage(&app_record, "--wdp: LAS 1.2 has no waveforms; allowed is --las-version 1.4");
     return option == NULL ? APP_OK : app_usage(&app_record, "%s is among the files", option);
 }
 
@@ -193,12 +196,13 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
-/* The files that are written beside those of -o: one of each scan, and those that a mesh names. */
+/* The files that are written beside those of -o: one of each scan, those that a mesh names, and a .wdp. */
 static int add_names(struct record_line *r)
 {
     static const struct {
-        const char *mesh, *ending;
-    } beside[] = {{".obj", ".mtl"}, {".obj", ".png"}, {".gltf", ".bin"}, {".gltf", ".png"}, {".fbx", ".png"}};
+        const char *named, *ending;
+    } beside[] = {{".obj", ".mtl"},  {".obj", ".png"}, {".gltf", ".bin"},
+                  {".gltf", ".png"}, {".fbx", ".png"}, {".las", ".wdp"}};
     const int n_files = r->in.n_files;
     int file = 0, status = APP_OK;
     for (int i = 0; i < n_files; i++) {
@@ -210,7 +214,8 @@ static int add_names(struct record_line *r)
         for (size_t k = 0; k < sizeof beside / sizeof beside[0] && status == APP_OK; k++) {
             struct app_file other = *named;
             other.ending = beside[k].ending;
-            if (strcmp(ops->ending, beside[k].mesh) == 0) status = app_add_file(&r->in, &other);
+            if (strcmp(other.ending, ".wdp") == 0 && !r->job.files.recorder.las_wdp) continue;
+            if (strcmp(ops->ending, beside[k].named) == 0) status = app_add_file(&r->in, &other);
         }
     }
     return status;
@@ -318,6 +323,8 @@ static const struct app_option OPTIONS[] = {
     {APP_CALL, "las-version", "1.2|1.4", .apply = take_las_version,
      .help = "version of .las; 1.2 is for older readers and holds no labels, and up to five returns of a pulse "
              "(default 1.4)"},
+    {APP_FLAG, "wdp", NULL, .at = AT(job.files.recorder.las_wdp),
+     .help = "write the waveforms of .las to a .wdp beside it, not into it"},
     {APP_FLAG, "empty-shots", NULL, .at = AT(job.files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
@@ -363,12 +370,13 @@ static const char HELP_NOTES[] =
     "\n"
     "  .ply                 points, binary or text, with double coordinates, label and station\n"
     "  .las                 LAS 1.4, point format 6 (7 with --colour): points with CRS, time, returns, label;\n"
-    "                       station as point source ID\n"
+    "                       station as point source ID; format 9 (10) with the waveforms that the head sends\n"
     "  .ptx                 a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57                 points of each scan, with its pose\n"
     "  .obj .gltf .glb .fbx a mesh of each scan's grid, which faces the head; its colours (--colour, else those of\n"
     "                       labels) are an image beside it, or within a .glb\n"
     "  .poses.csv           true position and orientation of each scan, or a moving head's trajectory\n"
+    "  .waves.csv           the waveforms that the head sends, a row for each window of samples\n"
     "  .shs                 the raw stream\n"
     "  .pcapng              the stream's frames as packets, for capinfos and tshark\n"
     "\n"
@@ -384,8 +392,8 @@ static const char HELP_NOTES[] =
     "  The head was disconnected within a scan.\n"
     "\n"
     "FILE keeps the data that came. Where it can't be completed, as on a full disk, the written data stay as\n"
-    "FILE.part, for --repair, with FILE.grid beside a .ptx. A recorder does not begin while such a FILE.part\n"
-    "exists.\n"
+    "FILE.part, for --repair, with FILE.grid beside a .ptx, and waveforms in X.wdp.part beside X.las. A recorder\n"
+    "does not begin while such a FILE.part exists.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends a recording with complete files. A second signal within a second counts as the same\n"
     "one; a third, or a later one, ends it at once.\n";

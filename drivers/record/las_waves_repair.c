@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: MIT */
+#include "drivers/record/las_waves_repair.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/bytes.h"
+#include "core/newfile.h"
+#include "drivers/record/las_header.h"
+
+static int is_inside(const struct las_packets *p)
+{
+    return p->path == NULL;
+}
+
+static int exists(const char *path)
+{
+    return access(path, F_OK) == 0;
+}
+
+static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
+{
+    struct stat st;
+    int rc = is_part ? newfile_left(p->path, &p->file.fd, err) : newfile_whole(p->path, &p->file.fd, err);
+    if (rc != SH_OK) p->file.fd = -1;
+    if (rc == SH_OK && fstat(p->file.fd, &st) != 0) rc = sh_fail(err, SH_EIO, "%s: cannot be read", p->path);
+    if (rc == SH_OK) p->len = p->file.len = (uint64_t)st.st_size;
+    return rc;
+}
+
+/* A completed record says its length. One that is being written says 0. */
+static int read_len(struct las_packets *p, struct sh_err *err)
+{
+    uint8_t at[8];
+    if (p->len < LAS_WAVES_HEAD_LEN) return SH_OK;
+    const int rc = repair_read(&p->file, p->begin + LAS_WAVES_LEN_AT, at, sizeof at, err);
+    if (rc == SH_OK && le_get64(at) <= p->len - LAS_WAVES_HEAD_LEN) p->end = LAS_WAVES_HEAD_LEN + le_get64(at);
+    return rc;
+}
+
+/* The name of the .las without .part, where that name is free: it will be renamed. */
+static int will_be_renamed(const struct repair *r, char *las)
+{
+    if (!repair_is_part(r)) return 0;
+    las[strlen(las) - strlen(".part")] = '\0';
+    return !exists(las);
+}
+
+static int find_outside(struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    char *las = strdup(r->path), *part = NULL;
+    const int is_renamed = las != NULL && will_be_renamed(r, las);
+    char *wdp = las != NULL ? las_waves_path(las) : NULL;
+    int rc = SH_OK, is_part = 0;
+    if (wdp == NULL || asprintf(&part, "%s.part", wdp) < 0) {
+        part = NULL;
+        rc = sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", r->path);
+    } else {
+        is_part = repair_is_part(r) && exists(part);
+        if (is_part && is_renamed && exists(wdp))
+            rc = sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command",
+                         part, wdp);
+        else if (!is_part && !exists(wdp))
+            rc = sh_fail(err, SH_EINPUT,
+                         "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep "
+                         "the points alone",
+                         r->path, repair_is_part(r) ? part : wdp);
+    }
+    p->path = is_part ? part : wdp;
+    p->target = is_part && is_renamed ? wdp : NULL;
+    if (p->path != wdp && p->target != wdp) free(wdp);
+    if (p->path != part) free(part);
+    free(las);
+    p->file.path = p->path;
+    if (rc == SH_OK) rc = packets_open(p, is_part, err);
+    return rc == SH_OK ? read_len(p, err) : rc;
+}
+
+/* Inside, the record begins where a point ends. A repair leaves a header that says neither: there are no packets. */
+static int check_place(const struct repair *r, const uint8_t *header, struct sh_err *err)
+{
+    const uint64_t begin = le_get64(header + LAS_WAVES_AT), front = le_get32(header + 96);
+    const int where = header[LAS_ENCODING_AT] & (LAS_WAVES_INSIDE | LAS_WAVES_OUTSIDE);
+    const int is_at_point = begin >= front && (begin - front) % le_get16(header + 105) == 0;
+    if (where == LAS_WAVES_INSIDE ? is_at_point : begin == 0 && where != (LAS_WAVES_INSIDE | LAS_WAVES_OUTSIDE))
+        return SH_OK;
+    return repair_fail_damaged(r, LAS_WAVES_AT, err);
+}
+
+int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
+{
+    *p = (struct las_packets){.file = {.fd = -1, .report = r->report}, .end = LAS_WAVES_HEAD_LEN};
+    p->wave_at = header[104] == 9 ? 30 : 38;
+    p->begin = le_get64(header + LAS_WAVES_AT);
+    const int rc = check_place(r, header, err);
+    if (rc != SH_OK) return rc;
+    if ((header[LAS_ENCODING_AT] & LAS_WAVES_OUTSIDE) != 0) return find_outside(p, r, err);
+    if (p->begin == 0) return SH_OK;
+    p->file = *r;
+    p->len = r->len > p->begin ? r->len - p->begin : 0;
+    return read_len(p, err);
+}
+
+uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, const uint8_t *header)
+{
+    const uint64_t n = le_get64(header + LAS_POINTS_AT), front = le_get32(header + 96), len = le_get16(header + 105);
+    if (p->begin != 0) return p->begin < r->len ? p->begin : r->len;
+    /* Packets that were being copied may follow the points; the points were counted before that. */
+    return n != 0 && n < (r->len - front) / len ? front + n * len : r->len;
+}
+
+/* 1: the point's record refers to a packet; *end is that packet's end. */
+static int refers(const struct las_packets *p, const uint8_t *record, uint64_t *end)
+{
+    const uint8_t *wave = record + p->wave_at;
+    const uint64_t at = le_get64(wave + 1);
+    *end = at <= UINT64_MAX - UINT32_MAX ? at + le_get32(wave + 9) : UINT64_MAX;
+    return wave[0] != 0;
+}
+
+void las_packets_take(struct las_packets *p, const uint8_t *record)
+{
+    uint64_t end;
+    if (!refers(p, record, &end)) return;
+    if (end > p->len)
+        p->n_without++;
+    else if (end > p->end)
+        p->end = end;
+}
+
+/* Packets are written in the order of points, and before them. So only the last points may lack theirs. */
+static int clear_points(struct las_packets *p, struct repair *r, const struct repair_rows *points, struct sh_err *err)
+{
+    static const uint8_t none[LAS_WAVE_LEN];
+    uint8_t record[LAS_POINT_LEN_MAX];
+    uint64_t left = p->n_without, end;
+    int rc = SH_OK;
+    for (uint64_t i = points->n; i-- > 0 && left > 0 && rc == SH_OK;) {
+        const uint64_t at = points->from + i * points->len;
+        rc = repair_read(r, at, record, points->len, err);
+        if (rc != SH_OK || !refers(p, record, &end) || end <= p->len) continue;
+        rc = repair_write(r, at + p->wave_at, none, sizeof none, err);
+        left--;
+    }
+    return rc;
+}
+
+/* The record's own length. 1: it was wrong. */
+static int set_len(struct las_packets *p, struct sh_err *err)
+{
+    uint8_t len[8], was[8];
+    int rc = repair_read(&p->file, p->begin + LAS_WAVES_LEN_AT, was, sizeof was, err);
+    le_put64(len, p->end - LAS_WAVES_HEAD_LEN);
+    if (rc != SH_OK || memcmp(len, was, sizeof len) == 0) return rc;
+    rc = repair_write(&p->file, p->begin + LAS_WAVES_LEN_AT, len, sizeof len, err);
+    return rc == SH_OK ? 1 : rc;
+}
+
+/* Not even the head of the record is there, so no point has a packet. */
+static void leave_out_record(uint8_t *header)
+{
+    header[LAS_ENCODING_AT] &= (uint8_t) ~(LAS_WAVES_INSIDE | LAS_WAVES_OUTSIDE);
+    memset(header + LAS_WAVES_AT, 0, LAS_POINTS_AT - LAS_WAVES_AT);
+}
+
+int las_packets_repair(struct las_packets *p, struct repair *r, const struct repair_rows *points, uint8_t *header,
+                       struct sh_err *err)
+{
+    int rc = clear_points(p, r, points, err), changed = p->n_without > 0 || p->len > p->end;
+    if (p->n_without > 0)
+        sh_warn(r->report, "%s: %llu points have no waveform: it did not reach the disk", r->path,
+                (unsigned long long)p->n_without);
+    if (rc == SH_OK && p->len < LAS_WAVES_HEAD_LEN) {
+        leave_out_record(header);
+        return p->n_without > 0;
+    }
+    if (rc == SH_OK) rc = set_len(p, err);
+    if (rc < 0) return rc;
+    changed |= rc;
+    if (is_inside(p)) return changed;
+    header[LAS_ENCODING_AT] = (uint8_t)((header[LAS_ENCODING_AT] & ~LAS_WAVES_INSIDE) | LAS_WAVES_OUTSIDE);
+    rc = repair_cut(&p->file, p->end, err);
+    if (rc != SH_OK) return rc;
+    if (p->target != NULL) sh_warn(r->report, "%s: its waveforms are in %s", r->path, p->target);
+    return changed;
+}
+
+int las_packets_settle(struct las_packets *p, struct sh_err *err)
+{
+    if (p->target == NULL) return SH_OK;
+    if (p->len < LAS_WAVES_HEAD_LEN) { /* nothing refers to it any more */
+        unlink(p->path);
+        return SH_OK;
+    }
+    const int rc = newfile_settle_free(p->target, p->path, p->file.fd, err);
+    if (rc == SH_OK) p->file.fd = -1;
+    return rc;
+}
+
+void las_packets_free(struct las_packets *p)
+{
+    if (!is_inside(p) && p->file.fd >= 0) close(p->file.fd);
+    free(p->path);
+    free(p->target);
+}

@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: MIT */
+/* Windows of waveforms, kept until the points that lie in them are given out. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/grow.h"
+#include "drivers/protocol/native.h"
+#include "drivers/record/track_inside.h"
+
+/* This much is kept for one frame of points. A head has at most as many windows as 64 MiB of samples fill; a broken stream might have more. */
+enum { WAVES_MOST_BYTES = 64 << 20, WAVES_AT_ONCE = 64 };
+
+static const double EARTH_M = 6.371e6;
+
+struct kept_wave {
+    struct scanhead_wave wave;
+    size_t sample_at;
+    int is_used;
+};
+
+struct track_waves {
+    struct kept_wave *wave;
+    size_t n, room, at; /* at: no window before it is of the pulse that was asked for last, or of a later one */
+    uint8_t *sample;
+    size_t n_bytes, bytes_room;
+};
+
+static int keep_wave(struct track *t, const struct scanhead_wave *wave)
+{
+    struct track_waves *w = t->waves;
+    const size_t len = 2 * (size_t)wave->n;
+    if (w->n_bytes + len + (w->n + 1) * sizeof *w->wave > WAVES_MOST_BYTES) {
+        t->missing.n_waves_unplaced++;
+        return 1;
+    }
+    if (!grow(&w->wave, &w->room, w->n + 1, sizeof *w->wave) || !grow(&w->sample, &w->bytes_room, w->n_bytes + len, 1))
+        return 0;
+    memcpy(w->sample + w->n_bytes, wave->sample, len);
+    w->wave[w->n++] = (struct kept_wave){.wave = *wave, .sample_at = w->n_bytes};
+    w->n_bytes += len;
+    return 1;
+}
+
+int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct scanhead_wave wave[WAVES_AT_ONCE];
+    if (t->ops->points == NULL) return 0;
+    if (!t->has_waves) {
+        t->missing.n_waves_unheld += frame->n_points;
+        return 0;
+    }
+    const int64_t lost = scanhead_waves_lost(t->sh, frame);
+    if (lost > 0) t->missing.n_samples_lost += (uint64_t)lost;
+    if (t->waves == NULL) t->waves = calloc(1, sizeof *t->waves);
+    if (t->waves == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for waveforms", t->path);
+    for (uint32_t first = 0; first < frame->n_points;) {
+        const int n = scanhead_waves(t->sh, frame, first, wave, WAVES_AT_ONCE);
+        if (n <= 0) {
+            t->missing.n_waves_unplaced += frame->n_points - first;
+            return 0;
+        }
+        for (int i = 0; i < n; i++)
+            if (!keep_wave(t, &wave[i])) return sh_fail(err, SH_ENOMEM, "%s: no memory for waveforms", t->path);
+        first += (uint32_t)n;
+    }
+    return 0;
+}
+
+/* The length of one unit of each axis on the ground, m. */
+static void units_m(const struct scanhead_info *info, double to[3])
+{
+    const double degree_m = EARTH_M * NATIVE_RAD_PER_DEG;
+    const int in_degrees = info->crs == NATIVE_CRS_GEODETIC;
+    to[0] = in_degrees ? degree_m : 1;
+    to[1] = in_degrees ? degree_m * cos(info->anchor[0] * NATIVE_RAD_PER_DEG) : 1;
+    to[2] = 1;
+}
+
+/* Where the head was in the CRS when it fired. Poses are in the scene's frame, which is the local CRS. How that frame lies
+ * in other systems along the way, only the head knows. 0: not known. */
+static int find_head(const struct track *t, const struct scanhead_point *p, double at[3])
+{
+    struct scanhead_pose pose;
+    memcpy(at, t->info.anchor, sizeof t->info.anchor);
+    if (!t->info.moving) return 1;
+    if (t->info.crs != NATIVE_CRS_LOCAL || scanhead_pose(t->sh, p->t_ns, &pose) != SCANHEAD_OK) return 0;
+    memcpy(at, pose.position_m, sizeof pose.position_m);
+    return 1;
+}
+
+/* In the geo layout a point has no range, but its window says how coordinates change along a metre of it: the range is the
+ * share of the way from the head to the point that lies along the beam. A beam that the CRS bends leaves the tangent
+ * sideways, so its range is right to the second order. NaN: the head's place is not known. */
+static double range_along(const struct track *t, const struct scanhead_point *p, const struct scanhead_wave *wave)
+{
+    const double xyz[3] = {p->x, p->y, p->z};
+    double head[3], unit_m[3], along = 0, square = 0;
+    if (!find_head(t, p, head)) return (double)NAN;
+    units_m(&t->info, unit_m);
+    for (int i = 0; i < 3; i++) {
+        double way = xyz[i] - head[i];
+        if (i == 1 && t->info.crs == NATIVE_CRS_GEODETIC) way = remainder(way, 360);
+        const double step_m = wave->direction[i] * unit_m[i];
+        along += way * unit_m[i] * step_m;
+        square += step_m * step_m;
+    }
+    return along / square;
+}
+
+const struct scanhead_wave *track_find_wave(struct track *t, const struct scanhead_point *p, uint64_t pulse, double *at)
+{
+    struct track_waves *w = t->waves;
+    if (t->info.geo && t->info.moving && t->info.crs != NATIVE_CRS_LOCAL) {
+        t->missing.n_without_ranges++;
+        return NULL;
+    }
+    while (w != NULL && w->at < w->n && w->wave[w->at].wave.pulse < pulse)
+        w->at++;
+    for (size_t i = w != NULL ? w->at : 0; w != NULL && i < w->n && w->wave[i].wave.pulse == pulse; i++) {
+        struct kept_wave *k = &w->wave[i];
+        const double range_m = t->info.geo ? range_along(t, p, &k->wave) : p->range_m;
+        *at = (range_m - k->wave.range_m) / k->wave.step_m;
+        if (!(*at >= -0.5 && *at < k->wave.n - 0.5)) continue;
+        k->is_used = 1;
+        k->wave.sample = w->sample + k->sample_at;
+        return &k->wave;
+    }
+    return NULL;
+}
+
+int track_beam(const struct track *t, int i, double beam[3])
+{
+    const struct scanhead_point *p = &t->point[i];
+    const double xyz[3] = {p->x, p->y, p->z};
+    struct scanhead_pose pose;
+    if (t->info.geo) {
+        memcpy(beam, t->wave[i]->direction, sizeof t->wave[i]->direction);
+        return 1;
+    }
+    if (!(p->range_m > 0)) return 0;
+    if (!t->info.moving) {
+        mat3_apply(t->pose.rotation, xyz, beam);
+        for (int k = 0; k < 3; k++)
+            beam[k] /= p->range_m;
+        return 1;
+    }
+    if (scanhead_pose(t->sh, p->t_ns, &pose) != SCANHEAD_OK) return 0;
+    for (int k = 0; k < 3; k++)
+        beam[k] = (xyz[k] - pose.position_m[k]) / p->range_m;
+    return 1;
+}
+
+void track_clear_waves(struct track *t)
+{
+    struct track_waves *w = t->waves;
+    if (w == NULL) return;
+    for (size_t i = 0; i < w->n; i++)
+        t->missing.n_waves_alone += !w->wave[i].is_used;
+    w->n = w->at = w->n_bytes = 0;
+}
+
+void track_free_waves(struct track *t)
+{
+    if (t->waves == NULL) return;
+    free(t->waves->wave);
+    free(t->waves->sample);
+    free(t->waves);
+    t->waves = NULL;
+}

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: MIT */
+/* .waves.csv: the waveforms of all pulses, a row a window, also of pulses without an echo.
+ *
+ * scan and station as in .poses.csv; pulse: its number in the scan; t_s: its firing time since the scan's start. Sample k
+ * of the n lies at range_m + k step_m. Its signal, in units of the detection threshold, is (count - baseline)
+ * count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the head's frame, in the geo
+ * layout the change of the CRS's coordinates along a metre of range. The last column has the counts, with blanks
+ * between. */
+#include <stdio.h>
+#include <string.h>
+
+#include "core/bytes.h"
+#include "drivers/record/csv_repair.h"
+#include "drivers/record/recorder.h"
+
+enum { WAVES_AT_ONCE = 64, FRONT_MOST = 512, COUNT_MOST = 6, LINE_MOST = FRONT_MOST + 4096 * COUNT_MOST };
+
+struct waves_file {
+    struct recorder base;
+    int is_titled;
+    uint64_t n_lost, n_samples_lost;
+};
+
+static const char *const title[] = {"scan,station,pulse,t_s,range_m,step_m,n,baseline,count_signal,dx,dy,dz,samples\n",
+                                    NULL};
+
+static int put_title(struct waves_file *file, struct sh_err *err)
+{
+    if (file->is_titled) return SH_OK;
+    file->is_titled = 1;
+    return outfile_write(&file->base.file, title[0], strlen(title[0]), err);
+}
+
+static char *put_count(char *at, unsigned count)
+{
+    char digit[COUNT_MOST];
+    int n = 0;
+    do
+        digit[n++] = (char)('0' + count % 10);
+    while ((count /= 10) != 0);
+    while (n > 0)
+        *at++ = digit[--n];
+    return at;
+}
+
+static int put_wave(struct waves_file *file, const struct scanhead_wave *w, struct sh_err *err)
+{
+    const struct track *t = &file->base.track;
+    char *row = (char *)outfile_room(&file->base.file, LINE_MOST, err), *at = row;
+    if (row == NULL) return SH_EIO;
+    at += snprintf(row, FRONT_MOST, "%u,%u,%llu,%.9f,%.9g,%.12g,%u,%.9g,%.9g,%.9g,%.9g,%.9g,", t->n_scans,
+                   t->info.station, (unsigned long long)w->pulse, 1e-9 * (double)w->t_ns, w->range_m, w->step_m, w->n,
+                   w->baseline, w->count_signal, w->direction[0], w->direction[1], w->direction[2]);
+    for (uint32_t i = 0; i < w->n; i++) {
+        if (i > 0) *at++ = ' ';
+        at = put_count(at, le_get16(w->sample + 2 * (size_t)i));
+    }
+    *at++ = '\n';
+    outfile_used(&file->base.file, (size_t)(at - row));
+    return SH_OK;
+}
+
+static int put_waves(struct waves_file *file, struct scanhead *sh, const struct scanhead_frame *frame,
+                     struct sh_err *err)
+{
+    struct scanhead_wave wave[WAVES_AT_ONCE];
+    const int64_t lost = scanhead_waves_lost(sh, frame);
+    int rc = put_title(file, err);
+    if (lost > 0) file->n_samples_lost += (uint64_t)lost;
+    for (uint32_t first = 0; rc == SH_OK && first < frame->n_points;) {
+        const int n = scanhead_waves(sh, frame, first, wave, WAVES_AT_ONCE);
+        if (n <= 0) {
+            file->n_lost += frame->n_points - first;
+            return SH_OK;
+        }
+        for (int i = 0; i < n && rc == SH_OK; i++)
+            rc = put_wave(file, &wave[i], err);
+        first += (uint32_t)n;
+    }
+    return rc;
+}
+
+static int waves_file_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct waves_file *file = rec;
+    return frame->type == SCANHEAD_WAVES ? put_waves(file, sh, frame, err)
+                                         : track_frame(&file->base.track, sh, frame, err);
+}
+
+/* Scans of other heads may follow. */
+static int waves_file_scan(void *rec, struct sh_err *err)
+{
+    return put_title(rec, err);
+}
+
+static int waves_file_finish(void *rec, struct sh_err *err)
+{
+    struct waves_file *file = rec;
+    const int rc = put_title(file, err);
+    if (rc != SH_OK) return rc;
+    recorder_report(rec, file->n_lost, "waveforms left out whose points were lost");
+    recorder_report(rec, file->n_samples_lost, "samples of waveforms that found no room in the head");
+    return SH_OK;
+}
+
+static int waves_file_repair(struct repair *r, struct sh_err *err)
+{
+    static const struct csv_format format = {title, "0123456789+-.einfa, ", "waveforms", "file of waveforms",
+                                             LINE_MOST};
+    return csv_repair(r, &format, err);
+}
+
+const struct recorder_ops recorder_waves = {
+    .ending = ".waves.csv",
+    .size = sizeof(struct waves_file),
+    .track = {.scan = waves_file_scan},
+    .frame = waves_file_frame,
+    .finish = waves_file_finish,
+    .repair = waves_file_repair,
+};

@@ -1,0 +1,313 @@
+/* SPDX-License-Identifier: MIT */
+/* What a kill or a full disk leaves of a LAS file with waveforms, cut anywhere: its repair keeps whole points and whole
+ * packets. Points without theirs say so. */
+#include <sys/stat.h>
+
+#include "tests/unit/repair_rig.h"
+#include "tests/unit/waves_rig.h"
+
+enum { N = 40, LINES = 400, N_SAMPLES = 12, POINT = 61, PACKET = 2 * N_SAMPLES, EVLR = 60, WAVE_AT = 30 };
+
+static struct bytes left, left_wdp, whole; /* as a kill leaves them; completed, with its packets inside */
+static char wdp[168], wdp_part[176];
+
+/* With it the points come out. */
+static void put_line_end(uint32_t line)
+{
+    static uint8_t out[256];
+    const struct line_end end = {.line = line, .pulse0 = line * N, .n_fired = N, .n_cast = N, .n_echoes = N};
+    rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
+}
+
+static void put_stream(uint32_t lines, uint16_t n_samples)
+{
+    static struct rig_point p[N];
+    static struct rig_window w[N];
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    for (uint32_t i = 0; i < N; i++) {
+        p[i] = (struct rig_point){5000, 0, 0, 0, 1, 1, 1};
+        w[i] = (struct rig_window){i, 28, n_samples, {0, 0, 0}};
+    }
+    rig_begin();
+    rig_wave_descriptor(0, 1, 4);
+    rig_anchor(&a);
+    for (uint32_t line = 0; line < lines; line++) {
+        /* Another digitiser needs a new descriptor: the header is written again while points come. */
+        struct rig_digitiser d = rig_12_bits;
+        if (line > 0) d.baseline_16++;
+        rig_points(line, line * N, line * N, p, N);
+        rig_waves(line, line * N, &d, w, N);
+        put_line_end(line);
+    }
+}
+
+static size_t front_of(const struct bytes *b)
+{
+    return (size_t)rig_uint(b->data + 96, 4);
+}
+
+static size_t left_len(const char *path)
+{
+    struct stat st;
+    assert_int_equal(stat(path, &st), 0);
+    return (size_t)st.st_size;
+}
+
+/* All frames have come, and are on the disk; the end has not. */
+static void leave(void)
+{
+    struct scanhead *sh;
+    struct scanhead_frame frame;
+    struct recorder *rec;
+    const struct recorder_options options = {0};
+    fclose(rig_stream);
+    rig_stream = NULL;
+    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+    assert_int_equal(recorder_open(recorder_find(repair_path, &repair_err), repair_path, &options, &rec, &repair_err),
+                     0);
+    while (scanhead_next(sh, &frame, -1) == 0)
+        if (recorder_frame(rec, sh, &frame, &repair_err) != 0) fail_msg("%s", repair_err.text);
+    for (int i = 0; i < 2; i++) /* the second call finds that nothing was written since the first */
+        assert_int_equal(recorder_save(rec, &repair_err), 0);
+    left = repair_slurp(repair_part);
+    left_wdp = repair_slurp(wdp_part);
+    assert_int_equal(recorder_close(rec, 0, &repair_err), 0);
+    scanhead_close(sh);
+    assert_int_equal(access(wdp_part, F_OK), -1);
+}
+
+static int set_up(void **state)
+{
+    if (rig_set_up(state) != 0) return -1;
+    repair_name("a.las");
+    snprintf(wdp, sizeof wdp, "%s", rig_path("a.wdp"));
+    snprintf(wdp_part, sizeof wdp_part, "%s.part", wdp);
+    put_stream(2, N_SAMPLES);
+    leave();
+    put_stream(2, N_SAMPLES);
+    assert_int_equal(rig_record(repair_path, (struct recorder_options){0}, RIG_KEEP, &repair_err), 0);
+    whole = repair_slurp(repair_path);
+    unlink(repair_path);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    free(left.data);
+    free(left_wdp.data);
+    free(whole.data);
+    return rig_tear_down(state);
+}
+
+/* Points that are whole in the .las; of these, the last ones lack packets that are not whole in the .wdp. */
+static void check(size_t n_points, size_t n_packets)
+{
+    static const uint8_t none[29];
+    const int has_packets = access(wdp, F_OK) == 0;
+    struct bytes got = repair_slurp(repair_path), packets = has_packets ? repair_slurp(wdp) : (struct bytes){NULL, 0};
+    const size_t front = front_of(&whole);
+    const uint64_t first = rig_uint(whole.data + 227, 8);
+    if (n_packets > n_points) n_packets = n_points;
+    assert_int_equal(got.len, front + n_points * POINT);
+    assert_int_equal(rig_uint(got.data + 247, 8), n_points);
+    assert_int_equal(rig_uint(got.data + 6, 2), 1 << 4 | has_packets << 2);
+    assert_int_equal(rig_uint(got.data + 227, 8), 0);
+    assert_string_equal((char *)got.data + 58, "scanhead, its end is missing");
+    for (size_t i = 0; i < n_points; i++) {
+        const uint8_t *is = got.data + front + i * POINT, *was = whole.data + front + i * POINT;
+        assert_memory_equal(is, was, WAVE_AT);
+        assert_memory_equal(is + WAVE_AT, i < n_packets ? was + WAVE_AT : none, 29);
+    }
+    if (has_packets) {
+        assert_int_equal(packets.len, EVLR + n_packets * PACKET);
+        assert_int_equal(rig_uint(packets.data + 20, 8), n_packets * PACKET);
+        assert_memory_equal(packets.data + EVLR, whole.data + first + EVLR, n_packets * PACKET);
+    }
+    free(got.data);
+    free(packets.data);
+}
+
+static void repair_cut_to(size_t las_len, size_t wdp_len)
+{
+    struct repaired file;
+    repair_write_file(repair_part, left.data, las_len);
+    repair_write_file(wdp_part, left_wdp.data, wdp_len);
+    if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+    assert_true(file.was_left);
+    repair_free(&file);
+    assert_int_equal(access(wdp_part, F_OK), -1);
+    assert_int_equal(access(repair_part, F_OK), -1);
+}
+
+static void test_cut(void **state)
+{
+    (void)state;
+    const size_t front = front_of(&left), n = 2 * N;
+    assert_int_equal(left.len, front + n * POINT);
+    assert_int_equal(left_wdp.len, EVLR + n * PACKET);
+    for (size_t cut = 0; cut < 40; cut++) {
+        const size_t las_len = front + (cut * 977) % (n * POINT + 1), wdp_len = (cut * 613) % (left_wdp.len + 1);
+        struct repaired again;
+        repair_cut_to(las_len, wdp_len);
+        check((las_len - front) / POINT, wdp_len < EVLR ? 0 : (wdp_len - EVLR) / PACKET);
+        assert_int_equal(access(wdp, F_OK) == 0, wdp_len >= EVLR);
+        if (repair_file(repair_path, NULL, &again, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        if (!again.was_whole) fail_msg("cut to %zu and %zu: the repaired file is not whole", las_len, wdp_len);
+        repair_free(&again);
+        unlink(repair_path);
+        unlink(wdp);
+    }
+}
+
+/* A kill while the packets were copied: the points are counted, and the copy is cut off. */
+static void test_cut_copy(void **state)
+{
+    (void)state;
+    const size_t front = front_of(&left), n = 2 * N, half = whole.len - 5 * PACKET - 3;
+    struct repaired file;
+    repair_write_file(repair_part, whole.data, half);
+    FILE *part = fopen(repair_part, "r+b");
+    fwrite(left.data, 1, 375, part); /* the header of before, with the counts */
+    fseek(part, 247, SEEK_SET);
+    fwrite(whole.data + 247, 1, 128, part);
+    fclose(part);
+    repair_write_file(wdp_part, left_wdp.data, left_wdp.len);
+    if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+    assert_int_equal(file.n_kept, n);
+    assert_int_equal(file.cut_bytes, half - front - n * POINT);
+    repair_free(&file);
+    check(n, n);
+    unlink(repair_path);
+    unlink(wdp);
+}
+
+/* A completed file that a copy has cut keeps the packets that are whole in it. */
+static void test_cut_inside(void **state)
+{
+    (void)state;
+    const size_t first = (size_t)rig_uint(whole.data + 227, 8), n = 2 * N;
+    for (size_t n_bytes = 0; n_bytes < whole.len - first; n_bytes += 59) {
+        struct repaired file;
+        const size_t packets = n_bytes < EVLR ? 0 : (n_bytes - EVLR) / PACKET;
+        repair_write_file(repair_path, whole.data, first + n_bytes);
+        if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        assert_int_equal(file.n_kept, n);
+        assert_false(file.was_whole);
+        repair_free(&file);
+        struct bytes got = repair_slurp(repair_path);
+        assert_int_equal(got.len, first + (n_bytes < EVLR ? 0 : EVLR + packets * PACKET));
+        assert_int_equal(rig_uint(got.data + 6, 2), 1 << 4 | (n_bytes < EVLR ? 0 : 1 << 1));
+        if (n_bytes >= EVLR) assert_int_equal(rig_uint(got.data + first + 20, 8), packets * PACKET);
+        for (size_t i = 0; i < n; i++)
+            assert_int_equal(got.data[front_of(&got) + i * POINT + WAVE_AT] != 0, i < packets);
+        free(got.data);
+        if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        assert_true(file.was_whole);
+        repair_free(&file);
+    }
+    struct repaired file;
+    repair_write_file(repair_path, whole.data, whole.len);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(file.was_whole);
+    repair_free(&file);
+    unlink(repair_path);
+}
+
+/* Packets that are not there, or whose name is taken: nothing is changed, and the error says what to do. */
+static void test_refused(void **state)
+{
+    (void)state;
+    struct repaired file;
+    repair_write_file(repair_part, left.data, left.len);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EINPUT);
+    assert_non_null(strstr(repair_err.text, "its waveforms are not there: put "));
+    repair_write_file(wdp_part, left_wdp.data, left_wdp.len);
+    repair_write_file(wdp, "other", 5);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_ESTATE);
+    assert_non_null(strstr(repair_err.text, "exists, and is not replaced"));
+    assert_int_equal(left_len(wdp_part), left_wdp.len);
+    assert_int_equal(left_len(repair_part), left.len);
+    unlink(wdp);
+    /* Beside another FILE both parts keep their names. */
+    repair_write_file(repair_path, "", 0);
+    assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), 0);
+    assert_true(file.is_part);
+    repair_free(&file);
+    assert_int_equal(access(wdp, F_OK), -1);
+    assert_int_equal(left_len(wdp_part), left_wdp.len);
+    unlink(repair_path);
+    unlink(repair_part);
+    unlink(wdp_part);
+    /* A record that begins within a point, and one that is both inside and outside. */
+    for (int i = 0; i < 2; i++) {
+        struct bytes wrong = {malloc(whole.len), whole.len};
+        memcpy(wrong.data, whole.data, whole.len);
+        wrong.data[i == 0 ? 227 : 6] ^= i == 0 ? 1 : 1 << 2;
+        repair_write_file(repair_path, wrong.data, wrong.len);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EFORMAT);
+        assert_non_null(strstr(repair_err.text, "is damaged at byte 227"));
+        assert_int_equal(left_len(repair_path), wrong.len);
+        free(wrong.data);
+        unlink(repair_path);
+    }
+}
+
+/* A limit on the files' size stands for a full disk. What is left is repaired: so many points, so many of them with
+ * packets. */
+static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_t n_points, size_t n_packets)
+{
+    struct sh_err err = {0};
+    struct rlimit old, small;
+    struct repaired file;
+    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+    put_stream(LINES, n_samples);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    getrlimit(RLIMIT_FSIZE, &old);
+    small = (struct rlimit){size, old.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const int rc = rig_record(repair_path, (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err);
+    setrlimit(RLIMIT_FSIZE, &old);
+    signal(SIGXFSZ, was);
+    assert_int_equal(rc, SH_EIO);
+    assert_non_null(strstr(err.text, names));
+    assert_non_null(strstr(rig_notes, "--repair"));
+    assert_int_equal(access(repair_path, F_OK) | access(wdp, F_OK), -1);
+    if (repair_file(repair_path, NULL, &file, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(file.n_kept, n_points);
+    repair_free(&file);
+    struct bytes got = repair_slurp(repair_path);
+    size_t with = 0;
+    while (with < n_points && got.data[front_of(&got) + with * POINT + WAVE_AT] != 0)
+        with++;
+    assert_int_equal(with, n_packets);
+    assert_int_equal(left_len(wdp), EVLR + n_packets * 2 * n_samples);
+    free(got.data);
+    unlink(repair_path);
+    unlink(wdp);
+}
+
+/* A packet of 60 samples is longer than a point, so packets find no room first. Points that fit are kept. */
+static void test_disk_full(void **state)
+{
+    (void)state;
+    check_full(100000, 60, "a.wdp", (100000 - front_of(&left)) / POINT, (100000 - EVLR) / 120);
+}
+
+/* Only the copy of the packets has no room: all is kept, in two files. */
+static void test_no_room_for_copy(void **state)
+{
+    (void)state;
+    const rlim_t size = front_of(&left) + (rlim_t)LINES * N * POINT + 5000;
+    assert_true(EVLR + (rlim_t)LINES * N * PACKET < size);
+    check_full(size, N_SAMPLES, "a.las", LINES * N, LINES * N);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_cut),     cmocka_unit_test(test_cut_copy),  cmocka_unit_test(test_cut_inside),
+        cmocka_unit_test(test_refused), cmocka_unit_test(test_disk_full), cmocka_unit_test(test_no_room_for_copy),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
