@@ -193,19 +193,7 @@ $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.o $(BUILD)/head.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   head and studio, no main                                    all of them
-<<<<<<< HEAD
 FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves waveform waveform_detect loop_cost loading kernels panorama copies)
-||||||| merged common ancestors
-<<<<<<<<< Temporary merge branch 1
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves loop_cost loading kernels panorama copies)
-||||||||| ac4f50ba
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne loop_cost loading kernels panorama copies)
-=========
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waveform waveform_detect loop_cost loading kernels panorama copies)
->>>>>>>>> Temporary merge branch 2
-=======
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waveform waveform_detect waves loop_cost loading kernels panorama copies)
->>>>>>> w3
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
 LIMIT = tests/common/limit.c

@@ -287,6 +287,9 @@ export class Cloud {
 export const isOutside = (window, block) => window !== null && block.span.from <= block.span.to &&
   (block.span.to < window.from - block.began_s || block.span.from > window.to - block.began_s);
 
+export const isPointOutside = (window, block, i) => window !== null &&
+  (block.t[i] < window.from - block.began_s || block.t[i] > window.to - block.began_s);
+
 // Returns all figures of point i of a block.
 export function pointOf(cloud, block, i) {
   const at = (axis) => block.position[3 * i + axis] + cloud.origin[axis];

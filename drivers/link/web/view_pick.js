@@ -3,7 +3,7 @@
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
-import {isOutside} from './cloud.js';
+import {isOutside, isPointOutside} from './cloud.js';
 import {dot, sub} from './view_camera.js';
 import {isWithin} from './section.js';
 
@@ -48,7 +48,7 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
       if (w <= 1e-3) continue;
       const off2 = dx * dx + dy * dy + dz * dz - w * w;
       if (off2 > slope2 * w * w) continue;
-      if (window && (block.t[i] < window.from - block.began_s || block.t[i] > window.to - block.began_s)) continue;
+      if (isPointOutside(window, block, i)) continue;
       if (section !== null && !isWithin(section, p[at], p[at + 1], p[at + 2])) continue;
       const px = Math.sqrt(Math.max(0, off2)) / w * k;
       const score = px + PIXELS_PER_DEPTH * Math.log(w);
@@ -73,14 +73,14 @@ function* searchFlat(cloud, camera, x, y, radius_px, limit) {
   let best = null;
   let least = Infinity;
   for (const block of [...cloud.blocks]) {
-    if (!meets(block, from, f, 0, radius_m)) continue;
+    if (!meets(block, from, f, 0, radius_m) || isOutside(cloud.window, block)) continue;
     const p = block.position;
     const n = Math.min(block.n, limit);
     for (let i = 0, at = 0; i < n; i++, at += 3) {
       const dx = p[at] - from[0], dy = p[at + 1] - from[1], dz = p[at + 2] - from[2];
       const w = dx * f[0] + dy * f[1] + dz * f[2];
       const off2 = dx * dx + dy * dy + dz * dz - w * w;
-      if (off2 > radius_m * radius_m) continue;
+      if (off2 > radius_m * radius_m || isPointOutside(cloud.window, block, i)) continue;
       if (section !== null && !isWithin(section, p[at], p[at + 1], p[at + 2])) continue;
       const px = Math.sqrt(Math.max(0, off2)) * k;
       const score = px + per_m * w;
