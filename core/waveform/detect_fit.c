@@ -33,7 +33,7 @@ static inline void fit_add(struct fit_sums *sums, double rest, double a, double 
     sums->rest2 += rest * rest;
 }
 
-/* Derivatives of a term of peak 1 by log peak, middle in sigmas and log sigma. */
+/* Sums products of a term's derivatives, by log peak, by its middle in sigmas and by log sigma. The term has peak 1. */
 static void fit_sum(const struct finder_run *run, const struct finder_term *g, uint32_t lo, uint32_t hi,
                     struct fit_sums *sums)
 {
@@ -59,7 +59,7 @@ static void fit_sum(const struct finder_run *run, const struct finder_term *g, u
     }
 }
 
-/* The step, by Cramer's rule. Returns by how much it lowers the sum of squares, below 0 where the samples don't
+/* Finds the step by Cramer's rule. Returns by how much it lowers the sum of squares; below 0 if the samples don't
  * determine it. */
 static double fit_step(const struct fit_sums *m, double peak, double p[3])
 {
@@ -75,7 +75,7 @@ static double fit_step(const struct fit_sums *m, double peak, double p[3])
     return peak * (p[0] * r[0] + p[1] * r[1] + p[2] * r[2]);
 }
 
-/* Samples within FINDER_NEAR sigma, or at least 4. Returns 0 where the peak's samples don't reach both flanks. */
+/* Chooses the samples within FINDER_NEAR sigma, at least 4. Returns 0 if the peak's samples don't reach both flanks. */
 static int fit_samples(const struct finder_peak *peak, const struct finder_term *g, uint32_t *lo, uint32_t *hi)
 {
     double reach = fmax(FINDER_NEAR * g->sigma, 1.5), from = ceil(g->at - reach), to = floor(g->at + reach);
@@ -135,7 +135,7 @@ static int fit_alone(const struct finder_run *run, const struct finder_peak *pea
     return 1;
 }
 
-/* Wilson's and Hilferty's approximation of the quantile of chi^2 over n (1931), at 4 sigma: one in 30,000 lies
+/* The quantile of chi^2 over n follows Wilson's and Hilferty's approximation (1931), at 4 sigma: one in 30,000 lies
  * beyond. */
 double finder_noise2(const struct finder *finder, double n)
 {

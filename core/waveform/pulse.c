@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The outgoing pulse, the receiver's bandwidth, and both together as a fine table. */
+/* This file has the outgoing pulse, the receiver's bandwidth, and both together as a fine table. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,15 +68,15 @@ static double parts_of(const struct outgoing *o, double fine_s)
     return o->pieces * ceil((o->to_s - o->from_s) / o->pieces / fine_s);
 }
 
-/* sigma of the receiver's answer to an impulse. A Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to which chains of many
- * stages tend; it is centred on what Elmore calls the delay, so it delays nothing here (W. C. Elmore, The transient
- * response of damped linear networks, J. Appl. Phys. 19, 1948). */
+/* Returns sigma of the receiver's answer to an impulse. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f /
+ * B)^2), to which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays
+ * nothing here (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
 static double receiver_sigma_s(double bandwidth_hz)
 {
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
 }
 
-/* The spectrum of h at an angular frequency, by its value at 0. */
+/* Returns the spectrum of h at an angular frequency, divided by its value at 0. */
 static double spectrum(const struct outgoing *o, double sigma_s, double per_s)
 {
     const double parts = parts_of(o, fmin(o->fine_s, 0.1 * o->spec->sample_s)), part_s = (o->to_s - o->from_s) / parts;

@@ -29,7 +29,7 @@ struct preview_request {
     double height_m;                    /* of the head above the floor */
 };
 
-/* SH_EINPUT with an empty text: nothing is at that path. */
+/* Returns SH_EINPUT with an empty text where nothing is at that path. */
 int preview_read_request(const struct preview_options *options, const char *path, const char *query,
                          struct preview_request *out, struct sh_err *err);
 
