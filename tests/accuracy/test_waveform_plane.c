@@ -32,8 +32,8 @@ static double plane_range(const struct plane *plane, double x, double y)
     return (plane->range_m - d * tangent * x) / (1.0 - s * tangent * y) * sqrt(1.0 + s * s * (x * x + y * y));
 }
 
-/* What is neglected: the far side of the footprint is hit from further away, and more steeply. Both change the power of
- * a sub-ray by its range: (R / r)^2 for the distance, and as much as R / r for the cosine. */
+/* The closed form neglects that the far side of the footprint is hit from further away, and more steeply. Both
+ * change the power of a sub-ray by its range: (R / r)^2 for the distance, and as much as R / r for the cosine. */
 static double plane_weight(const struct plane *plane, double range_m, int weighed)
 {
     return weighed ? pow(plane->range_m / range_m, 3) : 1.0;

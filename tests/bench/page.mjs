@@ -176,8 +176,8 @@ async function memory() {
 }
 
 // ---- 5
-// Lets go of a tried station at a place. Returns the times until all its points are on the page, until all its cells are known, and
-// until these are painted.
+// Lets go of a tried station at a place. Returns the times until all its points are on the page, until all its cells are
+// known, and until these are painted.
 const letGo = (number, [x, y, z]) => `(async () => {
   const {trial, view} = scanhead, station = trial.get(${number}), t0 = performance.now();
   const soon = () => new Promise((done) => setTimeout(done, 1));

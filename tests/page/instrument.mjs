@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// Tests of the page as an instrument: colours, ages and the time line as they are drawn; files that it saves; control, keys,
-// screen readers, small screens, and that nothing jumps. They read back the pixels of the picture.
+// These tests take the page as an instrument. They check colours, ages and the time line as they are drawn, the files
+// that it saves, control, keys, screen readers and small screens, and that nothing jumps. They read back the pixels of
+// the picture.
 import {execFileSync} from 'node:child_process';
 import {existsSync, mkdirSync, readdirSync, readFileSync} from 'node:fs';
 import {tableOf} from '../../drivers/link/web/view_colours.js';

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// These tests are about stations that are tried in the page: what is shown and painted, beside what `coverage` says of the
-// same scans. The head must not notice any of it.
+// These tests are about stations that are tried in the page. They compare what is shown and painted with the words of
+// `coverage` about the same scans. The head must not notice any of it.
 import {run} from './head.mjs';
 import {CONFIG} from './rig.mjs';
 import {pixelsOf} from './png8.mjs';

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms where plain sampling fails: pulses shorter than the samples, grazing planes, far ranges, extents that
+/* Plain sampling fails for some waveforms: pulses shorter than the samples, grazing planes, far ranges, extents that
  * vanish or that are much larger than the pulse. */
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Where plain detectors of echoes break: tops that the digits make flat, echoes of any strength at one level, pulses
- * that the receiver limits or the window cuts, and a parabola through logarithms of samples that are not positive. */
+/* Plain detectors of echoes break here: at tops that the digits make flat, at echoes of any strength at one level,
+ * at pulses that the receiver limits or the window cuts, and where a parabola goes through logarithms of samples
+ * that are not positive. */
 #include <math.h>
 #include <stdio.h>
 
@@ -118,7 +119,7 @@ static void flat_tops(void **state)
     table_check();
 }
 
-/* The same surface 5 to 20 dB above the level. Without noise, as the walk is a bias. */
+/* The same surface is 5 to 20 dB above the level. There is no noise, as the walk is a bias. */
 static void walk(void **state)
 {
     (void)state;

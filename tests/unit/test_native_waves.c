@@ -269,7 +269,7 @@ static void test_longest(void **state)
     assert_int_equal(seen.waves_frames, 4);
 }
 
-/* No window, no frame; but what was lost is said, once. */
+/* Without a window there is no frame, but lost samples are said, once. */
 static void test_none(void **state)
 {
     (void)state;

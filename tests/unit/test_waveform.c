@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Signals of waveforms against closed forms and sums of their own: energy, the pulse's shape, how returns spread. */
+/* Signals of waveforms are compared with closed forms and sums of their own: energy, the pulse's shape, the spread
+ * of returns. */
 #include <math.h>
 #include <string.h>
 
@@ -34,7 +35,7 @@ static struct waveform_spec shape_of(int k)
 }
 enum { SHAPES = 12 };
 
-/* The area below the table's straight lines, with its peak at 1; it begins and ends with 0. */
+/* Returns the area below the table's straight lines, with its peak at 1; it begins and ends with 0. */
 static double area_s(const struct waveform_spec *spec)
 {
     double sum = 0.0;
@@ -178,7 +179,8 @@ static double spread_of(const struct waveform_spec *spec, enum waveform_spread s
     return sum / all;
 }
 
-/* The largest error of one spread, at `points` places over all of it. So far away, ranges are even across the disc. */
+/* Returns the largest error of one spread, at `points` places over all of it. Far away, ranges are even across the
+ * disc. */
 static double spread_error(const struct waveform *w, enum waveform_spread spread, double extent_s, int points)
 {
     const struct waveform_spec *spec = waveform_spec_of(w);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which samples of a pulse are kept, and what the digitiser makes of them. */
+/* These tests check which samples of a pulse are kept, and which counts the digitiser makes of them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,7 +50,7 @@ static void counts_are_the_signal(void **state)
     waveform_free(w);
 }
 
-/* What a digitiser can't show it shows as its first or last count. */
+/* A signal that a digitiser can't show gives its first or last count. */
 static void counts_end_at_both_ends(void **state)
 {
     (void)state;
@@ -74,7 +74,8 @@ static void counts_end_at_both_ends(void **state)
     waveform_free(w);
 }
 
-/* The windows, by a plain reading of the header: each sample with a signal is kept, with what is before and behind. */
+/* Finds the windows by a plain reading of the header: each sample with a signal is kept, with those before and after
+ * it. */
 static uint32_t plain_windows(const struct waveform *w, uint8_t *kept, uint32_t before, uint32_t after)
 {
     uint32_t n = 0;

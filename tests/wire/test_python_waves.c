@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client in Python beside libscanhead: every number of every window of a waveform, and of every deviation, is the
- * same. */
+/* The client in Python gives the same as libscanhead: every number of every window of a waveform, and of every
+ * deviation. */
 #include "tests/wire/python_rig.h"
 
 #include "core/rng.h"
