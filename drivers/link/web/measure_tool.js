@@ -248,7 +248,7 @@ export class MeasureTool {
 // Writes two figures.
 const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
 
-// Flatness is told beside what noise alone gives.
+// Flatness stands beside the flatness that noise alone gives.
 function flatRows({flat, beyond, depth_m}) {
   const {n, rms, largest, sigma} = flat, isKnown = sigma > 0;
   const beside = (v, expected) => (isKnown ? `${millimetres(v)}; noise gives ${millimetres(expected)}` : millimetres(v));

@@ -76,8 +76,9 @@ export function batchOf(preview, station, scan) {
 
 export const hasBit = (bits, i) => ((bits[i >>> 5] >>> (i & 31)) & 1) === 1;
 
-// Returns by how many of the stations each cell is seen, and the area seen by none, by one and by several. hidden_m2 of
-// what none sees can't be seen from anywhere; reach says what can, null: not known.
+// Returns for each cell by how many of the stations it is seen, and the area seen by none, by one and by several.
+// hidden_m2 is the part seen by none that can't be seen from anywhere. reach says which cells can be seen; null: this
+// is not known.
 export function countSeen(cells, seen, reach = null) {
   const counts = new Uint8Array(cells.n);
   for (const bits of seen) {

@@ -109,8 +109,8 @@ export class CellsPart {
     this.n = n / 3;
   }
 
-  // counts: by how many stations each cell is seen. isTurned: they see the backs of the faces. showsUnseen(cell) says of
-  // a cell that none sees whether it is painted; false: none is.
+  // counts has the number of stations that see each cell. isTurned: they see the backs of the faces. showsUnseen(cell)
+  // says whether a cell that none sees is painted; false: none is.
   show({counts, isTurned, showsUnseen}) {
     const {gl} = this;
     this.isTurned = isTurned;
