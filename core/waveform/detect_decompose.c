@@ -74,7 +74,7 @@ static int decompose_limited(const struct finder_run *run, const struct finder_p
     if (!blind) {
         height = decompose_height(finder, (double)b - (double)a + 1.0, &centroid);
     } else {
-        /* Half of what could be told from noise stands for a sample that can't. */
+        /* A sample below 3 sigma can't be told from noise. Half of that stands for it. */
         const double least = 1.5 * finder->noise;
         uint32_t k = a > peak->from && run->y[a - 1] > 2.0 * least ? a - 1 : a;
         height = decompose_flank(finder, k > peak->from ? fmax(run->y[k - 1], least) : least,
@@ -112,7 +112,7 @@ static int decompose_begin(const struct finder_run *run, const struct finder_pea
     return n == 1 && blind;
 }
 
-/* The sum of squares that terms leave of echoes on planes, whose shape is another. */
+/* Returns the sum of squares that terms leave on planes, since a plane's echo has another shape than a term. */
 static double decompose_shapes(const struct finder_task *task, const struct finder_mix *mix)
 {
     double sum = 0.0;
@@ -153,7 +153,7 @@ static struct finder_term decompose_largest(const struct finder_task *task, cons
     return best;
 }
 
-/* Two pulses in place of one component that is wider than the pulse: with its energy and its variance. */
+/* Puts two pulses in place of one component that is wider than the pulse. They have its energy and its variance. */
 static int decompose_split(const struct finder_task *task, struct finder_mix *mix)
 {
     const double sigma = task->run->finder->spread[0].sigma;
@@ -186,7 +186,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
     return 1;
 }
 
-/* A component for what is left over. */
+/* Adds a component for the rest. */
 static int decompose_extra(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     double rest[WAVEFORM_MAX_SAMPLES];
@@ -235,8 +235,8 @@ static void decompose_fewer(const struct finder_task *task, double least, struct
     }
 }
 
-/* Two pulses with the energy, the mean, the variance and the third moment of the samples. Shares p and q, d apart: the
- * variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
+/* Makes two pulses with the energy, the mean, the variance and the third moment of the samples. For shares p and q,
+ * d apart, the variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
 static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
 {
     const struct finder *finder = task->run->finder;
@@ -267,7 +267,7 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
-    /* One term was not enough already. Mostly two are. */
+    /* One term was not enough before this. Mostly two are. */
     struct finder_mix two;
     if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);

@@ -143,7 +143,7 @@ double finder_noise2(const struct finder *finder, double n)
     return finder->noise * finder->noise * root * root * root;
 }
 
-/* The RMS that noise explains, and what echoes on planes leave. */
+/* Returns the RMS that noise explains, together with the misfit of echoes on planes. */
 static double fit_explained(const struct finder_run *run, const struct finder_term *g, double misfit)
 {
     const double left = (1.2 * misfit + FINDER_ROUGH) * g->peak;

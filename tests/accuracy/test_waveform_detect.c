@@ -179,8 +179,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
             /* the tail of a skew echo may reach the level once more, with noise on it */
             assert_true(f[d].single >= pulses() / 4 - pulses() / 4000);
-            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape
-             * through it lies off the centroid: by less than the third of what the rims are off. */
+            /* Ranges across the plane rise as 1 / (1 - x extent / R), so its echo is skew. A symmetric shape through
+             * it lies off the centroid, by less than a third of the rims' shift. */
             const double skew_m = extent * extent / RANGE_M / 3.0;
             wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
@@ -266,8 +266,8 @@ static void echoes_that_overlap_are_separated(void **state)
     two(&spec, "asymmetric", 60.0);
 }
 
-/* Three of 5 to 60 thresholds, 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own. Few are found
- * as two, fewer as four. */
+/* Three echoes of 5 to 60 thresholds are 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own.
+ * Few triples are found as two, fewer as four. */
 static void three_echoes_are_three(void **state)
 {
     (void)state;

@@ -79,9 +79,9 @@ static struct waveform_return closed_form(const struct plane *plane)
                                     WAVEFORM_DISC};
 }
 
-/* The closed form is below one count for sub-rays of equal power: b = s tan i is all that it neglects, with ranges of
- * second order in b. Power by distance and cosine is 3 b at the rim at most, so the samples change by less than 3 b of
- * themselves. */
+/* The error of the closed form is below one count for sub-rays of equal power. It neglects only ranges of second
+ * order in b = s tan i. Power by distance and cosine is 3 b at the rim at most, so the samples change by less than 3
+ * b of themselves. */
 static void planes_are_the_closed_form(void **state)
 {
     (void)state;
@@ -120,9 +120,9 @@ static void planes_are_the_closed_form(void **state)
 
 /* ---- what fills a footprint in other ways */
 
-/* A sub-ray of n stands for 1/n of the energy. An edge may take half a row of them, of about the root of n, to either
- * side: so 0.5 / sqrt(n) of the light lies elsewhere, or is a bit nearer or further. Leaves have many edges: twice
- * that. */
+/* One of n sub-rays stands for 1/n of the energy. To either side, an edge may take half a row of them, and a row has
+ * about the root of n. So 0.5 / sqrt(n) of the light lies elsewhere, or a bit nearer or further. Leaves have many
+ * edges: twice that. */
 static void rings_come_nearer(void **state)
 {
     (void)state;
@@ -146,7 +146,7 @@ static void rings_come_nearer(void **state)
     waveform_free(w);
 }
 
-/* Mean of (x - mean)^3 of the energy on one side of the edge at h. */
+/* Returns the mean of (x - mean)^3 of the energy on one side of the edge at h. */
 static double skewness(double h)
 {
     double n = 0.0, sum = 0.0, square = 0.0, cube = 0.0;

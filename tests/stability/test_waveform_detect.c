@@ -138,7 +138,7 @@ static void walk(void **state)
             compare(&w, by_level, WAVEFORM_THRESHOLD, &r, p, &worst);
         }
         snprintf(regime, sizeof regime, "a level 1, an echo %d dB above it", db);
-        /* Digits of 0.0074 thresholds: half of one in the sample below the level, which is not below 0.1 nor its
+        /* A digit is 0.0074 thresholds. Half of one, in a sample below the level that is not below 0.1 nor has a
          * slope below 0.2 a sample, is 0.02 samples. */
         table_row(regime, "crossing, half a pulse later", worst.naive_m, worst.ours_m, 3e-3, "m");
     }

@@ -307,8 +307,8 @@ static void test_next(void **state)
     close_room(&r);
 }
 
-/* The head's height above the ground, and what the cone of its tripod hides there: cos(opening) = height of the top /
- * length of a leg. */
+/* The head has a height above the ground, and the cone of its tripod hides a part of it: cos(opening) = height of
+ * the top / length of a leg. */
 static void test_tripod(void **state)
 {
     (void)state;

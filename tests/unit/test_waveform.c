@@ -62,8 +62,8 @@ static double peak_of(const struct waveform *w, const struct waveform_return *r)
     return peak;
 }
 
-/* Sums of samples against the link budget: 0.1 % for each shape, spread and place between the samples. Rounding adds at
- * most half a count each, against a peak near 14,000. */
+/* Sums of samples are the link budget to 0.1 %, for each shape, spread and place between the samples. Rounding adds
+ * at most half a count each, against a peak near 14,000. */
 static void samples_have_the_energy(void **state)
 {
     (void)state;
@@ -97,8 +97,8 @@ static void samples_have_the_energy(void **state)
     print_message("# energy in the samples: within %.4f %% of the link budget\n", 1e2 * worst);
 }
 
-/* h against the closed form: a Gaussian with the receiver's sigma added, or the log-normal with its centroid at 0.
- * Cubics through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. A log-normal's peak
+/* h has a closed form: a Gaussian with the receiver's sigma added, or the log-normal with its centroid at 0. Cubics
+ * through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. A log-normal's peak
  * bends more. Its tail is cut at 1e-6 of the peak, 48 widths behind it with a skew of 3, which moves the centroid by
  * 4e-4 widths. */
 static void shapes_are_the_closed_forms(void **state)

@@ -30,7 +30,8 @@ static double count_of(const struct waveform_spec *spec, double signal)
     return fmin(top, fmax(0.0, spec->baseline_counts + signal / spec->full_scale * (top - spec->baseline_counts)));
 }
 
-/* A count is the signal on the grid, rounded: with the tables' 2e-6 of 500 thresholds, a half counts either way. */
+/* A count is the signal on the grid, rounded. The tables have an error of 2e-6 of 500 thresholds, so both neighbours
+ * of a half count are allowed. */
 static void counts_are_the_signal(void **state)
 {
     (void)state;
@@ -140,7 +141,7 @@ static uint32_t check_windows(const struct waveform_record *record, const uint8_
     return parts;
 }
 
-/* Random pulses, with stretches longer than a piece: windows are where the plain reading has them. */
+/* Random pulses have stretches longer than a piece. Their windows are where the plain reading has them. */
 static void windows_are_where_light_is(void **state)
 {
     (void)state;

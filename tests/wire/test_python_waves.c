@@ -122,7 +122,7 @@ static void expect_block(struct dump *dump, char kind, int n)
     assert_int_equal(count, n);
 }
 
-/* Bit for bit: the same operations in the same order, sine and cosine from the same C library. */
+/* Values agree bit for bit: the same operations in the same order, sine and cosine from the same C library. */
 static void expect_real(struct dump *dump, double value)
 {
     double said;

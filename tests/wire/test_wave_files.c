@@ -30,7 +30,7 @@ static uint16_t sample[MOST_SAMPLES];
 static size_t n_echoes, n_windows, n_samples;
 static struct scanhead_info info;
 
-/* The head's frame to the scene's, in the polar layout. */
+/* Turns the head's frame into the scene's, in the polar layout. */
 static void to_file(const double p[3], double out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -131,8 +131,8 @@ static int has_samples(const struct window *w, const char *at, unsigned n)
     return 1;
 }
 
-/* One line of the reader: echo i of the stream with one of its pulse's windows, in which it lies. *w moves on to the
- * pulse's first window. tolerance_m: of the first sample's place. */
+/* Checks one line of the reader: echo i of the stream with one of its pulse's windows, in which it lies. *w moves on
+ * to the pulse's first window. tolerance_m: of the first sample's place. */
 static void check_line(const char *line, size_t i, size_t *w, double tolerance_m)
 {
     double p[3], first[3], signal;
@@ -193,7 +193,7 @@ static void check_csv(void)
     free(text);
 }
 
-/* A board before the wall, whose edges cut footprints: pulses with two returns. */
+/* A board stands before the wall. Its edges cut footprints, so some pulses have two returns. */
 static void write_scene(void)
 {
     room_write(wire);

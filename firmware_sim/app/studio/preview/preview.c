@@ -185,7 +185,7 @@ static void preview_do(struct preview *p, struct job *job)
     }
 }
 
-/* A coverage of surfaces that all give no cells: 4 bytes a triangle. */
+/* Makes a coverage whose surfaces give no cells: 4 bytes a triangle. */
 static int make_blind(struct preview *p, struct sh_err *err)
 {
     uint8_t *silent = malloc(SCENE_MAX_SURFACES + 1);
