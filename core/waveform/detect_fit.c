@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* One term through the samples of one maximum: the way of nearly all echoes, so it has to be cheap.
+/* One term goes through the samples of one maximum. Nearly all echoes are found so, so it has to be cheap.
  *
- * The half maxima give a first one. Gauss and Newton's steps then minimise the squares of what is left within
+ * The half maxima give a first term. Gauss's and Newton's steps then minimise the squares of the residual within
  * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 0.6 % (the part of
- * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from the
- * sample before by two products, since the ratio of neighbours changes by a constant factor. */
+ * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from
+ * the sample before by two products, since the ratio of neighbours changes by a constant factor. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>

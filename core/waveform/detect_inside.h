@@ -132,9 +132,10 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
 void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
                      struct finder_list *list);
 
-/* One term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its last. */
+/* Fits one term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its
+ * last. */
 int finder_fit(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g);
-/* The plain fit without that decision: -1 where it fails, else the RMS of what is left. */
+/* Makes the same fit without that decision. Returns the RMS of the residual, or -1 where the fit fails. */
 double finder_fit_near(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g);
 
 /* A mixture is fitted to the samples lo .. hi; variance: of one sample. */
@@ -147,7 +148,7 @@ struct finder_task {
 void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
 /* Fills rest[hi - lo + 1] with the part of the samples that the components don't explain. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
-/* Begins with one component a peak, and adds more while what is left over could be another echo of this level;
+/* Begins with one component a peak, and adds more while the residual could have another echo of this level;
  * INFINITY: adds none. Where a top is not seen, its flanks decide. */
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
                       struct finder_mix *mix);

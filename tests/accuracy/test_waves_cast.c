@@ -251,9 +251,9 @@ static void lost_samples_are_counted(void **state)
 /* ---- echoes */
 
 /* Without noise, echoes of one plate are where the closed form has them, but for digits. Half a count is 0.06
- * thresholds. From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 9
- * mm. At half of the peak a straight line between samples 1 ns apart is off by P'' / 8, 3.6 mm, where a detector takes
- * one. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
+ * thresholds. From the sample below the threshold to the one above it the signal rises by 1 or more, so half a count
+ * is 9 mm there at most. A detector that takes a straight line at half of the peak, between samples 1 ns apart, has
+ * an error of P'' / 8, 3.6 mm. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
 static void echoes_are_found_in_samples(void **state)
 {
     (void)state;

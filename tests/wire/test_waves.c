@@ -200,10 +200,10 @@ static void test_glass(void **state)
     }
 }
 
-/* Without noise, echoes that are found are those of the model, but for digits: half a count is an eighth of a
- * threshold. From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 19
- * mm. A straight line between samples 1 ns apart is off by 3.6 mm at half of the peak, where a detector takes one.
- * Amplitudes to 1 %, widths to 2 %. */
+/* Without noise, echoes that are found are those of the model, but for digits. Half a count is an eighth of a
+ * threshold. From the sample below the threshold to the one above it the signal rises by 1 or more, so half a count
+ * is 19 mm there at most. A detector that takes a straight line at half of the peak, between samples 1 ns apart, has
+ * an error of 3.6 mm. Amplitudes agree to 1 %, widths to 2 %. */
 static void test_echoes(void **state)
 {
     struct wire *wire = *state;

@@ -14,7 +14,7 @@ export class Hover {
   #timer = 0;
   #stop = null;
 
-  // told(point or null, isAsked) is called with each other point; isAsked: a key has asked for it
+  // Calls told(point or null, isAsked) when the point changes; isAsked: a key has asked for it
   constructor(view, told) {
     this.#view = view;
     this.#told = told;
