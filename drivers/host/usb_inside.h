@@ -15,7 +15,7 @@ enum {
     USB_SUBCLASS = 0x53,
     USB_PROTOCOL = 0x48,
     USB_REQUEST_SESSION = 0x22, /* bmRequestType 0x41, wValue 1 opens, 0 closes, wIndex: the interface; 0xc1 asks */
-    USB_CONTROL_MS = 5000, /* USB 2.0, 9.2.6.1: no request takes longer */
+    USB_CONTROL_MS = 5000,      /* USB 2.0, 9.2.6.1: no request takes longer */
 };
 
 /* The device that a source names: "usb", "usb:vid:pid", "usb:vid:pid:serial", ids in hexadecimal as lsusb prints

@@ -99,7 +99,7 @@ struct watch {
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;
     uint64_t lost_frames;
 
-    struct past *past;       /* the observer fills it */
+    struct past *past; /* the observer fills it */
     struct save *save;
     struct preview *preview; /* has a thread of its own; NULL: there are none */
 
