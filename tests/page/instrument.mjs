@@ -14,8 +14,8 @@ import {equal, folder, is, near, test} from './work.mjs';
 const ROOT = new URL('../..', import.meta.url).pathname;
 const SIZE = [600, 480];
 
-// This runs in a page before its scripts. It notes layout shifts that no input has caused, the theme before modules run,
-// and changes of texts that a screen reader reads out.
+// This runs in a page before its scripts. It notes layout shifts that no input has caused, the theme before modules
+// run, and changes of texts that a screen reader reads out.
 function watches() {
   Object.assign(window, {shifts: [], spoken: 0, firstTheme: null});
   new PerformanceObserver((list) => {
@@ -307,8 +307,9 @@ export async function testInstrument(browser) {
   await testTimeLines(browser, file);
 }
 
-// The page's scale for heights and that of files (core/colour.h) have other colours between the ends, and the same hues in
-// the same order: blue, green, yellow, red. They are within 60 of the 240 degrees; the other way round they would be 240 apart.
+// The page's scale for heights and that of files (core/colour.h) have other colours between the ends, and the same hues
+// in the same order: blue, green, yellow, red. They are within 60 of the 240 degrees; the other way round they would be
+// 240 apart.
 function sameMeaning() {
   const [low, high] = [-0.5, 3.5], file = `${folder}/heights.ply`;
   run('record', CONFIG, '-o', file, '--quiet', '--set', 'output.colour=height', '--set', `output.colour_limits=[${low}, ${high}]`);

@@ -75,8 +75,8 @@ export class Waves {
     }
   }
 
-  /** The windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples: Float32Array in
-   * units of the detection threshold, without the baseline}]. Empty where the head kept none, or they are no longer
+  /** The windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples: Float32Array
+   * in units of the detection threshold, without the baseline}]. Empty where the head kept none, or they are no longer
    * here. */
   of(pulse, scan = this.#scan) {
     const found = [], frames = scan === this.#scan ? this.#frames : [];

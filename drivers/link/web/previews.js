@@ -31,8 +31,8 @@ function begin(bytes, magic, least) {
 
 const origin = (view, at) => [at, at + 8, at + 16].map((k) => view.getFloat64(k, true));
 
-// Returns {number, cells, n, pulses, hits, front, origin, above_m, hides_m, feet_m, seen, xyz, range, label} of the bytes
-// of /preview. seen has a bit for each cell, 32 in a word.
+// Returns {number, cells, n, pulses, hits, front, origin, above_m, hides_m, feet_m, seen, xyz, range, label} of the
+// bytes of /preview. seen has a bit for each cell, 32 in a word.
 export function parsePreview(bytes) {
   const view = begin(bytes, 'SHPV', 72);
   const [number, cells, n, pulses, hits, front] = [8, 12, 16, 20, 24, 28].map((at) => view.getUint32(at, true));

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// A trial has stations that stand, in this page alone, where its user wants to try them. Each has the points of a coarse
-// scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a trial
-// needs no control.
+// A trial has stations that stand, in this page alone, where its user wants to try them. Each has the points of a
+// coarse scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a
+// trial needs no control.
 
 import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from './previews.js';
 

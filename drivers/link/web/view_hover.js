@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This module finds the point under the pointer, once the pointer stays, and marks a point that another part of the page
-// points at.
+// This module finds the point under the pointer, once the pointer stays, and marks a point that another part of the
+// page points at.
 
 import {searchSlowly} from './view_pick.js';
 import {pointOf} from './cloud.js';
