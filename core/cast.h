@@ -110,8 +110,8 @@ struct cast_disturbance {
     } wobble[CAST_MAX_WOBBLES];
 };
 
-/* Waveforms. The samples of a pulse go into blocks that have room for them. A single ray counts as a footprint that
- * lies on the plane it hits. Needs cast_detect with a signal. */
+/* Waveforms: the samples of a pulse go into blocks that have room for them. A single ray counts as a footprint that
+ * lies on the plane it hits. This needs cast_detect with a signal. */
 struct cast_waves {
     const struct waveform *waveform;
     const struct beam *beam; /* the head's, also of single rays */

@@ -80,7 +80,7 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
 /* A of a return E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
 
-/* The reflectance that a head reports for an amplitude at range_m: in the data sheet's air. */
+/* Returns the reflectance that a head reports for an amplitude at range_m, in the data sheet's air. */
 double detect_reflectance(const struct detect_signal *signal, double range_m, double amplitude);
 
 /* Extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's

@@ -151,7 +151,7 @@ struct beam_merging {
 };
 /* For a footprint, as defined above. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
-/* By range; in place. */
+/* Sorts returns by range, in place. */
 void beam_sort(struct beam_return *returns, uint32_t n);
 /* Merges the returns of one pulse into its echoes, by range; echo has room for most + 1. Reorders the
  * returns. Returns the number of echoes, and adds the number of those left out to *left_out. */

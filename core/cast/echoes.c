@@ -137,7 +137,7 @@ static uint32_t count_echoes(const struct echo_list *l)
     return n;
 }
 
-/* Whether echoes are those that were found in waveforms: detected, and with noise. */
+/* Returns whether echoes are found in waveforms: they are detected, and have noise. */
 static int finds_echoes(const struct chunk *k)
 {
     return k->waves != NULL && k->waves->how->finds;

@@ -7,7 +7,7 @@
 
 struct echo_list;
 
-/* Whether the beam with direction i of d goes into the cone. */
+/* Returns whether the beam with direction i of d goes into the cone. */
 static inline int caster_is_hidden(const struct cast_tripod *t, const struct vec3_in *d, uint32_t i)
 {
     const double cosine = d->x[i] * t->down[0] + d->y[i] * t->down[1] + d->z[i] * t->down[2];

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The light that comes back of each pulse, over time. A pulse's returns are those before merging:
+/* This stage makes the light of each pulse that comes back, over time. It takes a pulse's returns before merging:
  *
  *     one ray for the whole footprint    a disc on the plane that it hits: the closed form
  *     parts of a footprint that is cut   a bell each, as wide as the part is deep
  *     sub-rays                           bells, as deep as the area around each; many are joined first
  *
- * Echoes that are found in the samples have their noise from these: nothing else is added. */
+ * Echoes that are found in the samples have the noise of the samples; no other noise is added. */
 #include "core/cast/waves.h"
 
 #include <math.h>
@@ -25,7 +25,7 @@ void waves_begin(const struct wave_chunk *k)
 
 /* ---- returns */
 
-/* Half the depth of a footprint on a plane. At grazing incidence it is limited as in beam_plane_means. */
+/* Returns half the depth of a footprint on a plane. At grazing incidence it is limited as in beam_plane_means. */
 static double disc_extent(const struct cast_waves *waves, double range_m, double cosine)
 {
     const double tan_i = sqrt(fmax(0.0, 1.0 / fmax(cosine * cosine, 1e-12) - 1.0));
@@ -72,8 +72,8 @@ static struct wave_part join_returns(const struct beam_return *r, uint32_t n)
                               .spread = sigma_m > 0.0 ? WAVEFORM_BELL : WAVEFORM_POINT};
 }
 
-/* Joins sorted returns that are within apart_m of the first one of their group. Returns the number of groups, or
- * WAVES_PARTS + 1: there are too many. */
+/* Joins sorted returns that are within apart_m of the first one of their group. Returns the number of groups; if
+ * there are too many, WAVES_PARTS + 1. */
 static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apart_m, struct wave_part *part)
 {
     uint32_t found = 0;
@@ -117,7 +117,7 @@ void waves_take_returns(const struct wave_chunk *k, uint32_t pulse, struct beam_
     parts_end(w, pulse, found);
 }
 
-/* Entry i of the list as a return. Returns whether anything comes back. */
+/* Takes entry i of the list as a return. Returns whether any light comes back. */
 static int take_entry(const struct wave_chunk *k, uint32_t i, struct wave_part *part)
 {
     const struct echo_list *l = k->list;
@@ -146,7 +146,7 @@ void waves_take_paths(const struct wave_chunk *k)
 
 /* ---- samples */
 
-/* The returns of the pulse at hand. */
+/* This has the returns of the pulse at hand. */
 struct wave_pulse {
     uint32_t number; /* in the chunk */
     const struct wave_part *part;
@@ -286,8 +286,8 @@ static void clear_list(const struct wave_chunk *k)
     l->n_secondary = 0;
 }
 
-/* The part that sends most within half an echo's width of it; where there is none, the nearest within two widths.
- * NULL: the echo is noise. */
+/* Returns the part with the most light within half an echo's width of it; if there is none, the nearest part within
+ * two widths. NULL: the echo is noise. */
 static const struct wave_part *part_of(const struct wave_chunk *k, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {

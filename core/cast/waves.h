@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: this stage samples the light that comes back of pulses (core/waveform.h). Where a head is set
- * so, it finds the echoes in these samples. Only chunks with waveforms have it. */
+/* This stage samples the light that comes back of pulses (core/waveform.h). Where a head is set so, it finds the
+ * echoes in these samples. Only chunks with waveforms have it. The header is private to core/cast. */
 #ifndef CORE_CAST_WAVES_H
 #define CORE_CAST_WAVES_H
 
@@ -19,7 +19,7 @@ struct wave_part {
     enum waveform_spread spread;
 };
 
-/* Working memory of a thread. */
+/* Each thread has this working memory. */
 struct wave_work {
     /* Pulses with returns of their own: part[first .. first + n]. All others have the one return that is their entry
      * of the list. */
@@ -36,7 +36,7 @@ struct wave_work {
     uint16_t sample[WAVES_ROOM];
 };
 
-/* A chunk, as far as this stage needs it. */
+/* This is a chunk, as far as this stage needs it. */
 struct wave_chunk {
     const struct cast_setup *s;
     const struct cast_waves *how;
@@ -51,14 +51,14 @@ struct wave_chunk {
     int linear, texels; /* as in struct chunk */
 };
 
-/* Before returns are taken. */
+/* The caller begins with this, before returns are taken. */
 void waves_begin(const struct wave_chunk *k);
-/* The returns of a pulse with sub-rays, in any order; they may change places. */
+/* Takes the returns of a pulse with sub-rays, in any order; they may change places. */
 void waves_take_returns(const struct wave_chunk *k, uint32_t pulse, struct beam_return *returns, uint32_t n);
-/* The returns of single rays through glass and off mirrors, before the list has them merged. */
+/* Takes the returns of single rays through glass and off mirrors, before the list merges them. */
 void waves_take_paths(const struct wave_chunk *k);
-/* The samples go into the block, if it has room for waveforms. Where echoes are found in them, these replace those of
- * the list. */
+/* Puts the samples into the block, if it has room for waveforms. Echoes that are found in them replace those of the
+ * list. */
 void caster_waves(const struct wave_chunk *k);
 
 #endif

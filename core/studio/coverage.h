@@ -51,7 +51,8 @@ struct coverage_scan {
     /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
-    /* Also gets the scan's hits, those on bodies among them, from the threads that cast; NULL: nobody wants them. */
+    /* This gets the scan's hits, too, those on bodies among them, from the threads that cast; NULL: nobody wants
+     * them. */
     void (*take)(void *take_ctx, const struct cast_hit *hit, uint32_t n);
     void *take_ctx;
 };

@@ -87,7 +87,7 @@ struct deviation_terms {
     double ball_m, ball_per_m, ball_factor[3];    /* its radius and factors, as in core/detect.h */
     int ball_local;
 };
-/* 0: nothing is expected, since the instrument has errors. */
+/* Returns 0 where no error is expected, since the instrument has errors of its own. */
 int deviation_terms_of(const struct deviation_head *head, struct deviation_terms *out);
 
 /* INFINITY: there is no bound, as for Gaussian noise. */

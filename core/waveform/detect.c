@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The way of a pulse's samples to echoes: counts become signals, windows are searched for maxima, maxima that run into
- * each other are decomposed together. */
+/* Echoes are found in a pulse's samples in three steps. Counts become signals, windows are searched for maxima, and
+ * maxima that run into each other are decomposed together. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -161,7 +161,7 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
     }
 }
 
-/* Echoes of all detectors in the order of range. Where there is no room, the weakest is left out. */
+/* Keeps echoes of all detectors in the order of range. Where there is no room, the weakest is left out. */
 static void detect_put(struct finder_list *list, const struct waveform_echo *echo)
 {
     if (list->n == list->most) {
@@ -189,7 +189,7 @@ static double detect_others(const struct finder *finder, const struct finder_mix
     return sum;
 }
 
-/* RMS about h within an echo's width on both sides of its centroid, over its peak. */
+/* Returns the RMS about h, within an echo's width on both sides of its centroid, over its peak. */
 static double detect_deviation(const struct finder_run *run, const struct finder_found *found,
                                const struct finder_mix *mix, uint32_t self)
 {

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Maxima that run into each other, or whose tops are not seen, are a sum of terms. This says where it begins, and how
- * many there are. */
+/* Maxima that run into each other, or whose tops are not seen, are a sum of terms. This file says with which terms
+ * the fit begins, and how many there are. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
 
 enum { DECOMPOSE_TURNS = 2, DECOMPOSE_REACH = 64 }; /* samples: how far a pulse is compared with the rest */
 
-/* The samples of a mixture: from its first maximum down to the foot, or to the window's end, and so behind its last. */
+/* A mixture takes the samples from the foot (or the window's end) before its first maximum to that after its last. */
 static void decompose_range(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
                             struct finder_task *task)
 {
@@ -24,8 +24,9 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* The height of a top that stays above the limit for so long: the level sinks on both sides of h's peak until h is
- * above it for that time. *centroid: where the pulse then is, from the moment in which it reaches the limit. */
+/* Returns the height of a top that stays above the limit for `span` samples: the level sinks on both sides of h's
+ * peak until h is above it for that long. *centroid: where the pulse then is, after the moment in which it reaches
+ * the limit. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
@@ -42,8 +43,8 @@ static double decompose_height(const struct finder *finder, double span, double 
     return finder->limit / fmax(fmax(h[a], h[b]), 1e-6);
 }
 
-/* The same by the rising flank alone, where its last samples are y0 and y1: the higher the top, the less time lies
- * between what they are of it. *centroid: from the sample of y1. */
+/* Does the same by the rising flank alone, whose last samples are y0 and y1. The higher the top is, the less time
+ * passes between these two shares of it. *centroid counts from the sample of y1. */
 static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
 {
     double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
@@ -58,8 +59,8 @@ static double decompose_flank(const struct finder *finder, double y0, double y1,
     return y1 * exp(least);
 }
 
-/* A top that is limited. Where the receiver went blind after it, the rising flank's last two samples have to do;
- * returns 1 then, since a fit to these has nothing to add. */
+/* Fits a top that is limited. Where the receiver went blind after it, the last two samples of the rising flank
+ * decide. Then it returns 1, since a fit to these has nothing to add. */
 static int decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
 {
     const struct finder *finder = run->finder;
@@ -73,7 +74,7 @@ static int decompose_limited(const struct finder_run *run, const struct finder_p
     if (!blind) {
         height = decompose_height(finder, (double)b - (double)a + 1.0, &centroid);
     } else {
-        /* Half of what could be told from noise stands for a sample that can't. */
+        /* A sample below 3 sigma can't be told from noise. Half of that stands for it. */
         const double least = 1.5 * finder->noise;
         uint32_t k = a > peak->from && run->y[a - 1] > 2.0 * least ? a - 1 : a;
         height = decompose_flank(finder, k > peak->from ? fmax(run->y[k - 1], least) : least,
@@ -111,7 +112,7 @@ static int decompose_begin(const struct finder_run *run, const struct finder_pea
     return n == 1 && blind;
 }
 
-/* The sum of squares that terms leave of echoes on planes, whose shape is another. */
+/* Returns the sum of squares that terms leave on planes, since a plane's echo has another shape than a term. */
 static double decompose_shapes(const struct finder_task *task, const struct finder_mix *mix)
 {
     double sum = 0.0;
@@ -130,7 +131,7 @@ static int decompose_enough(const struct finder_task *task, const struct finder_
     return mix->chi2 <= n * finder_noise2(task->run->finder, n) + decompose_shapes(task, mix);
 }
 
-/* The pulse that explains most of the rest: its amplitude by least squares at each place. */
+/* Returns the pulse that explains most of the rest. At each place it gets its amplitude by least squares. */
 static struct finder_term decompose_largest(const struct finder_task *task, const double *rest)
 {
     const double sigma = task->run->finder->spread[0].sigma;
@@ -152,7 +153,7 @@ static struct finder_term decompose_largest(const struct finder_task *task, cons
     return best;
 }
 
-/* Two pulses in place of one component that is wider than the pulse: with its energy and its variance. */
+/* Puts two pulses in place of one component that is wider than the pulse. They have its energy and its variance. */
 static int decompose_split(const struct finder_task *task, struct finder_mix *mix)
 {
     const double sigma = task->run->finder->spread[0].sigma;
@@ -167,7 +168,8 @@ static int decompose_split(const struct finder_task *task, struct finder_mix *mi
     return 1;
 }
 
-/* Components that could be echoes: none is below half of the level, or what the tail of a larger one explains. */
+/* Returns whether all components could be echoes: none is below the least peak, or explained by the tail of a larger
+ * one. */
 static int decompose_sound(const struct finder_task *task, const struct finder_mix *mix, double least)
 {
     for (uint32_t j = 0; j < mix->n; j++)
@@ -184,7 +186,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
     return 1;
 }
 
-/* A component for what is left over. */
+/* Adds a component for the rest. */
 static int decompose_extra(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     double rest[WAVEFORM_MAX_SAMPLES];
@@ -195,8 +197,8 @@ static int decompose_extra(const struct finder_task *task, double least, struct 
     return 1;
 }
 
-/* One more component, in the two ways that there are; the second where the first does not explain it all. Returns 1
- * where a better mixture came of it. */
+/* Adds one more component, in one of two ways; the second is tried where the first leaves more than noise. Returns 1
+ * where the mixture became better. */
 static int decompose_more(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     struct finder_mix tried[2] = {*mix, *mix}, *best = NULL;
@@ -213,8 +215,8 @@ static int decompose_more(const struct finder_task *task, double least, struct f
     return 1;
 }
 
-/* A component that came early may stand in a place that none has now: the others can do without it. The two weakest are
- * tried, since each try costs a fit. */
+/* A component that was added early may be in a place where no echo is now: the others explain the samples without
+ * it. Only the two weakest are tried, since each try costs a fit. */
 static void decompose_fewer(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     uint32_t tried = 0;
@@ -233,8 +235,8 @@ static void decompose_fewer(const struct finder_task *task, double least, struct
     }
 }
 
-/* Two pulses with the energy, the mean, the variance and the third moment of the samples. Shares p and q, d apart: the
- * variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
+/* Makes two pulses with the energy, the mean, the variance and the third moment of the samples. For shares p and q,
+ * d apart, the variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
 static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
 {
     const struct finder *finder = task->run->finder;
@@ -265,7 +267,7 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
-    /* One term was not enough already. Mostly two are. */
+    /* One term was not enough before this. Mostly two are. */
     struct finder_mix two;
     if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);

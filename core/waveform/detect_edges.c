@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Echoes by the rising edge: where it crosses a fixed level, or a fraction of the peak.
+/* These detectors find an echo by its rising edge: where it crosses a fixed level, or a fraction of the peak.
  *
- * Two samples lie about the crossing. Each of them alone says where the echo is, since h says how long before its
- * centroid it has that part of its peak: this corrects the walk, and there is no interpolation error in a pulse of
- * h's shape. The place is taken between both, as the level lies between them. */
+ * One sample lies on each side of the crossing. Each of them alone gives a place of the echo, since h says how long
+ * before its centroid it has that part of its peak. This corrects the walk, and a pulse of h's shape has no
+ * interpolation error. The result lies between both places, as the level lies between both samples. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
 
-/* The centroid, from the crossing of a level between sample k - 1 and sample k. */
+/* Returns the centroid, from the crossing of a level between sample k - 1 and sample k. */
 static double edges_centroid(const struct finder_run *run, uint32_t k, double level, double peak)
 {
     double above = k + finder_lead(run->finder, run->y[k] / peak);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* One term through the samples of one maximum: the way of nearly all echoes, so it has to be cheap.
+/* One term goes through the samples of one maximum. Nearly all echoes are found so, so it has to be cheap.
  *
- * The half maxima give a first one. Gauss and Newton's steps then minimise the squares of what is left within
+ * The half maxima give a first term. Gauss's and Newton's steps then minimise the squares of the residual within
  * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 0.6 % (the part of
- * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from the
- * sample before by two products, since the ratio of neighbours changes by a constant factor. */
+ * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from
+ * the sample before by two products, since the ratio of neighbours changes by a constant factor. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -33,7 +33,7 @@ static inline void fit_add(struct fit_sums *sums, double rest, double a, double 
     sums->rest2 += rest * rest;
 }
 
-/* Derivatives of a term of peak 1 by log peak, middle in sigmas and log sigma. */
+/* Sums products of a term's derivatives, by log peak, by its middle in sigmas and by log sigma. The term has peak 1. */
 static void fit_sum(const struct finder_run *run, const struct finder_term *g, uint32_t lo, uint32_t hi,
                     struct fit_sums *sums)
 {
@@ -59,7 +59,7 @@ static void fit_sum(const struct finder_run *run, const struct finder_term *g, u
     }
 }
 
-/* The step, by Cramer's rule. Returns by how much it lowers the sum of squares, below 0 where the samples don't
+/* Finds the step by Cramer's rule. Returns by how much it lowers the sum of squares; below 0 if the samples don't
  * determine it. */
 static double fit_step(const struct fit_sums *m, double peak, double p[3])
 {
@@ -75,7 +75,7 @@ static double fit_step(const struct fit_sums *m, double peak, double p[3])
     return peak * (p[0] * r[0] + p[1] * r[1] + p[2] * r[2]);
 }
 
-/* Samples within FINDER_NEAR sigma, or at least 4. Returns 0 where the peak's samples don't reach both flanks. */
+/* Chooses the samples within FINDER_NEAR sigma, at least 4. Returns 0 if the peak's samples don't reach both flanks. */
 static int fit_samples(const struct finder_peak *peak, const struct finder_term *g, uint32_t *lo, uint32_t *hi)
 {
     double reach = fmax(FINDER_NEAR * g->sigma, 1.5), from = ceil(g->at - reach), to = floor(g->at + reach);
@@ -135,7 +135,7 @@ static int fit_alone(const struct finder_run *run, const struct finder_peak *pea
     return 1;
 }
 
-/* Wilson's and Hilferty's approximation of the quantile of chi^2 over n (1931), at 4 sigma: one in 30,000 lies
+/* The quantile of chi^2 over n follows Wilson's and Hilferty's approximation (1931), at 4 sigma: one in 30,000 lies
  * beyond. */
 double finder_noise2(const struct finder *finder, double n)
 {
@@ -143,7 +143,7 @@ double finder_noise2(const struct finder *finder, double n)
     return finder->noise * finder->noise * root * root * root;
 }
 
-/* The RMS that noise explains, and what echoes on planes leave. */
+/* Returns the RMS that noise explains, together with the misfit of echoes on planes. */
 static double fit_explained(const struct finder_run *run, const struct finder_term *g, double misfit)
 {
     const double left = (1.2 * misfit + FINDER_ROUGH) * g->peak;

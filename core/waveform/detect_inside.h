@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Shared by the detectors: a window as signals, how the pulse's echoes look to a detector, and the echoes found.
+/* The detectors share this: a window as signals, the learned look of the pulse's echoes, and the echoes found.
  *
  * Places and widths count in samples, from the first sample of the window; signals in thresholds. An echo's place is
  * its centroid, since that is its range (waveform.h).
  *
- * Pure, as waveform_detect is. Nothing here allocates. */
+ * All of it is pure, as waveform_detect is. Nothing here allocates. */
 #ifndef CORE_WAVEFORM_DETECT_INSIDE_H
 #define CORE_WAVEFORM_DETECT_INSIDE_H
 
@@ -40,7 +40,7 @@ struct finder_spread {
     double tail;      /* most of echo minus term further out, over its peak */
 };
 
-/* The pulse h, as detectors know it. Constant after finder_learn. */
+/* This is the pulse h, as detectors know it. It is constant after finder_learn. */
 struct finder {
     double peak;                                 /* of h */
     double width;                                /* of h, full at half maximum */
@@ -59,7 +59,7 @@ struct finder {
     double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
 };
 
-/* A table of h, so many widths after its centroid. */
+/* Returns the value of a table of h, so many widths after its centroid. */
 static inline double finder_table(const double table[FINDER_SHAPE], double widths)
 {
     double place = (widths + FINDER_SHAPE_LEAD) * (1.0 / FINDER_SHAPE_STEP);
@@ -67,15 +67,15 @@ static inline double finder_table(const double table[FINDER_SHAPE], double width
     uint32_t k = (uint32_t)place;
     return table[k] + (place - k) * (table[k + 1] - table[k]);
 }
-/* A term of peak 1, d of its sigmas after its middle: its value, and minus its derivative by d there. */
+/* A term of peak 1 has this value, d of its sigmas after its middle. finder_fall is minus its derivative by d there. */
 double finder_value(const struct finder *finder, double d);
 double finder_fall(const struct finder *finder, double d, double value);
-/* How long before its centroid h has `part` of its peak. */
+/* Returns how long before its centroid h has `part` of its peak. */
 double finder_lead(const struct finder *finder, double part);
 
 /* Fills `finder` from the signals of a waveform that is otherwise complete. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);
-/* The echo whose term has this sigma, and the one of this width. */
+/* Find the echo whose term has this sigma, and the echo of this width. */
 void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread);
 void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread);
 
@@ -94,7 +94,7 @@ struct finder_run {
 struct finder_peak {
     uint32_t top, from, to;
 };
-/* Whether its top was limited, so that its height is not known. */
+/* Returns whether its top was limited, so that its height is not known. */
 static inline int finder_limited(const struct finder_run *run, const struct finder_peak *peak)
 {
     return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
@@ -132,12 +132,13 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
 void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
                      struct finder_list *list);
 
-/* One term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its last. */
+/* Fits one term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its
+ * last. */
 int finder_fit(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g);
-/* The plain fit without that decision: -1 where it fails, else the RMS of what is left. */
+/* Makes the same fit without that decision. Returns the RMS of the residual, or -1 where the fit fails. */
 double finder_fit_near(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g);
 
-/* The samples lo .. hi that a mixture is fitted to; variance: of one sample. */
+/* A mixture is fitted to the samples lo .. hi; variance: of one sample. */
 struct finder_task {
     const struct finder_run *run;
     uint32_t lo, hi;
@@ -145,9 +146,9 @@ struct finder_task {
 };
 /* Moves the components to the least sum of squares near by, which becomes chi2. */
 void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
-/* rest[hi - lo + 1]: what the components leave of the samples. */
+/* Fills rest[hi - lo + 1] with the part of the samples that the components don't explain. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
-/* Begins with one component a peak, and adds more while what is left over could be another echo of this level;
+/* Begins with one component a peak, and adds more while the residual could have another echo of this level;
  * INFINITY: adds none. Where a top is not seen, its flanks decide. */
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
                       struct finder_mix *mix);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How the pulse's echoes look to the detectors: measured once on signals without noise, as a head is adjusted on
- * targets. */
+/* This file learns how the pulse's echoes look to the detectors. It measures them once, on signals without noise, as
+ * a head is adjusted on targets. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -51,7 +51,7 @@ static double learn_half(const struct finder *finder, const struct learn_echo *e
     return side[1] - side[0];
 }
 
-/* Peak and width of h, from the sight of a first guess: its area over its value at the centroid. */
+/* Measures peak and width of h, from a first guess: its area over its value at the centroid. */
 static void learn_pulse(const struct waveform *waveform, struct finder *finder, struct learn_echo *echo)
 {
     const double sample_s = waveform_spec_of(waveform)->sample_s, metre = finder->metre;
@@ -67,7 +67,8 @@ static void learn_pulse(const struct waveform *waveform, struct finder *finder, 
     finder->middle = (echo->from + rise * echo->step) / finder->width + 0.5;
 }
 
-/* Crossings of falling levels, from the top outward: each is where h is last below the level before its peak. */
+/* Finds the crossings of falling levels, from the top outward. At each of them h is last below the level before its
+ * peak. */
 static void learn_leads(struct finder *finder, const struct learn_echo *echo)
 {
     uint32_t i = echo->top;
@@ -127,7 +128,7 @@ double finder_lead(const struct finder *finder, double part)
     return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
 }
 
-/* The term of an echo, and what it leaves. */
+/* Fits the term of an echo, and measures how far the echo differs from it. */
 static void learn_fit(const struct finder *finder, const struct learn_echo *echo, struct finder_spread *spread)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
@@ -176,7 +177,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 5.0 * finder->noise);
 }
 
-/* Between tilts k and k + 1 by u. */
+/* Sets `spread` between those of the tilts k and k + 1, at share u of the way. */
 static void learn_between(const struct finder *finder, uint32_t k, double u, struct finder_spread *spread)
 {
     const struct finder_spread *a = &finder->spread[k], *b = a + 1;

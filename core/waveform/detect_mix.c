@@ -195,8 +195,8 @@ static double mix_within(double x, double least, double most)
     return x < least ? least : x > most ? most : x;
 }
 
-/* A step, shortened: in one, a peak changes by at most a factor of e^2, a centre by 1.5 sigma. A centre stays among the
- * samples, unless the window ends there. */
+/* Takes a step, but a shortened one: a peak changes by at most a factor of e^2, a centre by 1.5 sigma. A centre
+ * stays among the samples, unless the window ends there. */
 static void mix_move(const struct finder_task *task, const double p[MIX_MOST], struct finder_mix *mix)
 {
     const double h = task->run->finder->spread[0].sigma, room = task->hi - task->lo + 1.0;

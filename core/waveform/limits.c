@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a spec may have. */
+/* A spec is checked against its limits here. */
 #include <math.h>
 #include <stddef.h>
 
@@ -8,7 +8,7 @@
 
 enum { GAUSSIAN = 1 << WAVEFORM_GAUSSIAN, ASYMMETRIC = 1 << WAVEFORM_ASYMMETRIC, TABLE = 1 << WAVEFORM_TABLE, ALL = 7 };
 
-/* low .. high, in SI; texts have them in `unit`, of which there are `scale` in one of SI. */
+/* The limits low .. high are in SI. Texts show them in `unit`; one in SI is `scale` of these. */
 struct limit {
     const char *what, *unit;
     size_t at;

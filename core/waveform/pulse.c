@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The outgoing pulse, the receiver's bandwidth, and both together as a fine table. */
+/* This file has the outgoing pulse, the receiver's bandwidth, and both together as a fine table. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,8 +15,8 @@
 
 enum { MIN_PHASES = 4, STEPS_PER_SCALE = 16, EDGE_STEPS = 4, FINEST = 64 };
 
-/* The outgoing pulse from .. to, s after its peak. Sums over it take as many steps, of at most fine_s, in each of its
- * pieces. */
+/* This is the outgoing pulse from .. to, s after its peak. Sums over it take as many steps, of at most fine_s, in
+ * each of its pieces. */
 struct outgoing {
     const struct waveform_spec *spec;
     double from_s, to_s, fine_s, pieces;
@@ -62,21 +62,21 @@ static struct outgoing outgoing_of(const struct waveform_spec *spec)
     return (struct outgoing){spec, -GAUSSIAN_END * sigma_s, GAUSSIAN_END * sigma_s, 0.25 * sigma_s, 1.0};
 }
 
-/* How many steps of at most fine_s the pulse is taken in. */
+/* Returns in how many steps of at most fine_s the pulse is taken. */
 static double parts_of(const struct outgoing *o, double fine_s)
 {
     return o->pieces * ceil((o->to_s - o->from_s) / o->pieces / fine_s);
 }
 
-/* sigma of the receiver's answer to an impulse. A Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to which chains of many
- * stages tend; it is centred on what Elmore calls the delay, so it delays nothing here (W. C. Elmore, The transient
- * response of damped linear networks, J. Appl. Phys. 19, 1948). */
+/* Returns sigma of the receiver's answer to an impulse. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f /
+ * B)^2), to which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays
+ * nothing here (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
 static double receiver_sigma_s(double bandwidth_hz)
 {
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
 }
 
-/* The spectrum of h at an angular frequency, by its value at 0. */
+/* Returns the spectrum of h at an angular frequency, divided by its value at 0. */
 static double spectrum(const struct outgoing *o, double sigma_s, double per_s)
 {
     const double parts = parts_of(o, fmin(o->fine_s, 0.1 * o->spec->sample_s)), part_s = (o->to_s - o->from_s) / parts;
@@ -90,8 +90,8 @@ static double spectrum(const struct outgoing *o, double sigma_s, double per_s)
     return sqrt(even * even + odd * odd) / all * exp(-0.5 * per_s * per_s * sigma_s * sigma_s);
 }
 
-/* sigma of the Gaussian whose spectrum ends, at 1e-5, where that of h does. A table's straight lines have no such end:
- * what the sampling does not resolve does not count. */
+/* Returns sigma of the Gaussian whose spectrum falls to 1e-5 at the same frequency as that of h. The spectrum of a
+ * table's straight lines may not fall so far. Then least_s holds, since the sampling doesn't resolve more. */
 static double scale_of(const struct outgoing *o, double sigma_s)
 {
     const double end = 4.798526, least_s = 0.3 * o->spec->sample_s; /* exp(-end^2 / 2) = 1e-5 */
@@ -101,9 +101,9 @@ static double scale_of(const struct outgoing *o, double sigma_s)
     return scale_s;
 }
 
-/* h on n steps, the first of them at from_s: the receiver's answers to all of the pulse lie within them. The pulse is
- * taken finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by less than
- * 1e-6. */
+/* Fills h on n steps, the first of them at from_s. The receiver's answers to all of the pulse lie within them. The
+ * pulse is taken finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by
+ * less than 1e-6. */
 static void fill_steps(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
 {
     const double fine_s = fmin(o->fine_s, sigma_s), reach_s = GAUSSIAN_END * sigma_s;
@@ -121,7 +121,8 @@ static void fill_steps(const struct outgoing *o, double from_s, double step_s, d
     }
 }
 
-/* The largest deviation of a sum of samples, `apart` steps from each other, from that of all steps, as a part of it. */
+/* Returns the largest relative deviation of a sum of samples, `apart` steps from each other, from the sum of all
+ * steps. */
 static double ripple(const double *h, uint32_t n, uint32_t apart)
 {
     double all = 0.0, worst = 0.0;

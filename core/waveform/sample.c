@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The samples of one pulse: where its returns reach, which part of that is kept, and what the digitiser makes of it. */
+/* This file has the samples of one pulse: how far its returns reach, which part of that is kept, and which counts
+ * the digitiser makes of it. */
 #include <math.h>
 #include <string.h>
 
@@ -24,7 +25,7 @@ struct sampling {
     double signal[WAVEFORM_MAX_SAMPLES];
 };
 
-/* The windows found in a stretch. */
+/* These windows were found in a stretch. */
 struct found {
     struct span window[WAVEFORM_MAX_WINDOWS];
     uint32_t n;
@@ -32,7 +33,8 @@ struct found {
 
 /* ---- where there is light */
 
-/* What return i reaches, with what is kept before and behind. Number n is the fixed window, where there is one. */
+/* Returns the samples that return i reaches, and those kept before and after it. Number n is the fixed window, if
+ * there is one. */
 static struct span span_of(const struct sampling *s, uint32_t i)
 {
     const struct waveform *w = s->w;
@@ -44,7 +46,8 @@ static struct span span_of(const struct sampling *s, uint32_t i)
     return (struct span){from > 0.0 ? (int64_t)from : 0, (int64_t)(centre + reach + w->pulse.lag) + w->after + 2};
 }
 
-/* The first stretch from `from` on that returns reach one by one; what begins before `from` is in an earlier one. */
+/* Returns the first stretch after `from` that returns reach one by one. Light that begins before `from` is in an
+ * earlier stretch. */
 static int next_stretch(const struct sampling *s, int64_t from, struct span *stretch)
 {
     const uint32_t n = s->n + (s->w->gate_end > 0);
@@ -87,8 +90,9 @@ static void found_add(struct sampling *s, struct found *found, struct span windo
         found->window[found->n++] = window;
 }
 
-/* Windows of a piece of a stretch. Returns where the next piece begins: at a window that this piece cuts, so that the
- * next has it whole, else so far back that a window can begin there. A window of more samples than a piece is cut. */
+/* Finds the windows of a piece of a stretch. Returns where the next piece begins. If this piece cuts a window, the
+ * next one begins at that window, so that it has it whole. Else it begins so far back that a window can begin there.
+ * A window with more samples than a piece is cut. */
 static int64_t find_windows(struct sampling *s, struct span piece, int64_t stretch_end, struct found *found)
 {
     const struct waveform *w = s->w;
@@ -114,7 +118,7 @@ static int64_t find_windows(struct sampling *s, struct span piece, int64_t stret
     return open.end;
 }
 
-/* The fixed window, in place of those. */
+/* Takes the fixed window in place of those. */
 static int64_t find_gate(struct sampling *s, struct span piece, struct found *found)
 {
     const struct span gate = {s->w->gate_begin, s->w->gate_end};
@@ -164,7 +168,7 @@ static void digitise(const struct waveform_digits *d, const double *restrict sig
         count[i] = count_of(&digits, signal[i], 0.0);
 }
 
-/* The generator of core/rng.h in its plain form: the pulse's key is random already, so that one round is enough. */
+/* This is the generator of core/rng.h in its plain form. The pulse's key is random already, so one round is enough. */
 VEC_CLONES
 static void digitise_noisy(const struct waveform_digits *d, const double *restrict signal, uint32_t n, uint64_t key,
                            uint64_t first, uint16_t *restrict count)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How a return's energy spreads over time: as pulses at nodes, by quadrature. */
+/* A return's energy spreads over time as pulses at nodes, by quadrature. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -47,8 +47,8 @@ static void gauss_nodes(struct waveform_node three[3], struct waveform_node five
     five[4] = (struct waveform_node){sqrt(far2), far};
 }
 
-/* Error below 1e-5 of the amplitude (tests/unit/test_waveform.c). Of Gauss's nodes that is the next moment times the
- * next derivative of h. Of others it is what is left of h's spectrum where the nodes no longer follow it. */
+/* The error is below 1e-5 of the amplitude (tests/unit/test_waveform.c). With Gauss's nodes it is the next moment
+ * times the next derivative of h. With the others it is the part of h's spectrum that the nodes no longer follow. */
 static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;
@@ -125,7 +125,7 @@ static const struct waveform_rule *rule_of(const struct waveform *w, const struc
     return part->spread == WAVEFORM_DISC ? &w->disc : &w->bell;
 }
 
-/* In samples. Extents beyond the last level count as that. */
+/* Extents are in samples. Those beyond the last level count as that level. */
 static double extent_of(const struct waveform *w, const struct waveform_return *part)
 {
     if (part->spread == WAVEFORM_POINT) return 0.0;

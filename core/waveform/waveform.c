@@ -7,7 +7,7 @@
 #include "core/rng.h"
 #include "core/waveform/waveform_inside.h"
 
-/* So many samples cover a time; a time that was meant as whole samples may be a bit more. */
+/* Returns how many samples cover a time. A time that was meant as whole samples may be longer by a rounding error. */
 static int64_t samples_of(double time_s, double sample_s)
 {
     return (int64_t)ceil(time_s / sample_s - 1e-6);

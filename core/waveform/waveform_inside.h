@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private: a waveform's tables, and the steps from returns to samples. Times are counted in samples of the digitiser,
- * or in steps, which are sample_s / phases. */
+/* This private header has a waveform's tables, and the steps from returns to samples. Times are counted in samples
+ * of the digitiser, or in steps, which are sample_s / phases. */
 #ifndef CORE_WAVEFORM_WAVEFORM_INSIDE_H
 #define CORE_WAVEFORM_WAVEFORM_INSIDE_H
 
@@ -22,7 +22,7 @@ struct waveform_pulse {
 int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err);
 void waveform_pulse_free(struct waveform_pulse *pulse);
 
-/* How energy spreads, as nodes with weights of sum 1. Level k has its own nodes, enough up to extents of reach[k] times
+/* Energy spreads over nodes with weights of sum 1. Level k has its own nodes, enough up to extents of reach[k] times
  * the pulse's scale. */
 enum { WAVEFORM_LEVELS = 18, WAVEFORM_MOST_NODES = 2048 };
 #define WAVEFORM_BELL_END 4.8 /* standard deviations: 1.6e-6 of the energy lies beyond */

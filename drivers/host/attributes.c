@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Stream frames that follow the points: attributes and colour of each point, sums of each line. waves.c has waveforms. */
+/* These stream frames follow the points: attributes and colour of each point, sums of each line. waves.c has
+ * waveforms. */
 #include <math.h>
 
 #include "drivers/host/host.h"

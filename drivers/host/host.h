@@ -96,7 +96,7 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
 /* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);
 
-/* attributes.c: whether the descriptor says that the stream has this; SCANHEAD_ESTATE before it has come. */
+/* attributes.c: returns whether the descriptor says that the stream has this; SCANHEAD_ESTATE before it has come. */
 int host_has_content(const struct scanhead *sh, enum native_content content);
 
 /* poses.c: takes a poses frame in; forgets all (another scan). */

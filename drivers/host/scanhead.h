@@ -266,12 +266,12 @@ int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, ui
 /* 1: a frame of colours follows each frame of points; else as scanhead_has_attributes. */
 int scanhead_has_colours(const struct scanhead *sh);
 
-/* Where the head finds echoes in waveforms: how far the shape of each echo is from the pulse's, RMS over its amplitude.
- * They are in the frames of SCANHEAD_ATTRIBUTES, and decoded as scanhead_attributes does. 65.535: that or more; 0 for
- * an empty shot. */
+/* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over its
+ * amplitude. These deviations are in the frames of SCANHEAD_ATTRIBUTES, and decoded as scanhead_attributes does.
+ * 65.535: that or more; 0 for an empty shot. */
 int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, double *deviation,
                         uint32_t max);
-/* 1: attributes have them; else as scanhead_has_attributes. */
+/* Returns 1 if attributes have deviations; else as scanhead_has_attributes. */
 int scanhead_has_deviations(const struct scanhead *sh);
 
 /* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when it fires. */
@@ -281,8 +281,9 @@ struct scanhead_wave {
     uint32_t first, n;      /* samples, by their number on the grid */
     const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
     double range_m, step_m; /* of the first sample; from one to the next */
-    /* Polar: the beam in the head's frame SOCS, of length one. Geo: the change of x, y and z in the CRS along a metre of
-     * range. So range times direction goes from the head (geo: the anchor, where the head stands) to the sample. */
+    /* In the polar layout this is the beam in the head's frame SOCS, of length one. In the geo layout it is the
+     * change of x, y and z in the CRS along a metre of range. So range times direction goes from the head (geo: the
+     * anchor, where the head stands) to the sample. */
     double direction[3];
     uint32_t sample_ps, bits; /* time between samples; bits of a count */
     double baseline;          /* the count without light */
@@ -293,11 +294,12 @@ struct scanhead_wave {
  * none does where no window was kept. Returns how many, or SCANHEAD_ESTATE where the points were lost. */
 int scanhead_waves(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_wave *waves,
                    uint32_t max);
-/* Signal of sample i < wave->n in units of the detection threshold, without the baseline. */
+/* Returns the signal of sample i < wave->n in units of the detection threshold, without the baseline. */
 double scanhead_wave_signal(const struct scanhead_wave *wave, uint32_t i);
-/* Samples that found no room in the head, as a frame of SCANHEAD_WAVES says. SCANHEAD_EINPUT for another type. */
+/* Returns the number of samples that found no room in the head, as a frame of SCANHEAD_WAVES says. SCANHEAD_EINPUT
+ * for another type. */
 int64_t scanhead_waves_lost(struct scanhead *sh, const struct scanhead_frame *frame);
-/* 1: frames of waveforms follow the points; else as scanhead_has_attributes. */
+/* Returns 1 if frames of waveforms follow the points; else as scanhead_has_attributes. */
 int scanhead_has_waves(const struct scanhead *sh);
 
 struct scanhead_line_end {

@@ -161,7 +161,7 @@ static const uint8_t unit_of[] = {
     [FIELD_64] = UNIT_FIELD_64,    [FIELD_FLOAT] = UNIT_FIELD_FLOAT, [FIELD_REAL] = UNIT_FIELD_REAL,
     [FIELD_TEXT] = UNIT_FIELD_TEXT};
 
-/* A number of 1, 2, 4 or 8 bytes between the machine's order and the wire's; the same both ways. */
+/* Turns a number of 1, 2, 4 or 8 bytes between the machine's order and the wire's; both ways are the same. */
 static void fields_turn(void *to, const void *from, size_t unit)
 {
     if (unit == 1) {

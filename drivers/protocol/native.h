@@ -387,9 +387,9 @@ void native_parser_finish(struct native_parser *parser);
  * Counters and sequence go on; native_sequence_resume(). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
-/* 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points, line-end,
- * poses, attributes, colours and waveforms frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs over u8 type,
- * u32 length (LE) and the payload of each. */
+/* Returns 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points,
+ * line-end, poses, attributes, colours and waveforms frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs
+ * over u8 type, u32 length (LE) and the payload of each. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

@@ -238,7 +238,7 @@ static void put_wave(uint8_t *restrict at, const struct line_waves *waves, const
     if (n & 1) le_put16(at + NATIVE_SAMPLE_LEN * (size_t)n, 0);
 }
 
-/* Whether a frame of waveforms is still to come. */
+/* Returns whether a frame of waveforms is still to come. */
 static int has_waves(const struct encode_cut *cut)
 {
     const struct line_waves *waves = cut->block->waves;

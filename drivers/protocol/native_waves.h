@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms on the wire (WAVEFORMS.md): payloads of type 12 into windows of samples, and the deviations of attributes.
+/* This decodes waveforms on the wire (WAVEFORMS.md): payloads of type 12 into windows of samples, and the deviations of
+ * attributes.
  *
  * native_encode.h writes them. Pure; allocates nothing; any thread. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_WAVES_H
@@ -46,7 +47,7 @@ static inline size_t native_wave_len(uint32_t n)
     return NATIVE_WAVE_LEN + NATIVE_SAMPLE_LEN * (size_t)(n + (n & 1));
 }
 
-/* Checks all windows: 0, or SH_EFORMAT. */
+/* Checks all windows. Returns 0, or SH_EFORMAT. */
 int native_decode_waves(const uint8_t *payload, size_t len, struct native_waves *out);
 
 /* The window at byte `at` of a checked payload; the first one is at NATIVE_WAVES_HEAD_LEN. Returns where the next one
@@ -67,7 +68,7 @@ static inline size_t native_decode_wave(const uint8_t *payload, size_t at, struc
 
 /* An attributes payload of n_points has room for their deviations behind its records: 0, or SH_EFORMAT. */
 int native_check_deviations(size_t len, uint32_t n_points);
-/* Of point i < n_points of such a payload, 1/1000; 65535: that much or more. */
+/* Returns the deviation of point i < n_points of such a payload, in 1/1000; 65535: that much or more. */
 static inline uint16_t native_decode_deviation(const uint8_t *payload, uint32_t n_points, uint32_t i)
 {
     return le_get16(payload + NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)n_points * NATIVE_ATTRIBUTE_LEN +

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The repair (repair.h) of CSV files whose first column is the scan's number. Rows are kept up to the last whole one. Lines
- * of comment begin with #. */
+/* This is the repair (repair.h) of CSV files whose first column is the scan's number. Rows are kept up to the last
+ * whole one. Lines of comment begin with #. */
 #ifndef DRIVERS_RECORD_CSV_REPAIR_H
 #define DRIVERS_RECORD_CSV_REPAIR_H
 

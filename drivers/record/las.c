@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. Where the head
- * sends waveforms it is format 9 (10), and packets of samples follow (las_waves.c). On request LAS 1.2 for older
+ * sends waveforms it is format 9 (10), and packets of samples follow (las_waves.c). On request it is LAS 1.2 for older
  * readers: format 1 (3), five returns, no labels, scan angles, attributes or waveforms. The file itself describes its
  * numbers (las_header.c).
  *
@@ -236,8 +236,8 @@ static int put_packets(struct las *las, int n, struct sh_err *err)
     return rc == 0 && any_new ? write_front(las, err) : rc;
 }
 
-/* The specification puts a packet's first sample at point + location * (dx, dy, dz), which is nearer to the head than the
- * point. So (dx, dy, dz) leads back to the head, as readers take it. */
+/* The specification puts a packet's first sample at point + location * (dx, dy, dz), which is nearer to the head
+ * than the point. So (dx, dy, dz) leads back to the head, as readers take it. */
 static void set_wave(struct las *las, struct las_point *to, int i)
 {
     struct track *t = &las->base.track;
@@ -254,8 +254,8 @@ static void set_wave(struct las *las, struct las_point *to, int i)
         to->back_ps[k] = (float)(-beam[k] * M_PER_PS);
 }
 
-/* Completes the packets. Inside, they follow the points. Until they all do, the header says that they are outside, and
- * how many points there are: so a repair finds the end of the points. */
+/* Completes the packets. An internal record follows the points. Until it is copied, the header says that the packets
+ * are in a .wdp, and how many points there are. From this a repair finds the end of the points. */
 static int end_waves(struct las *las, struct sh_err *err)
 {
     int rc = las_waves_end(&las->waves, err);

@@ -291,7 +291,7 @@ static void put_wave(uint8_t *to, const struct las_point *p)
         le_put_float(to + 17 + 4 * i, p->back_ps[i]);
 }
 
-/* Format 6, 7, 9 or 10, and the extra bytes. The near infrared of format 10 stays 0. */
+/* Writes a point of format 6, 7, 9 or 10, and the extra bytes. The near infrared of format 10 stays 0. */
 static void put_point_14(const struct las_facts *f, const struct las_point *p, uint8_t *to)
 {
     to[14] = (uint8_t)(p->echo | p->echo_count << 4);

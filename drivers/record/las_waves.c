@@ -74,7 +74,7 @@ static int is_same_digitiser(const struct las_kind *a, const struct las_kind *b)
            !(a->offset < b->offset) && !(a->offset > b->offset);
 }
 
-/* The kind with the fewest samples, but n or more; LAS_KINDS: there is none. */
+/* Returns the kind with the fewest samples, but n or more; LAS_KINDS: there is none. */
 static uint32_t find_kind(const struct las_waves *w, const struct las_kind *want)
 {
     uint32_t best = LAS_KINDS;
@@ -87,7 +87,7 @@ static uint32_t find_kind(const struct las_waves *w, const struct las_kind *want
     return best;
 }
 
-/* The kind of a window's packet, from 0 on; LAS_KINDS: there is no room for another one. */
+/* Returns the kind of a window's packet, from 0 on; LAS_KINDS: there is no room for another one. */
 static uint32_t choose_kind(struct las_waves *w, const struct scanhead_wave *wave)
 {
     struct las_kind want = {.bits = wave->bits <= 8 ? 8 : 16,
@@ -106,7 +106,8 @@ static uint32_t choose_kind(struct las_waves *w, const struct scanhead_wave *wav
 
 /* ---- packets */
 
-/* The samples of a window, and behind them as many without light as its kind has. Returns the packet's length. */
+/* Writes the samples of a window. Samples without light follow, up to the length of its kind. Returns the packet's
+ * length. */
 static size_t put_samples(const struct scanhead_wave *wave, const struct las_kind *kind, uint8_t *to)
 {
     const uint32_t dark = (uint32_t)lrint(fmin(fmax(wave->baseline, 0), (1u << wave->bits) - 1));

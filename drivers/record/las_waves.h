@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The waveforms of a LAS 1.4 file (ASPRS LAS 1.4 R15): windows of samples go in, packets come out in a file of their
+/* A LAS 1.4 file may have waveforms (ASPRS LAS 1.4 R15). Windows of samples go in, packets come out in a file of their
  * own, X.wdp beside X.las. The packets of an internal record are copied behind the points at the end.
  *
  * A packet has as many samples as its descriptor says, and there are 255 descriptors. The first lengths each get one
- * of their own. Later ones are rounded up, and filled with samples without light; they are counted. Samples have 8 bits,
- * or 16 where the digitiser has more than 8. One thread. */
+ * of their own. Later lengths are rounded up. Their packets are filled up with samples without light, which are
+ * counted. Samples have 8 bits, or 16 where the digitiser has more than 8. One thread. */
 #ifndef DRIVERS_RECORD_LAS_WAVES_H
 #define DRIVERS_RECORD_LAS_WAVES_H
 
@@ -22,7 +22,7 @@ enum {
     LAS_WAVES_RECORD = 65535,
 };
 
-/* A wave packet descriptor. */
+/* This is a wave packet descriptor. */
 struct las_kind {
     uint32_t bits, n, sample_ps; /* of a sample in the file; samples; time between them */
     double gain, offset;         /* signal in units of the detection threshold = offset + gain * count */
@@ -48,13 +48,13 @@ struct las_waves {
     struct las_packet last;
 };
 
-/* Before the first scan: whether X.wdp of a recording at `path` can be written. Errors as of newfile_check. */
+/* Checks before the first scan whether X.wdp of a recording at `path` can be written. Errors as of newfile_check. */
 int las_waves_check(const char *path, struct sh_err *err);
 /* A recording at `path` makes its file of packets; 1 in is_open. Errors as of outfile_open. */
 int las_waves_open(struct las_waves *waves, const char *path, struct sh_err *err);
-/* To be flushed before points that refer to its packets. */
+/* The file has to be flushed before points that refer to its packets. */
 int las_waves_flush(struct las_waves *waves, struct sh_err *err);
-/* The packet of a window, in the recording's `scan`. *is_new: there is a new descriptor. */
+/* Writes the packet of a window, in the recording's `scan`. *is_new: there is a new descriptor. */
 int las_waves_put(struct las_waves *waves, uint32_t scan, const struct scanhead_wave *wave, struct las_packet *packet,
                   int *is_new, struct sh_err *err);
 /* Completes the file of packets. */
@@ -67,7 +67,7 @@ int las_waves_keep(struct las_waves *waves, struct sh_err *err);
 /* Removes the file, unless it was kept, or X.las.part exists: then it stays as X.wdp.part, for a repair. */
 void las_waves_close(struct las_waves *waves);
 
-/* X.wdp for X.las; to be freed. NULL: no memory. */
+/* Returns the name X.wdp for X.las, which the caller frees. NULL: no memory. */
 char *las_waves_path(const char *path);
 
 #endif

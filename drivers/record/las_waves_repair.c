@@ -112,7 +112,7 @@ uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, 
     return n != 0 && n < (r->len - front) / len ? front + n * len : r->len;
 }
 
-/* 1: the point's record refers to a packet; *end is that packet's end. */
+/* Returns 1 if the point's record refers to a packet; *end is that packet's end. */
 static int refers(const struct las_packets *p, const uint8_t *record, uint64_t *end)
 {
     const uint8_t *wave = record + p->wave_at;
@@ -148,7 +148,7 @@ static int clear_points(struct las_packets *p, struct repair *r, const struct re
     return rc;
 }
 
-/* The record's own length. 1: it was wrong. */
+/* Corrects the record's own length. Returns 1 if it was wrong. */
 static int set_len(struct las_packets *p, struct sh_err *err)
 {
     uint8_t len[8], was[8];

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The waveforms of a .las that is repaired (las_repair.h). Its packets are inside, or in a file of their own: X.wdp.part of a
- * recording that was not completed, else X.wdp. Whole packets are kept. A point whose packet did not reach the disk
- * keeps its place, and says that it has no waveform. Nothing is copied, since a full disk has no room: packets that were not
- * yet inside stay in X.wdp. */
+/* The waveforms of a .las are repaired with it (las_repair.h). Its packets are inside, or in a file of their own:
+ * X.wdp.part of a recording that was not completed, else X.wdp. Whole packets are kept. A point whose packet did not
+ * reach the disk keeps its place, and says that it has no waveform. Nothing is copied, since a full disk has no
+ * room: packets that were not yet inside stay in X.wdp. */
 #ifndef DRIVERS_RECORD_LAS_WAVES_REPAIR_H
 #define DRIVERS_RECORD_LAS_WAVES_REPAIR_H
 
@@ -18,15 +18,16 @@ struct las_packets {
     uint64_t n_without;  /* points whose packets are not there */
 };
 
-/* Finds the packets of a file with this header. SH_EINPUT: they are not there; SH_ESTATE: the name that they get is taken. */
+/* Finds the packets of a file with this header. SH_EINPUT: they are not there; SH_ESTATE: the name that they get is
+ * taken. */
 int las_packets_find(struct las_packets *packets, const struct repair *repair, const uint8_t *header,
                      struct sh_err *err);
 /* Takes each point's record that is kept. */
 void las_packets_take(struct las_packets *packets, const uint8_t *record);
 /* Returns where the points end at the latest. */
 uint64_t las_packets_limit(const struct las_packets *packets, const struct repair *repair, const uint8_t *header);
-/* Makes points and packets whole, and says in the header where these are. 1: something was changed; 0: nothing had to be;
- * or a negative error. */
+/* Makes points and packets whole, and says in the header where the packets are. Returns 1 where something was
+ * changed, 0 where nothing had to be, or a negative error. */
 int las_packets_repair(struct las_packets *packets, struct repair *repair, const struct repair_rows *points,
                        uint8_t *header, struct sh_err *err);
 /* Gives the .wdp its name; one without any packet is removed. */

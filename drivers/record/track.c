@@ -30,7 +30,7 @@ static int check_sent(const struct track *t, int did, int does, const char *what
                    did ? "without" : "with", what);
 }
 
-/* What is wanted and sent beside the points. */
+/* Takes those frames beside the points that are wanted and sent. */
 static int take_sent(struct track *t, struct sh_err *err)
 {
     const struct scanhead *sh = t->sh;

@@ -128,8 +128,8 @@ static inline int track_is_nowhere(struct track *track, double x, double y, doub
     return 1;
 }
 
-/* The change of the recording's coordinates along a metre of range, for point i of the batch, which has a window. 1; 0: the
- * pose of a moving head is lost. */
+/* Writes the change of the recording's coordinates along a metre of range, for point i of the batch, which has a
+ * window. Returns 1, or 0 if the pose of a moving head is lost. */
 int track_beam(const struct track *track, int i, double beam[3]);
 
 /* At the end: gives out the points that still wait. */

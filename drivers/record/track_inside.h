@@ -7,8 +7,8 @@
 
 /* Whether frames that follow the points are wanted, and sent. */
 int track_waits(const struct track *track);
-/* To be called before the points of a frame, when no points wait any more; first_row: that of its first pulse.
- * SH_ENOMEM. */
+/* The caller calls this before the points of a frame, when no points wait any more. first_row: the row of its first
+ * pulse. SH_ENOMEM. */
 int track_begin_waiting(struct track *track, const struct scanhead_frame *frame, uint64_t first_row,
                         struct sh_err *err);
 /* Keeps the n points of the batch. */
@@ -24,8 +24,8 @@ int track_colours(struct track *track, const struct scanhead_frame *frame, struc
 
 /* Takes a frame of waveforms; a recorder without a place for them counts them. SH_ENOMEM, SH_EFORMAT. */
 int track_waves(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
-/* The window that an echo of this pulse lies in, and its place in it; NULL: in none. Pulses never go back between two
- * calls of track_clear_waves. */
+/* Returns the window that an echo of this pulse lies in, and its place in it; NULL: it is in none. Pulses never go
+ * back between two calls of track_clear_waves. */
 const struct scanhead_wave *track_find_wave(struct track *track, const struct scanhead_point *point, uint64_t pulse,
                                             double *at);
 /* Forgets all windows, and counts those that no point was in. */

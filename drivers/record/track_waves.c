@@ -7,7 +7,8 @@
 #include "drivers/protocol/native.h"
 #include "drivers/record/track_inside.h"
 
-/* This much is kept for one frame of points. A head has at most as many windows as 64 MiB of samples fill; a broken stream might have more. */
+/* This much is kept for one frame of points. A head has at most as many windows as 64 MiB of samples fill; a broken
+ * stream might have more. */
 enum { WAVES_MOST_BYTES = 64 << 20, WAVES_AT_ONCE = 64 };
 
 static const double EARTH_M = 6.371e6;
@@ -66,7 +67,7 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
     return 0;
 }
 
-/* The length of one unit of each axis on the ground, m. */
+/* Writes the length of one unit of each axis on the ground, m. */
 static void units_m(const struct scanhead_info *info, double to[3])
 {
     const double degree_m = EARTH_M * NATIVE_RAD_PER_DEG;
@@ -76,8 +77,8 @@ static void units_m(const struct scanhead_info *info, double to[3])
     to[2] = 1;
 }
 
-/* Where the head was in the CRS when it fired. Poses are in the scene's frame, which is the local CRS. How that frame lies
- * in other systems along the way, only the head knows. 0: not known. */
+/* Finds where the head was in the CRS when it fired. Poses are in the scene's frame, which is the local CRS. Only
+ * the head knows how that frame lies in other systems along the way. 0: the place is not known. */
 static int find_head(const struct track *t, const struct scanhead_point *p, double at[3])
 {
     struct scanhead_pose pose;
@@ -88,9 +89,9 @@ static int find_head(const struct track *t, const struct scanhead_point *p, doub
     return 1;
 }
 
-/* In the geo layout a point has no range, but its window says how coordinates change along a metre of it: the range is the
- * share of the way from the head to the point that lies along the beam. A beam that the CRS bends leaves the tangent
- * sideways, so its range is right to the second order. NaN: the head's place is not known. */
+/* In the geo layout a point has no range, but its window says how coordinates change along a metre of it. The range
+ * is the share of the way from the head to the point that lies along the beam. A beam that the CRS bends leaves the
+ * tangent sideways, so its range is right to the second order. NaN: the head's place is not known. */
 static double range_along(const struct track *t, const struct scanhead_point *p, const struct scanhead_wave *wave)
 {
     const double xyz[3] = {p->x, p->y, p->z};

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* .waves.csv: the waveforms of all pulses, a row a window, also of pulses without an echo.
+/* A .waves.csv has the waveforms of all pulses, a row a window, also of pulses without an echo.
  *
- * scan and station as in .poses.csv; pulse: its number in the scan; t_s: its firing time since the scan's start. Sample k
- * of the n lies at range_m + k step_m. Its signal, in units of the detection threshold, is (count - baseline)
- * count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the head's frame, in the geo
- * layout the change of the CRS's coordinates along a metre of range. The last column has the counts, with blanks
- * between. */
+ * scan and station are as in .poses.csv; pulse is its number in the scan, and t_s its firing time since the scan's
+ * start. Sample k of the n lies at range_m + k step_m. Its signal, in units of the detection threshold, is (count -
+ * baseline) count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the head's
+ * frame, in the geo layout the change of the CRS's coordinates along a metre of range. The last column has the
+ * counts, with blanks between. */
 #include <stdio.h>
 #include <string.h>
 

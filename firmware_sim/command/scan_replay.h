@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `SCAN:REPLay`: where a recording is played, how fast, and whether it begins anew at its end. */
+/* `SCAN:REPLay` sets where a recording is played, how fast, and whether it begins anew at its end. */
 #ifndef FIRMWARE_SIM_COMMAND_SCAN_REPLAY_H
 #define FIRMWARE_SIM_COMMAND_SCAN_REPLAY_H
 

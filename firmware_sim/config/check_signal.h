@@ -9,7 +9,7 @@ struct config_profile;
 
 /* Noise, signal, surfaces, and the keys of a profile that concern them. */
 void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
-/* Waveforms: checks between their keys, and what they need of signal, noise and profile. */
+/* Checks waveforms: their keys together, and their needs of signal, noise and profile. */
 void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg);
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
 

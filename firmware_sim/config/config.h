@@ -252,15 +252,15 @@ static inline int config_has_footprint(const struct config *cfg)
     return cfg->profile.beam_exit_m != 0.0 || cfg->profile.beam_divergence_rad != 0.0;
 }
 
-/* Whether waveforms are made at all, to be sent or to find echoes in them. */
+/* Returns whether waveforms are made at all, to be sent or to find echoes in them. */
 static inline int config_has_waves(const struct config *cfg)
 {
     return cfg->head.settings.waves != 0 || cfg->waveform.echoes != WAVE_ECHOES_MODEL;
 }
-/* Samples of a usual pulse: one window around a return of 20 dB on a surface hit head on, or that of near_m and
- * far_m. */
+/* Returns the samples of a usual pulse: one window around a return of 20 dB on a surface hit head on, or the window
+ * of near_m and far_m. */
 uint32_t config_wave_samples(const struct config *cfg);
-/* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
+/* Returns the bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double config_wave_bytes_s(const struct config *cfg);
 /* Pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
 double config_cast_hz(const struct config *cfg);

@@ -81,18 +81,18 @@
      .help = "Extinction of the air (absorption and scattering), in place of visibility_m."},
 
     {"waveform", .type = CFG_MAP,
-     .help = "Full waveforms: the light that comes back of a pulse, over time, as a digitiser samples it. It needs "
-             "signal.model: on. The outgoing pulse has the profile's pulse_width_ns, the noise of the samples is one "
-             "over its threshold_snr (signal.detection: sharp: none)."},
+     .help = "Full waveforms: the light that comes back of a pulse, over time, as a digitiser samples it. They "
+             "need signal.model: on. The outgoing pulse has the profile's pulse_width_ns. The noise of a sample is the "
+             "threshold over the profile's threshold_snr; with signal.detection: sharp there is none."},
     {"waveform.send", SETTING(waves), CFG_ENUM, .def = "off", WORDS([0] = "off", [1] = "on"),
      .help = "on: frames with the samples follow the points, on links of protocol native. Clients may switch them off "
              "and on again (SCAN:WAVeform)."},
     {KEY(waveform.echoes), CFG_ENUM, .def = "model",
      WORDS([WAVE_ECHOES_MODEL] = "model", [WAVE_ECHOES_THRESHOLD] = "threshold", [WAVE_ECHOES_FRACTION] = "fraction",
            [WAVE_ECHOES_GAUSSIANS] = "gaussians"),
-     .help = "Where echoes come from. model: from closed forms of signal and noise; the others find them in the "
-             "samples, with the noise of these: threshold: where the signal crosses a level; fraction: half of the "
-             "peak; gaussians: decomposition into Gaussian pulses."},
+     .help = "Source of the echoes. model: closed forms of signal and noise. The other words find echoes in the "
+             "samples, with their noise. threshold: where the signal crosses a level; fraction: at half of the peak; "
+             "gaussians: by decomposition into Gaussian pulses."},
     {KEY(waveform.pulse), CFG_ENUM, .def = "gaussian",
      WORDS([WAVEFORM_GAUSSIAN] = "gaussian", [WAVEFORM_ASYMMETRIC] = "asymmetric", [WAVEFORM_TABLE] = "table"),
      .help = "Shape of the outgoing pulse: symmetric; asymmetric, with a longer fall (skew); or measured "
@@ -100,7 +100,7 @@
     {KEY(waveform.pulse_file), CFG_PATH, .def = "", .example = "pulse.csv",
      .help = "pulse: table: a CSV with the columns t_ns,power: the power at times that are equally far apart."},
     {KEY(waveform.skew), CFG_REAL, NULL, "2", 1, 3,
-     .help = "pulse: asymmetric: the time that the pulse takes to fall, over that to rise."},
+     .help = "pulse: asymmetric: the time in which the pulse falls, over the time in which it rises."},
     {KEY(waveform.bandwidth_mhz), CFG_REAL, "MHz", "0", 0, 100000,
      .help = "Bandwidth of the receiver, at -3 dB; 0: no limit."},
     {KEY(waveform.sample_ns), CFG_REAL, "ns", "1", 0.05, 100,
@@ -109,17 +109,17 @@
     {KEY(waveform.baseline_counts), CFG_REAL, NULL, "32", 0, 8191,
      .help = "The count without any light, in steps of 1/16. Above it there must be room for a signal."},
     {KEY(waveform.full_scale_db), CFG_REAL, "dB", "30", 0, 100,
-     .help = "Signal at the largest count, above the detection threshold. What is stronger is cut off there."},
+     .help = "Signal at the largest count, above the detection threshold. A stronger signal is cut off there."},
     {KEY(waveform.saturation_db), CFG_REAL, "dB", "0", 0, 100,
      .help = "The receiver gives no more than this signal, above the threshold; 0: no limit."},
     {KEY(waveform.dead_ns), CFG_REAL, "ns", "0", 0, 100000,
-     .help = "After a sample at that limit the receiver gives nothing for so long. It needs saturation_db."},
+     .help = "The receiver gives nothing for this time after a sample at saturation_db, which it needs."},
     {KEY(waveform.keep_db), CFG_REAL, "dB", "-6", -60, 60,
      .help = "Samples are kept in windows where the signal reaches this, relative to the threshold."},
     {KEY(waveform.before_ns), CFG_REAL, "ns", "5", 0, 4000,
-     .help = "A window begins so long before the signal reaches that."},
+     .help = "A window begins this long before the signal reaches keep_db."},
     {KEY(waveform.after_ns), CFG_REAL, "ns", "10", 0, 4000,
-     .help = "It ends so long after the signal has fallen below it."},
+     .help = "A window ends this long after the signal has fallen below keep_db."},
     {KEY(waveform.near_m), CFG_REAL, "m", "0", 0, 1e5,
      .help = "With far_m: one window from this range on, for every pulse, whatever comes back."},
     {KEY(waveform.far_m), CFG_REAL, "m", "0", 0, 1e5,

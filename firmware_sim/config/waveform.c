@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Full waveforms: checks that concern more than one key, and what they make of a stream. Limits of the digitiser's and
- * the pulse's figures by themselves are in core/waveform. */
+/* Full waveforms have checks that concern more than one key, and a share of the stream. Limits of the digitiser's
+ * and the pulse's figures by themselves are in core/waveform. */
 #include <math.h>
 
 #include "core/light.h"
@@ -10,7 +10,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
 
-/* What queues of the stream hold of it, 0.3 s and more, must fit into memory. */
+/* Queues hold 0.3 s and more of the stream, which must fit into memory. */
 static const double MOST_BYTES_S = 4e8;
 
 static int has_gate(const struct config_waveform *w)
@@ -18,8 +18,8 @@ static int has_gate(const struct config_waveform *w)
     return w->near_m < w->far_m;
 }
 
-/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. The receiver makes it longer: 312 ns for
- * a Gaussian response of 1 MHz. */
+/* A Gaussian pulse of 26 dB is above keep_db for three of its widths. The receiver makes it longer: 312 ns for a
+ * Gaussian response of 1 MHz. */
 uint32_t config_wave_samples(const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;

@@ -9,9 +9,9 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/pump.h"
 
-/* Bytes per second of the points at the present rates, with one echo per pulse, and one window of its waveform: a lower
- * bound. A command can raise the
- * rates later. Further echoes and the frames' headers come on top. A link announces what it loses then. */
+/* Returns the bytes per second of the points at the present rates, with one echo per pulse, and one window of its
+ * waveform. It is a lower bound. A command can raise the rates later. Further echoes and the frames' headers come on
+ * top. A link announces what it loses then. */
 static double stream_rate(const struct config *cfg)
 {
     double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0) +

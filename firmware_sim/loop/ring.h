@@ -30,7 +30,7 @@
  * the two that device_tick_lines adds. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
-/* Counts of hits: echoes, and hits that gave none; samples of waveforms without room (struct cast_counters). */
+/* These count echoes, hits that gave none, and samples of waveforms without room (struct cast_counters). */
 struct ring_hits {
     uint32_t echoes, crowded, faint, unfit, lost_samples;
 };

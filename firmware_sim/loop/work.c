@@ -70,7 +70,7 @@ void worker_free(struct worker *worker)
     free(worker);
 }
 
-/* Bytes of so many points, lines and waveforms. Each part of a line is a frame of its own. */
+/* Returns the bytes of so many points, lines and waveforms. Each part of a line is a stream frame of its own. */
 static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t lines, struct site_wave_room waves)
 {
     uint32_t bytes =

@@ -95,7 +95,7 @@ void replay_open_commands(struct replay *r)
     cmd->limits.n_stations = 1;
 }
 
-/* It is played from another time on, or otherwise. */
+/* The recording is played from another time on, at another speed, or with another loop. */
 static void replay_change(struct replay *r, const struct command_replay_change *to)
 {
     if (to->position_s >= 0.0) {

@@ -128,7 +128,7 @@ static int is_device(const struct config *cfg)
     return 0;
 }
 
-/* What SCAN:REPLay reports and allows. Its end is that of the part which is played. */
+/* Sets the figures that SCAN:REPLay reports and allows. Its end is the end of the part that is played. */
 static void describe_replay(struct replay *r)
 {
     int64_t last_ns;

@@ -18,7 +18,7 @@ struct pulse_table {
     double t0_ns, step_ns;
 };
 
-/* A line of the file. Times rise by one step, up to the rounding of decimals. */
+/* Takes a line of the file. Times rise by one step, up to the rounding of decimals. */
 static int take_power(struct pulse_table *table, const struct csv *csv, const char *path, struct sh_err *err)
 {
     const double t_ns = csv->value[0], power = csv->value[1];
@@ -148,7 +148,7 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* So many windows of a pulse have room, on average over a block. */
+/* A block has room for this many windows a pulse, on average. */
 enum { MOST_WINDOWS = 4 };
 
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)

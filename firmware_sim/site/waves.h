@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms of a site's scans: the digitiser of the configuration, made once, and the room that its samples need. */
+/* The waveforms of a site's scans need two things: the digitiser of the configuration, made once, and room for their
+ * samples. */
 #ifndef FIRMWARE_SIM_SITE_WAVES_H
 #define FIRMWARE_SIM_SITE_WAVES_H
 
@@ -23,22 +24,22 @@ struct site_waves {
 int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_waves(struct site *site);
 
-/* Windows and samples for which a block of so many pulses has room. What finds none is counted (core/line.h). 0 where
- * no waveforms are sent. */
+/* A block of so many pulses has room for these windows and samples. Those without room are counted (core/line.h). 0
+ * where no waveforms are sent. */
 struct site_wave_room {
     uint32_t windows, samples;
 };
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
-/* Those of as many usual pulses. */
+/* Returns the windows and samples of as many usual pulses. */
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
 /* Prepares a caster and a block of so many pulses for the site's waveforms, and for the deviations of echoes that are
  * found in them. Does nothing where there are none. */
 int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *caster, struct line_block *block,
                    struct sh_err *err);
 
-/* Cost of a usual pulse's waveform, ns; 0: there are none. */
+/* Returns the cost of a usual pulse's waveform, ns; 0: there are none. */
 double site_wave_ns(const struct site *site);
-/* The plan's row. */
+/* Fills the plan's row. */
 void site_wave_row(const struct site *site, struct plan_row *row);
 
 #endif

@@ -20,7 +20,7 @@ static double other_squares(const double *y, uint32_t lo, uint32_t hi, const dou
     return sum;
 }
 
-/* Gauss's elimination with the largest pivot. */
+/* Solves by Gauss's elimination with the largest pivot. */
 static int other_solve(double m[PARAMETERS][PARAMETERS + 1], double *p)
 {
     for (int k = 0; k < PARAMETERS; k++) {

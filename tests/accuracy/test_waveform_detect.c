@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* How well each detector ranges, against theory and against another decomposition, and where it is biased. The tables
- * are those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their standard errors. */
+/* These tests measure how well each detector ranges, against theory and against another decomposition, and where it
+ * is biased. The tables are those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their
+ * standard errors. */
 #include <math.h>
 #include <stdio.h>
 
@@ -22,8 +23,9 @@ static uint32_t pulses(void)
 
 /* ---- one echo */
 
-/* The deviation of ranges: of the decomposition within 10 % of Cramer's and Rao's bound, which no unbiased estimate
- * beats. Of the edges: noise over the slope at the crossing, and what the peak's noise does to the correction. */
+/* The deviation of ranges has bounds. The decomposition is within 10 % of Cramer's and Rao's bound, which no
+ * unbiased estimate beats. The edges have the noise over the slope at the crossing, and the effect of the peak's
+ * noise on the correction. */
 static double edge_sigma_m(double peak, double part, double noise, double sigma_s)
 {
     double v = sqrt(-2.0 * log(part)), at_edge = noise / (peak * part * v), by_peak = noise / (peak * v);
@@ -91,7 +93,7 @@ static void the_jitter_is_that_of_the_closed_form(void **state)
     wave_close(&w);
 }
 
-/* The part of pulses in which the target is seen. By a level: one sample of independent noise at least reaches it. By
+/* The target is seen in a part of the pulses. By a level: at least one sample of independent noise reaches it. By
  * decomposition: the fitted peak, whose noise is that of a sample times sqrt(1.5 dt / (sqrt(pi) s)), reaches it. */
 static double normal(double x)
 {
@@ -149,7 +151,7 @@ static double extent_m(double incidence_deg)
     return 0.5 * BEAM_RAD * RANGE_M * tan(incidence_deg * M_PI / 180.0);
 }
 
-/* The largest signal of a return, over that of one that is hit head on. */
+/* Returns the largest signal of a return, over that of one that is hit head on. */
 static double peak_of(const struct wave_echoes *w, const struct waveform_return *r)
 {
     const struct waveform_return point = {r->range_m, 1.0, 0.0, WAVEFORM_POINT};
@@ -177,8 +179,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
             /* the tail of a skew echo may reach the level once more, with noise on it */
             assert_true(f[d].single >= pulses() / 4 - pulses() / 4000);
-            /* Ranges across the plane rise as 1 / (1 - x extent / R). So its echo is skew, and a symmetric shape
-             * through it lies off the centroid: by less than the third of what the rims are off. */
+            /* Ranges across the plane rise as 1 / (1 - x extent / R), so its echo is skew. A symmetric shape through
+             * it lies off the centroid, by less than a third of the rims' shift. */
             const double skew_m = extent * extent / RANGE_M / 3.0;
             wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
@@ -264,8 +266,8 @@ static void echoes_that_overlap_are_separated(void **state)
     two(&spec, "asymmetric", 60.0);
 }
 
-/* Three of 5 to 60 thresholds, 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own. Few are found
- * as two, fewer as four. */
+/* Three echoes of 5 to 60 thresholds are 0.8 to 1.6 widths apart: the middle one seldom has a maximum of its own.
+ * Few triples are found as two, fewer as four. */
 static void three_echoes_are_three(void **state)
 {
     (void)state;

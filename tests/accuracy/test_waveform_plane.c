@@ -32,8 +32,8 @@ static double plane_range(const struct plane *plane, double x, double y)
     return (plane->range_m - d * tangent * x) / (1.0 - s * tangent * y) * sqrt(1.0 + s * s * (x * x + y * y));
 }
 
-/* What is neglected: the far side of the footprint is hit from further away, and more steeply. Both change the power of
- * a sub-ray by its range: (R / r)^2 for the distance, and as much as R / r for the cosine. */
+/* The closed form neglects that the far side of the footprint is hit from further away, and more steeply. Both
+ * change the power of a sub-ray by its range: (R / r)^2 for the distance, and as much as R / r for the cosine. */
 static double plane_weight(const struct plane *plane, double range_m, int weighed)
 {
     return weighed ? pow(plane->range_m / range_m, 3) : 1.0;
@@ -79,9 +79,9 @@ static struct waveform_return closed_form(const struct plane *plane)
                                     WAVEFORM_DISC};
 }
 
-/* The closed form is below one count for sub-rays of equal power: b = s tan i is all that it neglects, with ranges of
- * second order in b. Power by distance and cosine is 3 b at the rim at most, so the samples change by less than 3 b of
- * themselves. */
+/* The error of the closed form is below one count for sub-rays of equal power. It neglects only ranges of second
+ * order in b = s tan i. Power by distance and cosine is 3 b at the rim at most, so the samples change by less than 3
+ * b of themselves. */
 static void planes_are_the_closed_form(void **state)
 {
     (void)state;
@@ -120,9 +120,9 @@ static void planes_are_the_closed_form(void **state)
 
 /* ---- what fills a footprint in other ways */
 
-/* A sub-ray of n stands for 1/n of the energy. An edge may take half a row of them, of about the root of n, to either
- * side: so 0.5 / sqrt(n) of the light lies elsewhere, or is a bit nearer or further. Leaves have many edges: twice
- * that. */
+/* One of n sub-rays stands for 1/n of the energy. To either side, an edge may take half a row of them, and a row has
+ * about the root of n. So 0.5 / sqrt(n) of the light lies elsewhere, or a bit nearer or further. Leaves have many
+ * edges: twice that. */
 static void rings_come_nearer(void **state)
 {
     (void)state;
@@ -146,7 +146,7 @@ static void rings_come_nearer(void **state)
     waveform_free(w);
 }
 
-/* Mean of (x - mean)^3 of the energy on one side of the edge at h. */
+/* Returns the mean of (x - mean)^3 of the energy on one side of the edge at h. */
 static double skewness(double h)
 {
     double n = 0.0, sum = 0.0, square = 0.0, cube = 0.0;

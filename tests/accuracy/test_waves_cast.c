@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms of pulses that are cast: their energy beside the link budget, worked out by hand; the windows beside the
- * points; echoes that are found in them beside the closed forms. */
+/* These tests cast pulses with waveforms. They compare the energy with the link budget, worked out by hand, the
+ * windows with the points, and the echoes that are found with the closed forms. */
 #include "core/light.h"
 #include "tests/accuracy/lit_plates.h"
 
@@ -54,7 +54,7 @@ static void close_waves(struct waves *w)
     close_lit(&w->lit);
 }
 
-/* The samples of a pulse, as the amplitude that their energy is that of. */
+/* Returns the amplitude whose energy the samples of a pulse have. */
 static double energy_of(const struct waves *w, uint32_t pulse)
 {
     const struct line_waves *waves = w->lit.rig.block.waves;
@@ -97,8 +97,8 @@ static void check_energies(enum beam_mode mode, const struct beam_view *view, co
     close_waves(&w);
 }
 
-/* To 0.1 %: digits at 10,000 counts, and what lies outside of the windows, are less. Plates are hit at up to 44 deg.
- * */
+/* The energy agrees to 0.1 %: digits at 10,000 counts, and the light outside of the windows, are less. Plates are
+ * hit at up to 44 deg. */
 static void energy_is_the_link_budget(void **state)
 {
     (void)state;
@@ -110,7 +110,7 @@ static void energy_is_the_link_budget(void **state)
     }
 }
 
-/* The signal by sample of the pulse's grid, from the first one that is kept in `like`. */
+/* Fills the signal by sample of the pulse's grid, from the first one that is kept in `like`. */
 static void spread_samples(const struct line_waves *waves, uint32_t pulse, uint32_t from, double out[512])
 {
     for (uint32_t i = 0; i < 512; i++)
@@ -251,9 +251,9 @@ static void lost_samples_are_counted(void **state)
 /* ---- echoes */
 
 /* Without noise, echoes of one plate are where the closed form has them, but for digits. Half a count is 0.06
- * thresholds. From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 9
- * mm. At half of the peak a straight line between samples 1 ns apart is off by P'' / 8, 3.6 mm, where a detector takes
- * one. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
+ * thresholds. From the sample below the threshold to the one above it the signal rises by 1 or more, so half a count
+ * is 9 mm there at most. A detector that takes a straight line at half of the peak, between samples 1 ns apart, has
+ * an error of P'' / 8, 3.6 mm. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
 static void echoes_are_found_in_samples(void **state)
 {
     (void)state;
@@ -311,8 +311,8 @@ static void look(const struct line_block *b, struct seen seen[PULSES])
 }
 
 /* An edge cuts footprints on two plates 40 m apart. Where each has 2 % of the light or more, or nothing, the echoes
- * are those of the closed forms: 2 % are 8 thresholds and more, of which half a count is 1 %, and that of a pulse's
- * sigma 3 mm. (Of less the model makes no echo below 1 %, and the detector none below the threshold.) */
+ * are those of the closed forms. 2 % are 8 thresholds and more. Half a count is 1 % of these, and 1 % of a pulse's
+ * sigma is 3 mm. (Below 1 % the model makes no echo, and below the threshold the detector finds none.) */
 static void cut_footprints_have_two_echoes(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// make bench-page: this measures what a browser costs a head at its limit, and how fast the page is. It prints a table for each:
+// make bench-page: this measures what a browser costs a head at its limit, and how fast the page is. It prints a table
+// for each:
 //   1. 2.2 million pulses a second of a small room, without a browser, and with one at nice 10 that can't follow
 //   2. pictures a second of 2, 5 and 10 million points, drawn in software
 //   3. decoding, ns a point, in the page and in node
@@ -176,8 +177,8 @@ async function memory() {
 }
 
 // ---- 5
-// Lets go of a tried station at a place. Returns the times until all its points are on the page, until all its cells are known, and
-// until these are painted.
+// Lets go of a tried station at a place. Returns the times until all its points are on the page, until all its cells
+// are known, and until these are painted.
 const letGo = (number, [x, y, z]) => `(async () => {
   const {trial, view} = scanhead, station = trial.get(${number}), t0 = performance.now();
   const soon = () => new Promise((done) => setTimeout(done, 1));

@@ -2,8 +2,8 @@
 /* This measures echoes found in samples: ns a pulse by detector beside the error of the ranges, on pulses that were
  * sampled before. Sampling has a row of its own. Figures are medians of the rounds, in processor time of the thread.
  *
- * build/tests/bench/waveform_detect            a table build/tests/bench/waveform_detect --chart    rows of the
- * chart's table (tests/bench/README.md)
+ *   build/tests/bench/waveform_detect            a table
+ *   build/tests/bench/waveform_detect --chart    rows of the chart's table (tests/bench/README.md)
  *
  * `single` is one return on a plane that is hit head on, `tilted` at 80 degrees, `pair` are two a pulse's width
  * apart, `foliage` is 40 returns over 3 m, `limited` is one 30 dB above the full scale, and `nothing` is noise.

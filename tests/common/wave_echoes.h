@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms of known returns, and what the detectors find in them. */
+/* This makes waveforms of known returns, and compares what the detectors find in them. */
 #ifndef TESTS_COMMON_WAVE_ECHOES_H
 #define TESTS_COMMON_WAVE_ECHOES_H
 
@@ -16,7 +16,8 @@ struct wave_echoes {
     uint32_t most, n, n_crowded;
 };
 
-/* A Gaussian pulse of 4 ns, sampled each ns with 12 bits, noise 1/8 of the threshold, full scale 100 thresholds. */
+/* Returns a Gaussian pulse of 4 ns, sampled each ns with 12 bits, noise 1/8 of the threshold, full scale 100
+ * thresholds. */
 struct waveform_spec wave_spec(void);
 /* Room for 16 echoes a pulse. Fails the test where the spec is refused. */
 void wave_open(struct wave_echoes *w, const struct waveform_spec *spec);
@@ -41,11 +42,11 @@ void wave_between(double got, double least, double most);
 
 /* ---- what theory says of the pulse of wave_spec */
 
-/* sigma of a Gaussian by its full width at half maximum. */
+/* Returns sigma of a Gaussian by its full width at half maximum. */
 double wave_sigma(double width);
-/* The least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise: its peak and sigma have no
- * part in it, since their derivatives are even and that of the place is odd. Sum of (A (t - t0) / s^2 g)^2 over
- * samples dt apart: A^2 sqrt(pi) / (2 s dt). */
+/* Returns the least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise. Its peak and sigma
+ * have no part in it: their derivatives are even, and that of the place is odd. The sum of (A (t - t0) / s^2 g)^2
+ * over samples dt apart is A^2 sqrt(pi) / (2 s dt). */
 double wave_least_sigma_m(double peak, double noise, double sigma_s, double sample_s);
 
 #endif

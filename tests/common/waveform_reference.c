@@ -85,7 +85,7 @@ static double plane_85_range(double x, double y)
     return WAVEREF_FAR_M / (1.0 - B_85 * x);
 }
 
-/* Where an edge or a fold crosses the disc. */
+/* An edge or a fold crosses the disc at this place. */
 static const double EDGE_X = 0.23, STEP_M = 0.5, LEFT_M = 0.15, RIGHT_M = 0.06;
 
 static double step_range(double x, double y)
@@ -101,13 +101,13 @@ static double wedge_range(double x, double y)
     return WAVEREF_FAR_M + (x < EDGE_X ? -LEFT_M : RIGHT_M) * (x - EDGE_X);
 }
 
-/* A ball a little larger than the footprint. */
+/* The sphere is a little larger than the footprint. */
 static double sphere_range(double x, double y)
 {
     return WAVEREF_FAR_M + 0.4 - 0.4 * sqrt(fmax(0.0, 1.0 - (x * x + y * y) / 1.21));
 }
 
-/* Leaves: 60 discs at random, of which the nearest counts; a wall is behind. */
+/* The leaves are 60 discs at random, of which the nearest counts; a wall is behind. */
 static double foliage_range(double x, double y)
 {
     uint64_t random = 5;

@@ -24,12 +24,12 @@ struct waveref_window {
 /* Returns of these ranges, and the pulse around them. */
 void waveref_open(struct waveref_window *window, double from_m, double to_m);
 void waveref_add(struct waveref_window *window, double range_m, double weight);
-/* Place i of n in the unit disc, on a spiral of equal energies (Vogel 1979). */
+/* Sets place i of n in the unit disc, on a spiral of equal energies (Vogel 1979). */
 void waveref_place(uint32_t i, uint32_t n, double *x, double *y);
-/* RMS of the differences of a and b, in counts of 12 bits, with full scale at the peak of b. */
+/* Returns the RMS of the differences of a and b, in counts of 12 bits, with full scale at the peak of b. */
 double waveref_counts(const struct waveref_window *a, const struct waveref_window *b);
 
-/* The spec of such a pulse: 12 bits, a full scale of 1, no noise. */
+/* Returns the spec of such a pulse: 12 bits, a full scale of 1, no noise. */
 struct waveform_spec waveref_spec(void);
 void waveref_fill(const struct waveform *w, const struct waveform_return *r, uint32_t n,
                   const struct waveref_window *like, struct waveref_window *out);
@@ -50,9 +50,10 @@ struct waveref_shape {
 };
 extern const struct waveref_shape waveref_shape[WAVEREF_SHAPES];
 void waveref_by_rays(const struct waveref_shape *shape, struct waveref_window *out);
-/* The pattern's sub-rays as points. Returns how many. */
+/* Fills the pattern's sub-rays as points. Returns how many there are. */
 uint32_t waveref_rings(const struct waveref_shape *shape, uint32_t rings, struct waveform_return *r);
-/* A shape without sub-rays: a plane as one return, a step or wedge as its two sides. Returns how many; 0: others. */
+/* Fills a shape without sub-rays: a plane as one return, a step or wedge as its two sides. Returns how many; 0: it
+ * is another shape. */
 uint32_t waveref_parts(int shape, struct waveform_return r[2]);
 
 #endif

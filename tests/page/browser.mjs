@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This runs Chromium without a window, by the DevTools protocol over a pipe. So it ends with this program, however that ends,
-// and opens no port. Its profile is its own, and it finds no address but 127.0.0.1.
+// This runs Chromium without a window, by the DevTools protocol over a pipe. So it ends with this program, however that
+// ends, and opens no port. Its profile is its own, and it finds no address but 127.0.0.1.
 import {spawn, spawnSync} from 'node:child_process';
 import {accessSync, constants, mkdirSync, writeFileSync} from 'node:fs';
 import {folder, forget, remember} from './work.mjs';

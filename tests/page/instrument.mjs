@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// Tests of the page as an instrument: colours, ages and the time line as they are drawn; files that it saves; control, keys,
-// screen readers, small screens, and that nothing jumps. They read back the pixels of the picture.
+// These tests take the page as an instrument. They check colours, ages and the time line as they are drawn, the files
+// that it saves, control, keys, screen readers and small screens, and that nothing jumps. They read back the pixels of
+// the picture.
 import {execFileSync} from 'node:child_process';
 import {existsSync, mkdirSync, readdirSync, readFileSync} from 'node:fs';
 import {tableOf} from '../../drivers/link/web/view_colours.js';
@@ -13,8 +14,8 @@ import {equal, folder, is, near, test} from './work.mjs';
 const ROOT = new URL('../..', import.meta.url).pathname;
 const SIZE = [600, 480];
 
-// This runs in a page before its scripts. It notes layout shifts that no input has caused, the theme before modules run,
-// and changes of texts that a screen reader reads out.
+// This runs in a page before its scripts. It notes layout shifts that no input has caused, the theme before modules
+// run, and changes of texts that a screen reader reads out.
 function watches() {
   Object.assign(window, {shifts: [], spoken: 0, firstTheme: null});
   new PerformanceObserver((list) => {
@@ -306,8 +307,9 @@ export async function testInstrument(browser) {
   await testTimeLines(browser, file);
 }
 
-// The page's scale for heights and that of files (core/colour.h) have other colours between the ends, and the same hues in
-// the same order: blue, green, yellow, red. They are within 60 of the 240 degrees; the other way round they would be 240 apart.
+// The page's scale for heights and that of files (core/colour.h) have other colours between the ends, and the same hues
+// in the same order: blue, green, yellow, red. They are within 60 of the 240 degrees; the other way round they would be
+// 240 apart.
 function sameMeaning() {
   const [low, high] = [-0.5, 3.5], file = `${folder}/heights.ply`;
   run('record', CONFIG, '-o', file, '--quiet', '--set', 'output.colour=height', '--set', `output.colour_limits=[${low}, ${high}]`);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This tests the page of a head, of a recording, and of a head that goes, in one browser. Other programs compute the expected
-// values: `record`, the Python client, and a client by TCP.
+// This tests the page of a head, of a recording, and of a head that goes, in one browser. Other programs compute the
+// expected values: `record`, the Python client, and a client by TCP.
 import {createServer} from 'node:http';
 import {connect} from 'node:net';
 import {readFileSync} from 'node:fs';
@@ -37,8 +37,8 @@ const counts = (page) => page.eval(`(() => {
     bounds: scanhead.cloud.bounds};
 })()`);
 
-// The page holds positions as floats relative to the first point. So the tolerance is half a unit in the last place of the
-// room's diagonal.
+// The page holds positions as floats relative to the first point. So the tolerance is half a unit in the last place of
+// the room's diagonal.
 function sameBounds(bounds, {min, max}) {
   const tolerance = Math.hypot(...max.map((v, k) => v - min[k])) * 2 ** -24;
   min.forEach((v, k) => near(bounds.min[k], v, tolerance, `lower bound ${k}`));
@@ -55,8 +55,8 @@ const IS_RED = `getComputedStyle(document.querySelector('#banner')).color === ((
   return color;
 })()`;
 
-// This runs in a page before its scripts. It notes a pixel of each WebGL canvas at the end of the task that made it, or changed
-// its size. The browser shows the canvas as it is then.
+// This runs in a page before its scripts. It notes a pixel of each WebGL canvas at the end of the task that made it, or
+// changed its size. The browser shows the canvas as it is then.
 function seesBlack() {
   window.seen = [];
   const look = (canvas) => queueMicrotask(() => {

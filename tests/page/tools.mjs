@@ -7,7 +7,8 @@ import {equal, folder, is, near, test} from './work.mjs';
 const SIZE = [1100, 560]; // the narrowest wide page: its picture has about 500 x 400 pixels
 const TOOLS = 'scanhead.tools';
 
-// Takes a picture of the screen once all points are there, and returns a function of the pixel at a place of the canvas.
+// Takes a picture of the screen once all points are there, and returns a function of the pixel at a place of the
+// canvas.
 async function drawn(page) {
   await page.eval('scanhead.view.screenshotReady()');
   const {data} = await page.send('Page.captureScreenshot', {format: 'png'});

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-// These tests are about stations that are tried in the page: what is shown and painted, beside what `coverage` says of the
-// same scans. The head must not notice any of it.
+// These tests are about stations that are tried in the page. They compare what is shown and painted with the words of
+// `coverage` about the same scans. The head must not notice any of it.
 import {run} from './head.mjs';
 import {CONFIG} from './rig.mjs';
 import {pixelsOf} from './png8.mjs';
 import {equal, is, near, test} from './work.mjs';
 import {SEEN_COLOURS} from '../../drivers/link/web/view_paint.js';
 
-// A line head's rates for a step: lines = step * pulses / sweep, pan = step * lines. The sweep of this one is 240 degrees.
+// A line head's rates for a step: lines = step * pulses / sweep, pan = step * lines. The sweep of this one is 240
+// degrees.
 const STEP_DEG = 0.25, LINES_HZ = STEP_DEG * 100000 / 240;
 const micro = (v) => v.toFixed(6);
 const M2 = 1e-3; // areas come as floats; their sum over 20,000 cells of 0.02 m2 has errors below 20000 * 2^-30
@@ -49,7 +50,8 @@ const FLOOR = `(() => {
   return found;
 })()`;
 
-// Compares the hue of each of these places with the colour of its number. Colours differ by at least 0.3 in hue as a vector.
+// Compares the hue of each of these places with the colour of its number. Colours differ by at least 0.3 in hue as a
+// vector.
 async function sameColours(page) {
   const floor = await page.eval(FLOOR), {out, width, size} = pixelsOf(await page.picture());
   const unit = (c) => c.map((v) => v / Math.hypot(...c));
@@ -175,7 +177,8 @@ export async function trialTests(page, other, SIZE) {
     await page.press('#trial-target');
     await page.where('#picture');
     await page.eval('scanhead.view.screenshotReady()');
-    // A point of the first station that the camera sees, since nothing nearer lies there: those on the floor, from above.
+    // A point of the first station that the camera sees, since nothing nearer lies there: those on the floor, from
+    // above.
     const [x, y, number, at] = await page.eval(`(() => {
       const {left, top, width, height} = document.querySelector('#picture').getBoundingClientRect(), {view, trial} = scanhead;
       const block = view.cloud.blocks.find((b) => b.station === 1), o = view.cloud.origin;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms where plain sampling fails: pulses shorter than the samples, grazing planes, far ranges, extents that
+/* Plain sampling fails for some waveforms: pulses shorter than the samples, grazing planes, far ranges, extents that
  * vanish or that are much larger than the pulse. */
 #include <math.h>
 #include <stdio.h>
@@ -41,7 +41,7 @@ static double energy_jitter(const struct waveform *w, double width_s)
     return worst;
 }
 
-/* Naive: the pulse's power at each sample. Ours refuses that where its energy would change by more than 0.1 %, and
+/* Naive: the pulse's power at each sample. Ours refuses a pulse whose energy would change by more than 0.1 %, and
  * takes it with a receiver that is slow enough. */
 static void short_pulses_fall_between_samples(void **state)
 {
@@ -111,8 +111,8 @@ static double centre_m(const struct waveform *w, double range_m, int as_float)
     return moment / sum;
 }
 
-/* Naive: ranges as floats, which are 7.8 mm apart at 100 km. Ours: 1e5 m has 1.5e-11 m in double. What is left is the
- * table of the pulse: 1e-6 of the peak at up to 2 m from the centre, against an area of 2 samples. */
+/* Naive: ranges as floats, which are 7.8 mm apart at 100 km. Ours: 1e5 m has 1.5e-11 m in double. The rest is the
+ * error of the pulse's table: 1e-6 of the peak at up to 2 m from the centre, against an area of 2 samples. */
 static void far_ranges_keep_their_millimetres(void **state)
 {
     (void)state;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Where plain detectors of echoes break: tops that the digits make flat, echoes of any strength at one level, pulses
- * that the receiver limits or the window cuts, and a parabola through logarithms of samples that are not positive. */
+/* Plain detectors of echoes break here: at tops that the digits make flat, at echoes of any strength at one level,
+ * at pulses that the receiver limits or the window cuts, and where a parabola goes through logarithms of samples
+ * that are not positive. */
 #include <math.h>
 #include <stdio.h>
 
@@ -118,7 +119,7 @@ static void flat_tops(void **state)
     table_check();
 }
 
-/* The same surface 5 to 20 dB above the level. Without noise, as the walk is a bias. */
+/* The same surface is 5 to 20 dB above the level. There is no noise, as the walk is a bias. */
 static void walk(void **state)
 {
     (void)state;
@@ -137,7 +138,7 @@ static void walk(void **state)
             compare(&w, by_level, WAVEFORM_THRESHOLD, &r, p, &worst);
         }
         snprintf(regime, sizeof regime, "a level 1, an echo %d dB above it", db);
-        /* Digits of 0.0074 thresholds: half of one in the sample below the level, which is not below 0.1 nor its
+        /* A digit is 0.0074 thresholds. Half of one, in a sample below the level that is not below 0.1 nor has a
          * slope below 0.2 a sample, is 0.02 samples. */
         table_row(regime, "crossing, half a pulse later", worst.naive_m, worst.ours_m, 3e-3, "m");
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// It tests the pure parts of the tools of the page's picture (drivers/link/web): flat views, sections, measuring with its
-// expected errors, panoramas. It prints TAP on standard output.
+// It tests the pure parts of the tools of the page's picture (drivers/link/web): flat views, sections, measuring with
+// its expected errors, panoramas. It prints TAP on standard output.
 import {Cloud, pointOf} from '../../drivers/link/web/cloud.js';
 import {flatDepthOf, onPlane, radians} from '../../drivers/link/web/view_camera.js';
 import {nearest} from '../../drivers/link/web/view_pick.js';
@@ -151,8 +151,8 @@ const NOISE = {range_sigma_m: 0.004, range_sigma_per_m: 1e-5, range_floor_m: nul
   angle_sigma_rad: [4e-4, 7e-4], angle_step_rad: [0, 0], ball_m: 0, ball_per_m: 0, ball_factor: [1, 1, 1], ball_local: false};
 const STATION = {number: 1, x_m: 100, y_m: -50, z_m: 2, heading_deg: 40, pitch_deg: 8, roll_deg: -5};
 
-// This goes from a head's angles to the scene, by one turn after the other: roll about forward, pitch about right, heading
-// about up.
+// This goes from a head's angles to the scene, by one turn after the other: roll about forward, pitch about right,
+// heading about up.
 function toScene(station, range, mirror, pan) {
   let [x, y, z] = [range * Math.cos(mirror) * Math.sin(pan), range * Math.cos(mirror) * Math.cos(pan), range * Math.sin(mirror)];
   const [h, p, r] = [station.heading_deg, station.pitch_deg, station.roll_deg].map(radians);

@@ -79,7 +79,7 @@ static void noise_has_kinds_and_sizes(void **ctx)
     refuse(&dev, "HEAD:NOIS:BALL 100.5", CMD_E_RANGE, "allowed 0 to 100");
 }
 
-/* Also within a scan, where the head samples them at all. */
+/* A client can switch them within a scan, too, where the head samples them at all. */
 static void waveforms_can_be_switched(void **ctx)
 {
     (void)ctx;

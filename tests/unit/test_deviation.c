@@ -135,7 +135,8 @@ static void terms_give_the_same_sigma(void **state)
     head.file_count_m = 4e-3;
     assert_true(deviation_terms_of(&head, &t));
     double counts_m, sigma_m = deviation_sigma_m(&head, &TURNED, &counts_m);
-    /* The face is 100 m away and turned by 60 degrees: cosine 1/2, to the right sqrt(3)/2, and nothing by the mirror. */
+    /* The face is 100 m away and turned by 60 degrees: cosine 1/2, to the right sqrt(3)/2, and nothing by the
+     * mirror. */
     const double pan = sqrt(3.0) * 100.0, ball_m = t.ball_m * (1.0 + t.ball_per_m * 100.0) / sqrt(5.0);
     const double range_m = t.range_sigma_m + t.range_sigma_per_m * 100.0;
     const double along = t.ball_factor[0], right = sqrt(3.0) * t.ball_factor[1];

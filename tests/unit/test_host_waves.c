@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: waveforms and deviations belong to the points before them, and to no others. */
+/* With libscanhead, waveforms and deviations belong to the points before them, and to no others. */
 #include <math.h>
 
 #include "drivers/protocol/native_waves.h"
@@ -177,8 +177,8 @@ static void test_lost(void **state)
     scanhead_close(sh);
 }
 
-/* A client that knows nothing of them passes over them: its points and line ends are there. Damaged contents with a good
- * checksum are refused, and the next frame comes. */
+/* A client that knows nothing of waveforms passes over them: its points and line ends are there. Damaged contents
+ * with a good checksum are refused, and the next frame comes. */
 static void test_wrong(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms in LAS files, at the offsets of the ASPRS specification (LAS 1.4 R15): point formats 9 and 10, wave packet
- * descriptors, and the record of packets, inside or as a .wdp. */
+/* Waveforms in LAS files are at the offsets of the ASPRS specification (LAS 1.4 R15): point formats 9 and 10, wave
+ * packet descriptors, and the record of packets, inside or as a .wdp. */
 #include "tests/unit/waves_rig.h"
 
 enum { HEADER = 375, VLR = 54, EVLR = 60, WAVE = 29, DESCRIPTOR = 26 };
@@ -37,7 +37,7 @@ static const uint8_t *wave_at(size_t i)
     return point_at(i) + (las[104] == 9 ? 30 : 38);
 }
 
-/* The descriptor with this index, from 1 on: that of record 99 + index. */
+/* Returns the descriptor with this index, from 1 on, whose record id is 99 + index. */
 static const uint8_t *descriptor(unsigned index)
 {
     size_t at = rig_uint(las + 94, 2);
@@ -88,8 +88,8 @@ static void check_first(size_t i, const double want[3], const double tolerance[3
     }
 }
 
-/* Six shots forward, at (10, 20, 30) with heading 90: +x. Pulse 0: one return; 1: two in one window; 2: two in two windows; 3:
- * no return in its window; 4: an empty shot; 5: a return without window. */
+/* Six shots go forward, at (10, 20, 30) with heading 90: +x. Pulse 0: one return; 1: two in one window; 2: two in
+ * two windows; 3: no return in its window; 4: an empty shot; 5: a return without window. */
 static const struct rig_point points[] = {{5000, 0, 0, -1000, 1, 1, 1},       {6000, 0, 0, -1000, 2, 1, 2},
                                           {6500, 0, 0, -1000, 3, 2, 2},       {7000, 0, 0, -1000, 4, 1, 2},
                                           {9000, 0, 0, -1000, 5, 2, 2},       {1000, 0, 0, -1000, 6, 1, 1},
@@ -181,7 +181,7 @@ static void test_outside(void **state)
     check_points(&rig_12_bits);
 }
 
-/* Format 10: colours and near infrared, which stays 0, before the waveform. */
+/* Format 10 has colours and near infrared, which stays 0, before the waveform. */
 static void test_colour(void **state)
 {
     (void)state;
@@ -239,8 +239,8 @@ static void test_no_wdp(void **state)
     unlink(path);
 }
 
-/* A point 40 m along a beam of which a metre changes the coordinates by per_m. Half a count of the point on each axis is its
- * error, and that of its range; tolerance is a whole one. */
+/* A point lies 40 m along a beam of which a metre changes the coordinates by per_m. Half a count of the point on
+ * each axis is its error, and that of its range; tolerance is a whole one. */
 static void check_geo(const struct native_anchor *a, const double per_m[3], const double tolerance[3])
 {
     const double range_m = 40, first_m = 0.5e-9 * RIG_C_M_S * 250;
@@ -277,7 +277,7 @@ static void test_utm(void **state)
     check_geo(&a, (double[]){0.6 * 0.9996, 0.8 * 0.9996, 0}, (double[]){1e-3, 1e-3, 1e-3});
 }
 
-/* About what degrees are at 45 north. */
+/* These are about the degrees of a metre at 45 north. */
 static void test_geodetic(void **state)
 {
     (void)state;
@@ -288,8 +288,8 @@ static void test_geodetic(void **state)
     check_geo(&a, (double[]){0.6 / 111132, 0.8 / 78847, 0}, scale);
 }
 
-/* More than 255 lengths: the first 128 are exact, later ones are rounded up and filled with 205 counts, as many as are
- * reported. The energy is that of the frames: 205 counts are the baseline. */
+/* A stream has more than 255 lengths. The first 128 are exact; later ones are rounded up and filled with as many
+ * samples of 205 counts as are reported. The energy is that of the frames, since 205 counts are the baseline. */
 static void test_lengths(void **state)
 {
     (void)state;

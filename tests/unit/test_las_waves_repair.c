@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a kill or a full disk leaves of a LAS file with waveforms, cut anywhere: its repair keeps whole points and whole
+/* A kill or a full disk leaves a LAS file with waveforms cut anywhere. Its repair keeps whole points and whole
  * packets. Points without theirs say so. */
 #include <sys/stat.h>
 
@@ -252,7 +252,7 @@ static void test_refused(void **state)
     }
 }
 
-/* A limit on the files' size stands for a full disk. What is left is repaired: so many points, so many of them with
+/* A limit on the files' size stands for a full disk. The rest is repaired: so many points, so many of them with
  * packets. */
 static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_t n_points, size_t n_packets)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of waveforms, byte by byte. They are sent after their points, attributes and colours, cut with them, and
- * refused where they are wrong. Deviations are behind the attributes. */
+/* These tests compare frames of waveforms byte by byte. They are sent after their points, attributes and colours,
+ * cut with them, and refused where they are wrong. Deviations are behind the attributes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -256,7 +256,7 @@ static void test_cut_with_their_points(void **state)
     assert_int_equal(seen.lost, 5);
 }
 
-/* The longest windows: seven and no more fit into a frame, 32 + 7 x 8220 of 65536 bytes. */
+/* A frame has room for seven of the longest windows: 32 + 7 x 8220 of 65536 bytes. */
 static void test_longest(void **state)
 {
     (void)state;
@@ -269,7 +269,7 @@ static void test_longest(void **state)
     assert_int_equal(seen.waves_frames, 4);
 }
 
-/* No window, no frame; but what was lost is said, once. */
+/* Without a window there is no frame, but lost samples are said, once. */
 static void test_none(void **state)
 {
     (void)state;

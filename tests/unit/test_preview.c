@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Previews of stations for a page. Expected values are worked out by hand for an L-shaped room, or by another way: each
- * point lies on a wall, at its range from the place that was asked for. */
+/* These are previews of stations for a page. Expected values are worked out by hand for an L-shaped room, or by
+ * another way: each point lies on a wall, at its range from the place that was asked for. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
@@ -22,8 +22,8 @@ struct room {
     struct preview *preview;
 };
 
-/* A closed body in the right leg, from the ground to 0.1 m below the ceiling, wide enough to stand in. None of its walls
- * goes through a place of the grid. */
+/* A closed body is in the right leg, from the ground to 0.1 m below the ceiling, wide enough to stand in. None of
+ * its walls goes through a place of the grid. */
 static const char BODY[] = "o body\nv 3.1 0.2 0.01\nv 5.1 0.2 0.01\nv 5.1 1.8 0.01\nv 3.1 1.8 0.01\n"
                            "v 3.1 0.2 2.3\nv 5.1 0.2 2.3\nv 5.1 1.8 2.3\nv 3.1 1.8 2.3\n"
                            "f 13 16 15 14\nf 17 18 19 20\nf 13 14 18 17\nf 14 15 19 18\nf 15 16 20 19\nf 16 13 17 20\n";
@@ -155,8 +155,8 @@ static void test_settings(void **state)
     close_room(&r);
 }
 
-/* From the corner of the L all walls are seen; from its right leg none of the upper leg's west end behind the edge. A
- * line from (5, 1) by the edge (2, 2) meets x = 0 at y = 2.67. */
+/* From the corner of the L all walls are seen. From its right leg the west end of the upper leg is hidden behind the
+ * edge. A line from (5, 1) by the edge (2, 2) meets x = 0 at y = 2.67. */
 static void test_cells(void **state)
 {
     (void)state;
@@ -197,8 +197,9 @@ static void test_cells(void **state)
     close_room(&r);
 }
 
-/* Nothing of a closed room is out of sight from all its places, but where few can stand before: near walls the ground and
- * the ceiling lie within the cones that heads can't scan. A body in it is hidden within. */
+/* Every part of a closed room is seen from some of its places, except near walls. There the ground and the ceiling
+ * lie within the cones that heads can't scan, and few places are far enough away. A body in the room is hidden
+ * within. */
 static void test_reach(void **state)
 {
     (void)state;
@@ -244,7 +245,7 @@ static void test_search_gives_way(void **state)
     close_room(&r);
 }
 
-/* The bottom of a closed body lies on the ground: only who stands within the body sees it, and nobody does. */
+/* The bottom of a closed body lies on the ground. It is seen only from within the body, where nobody stands. */
 static void test_bodies(void **state)
 {
     (void)state;
@@ -282,8 +283,8 @@ static double number_of(const char *json, const char *key)
     return atof(at + strlen(key) + 2);
 }
 
-/* With a head in the right leg, the next one stands where it sees the upper leg. What neither sees then is less than
- * the ground and the ceiling within the cones that heads can't scan. */
+/* With a head in the right leg, the next one stands where it sees the upper leg. The area that neither sees then is
+ * less than the ground and the ceiling within the cones that heads can't scan. */
 static void test_next(void **state)
 {
     (void)state;
@@ -306,8 +307,8 @@ static void test_next(void **state)
     close_room(&r);
 }
 
-/* The head's height above the ground, and what the cone of its tripod hides there: cos(opening) = height of the top /
- * length of a leg. */
+/* The head has a height above the ground, and the cone of its tripod hides a part of it: cos(opening) = height of
+ * the top / length of a leg. */
 static void test_tripod(void **state)
 {
     (void)state;
@@ -324,8 +325,8 @@ static void test_tripod(void **state)
     close_room(&r);
 }
 
-/* A station of another scanner is previewed with that one: a VLP-16 fires 16 beams 1809 times in a turn at 10 Hz, whatever
- * the step (55.296 us a sequence). */
+/* A station of another scanner is previewed with that one. A VLP-16 fires 16 beams 1809 times in a turn at 10 Hz,
+ * whatever the step (55.296 us a sequence). */
 static void test_scanners(void **state)
 {
     (void)state;

@@ -32,7 +32,7 @@ static void put_attributes(int has_deviations)
     rig_put(out, 28 + len);
 }
 
-/* lost: the frame of attributes does not come. */
+/* Records a stream; lost: the frame of attributes does not come. */
 static uint8_t *record(const char *name, uint32_t content, int lost, int ascii)
 {
     struct sh_err err = {0};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Signals of waveforms against closed forms and sums of their own: energy, the pulse's shape, how returns spread. */
+/* Signals of waveforms are compared with closed forms and sums of their own: energy, the pulse's shape, the spread
+ * of returns. */
 #include <math.h>
 #include <string.h>
 
@@ -34,7 +35,7 @@ static struct waveform_spec shape_of(int k)
 }
 enum { SHAPES = 12 };
 
-/* The area below the table's straight lines, with its peak at 1; it begins and ends with 0. */
+/* Returns the area below the table's straight lines, with its peak at 1; it begins and ends with 0. */
 static double area_s(const struct waveform_spec *spec)
 {
     double sum = 0.0;
@@ -61,8 +62,8 @@ static double peak_of(const struct waveform *w, const struct waveform_return *r)
     return peak;
 }
 
-/* Sums of samples against the link budget: 0.1 % for each shape, spread and place between the samples. Rounding adds at
- * most half a count each, against a peak near 14,000. */
+/* Sums of samples are the link budget to 0.1 %, for each shape, spread and place between the samples. Rounding adds
+ * at most half a count each, against a peak near 14,000. */
 static void samples_have_the_energy(void **state)
 {
     (void)state;
@@ -96,8 +97,8 @@ static void samples_have_the_energy(void **state)
     print_message("# energy in the samples: within %.4f %% of the link budget\n", 1e2 * worst);
 }
 
-/* h against the closed form: a Gaussian with the receiver's sigma added, or the log-normal with its centroid at 0.
- * Cubics through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. A log-normal's peak
+/* h has a closed form: a Gaussian with the receiver's sigma added, or the log-normal with its centroid at 0. Cubics
+ * through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. A log-normal's peak
  * bends more. Its tail is cut at 1e-6 of the peak, 48 widths behind it with a skew of 3, which moves the centroid by
  * 4e-4 widths. */
 static void shapes_are_the_closed_forms(void **state)
@@ -178,7 +179,8 @@ static double spread_of(const struct waveform_spec *spec, enum waveform_spread s
     return sum / all;
 }
 
-/* The largest error of one spread, at `points` places over all of it. So far away, ranges are even across the disc. */
+/* Returns the largest error of one spread, at `points` places over all of it. Far away, ranges are even across the
+ * disc. */
 static double spread_error(const struct waveform *w, enum waveform_spread spread, double extent_s, int points)
 {
     const struct waveform_spec *spec = waveform_spec_of(w);

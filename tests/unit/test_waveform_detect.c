@@ -252,7 +252,7 @@ static void three_surfaces_are_three_echoes(void **state)
     wave_close(&w);
 }
 
-/* RIEGL's pulse shape deviation: small on one flat surface, large where two surfaces make one echo. */
+/* RIEGL's pulse shape deviation is small on one flat surface, and large where two surfaces make one echo. */
 static void the_deviation_shows_mixed_echoes(void **state)
 {
     (void)state;

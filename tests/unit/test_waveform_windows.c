@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which samples of a pulse are kept, and what the digitiser makes of them. */
+/* These tests check which samples of a pulse are kept, and which counts the digitiser makes of them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +30,8 @@ static double count_of(const struct waveform_spec *spec, double signal)
     return fmin(top, fmax(0.0, spec->baseline_counts + signal / spec->full_scale * (top - spec->baseline_counts)));
 }
 
-/* A count is the signal on the grid, rounded: with the tables' 2e-6 of 500 thresholds, a half counts either way. */
+/* A count is the signal on the grid, rounded. The tables have an error of 2e-6 of 500 thresholds, so both neighbours
+ * of a half count are allowed. */
 static void counts_are_the_signal(void **state)
 {
     (void)state;
@@ -50,7 +51,7 @@ static void counts_are_the_signal(void **state)
     waveform_free(w);
 }
 
-/* What a digitiser can't show it shows as its first or last count. */
+/* A signal that a digitiser can't show gives its first or last count. */
 static void counts_end_at_both_ends(void **state)
 {
     (void)state;
@@ -74,7 +75,8 @@ static void counts_end_at_both_ends(void **state)
     waveform_free(w);
 }
 
-/* The windows, by a plain reading of the header: each sample with a signal is kept, with what is before and behind. */
+/* Finds the windows by a plain reading of the header: each sample with a signal is kept, with those before and after
+ * it. */
 static uint32_t plain_windows(const struct waveform *w, uint8_t *kept, uint32_t before, uint32_t after)
 {
     uint32_t n = 0;
@@ -139,7 +141,7 @@ static uint32_t check_windows(const struct waveform_record *record, const uint8_
     return parts;
 }
 
-/* Random pulses, with stretches longer than a piece: windows are where the plain reading has them. */
+/* Random pulses have stretches longer than a piece. Their windows are where the plain reading has them. */
 static void windows_are_where_light_is(void **state)
 {
     (void)state;

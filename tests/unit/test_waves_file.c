@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .waves.csv: a row of each window, with what its sample's places and signals are computed from; its repair. */
+/* A .waves.csv has a row for each window, from which its samples' places and signals are computed. The tests check
+ * these, and its repair. */
 #include "tests/unit/repair_rig.h"
 #include "tests/unit/waves_rig.h"
 

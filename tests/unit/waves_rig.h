@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of recorders of waveforms: frames of type 12, byte by byte as drivers/protocol/WAVEFORMS.md has them, and the
- * samples that are in them. */
+/* Tests of recorders of waveforms use these: frames of type 12, byte by byte as drivers/protocol/WAVEFORMS.md has
+ * them, and the samples that are in them. */
 #ifndef TESTS_UNIT_WAVES_RIG_H
 #define TESTS_UNIT_WAVES_RIG_H
 
@@ -24,17 +24,17 @@ struct rig_window {
     uint32_t beam[3]; /* as on the wire: a, b, c */
 };
 
-/* Sample k of the pulse's grid: the same for all digitisers but for their bits. */
+/* Returns sample k of the pulse's grid: the same for all digitisers but for their bits. */
 uint16_t rig_sample(const struct rig_digitiser *d, uint64_t pulse, uint32_t k);
 
-/* As rig_descriptor, of a head that sends `content`: 4 are waveforms. */
+/* Does as rig_descriptor, for a head that sends `content`: 4 are waveforms. */
 void rig_wave_descriptor(int geo, uint32_t scan, uint32_t content);
 
-/* A frame of windows. pulse0 and line are those of the points frame before; a pulse is a millisecond. */
+/* Sends a frame of windows. pulse0 and line are those of the points frame before; a pulse is a millisecond. */
 void rig_waves(uint32_t line, uint64_t pulse0, const struct rig_digitiser *d, const struct rig_window *window,
                uint32_t n);
 
-/* The bit pattern of a float. */
+/* Returns the bit pattern of a float. */
 uint32_t rig_float_bits(float f);
 float rig_float(const uint8_t *p);
 

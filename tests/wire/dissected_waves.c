@@ -4,7 +4,7 @@
 #include "drivers/protocol/native_waves.h"
 #include "tests/wire/wireshark_rig.h"
 
-/* The window's direction, by its angles: sine and cosine are of another library (expect_point). */
+/* Compares the window's direction, by its angles: sine and cosine are of another library (expect_point). */
 static void expect_beam(const struct scanhead_wave *w, int is_geo)
 {
     static const char *const slope[] = {S "wave.dx", S "wave.dy", S "wave.dz"};

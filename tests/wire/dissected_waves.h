@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The fields of waveforms by tshark, beside libscanhead's values of the same frame. */
+/* The fields of waveforms by tshark are compared with libscanhead's values of the same frame. */
 #ifndef TESTS_WIRE_DISSECTED_WAVES_H
 #define TESTS_WIRE_DISSECTED_WAVES_H
 

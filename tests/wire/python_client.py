@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""test_python.c, test_python_waves.c and test_python_damage.c ask the Python client by this. Its answers are binary rows or plain numbers.
+"""test_python.c, test_python_waves.c and test_python_damage.c ask the Python client by this. Its answers are binary rows
+or plain numbers.
 
     python_client.py FOLDER_OF_THE_CLIENT numpy|plain WHAT ...
         dump SOURCE OUT     points, attributes, poses and times, frame by frame, as test_python.c reads them

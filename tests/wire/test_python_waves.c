@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client in Python beside libscanhead: every number of every window of a waveform, and of every deviation, is the
- * same. */
+/* The client in Python gives the same as libscanhead: every number of every window of a waveform, and of every
+ * deviation. */
 #include "tests/wire/python_rig.h"
 
 #include "core/rng.h"
@@ -122,7 +122,7 @@ static void expect_block(struct dump *dump, char kind, int n)
     assert_int_equal(count, n);
 }
 
-/* Bit for bit: the same operations in the same order, sine and cosine from the same C library. */
+/* Values agree bit for bit: the same operations in the same order, sine and cosine from the same C library. */
 static void expect_real(struct dump *dump, double value)
 {
     double said;

@@ -210,7 +210,7 @@ static void test_how_it_is_played(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A client's seek: what it reads goes on there, as another sequence, and nothing counts as lost. */
+/* A client seeks: its stream goes on there, as another sequence, and nothing counts as lost. */
 static void test_seek(void **state)
 {
     struct head head;

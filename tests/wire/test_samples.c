@@ -34,7 +34,7 @@ static size_t read_hex(const char *page, int n, uint8_t *bytes, size_t room)
     return len;
 }
 
-/* Windows of a frame of waveforms, into a block's. */
+/* Takes windows of a frame of waveforms into a block's. */
 static void take_waves(const uint8_t *frame, struct line_waves *waves)
 {
     struct native_waves head;

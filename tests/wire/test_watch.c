@@ -311,7 +311,7 @@ static void who_is_waited_for_is_not_last(void **state)
     }
 }
 
-/* The points after a PLY's header. */
+/* Returns the points after a PLY's header. */
 static const char *ply_points(const char *file, size_t len, size_t *n)
 {
     static const char last[] = "end_header\n";
@@ -322,7 +322,7 @@ static const char *ply_points(const char *file, size_t len, size_t *n)
     return at;
 }
 
-/* What a page saves has the bytes of what `record` writes of the same scan. */
+/* The file that a page saves has the bytes that `record` writes of the same scan. */
 static void the_points_so_far_are_a_file(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms from a configuration to files: each point's packet in LAS, as a reader of its own takes it from the
- * specification, and each row of .waves.csv are those of the stream. */
+/* Waveforms go from a configuration to files. The packet of each point in LAS, which a reader of its own takes from
+ * the specification, and each row of .waves.csv are those of the stream. */
 #include "tests/wire/python_rig.h"
 #include "tests/wire/readers.h"
 
@@ -30,7 +30,7 @@ static uint16_t sample[MOST_SAMPLES];
 static size_t n_echoes, n_windows, n_samples;
 static struct scanhead_info info;
 
-/* The head's frame to the scene's, in the polar layout. */
+/* Turns the head's frame into the scene's, in the polar layout. */
 static void to_file(const double p[3], double out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -100,7 +100,7 @@ static void run_program(const char *const *args)
     assert_int_equal(status, 0);
 }
 
-/* What the reader prints of a LAS file. */
+/* Returns the text that the reader prints of a LAS file. */
 static char *read_las(const char *las)
 {
     char script[PATH_MAX], path[352], text[352];
@@ -119,7 +119,7 @@ static double far_from(const double a[3], const double b[3])
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* Whether the samples of one line are those of the window; it may be filled up behind them. */
+/* Returns whether the samples of one line are those of the window; it may be filled up behind them. */
 static int has_samples(const struct window *w, const char *at, unsigned n)
 {
     if (n < w->n) return 0;
@@ -131,8 +131,8 @@ static int has_samples(const struct window *w, const char *at, unsigned n)
     return 1;
 }
 
-/* One line of the reader: echo i of the stream with one of its pulse's windows, in which it lies. *w moves on to the
- * pulse's first window. tolerance_m: of the first sample's place. */
+/* Checks one line of the reader: echo i of the stream with one of its pulse's windows, in which it lies. *w moves on
+ * to the pulse's first window. tolerance_m: of the first sample's place. */
 static void check_line(const char *line, size_t i, size_t *w, double tolerance_m)
 {
     double p[3], first[3], signal;
@@ -193,7 +193,7 @@ static void check_csv(void)
     free(text);
 }
 
-/* A board before the wall, whose edges cut footprints: pulses with two returns. */
+/* A board stands before the wall. Its edges cut footprints, so some pulses have two returns. */
 static void write_scene(void)
 {
     room_write(wire);
@@ -221,7 +221,8 @@ static void check_layout(const char *keys)
     need_python();
     record_all(keys);
     read_stream(wire_path(wire, "a.shs"));
-    /* A point is half a count wrong on each axis, and so is the sample's place: sqrt(3) / 2 of the scale, 1 mm at most. */
+    /* A point is half a count wrong on each axis, and so is the sample's place: sqrt(3) / 2 of the scale, at most 1
+     * mm. */
     check_las("in.las", 1e-3);
     check_las("out.las", 1e-3);
     assert_int_equal(access(wire_path(wire, "out.wdp"), F_OK), 0);

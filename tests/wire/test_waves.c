@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* waveform.send and waveform.echoes from the configuration to a client: what stays the same, the energy of what comes
- * beside it, echoes that are found, and what is lost. */
+/* waveform.send and waveform.echoes go from the configuration to a client. The tests check the frames that stay the
+ * same, the energy of the samples, the echoes that are found, and losses. */
 #include "tests/wire/room.h"
 
 enum { MOST = 40000, POINTS = 4096, WINDOWS = 4096, CONTENT_WAVES = 4 };
@@ -144,9 +144,9 @@ static void test_off_and_on(void **state)
     scanhead_close(on);
 }
 
-/* A Gaussian pulse of 4 ns has an area of 4 ns sqrt(pi / (4 ln 2)). The amplitude is told in 0.01 dB, to 0.12 %, and
- * the energy is to be its to 0.1 %. A dozen samples of the pulse are rounded, to a count of a quarter: 1 ns at most.
- * */
+/* A Gaussian pulse of 4 ns has an area of 4 ns sqrt(pi / (4 ln 2)). The amplitude is sent in steps of 0.01 dB, which
+ * is 0.12 %. The energy agrees with it to a further 0.1 %. A dozen samples of the pulse are rounded to a count of a
+ * quarter: 1 ns at most. */
 static void test_energy(void **state)
 {
     struct wire *wire = *state;
@@ -169,9 +169,9 @@ static void test_energy(void **state)
     assert_true(n > 5000);
 }
 
-/* A pane 2 m before a wall: what is sampled is what comes back of both. It is up to 3 % more where the model leaves
- * out what the samples have: at the pane's edge echoes with less than 1 % of a footprint; where pane and floor are one
- * echo, that 1 / R^2 of both is more than that of their mean, 3 (0.3 m / R)^2 at most. */
+/* A pane stands 2 m before a wall. The samples have the light of both. They have up to 3 % more where the model
+ * leaves out light: at the pane's edge, echoes with less than 1 % of a footprint; where pane and floor are one echo,
+ * 1 / R^2 of both is more than that of their mean, by 3 (0.3 m / R)^2 at most. */
 static void test_glass(void **state)
 {
     struct wire *wire = *state;
@@ -200,10 +200,10 @@ static void test_glass(void **state)
     }
 }
 
-/* Without noise, echoes that are found are those of the model, but for digits: half a count is an eighth of a
- * threshold. From the sample below the threshold to that above it the signal rises by 1 or more, so there each is 19
- * mm. A straight line between samples 1 ns apart is off by 3.6 mm at half of the peak, where a detector takes one.
- * Amplitudes to 1 %, widths to 2 %. */
+/* Without noise, echoes that are found are those of the model, but for digits. Half a count is an eighth of a
+ * threshold. From the sample below the threshold to the one above it the signal rises by 1 or more, so half a count
+ * is 19 mm there at most. A detector that takes a straight line at half of the peak, between samples 1 ns apart, has
+ * an error of 3.6 mm. Amplitudes agree to 1 %, widths to 2 %. */
 static void test_echoes(void **state)
 {
     struct wire *wire = *state;
@@ -229,8 +229,8 @@ static void test_echoes(void **state)
     }
 }
 
-/* A pulse of 1,000 ns, where the profile says 4, has windows longer than what a block has room for. What is lost is
- * said by the frames, by the statistics and in a warning, and all agree. */
+/* A pulse of 1,000 ns, where the profile says 4, has windows longer than a block has room for. The lost samples are
+ * reported by the frames, by the statistics and in a warning, and all agree. */
 static void test_lost(void **state)
 {
     struct wire *wire = *state;

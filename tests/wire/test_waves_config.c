@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms that a configuration asks for: what is refused, the link's rate, the plan's row. */
+/* A configuration asks for waveforms. The tests check what is refused, the link's rate, and the plan's row. */
 #include "tests/wire/room.h"
 
 static const struct room_config SCAN = {.profile = "riegl-vz400i",
@@ -25,7 +25,8 @@ static void refuse(struct wire *wire, const char *const *sets, const char *says)
     wire_expect_usage(wire, args, says);
 }
 
-/* Of figures by themselves, which core/waveform knows. config_cases.h has those that contradict each other. */
+/* Some figures are wrong by themselves, which core/waveform knows. config_cases.h has those that contradict each
+ * other. */
 static void test_refused(void **state)
 {
     struct wire *wire = *state;

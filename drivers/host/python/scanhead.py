@@ -551,11 +551,11 @@ class Wave(NamedTuple):
 
     @property
     def step_m(self) -> float:
-        """Range from sample to sample."""
+        """The range from one sample to the next."""
         return 1e-3 * self.sample_ps * _M_PER_NS
 
     def range_m(self, i: int = 0) -> float:
-        """Range of sample i of the window."""
+        """The range of sample i of the window."""
         return (self.first + i) * self.step_m
 
     def signal(self) -> List[float]:
@@ -564,7 +564,7 @@ class Wave(NamedTuple):
 
 
 def _wave_records(payload: bytes, n: int) -> Iterator[Tuple]:
-    """Each of n windows: its record's numbers, and where its samples begin."""
+    """Yields for each of n windows its record's numbers, and where its samples begin."""
     at = _UNPACK[WAVES][0].size
     for _ in range(n):
         if len(payload) - at < _WAVE.size:
@@ -578,7 +578,7 @@ def _wave_records(payload: bytes, n: int) -> Iterator[Tuple]:
 
 
 def _wave_direction(payload: bytes, at: int, d: Dict) -> Tuple[float, ...]:
-    """From the three words at `at`."""
+    """Returns the direction of the beam from the three words at `at`."""
     if d["layout"] == GEO:
         return struct.unpack_from(_WAVE_SLOPES, payload, at)
     _, mirror, pan = struct.unpack_from(_WAVE_COUNTS, payload, at)
@@ -1543,7 +1543,7 @@ class Head:
                 _column((w / 100.0 if w else _NAN for _, w in raw), n))
 
     def deviations(self, frame: Frame) -> Optional[List[float]]:
-        """How far the shape of each echo is from the pulse's, RMS over its amplitude, from a frame of attributes:
+        """The deviation of each echo's shape from the pulse's, RMS over its amplitude, from a frame of attributes.
         65.535: that or more; 0: a shot without echo. None: the points were lost, or the head sends none."""
         n = frame.fields["n_points"]
         if not self._has(HAS_DEVIATIONS) or not self._is_of_points(frame, 1):

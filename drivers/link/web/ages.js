@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This row limits the points' age: only the last seconds before the newest point are shown. Ages count in device time, so a
-// head that rests keeps its last points on the picture.
+// This row limits the points' age: only the last seconds before the newest point are shown. Ages count in device time,
+// so a head that rests keeps its last points on the picture.
 import {make} from './page.js';
 
 const AGES_S = [0.1, 0.5, 1, 2, 5, 10, 30, 60];
@@ -9,7 +9,7 @@ const FOLLOW_MS = 200, PATIENCE_MS = 1500;
 // Returns the row for the display's panel.
 export function ageRow(view) {
   let timer = 0, latest_s = NaN, since_ms = 0;
-  // Where drawing takes longer than the pause between two limits, most of a picture is drawn before the next one begins.
+  // If drawing takes longer than the pause between two limits, most of a picture is drawn before the next one begins.
   const follow = () => {
     const {drawn, left} = view.state;
     const isSoon = left > 0.2 * drawn && performance.now() - since_ms < PATIENCE_MS;

@@ -15,7 +15,7 @@ class Expected {
     this.#stations = (await fetchJson('/quality'))?.stations ?? [];
   }
 
-  // Returns what is expected of the last scan of a station; null: not known.
+  // Returns the errors that the head expects of a station's last scan; null: they are not known.
   of(station) {
     return this.#stations.find(({number}) => number === station)?.expected ?? null;
   }

@@ -67,7 +67,7 @@ export class Bar {
   #notice = '';
   #kind = '';
   #recording = '';
-  // Says what is being recorded beside the progress; '': nothing.
+  // Shows beside the progress what is being recorded; '': nothing.
   recording(words) {
     this.#recording = words;
     this.show();

@@ -283,7 +283,7 @@ export class Cloud {
   get boundsOfAll() { return this.#within(this.#gone_lo, this.#gone_hi); }
 }
 
-// Whether no point of a block is within a window of times. Points without a time are in all of them.
+// Returns whether no point of a block is within a window of times. Points without a time are in all of them.
 export const isOutside = (window, block) => window !== null && block.span.from <= block.span.to &&
   (block.span.to < window.from - block.began_s || block.span.from > window.to - block.began_s);
 

@@ -83,8 +83,8 @@ export class Head extends EventTarget {
     return this.#replies.ask(line, timeout_s);
   }
 
-  /** Asks for the waveform of a pulse of a scan; the answer is an event `waves`. Only the last ones of the last scan are
-   * kept (native_waves.js). */
+  /** Asks for the waveform of a pulse of a scan; the answer is an event `waves`. Only the newest waveforms of the last
+   * scan are kept (native_waves.js). */
   askWaves(pulse, scan) {
     this.#wire.post({wavesOf: pulse, scan});
   }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This class has the rows of the display for colour scales and their limits: by shares of the points, or by hand.
+// This class has the rows of the display for colour scales and their limits. Limits leave out a share of the points, or
+// are set by hand.
 import {kept, make, say} from './page.js';
 import {MODES} from './view_colours.js';
 import {SCALES} from './view_ramps.js';
@@ -32,7 +33,8 @@ export class Limits {
     view.ramp({scale: p.scale.value});
   }
 
-  // Another figure is shown: its limits are those that it had last on this page. Another scene has others.
+  // When another figure is shown, it gets the limits that it had last on this page. Another scene has limits of its
+  // own.
   show(mode) {
     const p = this.#parts, {kind, unit} = MODES[mode];
     this.#mode = mode;
@@ -49,7 +51,7 @@ export class Limits {
     this.#view.ramp({scale: this.#parts.scale.value});
   }
 
-  // Limits by hand begin with those that are shown.
+  // Limits by hand begin with the limits that are shown.
   #chosen() {
     const p = this.#parts, legend = this.#view.legend();
     if (p.share.value === 'hand' && typeof legend?.from === 'number') {

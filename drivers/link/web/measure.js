@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-// Measures between picked points, each figure with its expected error (one sigma). It is pure.
+// This module measures between picked points. Each figure has its expected error (one sigma). It is pure.
 //
 // The expected error of a point follows from the noise and the counts that the head reports (`expected` in /quality),
-// as in core/studio/deviation.h: along the beam that of the range, across it those of the angles times the range. The
-// error of a figure is that of its points to first order, by differences.
+// as in core/studio/deviation.h. Along the beam it is the error of the range; across the beam it is the error of the
+// angles times the range. The error of a figure follows from its points to first order, by differences.
 
 import {add, dot, sub} from './view_camera.js';
 import {headAxes} from './view_stations.js';
@@ -52,7 +52,7 @@ export const withError = (point, station, expected) => ({...point, error: errorT
 export const sigmaAlong = ({error}, direction) =>
   (error ? Math.sqrt(error.reduce((sum, [variance, axis]) => sum + variance * dot(axis, direction) ** 2, 0)) : NaN);
 
-// Returns {value, error} of a function of places. Its error is NaN where that of any point is.
+// Returns {value, error} of a function of places. The error is NaN where the error of any point is.
 export function figureOf(f, points) {
   const places = points.map(placeOf);
   let variance = 0;
@@ -71,8 +71,8 @@ const corner = (a, b, c) => {
   return DEG * Math.atan2(length(cross(u, v)), dot(u, v));
 };
 
-// These are the kinds of measurement: how many points they take (0: three or more, until they are ended), and their
-// figures [name, unit, {value, error}].
+// Each kind of measurement takes a number of points (0: three or more, until the user ends them), and has figures
+// [name, unit, {value, error}].
 export const KINDS = {
   distance: {title: 'Distance', points: 2, figures: (p) => [
     ['Distance', 'm', figureOf((a, b) => length(sub(b, a)), p)],
@@ -124,7 +124,8 @@ export function planeThrough(places) {
   return {middle, normal: smallestAxis(sums)};
 }
 
-// Returns whether a place of the plane is in a polygon [[u, v], ...], by the number of its sides to one side of it.
+// Returns whether a place of the plane is in a polygon [[u, v], ...], by the number of sides that lie to one side of
+// it.
 function isInPolygon(polygon, u, v) {
   let inside = false;
   for (let i = 0, j = polygon.length - 1; i < polygon.length; j = i++) {
@@ -137,7 +138,7 @@ function isInPolygon(polygon, u, v) {
 const FURTHER = 4; // points up to so many depths from the plane are counted, as left out
 
 // Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value
-// is {places (relative to the cloud's origin), plane, beyond}: beyond counts those a little further from the plane.
+// is {places (relative to the cloud's origin), plane, beyond}; `beyond` counts points a little further from the plane.
 export function* pointsOnFace(cloud, camera, corners, depth_m) {
   const origin = cloud.origin;
   const own = corners.map((p) => sub(placeOf(p), origin));
@@ -205,8 +206,8 @@ export function flatnessOf(places, corners, origin, eye) {
 
 const NEIGHBOURS = 8;
 
-// Steps towards the mean distance of the points around a place, from the area in which its nearest ones lie: that of k
-// points evenly at random has (k - 1) of them in the mean. NaN: there are none within 2 m.
+// Steps towards the mean distance of the points around a place. It follows from the area of the k nearest points, which
+// has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m.
 export function* spacingAround(cloud, place, first_m) {
   const p = sub(place, cloud.origin);
   for (let r = Math.max(1e-4, first_m); r < 6; r *= 3) {
@@ -226,7 +227,7 @@ export function* spacingAround(cloud, place, first_m) {
 
 // ---- in words
 
-// Returns how many decimals a figure has by its error: two figures of it below 2, else one.
+// Returns how many decimals a figure has, by its error: the error has two figures if it begins below 2, else one.
 export function decimalsOf(error) {
   if (!(error > 0)) return 3;
   const power = Math.floor(Math.log10(error));

@@ -136,7 +136,7 @@ export class MeasureTool {
     if (this.#picked.length < 3) return say(this.#says, 'An outline has at least three corners.');
     if (!(depth_m > 0 && depth_m <= 10)) return say(this.#says, 'Refused: the depth is a number from above 0 to 10 m.');
     const corners = this.#picked.splice(0), {cloud, camera} = this.#view;
-    say(this.#says, 'The points are looked through.');
+    say(this.#says, 'Looking through the points.');
     return runSlowly(pointsOnFace(cloud, camera, corners, depth_m), ({places, beyond}) => {
       const station = this.#view.stations.get(corners[0].station);
       const eye = station ? [station.x_m, station.y_m, station.z_m] : camera.eye;
@@ -144,7 +144,7 @@ export class MeasureTool {
       if (flat === null) {
         this.#picked = corners;
         this.#show();
-        return say(this.#says, 'There are less than four points in this outline, at that depth.');
+        return say(this.#says, 'There are fewer than four points in this outline, at that depth.');
       }
       this.#finish('flatness', corners, {flat, beyond, depth_m});
       return this.#show();
@@ -194,7 +194,7 @@ export class MeasureTool {
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
     if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', millimetres(spacing),
-      'The points are so far apart there: an edge may lie beyond the one that was picked']);
+      'The distance between points there: an edge may lie so far beyond the picked point']);
     return rows;
   }
 
@@ -248,12 +248,12 @@ export class MeasureTool {
 // Writes two figures.
 const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
 
-// Flatness is told beside what noise alone gives.
+// Flatness stands beside the flatness that noise alone gives.
 function flatRows({flat, beyond, depth_m}) {
   const {n, rms, largest, sigma} = flat, isKnown = sigma > 0;
   const beside = (v, expected) => (isKnown ? `${millimetres(v)}; noise gives ${millimetres(expected)}` : millimetres(v));
   const rows = [['RMS', beside(rms, sigma)], ['Largest', beside(largest, sigma * largestOf(n)), 'More than 0 is towards the head'],
     ['Points', grouped(n)]];
-  if (beyond > 0) rows.push(['Left out', `${grouped(beyond)} beyond ${depth_m}\u00a0m`, `Those up to ${4 * depth_m} m from the plane; nothing further was looked at`]);
+  if (beyond > 0) rows.push(['Left out', `${grouped(beyond)} beyond ${depth_m}\u00a0m`, `Points up to ${4 * depth_m} m from the plane; points further away are ignored`]);
   return rows;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The native protocol, from PROTOCOL.md and its pages alone: bytes to frames (Parser), frames to values and batches of points in the
-// scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
+// The native protocol, from PROTOCOL.md and its pages alone: bytes to frames (Parser), frames to values and batches of
+// points in the scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';
 import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,
   readTelemetry, refuse, Refused} from './native_fields.js';

@@ -6,7 +6,7 @@ import {readWavesHead, refuse} from './native_fields.js';
 const HEAD = 32, RECORD = 28, MAX_SAMPLES = 4096, M_PER_NS = 0.5 * 0.299792458;
 const KEPT_BYTES = 64 * 2 ** 20; // at 300,000 pulses per second of 64 samples each, the last 1.4 s
 
-// Calls each(at, n) for each window: where its record begins, and how many samples it has.
+// Calls each(at, n) for each window: `at` is where its record begins, n is the number of its samples.
 function walk(view, n_windows, each) {
   let at = HEAD;
   for (let i = 0; i < n_windows; i++) {
@@ -75,8 +75,9 @@ export class Waves {
     }
   }
 
-  /** The windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples: Float32Array in units of the
-   * detection threshold, without the baseline}]. Empty where the head kept none, or they are no longer here. */
+  /** The windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples: Float32Array
+   * in units of the detection threshold, without the baseline}]. Empty where the head kept none, or they are no longer
+   * here. */
   of(pulse, scan = this.#scan) {
     const found = [], frames = scan === this.#scan ? this.#frames : [];
     let low = Math.min(this.#begin, frames.length), high = frames.length; // the first frame that ends with this pulse or later

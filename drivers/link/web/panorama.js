@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// A panorama has the points of one station as its head sees them: azimuth from its forward direction to the right,
-// elevation upward, the nearest point of each pixel. It is pure.
+// A panorama shows the points of one station as its head sees them. Azimuth goes from the head's forward direction to
+// the right, elevation upward. Each pixel has its nearest point. The module is pure.
 
 import {dot, sub} from './view_camera.js';
 import {headAxes} from './view_stations.js';
@@ -95,8 +95,8 @@ export class Panorama {
     this.height = Math.max(1, Math.min(WIDEST, Math.round(this.width / columns)));
   }
 
-  // Where lines are further apart than the points in them, pixels are wider than high, or the other way round: of the
-  // shapes the one that has the most pixels with a point.
+  // Where lines are further apart than the points in them, pixels are wider than high, or the other way round. Returns
+  // the shape with which the most pixels have a point.
   * #chooseShape(blocks) {
     const tries = SHAPES.map((shape) => {
       this.#size(shape);
@@ -129,7 +129,8 @@ export class Panorama {
     return Math.min(height - 1, Math.floor(y * height)) * width + Math.min(width - 1, Math.floor(x * width));
   }
 
-  // Returns the pixel whose point a pixel shows: itself, or one beside it where both sides have a point. null: none.
+  // Returns the pixel whose point a pixel shows: itself, or one beside it if both sides have a point. null: there is
+  // none.
   #shown(pixel) {
     if (this.#block[pixel] !== EMPTY) return pixel;
     for (const step of [1, this.width]) {

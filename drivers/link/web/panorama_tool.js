@@ -110,7 +110,7 @@ export class PanoramaTool {
     say(this.#says, station ? 'This station has no points yet.' : 'No station has a known place.');
   }
 
-  // Intensity is the reflectance, or the amplitude where only that is known.
+  // Intensity is the reflectance; where that is not known, it is the amplitude.
   get mode() {
     if (this.#mode.value !== 'intensity') return this.#mode.value;
     return this.#view.cloud.blocks.some((block) => block.reflectance !== null) ? 'reflectance' : 'amplitude';
@@ -171,7 +171,7 @@ export class PanoramaTool {
     e.preventDefault();
   }
 
-  // A point was pointed at, here or in the picture.
+  // The user points at a point, here or in the picture.
   #markPoint(point) {
     const {panorama} = this;
     this.#put(point && panorama ? panorama.shareOf(panorama.anglesOf([point.x, point.y, point.z])) : null);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This panel shows the point under the pointer, in figures. It lies over the picture, and only while there is a point, so
-// that nothing else moves.
+// This panel shows the figures of the point under the pointer. It lies over the picture, and only while there is a
+// point, so that nothing else moves.
 import {byId, grouped, make, say, NONE} from './page.js';
 
 const CELLS = [['place', 'x, y, z', 'wide'], ['range', 'Range'], ['reflectance', 'Reflectance'],
@@ -49,7 +49,7 @@ export class Point {
     this.#isAsked = false;
   }
 
-  // A screen reader reads a point that was asked for by a key, and none of those that the pointer comes by.
+  // A screen reader reads a point that a key has asked for. It doesn't read points that the pointer passes over.
   #speak({place, range, surface}) {
     say(byId('point-says'), place === undefined ? 'No point in the middle of the picture'
       : [`x, y, z: ${place}`, range !== NONE && `range ${range}`, surface !== NONE && surface].filter(Boolean).join('; '));

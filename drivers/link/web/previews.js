@@ -31,8 +31,8 @@ function begin(bytes, magic, least) {
 
 const origin = (view, at) => [at, at + 8, at + 16].map((k) => view.getFloat64(k, true));
 
-// Returns {number, cells, n, pulses, hits, front, origin, above_m, hides_m, feet_m, seen, xyz, range, label} of the bytes
-// of /preview. seen has a bit for each cell, 32 in a word.
+// Returns {number, cells, n, pulses, hits, front, origin, above_m, hides_m, feet_m, seen, xyz, range, label} of the
+// bytes of /preview. seen has a bit for each cell, 32 in a word.
 export function parsePreview(bytes) {
   const view = begin(bytes, 'SHPV', 72);
   const [number, cells, n, pulses, hits, front] = [8, 12, 16, 20, 24, 28].map((at) => view.getUint32(at, true));
@@ -76,8 +76,9 @@ export function batchOf(preview, station, scan) {
 
 export const hasBit = (bits, i) => ((bits[i >>> 5] >>> (i & 31)) & 1) === 1;
 
-// Returns by how many of the stations each cell is seen, and the area seen by none, by one and by several. hidden_m2 of
-// what none sees can't be seen from anywhere; reach says what can, null: not known.
+// Returns for each cell by how many of the stations it is seen, and the area seen by none, by one and by several.
+// hidden_m2 is the part seen by none that can't be seen from anywhere. reach says which cells can be seen; null: this
+// is not known.
 export function countSeen(cells, seen, reach = null) {
   const counts = new Uint8Array(cells.n);
   for (const bits of seen) {

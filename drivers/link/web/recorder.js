@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// The button that records: the frames that come while it is pressed become a file, which the user saves.
+// This button records: the frames that come while it is pressed become a file, which the user saves.
 import {byId, say, short} from './page.js';
 import {download, fileName} from './picture.js';
 

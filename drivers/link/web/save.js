@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This row saves the points so far as a file: the head writes it, in the formats of `scanhead record` (GET /save), and the page fetches
-// it in pieces.
+// This row saves the points so far as a file. The head writes it, in the formats of `scanhead record` (GET /save), and
+// the page fetches it in pieces.
 import {make, say} from './page.js';
 import {download, fileName} from './picture.js';
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// A section is the part of the scene that is seen: a box that may be turned about the vertical, or all between two
-// heights. It is pure; lengths are metres in the scene frame, relative to an origin where one is given.
+// A section is the part of the scene that is seen. It is a box that may be turned about the vertical, or all between
+// two heights. The module is pure; lengths are metres in the scene's frame, relative to an origin where one is given.
 
 import {add, dot, radians, sub} from './view_camera.js';
 
@@ -21,7 +21,7 @@ export class Section {
     Object.assign(this, from);
   }
 
-  // Returns one of all within {min, max}, a little larger; a height cut takes the upper third away.
+  // Returns a section with all of {min, max} in it, a little larger; a height cut takes the upper third away.
   static around({min, max}, kind) {
     const margin = 0.01 * Math.hypot(...sub(max, min)) + THIN;
     const top = kind === 'height' ? min[2] + (max[2] - min[2]) * 2 / 3 : max[2] + margin;
@@ -42,7 +42,7 @@ export class Section {
     return {middle: sub(this.middle, origin), half: this.limits, turn: [right[0], -right[1]]};
   }
 
-  // Returns whether a box relative to the origin may have a part in it; it is never false for one that has.
+  // Returns whether a box relative to the origin may have a part in the section; it is never false for a box that has.
   meets(lo, hi, origin) {
     const {middle} = this.relativeTo(origin);
     const limits = this.limits;
@@ -53,7 +53,7 @@ export class Section {
     });
   }
 
-  // Returns the part of {min, max} around what is in it; all of it, if nothing is.
+  // Returns the part of {min, max} around the section; all of it, if nothing is in the section.
   within({min, max}) {
     const corners = this.corners, axes = this.kind === 'height' ? [2] : [0, 1, 2];
     const bound = (v, a, least, most) => (axes.includes(a) ? most(v, least(...corners.map((p) => p[a]))) : v);
@@ -61,7 +61,8 @@ export class Section {
     return inner.min.every((v, a) => v < inner.max[a]) ? inner : {min, max};
   }
 
-  // Returns the eight corners, bit k of the index for axis k. Those of a height cut are where it was made.
+  // Returns the eight corners, bit k of the index for axis k. A height cut has the corners of the box from which it was
+  // made.
   get corners() {
     const axes = this.axes;
     return Array.from({length: 8}, (_, i) => axes.reduce((p, axis, k) => add(p, axis, (i >> k & 1 ? 1 : -1) * this.half[k]), this.middle));
@@ -85,7 +86,7 @@ export class Section {
     this.middle = add(this.middle, this.axes[axis], 0.5 * d * sign);
   }
 
-  // Sets the heights of bottom and top; returns false for ones that leave nothing.
+  // Sets the heights of bottom and top; returns false for heights that leave nothing.
   between(from_m, to_m) {
     if (!(to_m - from_m >= THIN)) return false;
     this.middle = withAt(this.middle, 2, 0.5 * (from_m + to_m));
@@ -103,7 +104,7 @@ export function isWithin({middle, half, turn: [c, s]}, x, y, z) {
   return Math.abs(c * dx - s * dy) <= half[0] && Math.abs(s * dx + c * dy) <= half[1] && Math.abs(z - middle[2]) <= half[2];
 }
 
-// Returns how far along a line through `at` the ray of a place of the screen comes closest to it; null where the line
+// Returns how far along a line through `at` it comes closest to the ray of a place of the screen; null if the line
 // points at the eye.
 export function alongLine(camera, at, along, x, y) {
   const o = camera.from(x, y), r = camera.ray(x, y);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This tool looks into a house: a section box, or a cut between two heights. Its handles are sliders on the picture, for
-// pointer, touch and keys. The section stays after the tool is left, until it is switched off.
+// This tool looks into a house, by a section box, or by a cut between two heights. Its handles are sliders on the
+// picture, for pointer, touch and keys. The section stays after the tool is left, until it is switched off.
 import {byId, make, say} from './page.js';
 import {alongLine, Section} from './section.js';
 import {arrowStep, degrees, headingTo, onPlane, sub} from './view_camera.js';
@@ -107,7 +107,7 @@ export class SectionTool {
     const isSound = Object.values(v).every(Number.isFinite) && v.wide > 0 && v.deep > 0;
     if (!isSound || !s.between(v.from, v.to)) {
       this.#show();
-      return say(this.#says, 'Refused: all fields are numbers, width and depth more than 0, and it ends at least 0.02 m above its begin.');
+      return say(this.#says, 'Refused: all fields are numbers, width and depth are more than 0, and the top is at least 0.02 m above the bottom.');
     }
     s.middle = [v.x, v.y, s.middle[2]];
     s.half = [0.5 * v.wide, 0.5 * v.deep, s.half[2]];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The time line of a recording: play and pause, seek, speed, loop. A player does the work: RecordingPlayer shows the
-// points of a recording up to a time, ReplayPlayer commands a head that replays one.
+// The time line of a recording has play and pause, seek, speed and loop. A player does the work: RecordingPlayer shows
+// the points of a recording up to a time, ReplayPlayer commands a head that replays one.
 import {byId, make, say} from './page.js';
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 50];
@@ -28,7 +28,7 @@ export class Timeline {
     this.show();
   }
 
-  // A replay is sought once the handle is let go; points of a recording follow it.
+  // A replay seeks when the user lets the handle go; the points of a recording follow the handle.
   #held(isHeld) {
     this.#isHeld = isHeld;
     if (!isHeld || this.#player.follows) this.#player.seek(Number(this.seek.value));
@@ -55,7 +55,7 @@ export class Timeline {
     this.#says(position_s);
   }
 
-  // The program was started with a speed that is not in the list.
+  // The program may have been started with a speed that is not in the list.
   #addSpeed(speed) {
     if ([...this.speed.options].some(({value}) => Number(value) === speed)) return;
     this.speed.append(make('option', {value: speed}, `${speed} ×`));
@@ -119,7 +119,8 @@ export class RecordingPlayer {
   }
 }
 
-// A head that replays a recording (SCAN:REPLay). Points from another time are taken off the picture.
+// This player is for a head that replays a recording (SCAN:REPLay). After a seek the points from before are taken off
+// the picture.
 export class ReplayPlayer {
   changed = () => {};
   follows = false;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The tools of the picture: buttons over it, and one card for the tool that was asked for. A tool is {id, name, title,
-// body, start(), stop()}: its body stands in the card between start() and stop(). A tool with `isApart` has a place of its
-// own on the page, and stays open beside the others.
+// The tools of the picture are buttons over it, and one card for the tool that was asked for. A tool is {id, name,
+// title, body, start(), stop()}: its body stands in the card between start() and stop(). A tool with `isApart` has a
+// place of its own on the page, and stays open beside the others.
 import {byId, make, say} from './page.js';
 
 export class Tools {
@@ -30,7 +30,7 @@ export class Tools {
       e.preventDefault();
       this.leave(tool);
     });
-    // A key in the picture, or another button, may have changed what a tool shows as on.
+    // A key in the picture, or another button, may have changed which tools are shown as on.
     for (const type of ['keyup', 'click']) document.addEventListener(type, () => this.show());
     this.show();
   }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-// A trial has stations that stand, in this page alone, where its user wants to try them. Each has the points of a coarse
-// scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a trial
-// needs no control.
+// A trial has stations that stand, in this page alone, where its user wants to try them. Each has the points of a
+// coarse scan from there, and the cells of the surface that it sees. The head computes these and stays as it is, so a
+// trial needs no control.
 
 import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from './previews.js';
 
-// Cells are seen by pulses that are nearer to each other than those that are shown, and once more by finer ones, which
-// grazing surfaces need.
+// Cells are looked for by pulses that are nearer to each other than those that are shown. At rest finer pulses follow,
+// which grazing surfaces need.
 const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station rests so long before the finer ones
 const COVER_MS = 500; // while a station is dragged, its cells come so far apart
@@ -101,8 +101,8 @@ export class Trial extends EventTarget {
 
   #tell(type) { this.dispatchEvent(new Event(type)); }
 
-  // Gets the points, then the cells, of where the station is now. Only one request of a station is under way: while it
-  // is dragged, each answer is followed by the request for its newest place.
+  // Gets the points, then the cells, for the present place of the station. A station has only one request under way:
+  // while it is dragged, each answer is followed by the request for its newest place.
   async renew(station) {
     station.wanted++;
     this.next = null;
@@ -169,7 +169,7 @@ export class Trial extends EventTarget {
     this.#tell('change');
   }
 
-  // Asks once what can be seen at all.
+  // Asks once which cells can be seen at all.
   async #learnReach() {
     if (this.#asksReach) return;
     this.#asksReach = true;
@@ -179,14 +179,14 @@ export class Trial extends EventTarget {
     } catch { /* shares are then of all surfaces */ }
   }
 
-  // Returns the path of a question about what the stations see.
+  // Returns the path of a request about the cells that the stations see.
   #about(name) {
     const like = this.stations[0], seen = this.stations.filter((s) => s.seen).slice(0, MOST_OF);
     const height_m = like.above_m > 0 ? round(like.above_m) : null;
     return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer]))});
   }
 
-  // Is true where the stations see the backs of most faces: these then look the other way.
+  // Returns true where the stations see the backs of most faces: these then look the other way.
   get seesBacks() {
     const all = this.stations.filter((s) => s.seen);
     return all.length > 0 && 2 * all.reduce((sum, s) => sum + s.front, 0) < all.reduce((sum, s) => sum + s.hits, 0);

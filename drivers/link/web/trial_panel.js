@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// This part of the stations' panel is for trying places. It has stations that are moved, added and set in this page alone,
-// what they see together, and the best next place. It takes the place of the list of stations while it is open.
+// This part of the stations' panel is for trying places. It has stations that are moved, added and set in this page
+// alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
+// it is open.
 
 import {bodyOf, grouped, kept, make, percent, say} from './page.js';
 import {why} from './session.js';
@@ -56,7 +57,8 @@ export class TrialPanel {
     session.addEventListener('change', () => this.#trial && this.#allow());
   }
 
-  // A head that has no previews offers no trial. Another run of it may have another scene, so that a trial ends.
+  // A head that has no previews offers no trial. A trial ends when another run of the head begins, since that may have
+  // another scene.
   offer(hasPreviews, run) {
     if (this.#trial && run !== this.#run) this.end();
     this.#run = run;
@@ -165,7 +167,7 @@ export class TrialPanel {
     if (trial.stations.map((s) => s.number).join() !== [...this.#items.keys()].join()) this.#relist(colour);
     for (const station of trial.stations) this.#fill(station);
     const ghost = trial.next ? [{...trial.next, number: GHOST, name: 'Best next place', suggested: true}] : [];
-    // While one is moved, the picture keeps its list, and has the newest place itself.
+    // While a station is moved, the picture keeps its list, and has the newest place itself.
     const {dragging, moved, pending} = this.#view.stations;
     if (!dragging && (!moved || pending)) {
       this.#view.setStations([...trial.stations.map((s) => ({...s, colour: colour(s.number).map((c) => c / 255)})), ...ghost]);
@@ -240,7 +242,7 @@ export class TrialPanel {
       : 'All surfaces, also those within walls';
   }
 
-  // The area that can be seen, or all of it as long as that is not known.
+  // Returns the area that can be seen, or all of it as long as that is not known.
   #all() {
     const {sum} = this.#trial;
     return sum ? sum.none_m2 + sum.one_m2 + sum.several_m2 - sum.hidden_m2 : 0;
@@ -303,7 +305,7 @@ export class TrialPanel {
     this.text.select();
   }
 
-  // Sends the head what was tried. Its stations then stand there for everybody.
+  // Sends the tried places to the head. Its stations then stand there for everybody.
   async #apply() {
     for (const s of this.#trial.stations.filter((s) => !s.isAdded)) {
       const place = PLACE.map(([key]) => Math.round(s[key] * 1e4) / 1e4);

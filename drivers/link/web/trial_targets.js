@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// These are targets of a trial: places on surfaces, such as a mark on a wall, by which scans are put together later. A
+// The targets of a trial are places on surfaces, such as a mark on a wall, by which scans are put together later. A
 // target is seen by a station that sees its cell of the surface. Two scans need three targets that both see.
 
 import {make, say} from './page.js';

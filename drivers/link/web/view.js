@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // The view draws the picture of a cloud: WebGL 2 points, the scene, the stations, and the point under the pointer.
-// README.md says what it offers. While the view moves it draws a level of detail, as much as a frame's time allows; once
-// it rests the rest is added, a slice at a time; points that come are added to what is there.
+// README.md has its interface. While the view moves it draws a level of detail, as much as a picture's time allows. At
+// rest the other points are added, a slice at a time; so are points that come.
 
 import {Camera, radians} from './view_camera.js';
 import {MODES} from './view_colours.js';
@@ -195,8 +195,8 @@ export class View extends EventTarget {
     this.#ask('restart');
   }
 
-  // Shows only points of these times, {from, to} in seconds as `latest_s` of the cloud; null shows all. While these change
-  // from picture to picture (isMoving), each has a level of detail, as of a view that moves.
+  // Shows only points of these times, {from, to} in seconds as `latest_s` of the cloud; null shows all. While the times
+  // change from picture to picture (isMoving), each picture has a level of detail, like that of a view that moves.
   times(window, isMoving = false) {
     this.cloud.window = window;
     this.#want.restart ??= 'later';
@@ -272,7 +272,7 @@ export class View extends EventTarget {
 
   get showsStations() { return this.#solids.stationsOn; }
 
-  // Only what lies over the picture has changed.
+  // Draws again only the layers over the picture.
   redraw() { this.#ask('overlay'); }
 
   // ---- drawing

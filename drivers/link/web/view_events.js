@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// This module tells the view what happens to its canvas: a lost context, another size, another theme.
+// This module reports to the view what happens to its canvas: a lost context, another size, another theme.
 
 // on: {lost(), restored(), resized(), themed()}
 export function listenTo(canvas, on) {

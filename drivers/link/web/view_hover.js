@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This module finds the point under the pointer, once the pointer stays, and marks a point that another part of the page
-// points at.
+// This module finds the point under the pointer, once the pointer stays, and marks a point that another part of the
+// page points at.
 
 import {searchSlowly} from './view_pick.js';
 import {pointOf} from './cloud.js';
@@ -14,7 +14,7 @@ export class Hover {
   #timer = 0;
   #stop = null;
 
-  // told(point or null, isAsked) is called with each other point; isAsked: a key has asked for it
+  // Calls told(point or null, isAsked) when the point changes; isAsked: a key has asked for it
   constructor(view, told) {
     this.#view = view;
     this.#told = told;

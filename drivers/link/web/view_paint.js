@@ -6,7 +6,7 @@ import {CUT, DEPTH, HEAD, PLACE} from './view_gl.js';
 
 const WIDE = 1024; // cells in a row of the texture
 
-// These can be told apart by people who are blind to red or green, and by lightness alone (Okabe and Ito 2002).
+// These colours differ for people who are blind to red or green, and by lightness alone (Okabe and Ito 2002).
 export const SEEN_COLOURS = [[213, 94, 0], [240, 228, 66], [0, 158, 115]];
 
 const CELLS = {
@@ -109,8 +109,8 @@ export class CellsPart {
     this.n = n / 3;
   }
 
-  // counts: by how many stations each cell is seen. isTurned: they see the backs of the faces. showsUnseen(cell) says of
-  // a cell that none sees whether it is painted; false: none is.
+  // counts has the number of stations that see each cell. isTurned: they see the backs of the faces. showsUnseen(cell)
+  // says whether a cell that none sees is painted; false: none is.
   show({counts, isTurned, showsUnseen}) {
     const {gl} = this;
     this.isTurned = isTurned;

@@ -29,7 +29,7 @@ class BlockPart {
     this.value = gl.createBuffer();
   }
 
-  // Only points of some times are shown: their times go to the GPU, too, from the first such drawing on.
+  // Shows only points of some times. These go to the GPU, too, from the first such picture on.
   #times(stride) {
     const {gl, cloud: {window}} = this.points, {block} = this;
     if (window === null) {

@@ -62,8 +62,8 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   return best;
 }
 
-// Does the same in a flat view, whose rays are parallel: w may be less than 0. A tenth of the target's distance in
-// depth counts as much as a tenth in a view with perspective.
+// Does the same in a flat view, whose rays are parallel: w may be less than 0. A depth of a tenth of the target's
+// distance counts as much as a tenth in a view with perspective.
 function* searchFlat(cloud, camera, x, y, radius_px, limit) {
   const from = sub(camera.from(x, y), cloud.origin);
   const f = camera.forward;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// This module has the colour scales: a figure's place between its limits, 0 to 1, becomes a colour. It is pure.
+// This module has the colour scales: a figure's place between its limits, 0 to 1, becomes a colour. The module is pure.
 //
 // Low and high mean the same on every scale, and the same as in files (core/colour.h): low is blue or dark, high is red
 // or bright. `even` and `blue` are computed in OKLab (Ottosson 2020), whose lightness is that of the eye. It rises

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The waveform of the point's pulse, in the point's panel: samples over range, its echoes marked. It is there only where
-// the stream has waveforms, and asks for one pulse at a time.
+// This part of the point's panel shows the waveform of its pulse: samples over range, with its echoes marked. It is
+// there only where the stream has waveforms, and asks for one pulse at a time.
 import {make, makeSvg, say, short} from './page.js';
 
 const HAS_WAVEFORMS = 4; // of a descriptor's content

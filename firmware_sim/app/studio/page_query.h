@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The query of a page's request: NAME=NUMBER with & between them. In: the text after '?', and the names that are
- * allowed. Out: their values, or one line that says what is allowed. Pure; any thread. */
+/* This reads the query of a page's request: NAME=NUMBER with & between them. In: the text after '?', and the names
+ * that are allowed. Out: their values, or one line that says what is allowed. Pure; any thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PAGE_QUERY_H
 #define FIRMWARE_SIM_APP_STUDIO_PAGE_QUERY_H
 

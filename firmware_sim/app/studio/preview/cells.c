@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* /cells: the pieces of the surface with their cells, for a page that paints them. */
+/* /cells gives the pieces of the surface with their cells, to a page that paints them. */
 #include <stdlib.h>
 #include <string.h>
 

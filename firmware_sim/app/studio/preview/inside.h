@@ -29,7 +29,7 @@ struct preview_request {
     double height_m;                    /* of the head above the floor */
 };
 
-/* SH_EINPUT with an empty text: nothing is at that path. */
+/* Returns SH_EINPUT with an empty text where nothing is at that path. */
 int preview_read_request(const struct preview_options *options, const char *path, const char *query,
                          struct preview_request *out, struct sh_err *err);
 
@@ -62,9 +62,9 @@ int preview_site_open(const struct preview_work *work, const struct preview_requ
 /* These make bodies, whose formats README.md has. number: the preview's. */
 int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
                  struct web_body *out, struct sh_err *err);
-/* The cells of such a body, which stay there, and its hits. */
+/* The cells stay in such a body; the hits are in its head. */
 enum { PREVIEW_HEAD_BYTES = 72, PREVIEW_CELLS_AT = 72, PREVIEW_HITS_AT = 24, PREVIEW_FRONT_AT = 28 };
-/* seen[request->n_of]. */
+/* seen has request->n_of previews. */
 int preview_next(const struct preview_work *work, const struct preview_request *request,
                  const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
 int preview_reach(const struct preview_work *work, const struct preview_request *request,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* /next: the place that adds most to what stations of a trial see (`scanhead coverage --next`, with coarse scans).
- * /reach: what can be seen from any of its places. */
+/* /next gives the place that adds most to the surface that the stations of a trial see (as `scanhead coverage
+ * --next`, with coarse scans). /reach gives the surface that can be seen from any of its places. */
 #include "firmware_sim/app/studio/coverage/next.h"
 
 #include <math.h>
@@ -105,8 +105,8 @@ int preview_next(const struct preview_work *work, const struct preview_request *
 
 /* ---- what can be seen at all */
 
-/* Adds what each place sees. Where the previews see fronts, a place that sees backs lies within a body, and is left out.
- * Returns the places that count, or an error. */
+/* Adds the cells that each place sees. If the previews see fronts, a place that sees backs lies within a body, and
+ * is left out. Returns the number of places that count, or an error. */
 static int mark_reach(const struct preview_work *work, const struct stand *s, uint64_t *reach, struct sh_err *err)
 {
     const struct coverage *coverage = work->coverage;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* /preview: the scan of a station from another place. */
+/* /preview is the scan of a station from another place. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,7 @@ static int64_t udeg_or(double deg, int64_t otherwise_udeg)
     return isinf(deg) ? otherwise_udeg : llround(1e6 * deg);
 }
 
-/* Sets windows of the lines and of the pan. Only a line head's can be cut without another plan. */
+/* Sets windows of the lines and of the pan. Only a line head can have them without another plan. */
 static int set_windows(const struct preview_request *r, const struct config_profile *p, struct head_settings *s,
                        struct sh_err *err)
 {

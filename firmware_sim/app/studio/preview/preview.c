@@ -3,9 +3,10 @@
  *
  *     free --asked--> waiting --taken--> working --> done --asked--> its body, again and again
  *
- * A request is known by its text. One for a place stops the search for a next station, which takes longer and then
- * begins again, so that a dragged station does not wait for it. The newest one is worked on first: while a station is dragged, older ones are about
- * places that it has left. One that nobody asked for lately gives its slot away, and so do the oldest answers. */
+ * A request is known by its text. One for a place stops the search for a next station, which takes longer. The search
+ * begins again afterwards, so that a dragged station does not wait for it. The newest request is worked on first: while
+ * a station is dragged, older ones are about places that it has left. A request that nobody asked for lately gives its
+ * slot away, and so do the oldest answers. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
 #include <pthread.h>
@@ -70,7 +71,7 @@ static struct job *find_job(struct preview *p, const char *text)
     return NULL;
 }
 
-/* The one asked for longest ago of a state; NULL: none. */
+/* Returns the job of a state that was asked for longest ago; NULL: there is none. */
 static struct job *oldest_of(struct preview *p, enum job_state state)
 {
     struct job *oldest = NULL;
@@ -184,7 +185,7 @@ static void preview_do(struct preview *p, struct job *job)
     }
 }
 
-/* A coverage of surfaces that all give no cells: 4 bytes a triangle. */
+/* Makes a coverage whose surfaces give no cells: 4 bytes a triangle. */
 static int make_blind(struct preview *p, struct sh_err *err)
 {
     uint8_t *silent = malloc(SCENE_MAX_SURFACES + 1);

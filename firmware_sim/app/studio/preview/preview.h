@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Previews: what a station would see from another place, or with other settings, for a page on which stations are
- * tried. Nothing of the head moves or changes, so nobody needs control of it.
+/* A preview is what a station would see from another place, or with other settings. A page on which stations are tried
+ * asks for it. The head neither moves nor changes, so nobody needs control of it.
  *
- * In: requests of a page, as path and query (README.md has them and their answers). Out: bodies. A request that is not
- * answered yet gets an empty body at once, and the page asks again. One thread at the lowest priority does the work,
- * and is made with the first request. Bounded are the pulses of a preview, the requests that wait, and the bytes of
- * the answers that are kept. */
+ * In: requests of a page, as path and query (README.md has them and their answers). Out: bodies. A request that is
+ * not answered yet gets an empty body at once, and the page asks again. One thread at the lowest priority does the
+ * work, and is made with the first request. The pulses of a preview, the requests that wait, and the bytes of the
+ * answers that are kept are limited. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
 #define FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
 
@@ -18,8 +18,8 @@ struct preview;
 struct preview_options {
     const struct config *cfg;
     const struct site *site; /* of the head that runs, copies written out; it and cfg outlive the preview */
-    /* It is that site's. Its scans and stations are the preview's; others may only ask it for cells of places. NULL: there
-     * is none, and previews have points alone. */
+    /* It is that site's. Its scans and stations are the preview's; others may only ask it for cells of places. NULL:
+     * there is no coverage, and previews have points alone. */
     struct coverage *coverage;
     double cell_m;
     const struct sh_report *report; /* hears why a scanner of the scene can't be previewed */

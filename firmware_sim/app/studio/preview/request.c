@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Requests of a page: what their queries may say. */
+/* This file reads the requests of a page, and checks their queries. */
 #include <math.h>
 #include <string.h>
 

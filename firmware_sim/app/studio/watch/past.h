@@ -5,9 +5,9 @@
  * format). A piece begins with the descriptor, the emitter and the anchor that its points need, so that a reader of the
  * protocol can begin with any piece.
  *
- * Kept are points with their attributes and colours, poses, and what places them. Waveforms are not: a second of them
- * may be as long as all else. When there are more than `points` or
- * `bytes`, the oldest piece goes, and its points are counted as gone.
+ * It keeps points with their attributes and colours, poses, and the frames that place them. It keeps no waveforms: a
+ * second of them may be as long as all else. When there are more than `points` or `bytes`, the oldest piece goes, and
+ * its points are counted as gone.
  *
  * Memory: none but this until the first points come; then a piece of PAST_PIECE bytes after the other, up to `bytes`.
  * Threads: one takes frames; any number of others read. */

@@ -74,7 +74,7 @@ static int write_stream(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* A stream of points alone ends in the middle of a scan, for whoever reads it. */
+/* A stream of points alone ends in the middle of a scan, for every reader. */
 static int write_file(struct save *s, struct sh_err *err)
 {
     struct record_job *job = calloc(1, sizeof *job);
@@ -135,7 +135,7 @@ static int check_as(const char *as, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "as=%.32s: allowed are las, ply, e57, ptx, pcapng", as);
 }
 
-/* With the lock held. */
+/* The caller holds the lock. */
 static int begin(struct save *s, const char *as, struct sh_err *err)
 {
     if (s->state == SAVE_WORKING) return sh_fail(err, SH_EINPUT, "a file is being made (%s); ask again later", s->as);

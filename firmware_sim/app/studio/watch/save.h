@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The points so far as a file, for a page: in each format that `scanhead record` writes from a stream.
+/* A page saves the points so far as a file, in each format that `scanhead record` writes from a stream.
  *
  * In: the frames of past.h. Out: a file, in pieces. One file at a time; a thread of its own makes it, at the lowest
  * priority. The file is in a folder for temporary files until the next one is made, or until save_free.
@@ -20,7 +20,8 @@ struct save *save_create(struct past *past);
 /* `/save?as=las` begins a file, `/save` asks for it: JSON with `state` (idle, working, done), `as` and `bytes`.
  * SH_EINPUT: a format that it can't be, or one is being made. A file that could not be made is an error once. */
 int save_get(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
-/* `/saved?from=POSITION`: bytes of the finished file from there on, at its end none. SH_EINPUT: there is no file. */
+/* `/saved?from=POSITION` gives bytes of the finished file from that position; at the file's end it gives none.
+ * SH_EINPUT: there is no file. */
 int save_get_piece(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
 /* Waits for a file that is being made. save may be NULL. */
 void save_free(struct save *save);
