@@ -92,6 +92,7 @@ export async function testTools(browser, url, points) {
 
   await test('the largest deviation is gone to, and marked', async () => {
     await page.until(`scanhead.head.state === 'idle'`);
+    const before = await page.eval('({target: [...scanhead.view.camera.target], distance: scanhead.view.camera.distance})');
     await page.press('#show-largest');
     const {max_at} = (await page.eval("fetch('/quality').then((answer) => answer.json())")).all;
     const {x, y, z} = await page.eval('scanhead.view.pointed.point');
@@ -99,6 +100,7 @@ export async function testTools(browser, url, points) {
     const seen = await place(page, max_at), middle = await page.eval('[scanhead.view.camera.width / 2, scanhead.view.camera.height / 2]');
     near(Math.hypot(...seen.map((v, k) => v - middle[k])), 0, 1, 'pixels from the middle');
     is((await page.eval(`document.querySelector('#point').textContent`)).includes('Range'), 'its figures are shown');
+    await page.eval(`Object.assign(scanhead.view.camera, ${JSON.stringify(before)}), scanhead.view.pointed.mark(null), scanhead.view.cameraMoved()`);
   });
 
   await test('the handles of a section follow pointer and keys', async () => {
