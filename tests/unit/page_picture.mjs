@@ -34,7 +34,8 @@ test('the point nearest to a place is found within reach, in any block', () => {
   same(nearestTo(cloud, [500_002 + 1 / 1024, 5_600_000, 110], 1e-3).x, 500_002, 'the nearer one');
   const {station, z} = nearestTo(cloud, [500_001, 5_600_000, 203.0004], 1e-3);
   same([station, z], [2, 203], 'of the other station');
-  same(nearestTo(cloud, [500_002, 5_600_000, 110.002], 1e-3), null, 'out of reach');
+  same(nearestTo(cloud, [500_002 + 1 / 256, 5_600_000, 110], 1e-3), null, 'between two points, out of reach of both');
+  same(nearestTo(cloud, [500_002, 5_600_000, 110.002], 1e-3), null, 'beyond all');
 });
 
 test('a point keeps its figures through closing, in blocks of their own by station and scan', () => {
