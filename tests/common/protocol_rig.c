@@ -119,7 +119,7 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
     rig->spec = (struct protocol_spec){
         .identity = &rig->identity,
-        .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns, store},
+        .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns, store, NULL},
         .session = 1,
         .fixes_hz = 1,
         .power_ons = 1};

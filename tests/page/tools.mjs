@@ -91,6 +91,19 @@ export async function testTools(browser, url, points) {
     is(found[0] === null && found[1] < 1.5, `picked above and below: ${found}`);
   });
 
+  await test('the largest deviation is gone to, and marked', async () => {
+    await page.until(`scanhead.head.state === 'idle'`);
+    const before = await page.eval('({target: [...scanhead.view.camera.target], distance: scanhead.view.camera.distance})');
+    await page.press('#show-largest');
+    const {max_at} = (await page.eval("fetch('/quality').then((answer) => answer.json())")).all;
+    const {x, y, z} = await page.eval('scanhead.view.pointed.point');
+    near(Math.hypot(x - max_at[0], y - max_at[1], z - max_at[2]), 0, 2e-6, 'the point of the page less that of the head, as floats');
+    const seen = await place(page, max_at), middle = await page.eval('[scanhead.view.camera.width / 2, scanhead.view.camera.height / 2]');
+    near(Math.hypot(...seen.map((v, k) => v - middle[k])), 0, 1, 'pixels from the middle');
+    is((await page.eval(`document.querySelector('#point').textContent`)).includes('Range'), 'its figures are shown');
+    await page.eval(`Object.assign(scanhead.view.camera, ${JSON.stringify(before)}), scanhead.view.pointed.mark(null), scanhead.view.cameraMoved()`);
+  });
+
   await test('the handles of a section follow pointer and keys', async () => {
     await page.eval(bare(false));
     await page.press('#tool-section');

@@ -9,8 +9,9 @@ import {ptpText} from '../../drivers/link/web/figures.js';
 import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
-import {batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from '../../drivers/link/web/previews.js';
+import {batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf, seenWithin} from '../../drivers/link/web/previews.js';
 import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
+import {Section} from '../../drivers/link/web/section.js';
 import {runTests, test} from './page_tap.mjs';
 
 const web = new URL('../../drivers/link/web/', import.meta.url);
@@ -256,6 +257,16 @@ test('previews: areas seen by none, one and several; what nobody can see counts 
   equal(sums([none], wall), [2, 0, 0, 1]);
   equal([...parseReach(bytesOf('SHRE', ['Uint32', 1, 33, 4, 5, 1]))], [5, 1]);
   equal(pathOf('preview', {station: 1, far_m: null, x_m: -2.5}), '/preview?station=1&x_m=-2.5');
+});
+
+test('previews: of one room, only what lies in the section counts, and not what nobody can see', () => {
+  const cells = parseCells(SQUARES), counts = Uint8Array.of(1, 0); // the floor is seen; its middle is (10.5, 0.5, 0), the wall's (11, 0.5, 0.5)
+  const share = (section, reach = null) => (({seen_m2, all_m2}) => [seen_m2, all_m2])(seenWithin(cells, counts, reach, new Section(section)));
+  equal(share({middle: [10.75, 0.5, 0.25], half: [1, 1, 1]}), [1, 2], 'both');
+  equal(share({middle: [10.75, 0.5, 0.25], half: [1, 1, 1]}, Uint32Array.of(1, 0)), [1, 1], 'nobody can see the wall');
+  equal(share({middle: [11, 0.5, 0.5], half: [0.2, 1, 0.2]}), [0, 1], 'the wall');
+  equal(share({kind: 'height', middle: [500, 500, 0], half: [1, 1, 0.1]}), [1, 1], 'a height cut has the floor, however far its middle');
+  equal(share({middle: [50, 0, 0], half: [1, 1, 1]}), [0, 0], 'nothing');
 });
 
 test('targets: the cell of a place, the stations that see it, and what pairs have in common', () => {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // It tests the pure parts of the page's picture (drivers/link/web): the stored points and their order, the camera,
 // colours and limits, picking, dragging, levels of detail, the scene's bytes. It prints TAP on standard output.
-import {Cloud, BLOCK, evenOrder, pointOf} from '../../drivers/link/web/cloud.js';
+import {Cloud, BLOCK, evenOrder, nearestTo, pointOf} from '../../drivers/link/web/cloud.js';
 import {FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
 import {SCALES} from '../../drivers/link/web/view_ramps.js';
@@ -24,6 +24,18 @@ test('the oldest points go, whole blocks, and not below the capacity', () => {
   same(cloud.bounds.min[0], 2, 'bounds of those held'); // the 131,073rd point is of the third batch
   cloud.clear();
   same([cloud.total, cloud.count, cloud.bounds, cloud.origin], [0, 0, null, null], 'cleared');
+});
+
+test('the point nearest to a place is found within reach, in any block', () => {
+  const cloud = new Cloud();
+  same(nearestTo(cloud, [0, 0, 0], 1), null, 'no points');
+  cloud.add(batch(1000, (i) => [500_000 + i / 128, 5_600_000, 110]));
+  cloud.add(batch(5, (i) => [500_001, 5_600_000, 200 + i], {station: 2}));
+  same(nearestTo(cloud, [500_002 + 1 / 1024, 5_600_000, 110], 1e-3).x, 500_002, 'the nearer one');
+  const {station, z} = nearestTo(cloud, [500_001, 5_600_000, 203.0004], 1e-3);
+  same([station, z], [2, 203], 'of the other station');
+  same(nearestTo(cloud, [500_002 + 1 / 256, 5_600_000, 110], 1e-3), null, 'between two points, out of reach of both');
+  same(nearestTo(cloud, [500_002, 5_600_000, 110.002], 1e-3), null, 'beyond all');
 });
 
 test('a point keeps its figures through closing, in blocks of their own by station and scan', () => {

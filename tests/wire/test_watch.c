@@ -152,6 +152,24 @@ static void same(const char *what, double value, double expected, double toleran
     if (!(fabs(value - expected) <= tolerance)) fail_msg("%s: %.12g, not %.12g", what, value, expected);
 }
 
+static double beyond(double v, double lo, double hi)
+{
+    return fmax(0.0, fmax(lo - v, v - hi));
+}
+
+/* The place of the largest distance is so far from SCENE's floor, east and north wall, whose distances are worked out here. */
+static void check_place_of_largest(const char *quality)
+{
+    double p[3];
+    const char *at = strstr(quality, "\"max_at\":[");
+    assert_non_null(at);
+    assert_int_equal(sscanf(at, "\"max_at\":[%lf,%lf,%lf]", &p[0], &p[1], &p[2]), 3);
+    const double floor_m = hypot(hypot(beyond(p[0], -4, 4), beyond(p[1], -4, 4)), p[2]);
+    const double east_m = hypot(hypot(p[0] - 4, beyond(p[1], -4, 4)), beyond(p[2], 0, 3));
+    const double north_m = hypot(hypot(beyond(p[0], -4, 4), p[1] - 4), beyond(p[2], 0, 3));
+    same("distance at max_at", fmin(floor_m, fmin(east_m, north_m)), number(quality, "\"all\"", "max_m"), 1e-12);
+}
+
 /* The file holds the points as a client decodes them. So distances are the same but for the way back from UTM, whose
  * anchor is made twice: some units in the last place of 5.8e6 m, 1e-9 m each. Densities are of whole points in the same
  * cells: to a float's digits. */
@@ -165,6 +183,7 @@ static void check_figures(const char *quality, const char *report)
     same("empty", number(quality, "{", "empty_share") * shots, number(report, "{", "empty"), 1e-6);
     for (int k = 0; k < 4; k++)
         same(key[k], number(quality, "\"all\"", key[k]), number(report, "{", key[k]), 4e-9);
+    check_place_of_largest(quality);
     same("bound", number(quality, "\"verdict\"", "bound_m"), number(report, "\"verdict\"", "bound_m"), 1e-12);
     same("p50", number(quality, "density", "p50_m2"), number(report, "density", "p50_m2"),
          1e-6 * number(report, "density", "p50_m2"));

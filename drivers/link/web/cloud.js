@@ -290,6 +290,21 @@ export const isOutside = (window, block) => window !== null && block.span.from <
 export const isPointOutside = (window, block, i) => window !== null &&
   (block.t[i] < window.from - block.began_s || block.t[i] > window.to - block.began_s);
 
+// Returns the point nearest to a place, up to reach_m away in each axis, as pointOf() does; null: there is none.
+export function nearestTo(cloud, place, reach_m) {
+  if (cloud.origin === null) return null;
+  const p = place.map((v, a) => v - cloud.origin[a]);
+  let best = Infinity, found = null;
+  for (const block of cloud.blocks) {
+    if ([0, 1, 2].some((a) => block.lo[a] > p[a] + reach_m || block.hi[a] < p[a] - reach_m)) continue;
+    for (let i = 0; i < block.n; i++) {
+      const d = Math.max(...[0, 1, 2].map((a) => Math.abs(block.position[3 * i + a] - p[a])));
+      if (d <= reach_m && d < best) [best, found] = [d, {block, i}];
+    }
+  }
+  return found && pointOf(cloud, found.block, found.i);
+}
+
 // Returns all figures of point i of a block.
 export function pointOf(cloud, block, i) {
   const at = (axis) => block.position[3 * i + axis] + cloud.origin[axis];

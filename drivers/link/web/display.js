@@ -42,7 +42,7 @@ export class Display {
         make('button', {type: 'button', id: 'look', title: 'Look from where the head stands',
           click: () => view.lookFrom(this.station?.())}, 'From the head'),
         isRecording ? null : make('button', {type: 'button', id: 'clear', title: 'Forgets the points that are held',
-          click: () => view.cloud.clear()}, 'Clear'),
+          click: () => view.cloud.clear()}, 'Clear points'),
         make('button', {type: 'button', id: 'screenshot', title: 'The picture with its legend, as a PNG file',
           click: () => this.#save()}, 'Save picture'))];
     body.append(...rows.filter(Boolean));

@@ -95,7 +95,7 @@ function startHead(cloud, view, names, keepsPast) {
   if (keepsPast) bodyOf('display').append(saveRow());
   names.stations = stations;
   display.station = () => Number(knobs.value('HEAD:STATION')) || 1;
-  new Quality(() => session.link === 'open' && byId('panel-quality').open);
+  new Quality(() => session.link === 'open' && byId('panel-quality').open, view);
   new Point(view, names.of);
   if (view) new WavePlot(head, view, byId('point'));
   const trials = new TrialPanel(session, stations, view);

@@ -193,8 +193,8 @@ export class MeasureTool {
     const spacing = Math.max(...m.points.map((p) => p.spacing));
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
-    if (!m.flat && Number.isFinite(spacing)) rows.push(['To an edge, up to', millimetres(spacing),
-      'The distance between points there: an edge may lie so far beyond the picked point']);
+    if (!m.flat && Number.isFinite(spacing)) rows.push(['Points apart, mean', millimetres(spacing),
+      'An edge lies beyond the point that was picked by up to the distance of scan lines there, which may be several times this']);
     return rows;
   }
 

@@ -2,6 +2,8 @@
 // This module asks a head what stations would see from other places, and reads its answers. The head's folder preview
 // (README.md) has their formats. Reading is pure.
 
+import {isWithin} from './section.js';
+
 const AGAIN_MS = 15;
 
 // Returns the bytes of an answer, once the head has it. It throws an Error with the head's words.
@@ -91,4 +93,28 @@ export function countSeen(cells, seen, reach = null) {
     if (reach !== null && counts[i] === 0 && !hasBit(reach, i)) hidden_m2 += cells.area[i];
   }
   return {counts, none_m2: area[0], one_m2: area[1], several_m2: area[2], hidden_m2};
+}
+
+// Returns the middle of each cell, x, y, z, x, y, z ..., relative to the cells' origin: that of its pieces.
+export function middlesOf({n, pieces, cell, corners}) {
+  const middles = new Float32Array(3 * n), parts = new Uint32Array(n);
+  for (let i = 0; i < pieces; i++) {
+    parts[cell[i]]++;
+    for (let k = 0; k < 12; k++) middles[3 * cell[i] + k % 3] += corners[12 * i + k] / 4;
+  }
+  return middles.map((sum, k) => sum / parts[Math.floor(k / 3)]);
+}
+
+// Returns {seen_m2, all_m2} of the cells that have their middles in a section. Those that can't be seen don't count.
+export function seenWithin(cells, counts, reach, section) {
+  cells.middles ??= middlesOf(cells);
+  const box = section.relativeTo(cells.origin);
+  let seen_m2 = 0, all_m2 = 0;
+  for (let i = 0; i < cells.n; i++) {
+    if (counts[i] === 0 && reach !== null && !hasBit(reach, i)) continue;
+    if (!isWithin(box, cells.middles[3 * i], cells.middles[3 * i + 1], cells.middles[3 * i + 2])) continue;
+    all_m2 += cells.area[i];
+    if (counts[i] > 0) seen_m2 += cells.area[i];
+  }
+  return {seen_m2, all_m2};
 }

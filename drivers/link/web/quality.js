@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows the quality of the scan so far. The head, which knows the true values, reports it at /quality.
+import {nearestTo} from './cloud.js';
 import {bodyOf, byId, fetchJson, figureList, grouped, make, makeSvg, metres, percent, say, short, NONE} from './page.js';
 
 const ROWS = [
@@ -20,6 +21,9 @@ const DEVIATION = [
 ];
 const WIDTH = 300, HEIGHT = 92, BASE = 74;
 
+const NEAR_M = 1e-3; // the page's points are this near to the head's, or far away
+const LOOK_M = 3;
+
 export class Quality {
   #set;
   #svg = makeSvg('svg', {class: 'histogram', viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img'});
@@ -28,7 +32,14 @@ export class Quality {
   #coverage = make('p', {class: 'figure-line'});
   #aside = byId('panel-quality').querySelector('summary').appendChild(make('span', {class: 'aside'}));
 
-  constructor(isOpen) {
+  #view;
+  #worst = null; // the place of the largest deviation
+  #look = make('button', {type: 'button', id: 'show-largest', disabled: true, click: () => this.#showLargest(),
+    title: 'Goes to the point with the largest deviation, of those looked at'}, 'Show the largest');
+
+  // view: null where there is no picture
+  constructor(isOpen, view) {
+    this.#view = view;
     const body = bodyOf('quality');
     const general = figureList(body, ROWS);
     body.append(make('p', {class: 'note'}, 'The head judges the whole scan, also what did not come to this page.'),
@@ -36,7 +47,7 @@ export class Quality {
       make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.#covered), this.#coverage));
     body.append(make('h3', {}, 'Deviation from the scene'), this.#svg);
     const deviation = figureList(body, DEVIATION, 'two');
-    body.append(this.#verdict);
+    body.append(make('div', {class: 'actions'}, this.#look), this.#verdict);
     this.#set = (a, b) => {
       general(a);
       deviation(b);
@@ -67,6 +78,8 @@ export class Quality {
       'dev-bound': metres(bound), 'dev-sigma': along.noisy > 0 ? metres(along.expected_rms_m) : NONE,
       'dev-far': d.far === undefined ? NONE : short(d.far), 'dev-along': metres(along.judged_rms_m),
     });
+    this.#worst = d.max_at?.every(Number.isFinite) ? d.max_at : null;
+    this.#look.disabled = this.#worst === null || this.#view === null;
     byId('figure-dev-max').classList.toggle('bad', bound && d.max_m > bound && isBeyond);
     this.#histogram(q.along_beam ?? q.distances, q.along_beam ? ' along the beam' : '', bound);
     const words = verdict.text ?? '';
@@ -74,6 +87,14 @@ export class Quality {
     this.#verdict.title = words;
     this.#verdict.classList.toggle('refusal', isBeyond);
     this.#cover(q.coverage);
+  }
+
+  #showLargest() {
+    const view = this.#view;
+    Object.assign(view.camera, {target: [...this.#worst], distance: Math.min(view.camera.distance, LOOK_M)});
+    view.touched();
+    view.cameraMoved();
+    view.pointed.mark(nearestTo(view.cloud, this.#worst, NEAR_M), true);
   }
 
   #cover(c) {

@@ -86,6 +86,7 @@ export class SectionTool {
     say(this.#says, '');
     this.#view.touched();
     this.#view.cameraMoved();
+    this.#view.dispatchEvent(new Event('section'));
     this.#show();
     this.changed?.();
   }

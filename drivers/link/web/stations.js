@@ -94,7 +94,7 @@ export class Stations extends EventTarget {
       move: make('button', {type: 'submit', class: 'main'}, 'Move'),
       back: button('As it was', () => this.#fill(this.#of(number), true), 'The place that holds'),
       home: button('Power-up place', () => this.#send(number, `${number}, DEF`)),
-      use: button('Scan from here', () => this.#use(number)),
+      use: button('Put the head here', () => this.#use(number), 'Its next scan is from here: press Start'),
       look: button('Look from here', () => this.#view?.lookFrom(number)),
     };
     buttons.look.hidden = !this.#view;

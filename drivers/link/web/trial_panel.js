@@ -7,7 +7,7 @@ import {bodyOf, grouped, kept, make, percent, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
-import {hasBit} from './previews.js';
+import {hasBit, seenWithin} from './previews.js';
 import {TargetList} from './trial_targets.js';
 import {SEEN_COLOURS} from './view_paint.js';
 import {tableOf} from './view_colours.js';
@@ -55,6 +55,7 @@ export class TrialPanel {
     this.#body.prepend(make('div', {class: 'actions'}, this.#open), this.#box);
     this.#make();
     session.addEventListener('change', () => this.#trial && this.#allow());
+    view?.addEventListener('section', () => this.#trial && this.#within());
   }
 
   // A head that has no previews offers no trial. A trial ends when another run of the head begins, since that may have
@@ -73,6 +74,8 @@ export class TrialPanel {
     this.note = make('p', {class: 'note'}, 'Stations move in this page alone; the head stays as it is. Drag them in the picture, or edit their numbers.');
     this.covered = make('div');
     this.coverage = make('p', {class: 'figure-line', id: 'trial-coverage', role: 'status'});
+    this.inSection = make('p', {class: 'figure-line', id: 'trial-section', role: 'status',
+      title: 'Cells of the surface with their middle in the section box, or between the heights of the cut'});
     this.shares = SEEN.map((_, i) => make('dd', {id: `trial-seen-${i}`}, '–'));
     this.step = make('select', {id: 'trial-step', change: () => this.#trial.setStep(Number(this.step.value))},
       ...STEPS.map((deg) => option(deg, `${deg}°`)));
@@ -87,7 +90,7 @@ export class TrialPanel {
     this.apply = button('trial-apply', 'Move the head’s stations', () => this.#apply());
     this.text = make('textarea', {id: 'trial-text', readonly: true, rows: 6, 'aria-label': 'Stations for a configuration', spellcheck: 'false'});
     this.#box.append(this.note,
-      make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.covered), this.coverage),
+      make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.covered), this.coverage, this.inSection),
       make('dl', {class: 'figures'}, ...SEEN.map((name, i) => make('div', {}, make('dt', {}, patch(SEEN_COLOURS[i]), name), this.shares[i]))),
       make('div', {class: 'row'}, make('label', {for: 'trial-paint'}, 'Painted'), this.paint),
       make('div', {class: 'row'}, make('label', {for: 'trial-step'}, 'Points every'), this.step),
@@ -240,6 +243,15 @@ export class TrialPanel {
       : this.#trial.error || (cells ? '' : 'The surface is being cut into cells.'));
     this.coverage.title = reach ? `Seen from anywhere that a tripod can stand, or by a station; ${grouped(sum.hidden_m2)} m² more can't be seen`
       : 'All surfaces, also those within walls';
+    this.#within();
+  }
+
+  // Says how much of what is in the section is seen, so that one room can be judged.
+  #within() {
+    const {sum, cells, reach} = this.#trial, {section} = this.#view.camera;
+    if (!sum || !section) return say(this.inSection, sum ? 'For one room alone: put a Section around it.' : '');
+    const {seen_m2, all_m2} = seenWithin(cells, sum.counts, reach, section);
+    return say(this.inSection, all_m2 > 0 ? `In the section: ${percent(seen_m2 / all_m2)} of ${grouped(all_m2)}\u00a0m²` : 'Nothing of it is in the section.');
   }
 
   // Returns the area that can be seen, or all of it as long as that is not known.

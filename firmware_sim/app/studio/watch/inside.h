@@ -49,6 +49,7 @@ struct watch_scan {
     uint32_t every;
     int in_scene; /* points could be taken to the scene's frame */
     struct figures figures;
+    double max_at_m[3];                 /* the point that figures.max_m is of; NaN: none */
     struct figures_density_row density; /* of the points looked at, times `every` */
     double density_cell_m;
     struct figures_histogram histogram; /* of deviations along the beam, or of distances where there are none */

@@ -108,6 +108,7 @@ static void put_scan(struct json *json, const struct watch_scan *s)
     }
     json_open_object(json, "all");
     report_put_figures(json, &s->figures);
+    page_put_vector(json, "max_at", s->max_at_m);
     report_put_density(json, &s->density);
     json_double(json, "density_cell_m", s->density_cell_m > 0.0 ? s->density_cell_m : (double)NAN);
     json_close_object(json);

@@ -185,6 +185,18 @@ static void sample_judge(struct watch *w)
     if (w->site->moving) snprintf(v->text, sizeof v->text, "Not judged: the head moves.");
 }
 
+static void find_largest(struct watch *w)
+{
+    const struct watch_sample *s = &w->sample;
+    for (int k = 0; k < 3; k++)
+        w->at.max_at_m[k] = (double)NAN;
+    for (size_t i = 0; i < s->n; i++) {
+        if (s->distance_m[i] != w->at.figures.max_m) continue;
+        memcpy(w->at.max_at_m, s->xyz_m[i], sizeof w->at.max_at_m);
+        return;
+    }
+}
+
 int watch_sample_figures(struct watch *w, struct sh_err *err)
 {
     struct watch_sample *s = &w->sample;
@@ -197,6 +209,7 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
         figures_histogram_of_signed(s->points.along_m, s->n, SHOWN, &w->at.histogram);
     else
         figures_histogram_of(s->distance_m, s->n, SHOWN, &w->at.histogram);
+    find_largest(w);
     sample_judge(w);
     w->at.expects = !w->site->moving && deviation_terms_of(&w->now, &w->at.expected);
     w->at.every = s->every;
