@@ -1,40 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Full waveforms: checks that concern more than one key, and what they make of a stream. Limits of the digitiser's and
- * the pulse's figures by themselves are in core/waveform. */
+/* Full waveforms: checks that concern more than one key. Limits of the digitiser's and the pulse's figures by themselves
+ * are in core/waveform, that of the stream's rate is in ../site. */
 #include <math.h>
 
-#include "core/light.h"
-#include "drivers/protocol/native_waves.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
-
-/* What queues of the stream hold of it, 0.3 s and more, must fit into memory. */
-static const double MOST_BYTES_S = 4e8;
-
-static int has_gate(const struct config_waveform *w)
-{
-    return w->near_m < w->far_m;
-}
-
-/* Three widths: so long a Gaussian pulse of 26 dB above keep_db is above it. The receiver makes it longer: 312 ns for
- * a Gaussian response of 1 MHz. */
-uint32_t config_wave_samples(const struct config *cfg)
-{
-    const struct config_waveform *w = &cfg->waveform;
-    const double receiver_ns = w->bandwidth_mhz > 0.0 ? 312.0 / w->bandwidth_mhz : 0.0;
-    const double pulse_ns = 3.0 * hypot(cfg->profile.pulse_width_ns, receiver_ns);
-    const double span_ns =
-        has_gate(w) ? 2e9 / LIGHT_SPEED_M_S * (w->far_m - w->near_m) : w->before_ns + pulse_ns + w->after_ns;
-    return (uint32_t)fmin(floor(span_ns / w->sample_ns) + 1.0, (double)WAVEFORM_MAX_SAMPLES);
-}
-
-double config_wave_bytes_s(const struct config *cfg)
-{
-    if (cfg->head.settings.waves == 0) return 0.0;
-    return config_cast_hz(cfg) * (double)native_wave_len(config_wave_samples(cfg));
-}
 
 /* Keys that only one shape of the pulse has. */
 static void check_pulse(struct cfg_reader *rd, const struct config *cfg)
@@ -69,18 +41,11 @@ static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
 static void check_windows(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;
-    const double rate_bytes = config_wave_bytes_s(cfg);
-    const char *key = has_gate(w) ? "waveform.far_m" : "waveform.after_ns";
-    if (!CFG_SOUND(rd, 0, "waveform.near_m", "waveform.far_m", "waveform.before_ns", "waveform.after_ns",
-                   "waveform.sample_ns"))
-        return;
-    if (!has_gate(w) && (w->near_m != 0.0 || w->far_m != 0.0))
+    if (!CFG_SOUND(rd, 0, "waveform.near_m", "waveform.far_m")) return;
+    if (!(w->near_m < w->far_m) && (w->near_m != 0.0 || w->far_m != 0.0))
         cfg_fail_key(rd, cfg_is_given(rd, "waveform.far_m", 0) ? "waveform.far_m" : "waveform.near_m", 0,
                      "a window from %.10g to %.10g m; allowed a far_m above %.10g, or 0 for both", w->near_m, w->far_m,
                      w->near_m);
-    else if (rate_bytes > MOST_BYTES_S && cfg_has_profile(rd) && CFG_SOUND(rd, 0, "head.prr_hz"))
-        cfg_fail_key(rd, key, 0, "windows of %u samples for %.10g pulses/s are %.4g MB/s; allowed up to %.4g MB/s",
-                     config_wave_samples(cfg), config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
 }
 
 static void check_waveform_links(struct cfg_reader *rd, const struct config *cfg)

@@ -265,8 +265,6 @@ const struct bad bad[] = {
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 5}"), 17, "waveform.near_m", "allowed a far_m above 5"},
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 9, far_m: 8}"), 17, "waveform.far_m",
      "allowed a far_m above 9"},
-    {AT_16("signal: {model: on}\nwaveform: {send: on, sample_ns: 0.05, after_ns: 100}"), 17, "waveform.after_ns",
-     "allowed up to 400 MB/s"},
     {"heading_deg: 90\nlinks:\n  - type: tcp\n    port: 0\noutput:",
      "heading_deg: 90\n    lat_deg: 1\n    lon_deg: 2\n    height_m: 0\nlinks: [{type: tcp, port: 0, protocol: nmea}]\n"
      "time: {epoch: utc}\nsignal: {model: on}\nwaveform: {send: on}\noutput:",
