@@ -268,12 +268,16 @@ void site_wave_row(const struct site *site, struct plan_row *row)
         plan_say(row, "waveform", "none", 0.0, 0.0, "waveform.send is off, and waveform.echoes is model");
         return;
     }
-    const int rings = site->plan.methods.beam == BEAM_RINGS;
+    const enum beam_mode beam = site->plan.methods.beam;
     size_t used = (size_t)snprintf(why, sizeof why, "%u samples for a usual pulse", site->waves->usual.samples);
     if (cfg->head.settings.waves != 0)
         used += (size_t)snprintf(why + used, sizeof why - used, ", %.3g MB/s", 1e-6 * site_wave_bytes_s(site));
     if (site->waves->cast.finds)
-        snprintf(why + used, sizeof why - used, "; echoes are found in them, with the noise of the samples");
-    const double error_m = site->waves->cast.finds ? (double)NAN : 0.0; /* of ranges: those of the detector */
-    plan_say(row, "waveform", rings ? "sub-rays" : "closed form", error_m, site_wave_ns(site), why);
+        used += (size_t)snprintf(why + used, sizeof why - used,
+                                 "; echoes are found in them, with the noise of the samples");
+    if (beam == BEAM_SINGLE) snprintf(why + used, sizeof why - used, "; single rays: an edge has no second return");
+    const double error_m = site->waves->cast.finds ? (double)NAN /* of ranges: those of the detector */
+                           : beam == BEAM_SINGLE   ? site->plan.beam.error_m
+                                                   : 0.0;
+    plan_say(row, "waveform", beam == BEAM_RINGS ? "sub-rays" : "closed form", error_m, site_wave_ns(site), why);
 }

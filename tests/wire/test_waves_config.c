@@ -139,6 +139,46 @@ static void test_plan_row(void **state)
     }
 }
 
+/* The figure behind a key of the plan's stage. */
+static double figure_of(const char *plan, const char *stage, const char *key)
+{
+    char name[40];
+    snprintf(name, sizeof name, "\"stage\": \"%s\"", stage);
+    const char *row = strstr(plan, name);
+    if (row == NULL || (row = strstr(row, key)) == NULL) fail_msg("no %s of %s: %s", key, stage, plan);
+    return strtod(row + strlen(key), NULL);
+}
+
+/* A single ray misses the other surfaces in its footprint: its samples are as wrong as its points. Those of rings are not. */
+static void test_plan_single(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
+    for (int single = 0; single < 2; single++) {
+        const char *const args[] = {"plan",
+                                    config,
+                                    "--json",
+                                    "--set",
+                                    "waveform.send=on",
+                                    "--set",
+                                    single ? "beam.mode=single" : "beam.mode=rings",
+                                    NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        char *out = wire_read(wire_path(wire, "out"), NULL);
+        const double error_m = figure_of(out, "waveform", "\"error_m\": ");
+        if (single) {
+            assert_true(error_m > 0.0);
+            assert_true(error_m == figure_of(out, "beam", "\"error_m\": "));
+        } else {
+            assert_true(error_m == 0.0);
+        }
+        assert_int_equal(strstr(out, "an edge has no second return") != NULL, single);
+        free(out);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -146,6 +186,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_usual, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_plan_row, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_plan_single, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
