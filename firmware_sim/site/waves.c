@@ -116,7 +116,9 @@ static int make_waveform(const struct site *site, const struct sh_report *report
     if (rc != SH_OK) return rc;
     fill_spec(cfg, &table, &spec);
     rc = waveform_create(&spec, out, &why);
-    if (rc != SH_OK) return sh_fail(err, rc, "%s: waveform: %.300s", cfg->file, why.text);
+    if (rc != SH_OK) /* keys by themselves are within their limits: the pulse does not fit to the sampling */
+        return sh_fail(err, rc, "%s: waveform.%s: %.300s", cfg->file,
+                       cfg->waveform.pulse == WAVEFORM_TABLE ? "pulse_file" : "sample_ns", why.text);
     warn_digits(cfg, &spec, report);
     return SH_OK;
 }

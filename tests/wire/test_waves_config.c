@@ -41,9 +41,11 @@ static void test_refused(void **state)
     refuse(wire, (const char *const[]){send, table, few, NULL}, "few.csv: 2 lines; allowed are 3 to 1024");
     refuse(wire, (const char *const[]){send, table, uneven, NULL}, "uneven.csv:4: t_ns is 2.5");
     refuse(wire, (const char *const[]){send, table, dark, NULL}, "dark.csv:3: a power of -2");
-    refuse(wire, (const char *const[]){send, "waveform.after_ns=3000", NULL}, "waveform: 5 ns kept before an echo");
-    refuse(wire, (const char *const[]){send, "waveform.near_m=1", "waveform.far_m=2000", NULL},
-           "a window from 1 to 2000 m");
+    refuse(wire, (const char *const[]){send, "waveform.sample_ns=3", NULL},
+           "waveform.sample_ns: samples 3 ns apart are too coarse");
+    refuse(wire,
+           (const char *const[]){send, "waveform.sample_ns=0.7", "waveform.pulse=asymmetric", "waveform.skew=3", NULL},
+           "waveform.sample_ns: samples 0.7 ns apart are too coarse");
     refuse(wire,
            (const char *const[]){send, "head.prr_hz=1200000", "waveform.sample_ns=0.05", "waveform.after_ns=90", NULL},
            "waveform.after_ns: windows of");
@@ -93,7 +95,9 @@ static void test_capacity(void **state)
 }
 
 /* A usual return is one of 20 dB, so keep_db says how long its window is. A Gaussian of 4 ns falls by x dB in 4 ns sqrt(x /
- * 12.04): with -40 dB it is above for 17.9 ns, with -6 for 11.8, with 17 for 4. Before it lie 5 ns, behind it 10. */
+ * 12.04): with -40 dB it is above for 17.9 ns, with -6 for 11.8, with 17 for 4. Before it lie 5 ns, behind it 10. The
+ * asymmetric pulse works with all other keys left out. With its skew s of 1.5 it is above from -a to b, a = 4 ns (1 - s^-q)
+ * / (s - 1 / s), b = 4 ns (s^q - 1) / (s - 1 / s), q = sqrt(26 / 3.01): for 14.3 ns. */
 static void test_usual(void **state)
 {
     struct wire *wire = *state;
@@ -101,11 +105,12 @@ static void test_usual(void **state)
         const char *set, *says;
     } cases[] = {{"waveform.keep_db=-40", "waveforms 33 samples"},
                  {"waveform.keep_db=-6", "waveforms 27 samples"},
-                 {"waveform.keep_db=17", "waveforms 19 samples"}};
+                 {"waveform.keep_db=17", "waveforms 19 samples"},
+                 {"waveform.pulse=asymmetric", "waveforms 30 samples"}};
     char config[352];
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         const char *const args[] = {"check", config, "--set", "waveform.send=on", "--set", cases[i].set, NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
         char *out = wire_read(wire_path(wire, "out"), NULL);
