@@ -205,8 +205,9 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* So many windows of a pulse have room, on average over a block. */
-enum { MOST_WINDOWS = 4 };
+/* So many windows of a pulse have room, on average over a block; and so many samples in a block, so that its bytes are
+ * counted in 32 bits: 9000 of a pulse at 10 MHz and 100 ticks a second. */
+enum { MOST_WINDOWS = 4, MOST_SAMPLES = 1 << 30 };
 
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)
 {
@@ -215,7 +216,9 @@ struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)
     const int gate = cfg->waveform.near_m < cfg->waveform.far_m;
     const struct site_wave_room one = site->waves->usual;
     const uint32_t points = site_most_points_per_pulse(site);
-    const uint32_t each = gate ? 1 : points < MOST_WINDOWS ? points : MOST_WINDOWS;
+    uint32_t each = gate ? 1 : points < MOST_WINDOWS ? points : MOST_WINDOWS;
+    while (each > 1 && (uint64_t)n_pulses * each * one.samples > MOST_SAMPLES)
+        each--;
     return (struct site_wave_room){n_pulses * each * one.windows + WAVEFORM_MAX_WINDOWS,
                                    n_pulses * each * one.samples + 2 * WAVEFORM_MAX_SAMPLES};
 }
