@@ -116,7 +116,7 @@ static int make_waveform(const struct site *site, const struct sh_report *report
     if (rc != SH_OK) return rc;
     fill_spec(cfg, &table, &spec);
     rc = waveform_create(&spec, out, &why);
-    if (rc != SH_OK) /* keys by themselves are within their limits: the pulse does not fit to the sampling */
+    if (rc != SH_OK) /* Keys are within their limits: the pulse does not fit the sampling. */
         return sh_fail(err, rc, "%s: waveform.%s: %.300s", cfg->file,
                        cfg->waveform.pulse == WAVEFORM_TABLE ? "pulse_file" : "sample_ns", why.text);
     warn_digits(cfg, &spec, report);
@@ -137,7 +137,7 @@ static struct site_wave_room sample_return(const struct waveform *waveform, doub
     uint16_t sample[2 * WAVEFORM_MAX_SAMPLES];
     struct site_wave_room most = {0, 0};
     for (int i = 0; i < PLACES; i++) {
-        /* so far away that nothing of the window lies before the emission */
+        /* Nothing of the window lies before the emission. */
         const struct waveform_return one = {.range_m = (2 * WAVEFORM_MAX_SAMPLES + (double)i / PLACES) * sample_m,
                                             .amplitude = amplitude};
         struct waveform_record record = {.sample = sample, .capacity = 2 * WAVEFORM_MAX_SAMPLES};

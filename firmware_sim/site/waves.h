@@ -32,7 +32,7 @@ void site_free_waves(struct site *site);
 /* Windows and samples for which a block of so many pulses has room. What finds none is counted (core/line.h). 0 where
  * no waveforms are sent. */
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
-/* Those of as many usual pulses, each with a return of 20 dB on a surface that is hit head on. */
+/* What so many usual pulses make, each with a return of 20 dB on a surface that is hit head on. */
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
 /* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double site_wave_bytes_s(const struct site *site);

@@ -65,7 +65,7 @@ static void test_same_file(void **state)
     assert_int_equal(unlink(part), 0);
     wire_write_text(wire, "a-1.las.part", "left behind");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--quiet", "--split", NULL}, "a-1.las.part");
-    /* Nor is its second file, which may be there alone. */
+    /* Its second file is kept, too, also where it is there alone. */
     static const struct {
         const char *file, *left;
     } second[] = {{"b.las", "b.wdp.part"}, {"b.ptx", "b.ptx.grid"}};
