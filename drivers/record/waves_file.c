@@ -17,7 +17,7 @@ enum { WAVES_AT_ONCE = 64, FRONT_MOST = 512, COUNT_MOST = 6, LINE_MOST = FRONT_M
 
 struct waves_file {
     struct recorder base;
-    int is_titled;
+    int is_titled, is_sent; /* is_sent: some head has waveforms */
     uint64_t n_lost, n_samples_lost;
 };
 
@@ -90,7 +90,9 @@ static int waves_file_frame(void *rec, struct scanhead *sh, const struct scanhea
 /* Scans of other heads may follow. */
 static int waves_file_scan(void *rec, struct sh_err *err)
 {
-    return put_title(rec, err);
+    struct waves_file *file = rec;
+    file->is_sent |= scanhead_has_waves(file->base.track.sh) == 1;
+    return put_title(file, err);
 }
 
 static int waves_file_finish(void *rec, struct sh_err *err)
@@ -98,6 +100,9 @@ static int waves_file_finish(void *rec, struct sh_err *err)
     struct waves_file *file = rec;
     const int rc = put_title(file, err);
     if (rc != SH_OK) return rc;
+    if (!file->is_sent)
+        sh_warn(file->base.options.report, "%s: there are no waveforms in it: the head sends none (waveform.send)",
+                file->base.file.path);
     recorder_report(rec, file->n_lost, "waveforms left out whose points were lost");
     recorder_report(rec, file->n_samples_lost, "samples of waveforms that found no room in the head");
     return SH_OK;

@@ -13,6 +13,7 @@
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/loop/pose_feed.h"
+#include "firmware_sim/site/waves.h"
 
 /* Opens and closes each link, and the socket of a live platform: a taken port or a wrong path shows now. */
 static int check_links(const struct config *cfg, struct sh_err *err)
@@ -83,11 +84,11 @@ static void print_output(const struct config *cfg, const struct site *site, FILE
                                                   : ", heights above the ellipsoid");
 }
 
-static void print_waves(const struct config *cfg, FILE *out)
+static void print_waves(const struct site *site, FILE *out)
 {
-    if (cfg->head.settings.waves == 0) return;
-    fprintf(out, "waveforms %u samples for a usual pulse, %.4g MB/s\n", config_wave_samples(cfg),
-            1e-6 * config_wave_bytes_s(cfg));
+    if (site->cfg->head.settings.waves == 0) return;
+    fprintf(out, "waveforms %u samples for a usual pulse, %.4g MB/s\n", site_usual_waves(site, 1).samples,
+            1e-6 * site_wave_bytes_s(site));
 }
 
 static void print_links(const struct config *cfg, FILE *out)
@@ -143,7 +144,7 @@ static int print_summary(const struct config *cfg, const struct sites *sites, FI
         rc = check_print_station(sites_of(sites, i), i, out, err);
     print_platform(site, out);
     print_output(cfg, site, out);
-    print_waves(cfg, out);
+    print_waves(site, out);
     print_links(cfg, out);
     return rc;
 }

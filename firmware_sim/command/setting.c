@@ -306,7 +306,8 @@ static void say_because(const struct command_call *call, int no_width, char *tex
 
 static const char *what_word_needs(const struct command_call *call)
 {
-    if (is_setting(call, offsetof(struct head_settings, noise))) return "signal.model: on";
+    if (is_setting(call, offsetof(struct head_settings, noise)))
+        return call->dev->limits.noise_most == 0 ? "waveform.echoes: model" : "signal.model: on";
     if (is_setting(call, offsetof(struct head_settings, phase_lock))) return "a head profile with emitter: beams";
     if (is_setting(call, offsetof(struct head_settings, waves))) return "waveform.send: on in the configuration";
     return "mirror_sigma_deg or pan_sigma_deg of the head profile";

@@ -257,11 +257,6 @@ static inline int config_has_waves(const struct config *cfg)
 {
     return cfg->head.settings.waves != 0 || cfg->waveform.echoes != WAVE_ECHOES_MODEL;
 }
-/* Returns the samples of a usual pulse: one window around a return of 20 dB on a surface hit head on, or the window
- * of near_m and far_m. */
-uint32_t config_wave_samples(const struct config *cfg);
-/* Returns the bytes of waveforms per second that usual pulses make with the settings of power-up. */
-double config_wave_bytes_s(const struct config *cfg);
 /* Pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
 double config_cast_hz(const struct config *cfg);
 

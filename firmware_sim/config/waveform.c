@@ -1,40 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Full waveforms have checks that concern more than one key, and a share of the stream. Limits of the digitiser's
- * and the pulse's figures by themselves are in core/waveform. */
+/* Full waveforms: checks that concern more than one key. Limits of the digitiser's and the pulse's figures by themselves
+ * are in core/waveform, that of the stream's rate is in ../site. */
 #include <math.h>
 
 #include "core/light.h"
-#include "drivers/protocol/native_waves.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
-
-/* Queues hold 0.3 s and more of the stream, which must fit into memory. */
-static const double MOST_BYTES_S = 4e8;
-
-static int has_gate(const struct config_waveform *w)
-{
-    return w->near_m < w->far_m;
-}
-
-/* A Gaussian pulse of 26 dB is above keep_db for three of its widths. The receiver makes it longer: 312 ns for a
- * Gaussian response of 1 MHz. */
-uint32_t config_wave_samples(const struct config *cfg)
-{
-    const struct config_waveform *w = &cfg->waveform;
-    const double receiver_ns = w->bandwidth_mhz > 0.0 ? 312.0 / w->bandwidth_mhz : 0.0;
-    const double pulse_ns = 3.0 * hypot(cfg->profile.pulse_width_ns, receiver_ns);
-    const double span_ns =
-        has_gate(w) ? 2e9 / LIGHT_SPEED_M_S * (w->far_m - w->near_m) : w->before_ns + pulse_ns + w->after_ns;
-    return (uint32_t)fmin(floor(span_ns / w->sample_ns) + 1.0, (double)WAVEFORM_MAX_SAMPLES);
-}
-
-double config_wave_bytes_s(const struct config *cfg)
-{
-    if (cfg->head.settings.waves == 0) return 0.0;
-    return config_cast_hz(cfg) * (double)native_wave_len(config_wave_samples(cfg));
-}
 
 /* Keys that only one shape of the pulse has. */
 static void check_pulse(struct cfg_reader *rd, const struct config *cfg)
@@ -55,32 +28,58 @@ static void check_pulse(struct cfg_reader *rd, const struct config *cfg)
 static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
 {
     const double ps = 1e3 * w->sample_ns, steps = 16.0 * w->baseline_counts;
+    const double most_counts = 0.5 * (ldexp(1.0, (int)w->bits) - 1.0);
     if (fabs(ps - rint(ps)) > 1e-6)
         cfg_fail_key(rd, "waveform.sample_ns", 0,
                      "%.10g is no whole number of ps; allowed 0.05 to 100 in steps of 0.001", w->sample_ns);
-    if (steps != floor(steps))
-        cfg_fail_key(rd, "waveform.baseline_counts", 0, "%.10g is no multiple of 1/16; allowed 0 to 4095 in such steps",
-                     w->baseline_counts);
+    if (CFG_SOUND(rd, 0, "waveform.bits", "waveform.baseline_counts") &&
+        (steps != floor(steps) || w->baseline_counts > most_counts))
+        cfg_fail_key(rd, "waveform.baseline_counts", 0,
+                     "%.10g with %u bits; allowed 0 to %.10g, half of the largest count, in steps of 1/16",
+                     w->baseline_counts, w->bits, most_counts);
+    if (w->bandwidth_mhz > 0.0 && w->bandwidth_mhz < 1.0)
+        cfg_fail_key(rd, "waveform.bandwidth_mhz", 0, "%.10g MHz; allowed 1 to 100000, or 0 for no limit",
+                     w->bandwidth_mhz);
     if (w->dead_ns > 0.0 && w->saturation_db == 0.0 && CFG_SOUND(rd, 0, "waveform.saturation_db"))
         cfg_fail_key(rd, "waveform.dead_ns", 0,
                      "a dead time, but saturation_db is 0: nothing saturates; allowed with saturation_db above 0");
 }
 
+/* Windows around returns; limits as in core/waveform. */
+static void check_margins(struct cfg_reader *rd, const struct config_waveform *w)
+{
+    const double most_ns = 0.5 * WAVEFORM_MAX_SAMPLES * w->sample_ns;
+    if (w->before_ns + w->after_ns <= most_ns) return;
+    cfg_fail_key(rd, cfg_is_given(rd, "waveform.after_ns", 0) ? "waveform.after_ns" : "waveform.before_ns", 0,
+                 "%.10g ns before an echo and %.10g ns behind it; allowed together up to %.10g, %d samples",
+                 w->before_ns, w->after_ns, most_ns, WAVEFORM_MAX_SAMPLES / 2);
+}
+
+/* One window of each pulse. */
+static void check_gate(struct cfg_reader *rd, const struct config_waveform *w)
+{
+    const double sample_m = 0.5e-9 * LIGHT_SPEED_M_S * w->sample_ns, long_m = w->far_m - w->near_m;
+    const double most_m = (WAVEFORM_MAX_SAMPLES - 1) * sample_m;
+    if (long_m >= sample_m && long_m <= most_m) return;
+    cfg_fail_key(rd, "waveform.far_m", 0,
+                 "a window from %.10g to %.10g m; allowed are %.4g to %.6g m of length, 1 to %d samples", w->near_m,
+                 w->far_m, sample_m, most_m, WAVEFORM_MAX_SAMPLES - 1);
+}
+
 static void check_windows(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;
-    const double rate_bytes = config_wave_bytes_s(cfg);
-    const char *key = has_gate(w) ? "waveform.far_m" : "waveform.after_ns";
     if (!CFG_SOUND(rd, 0, "waveform.near_m", "waveform.far_m", "waveform.before_ns", "waveform.after_ns",
                    "waveform.sample_ns"))
         return;
-    if (!has_gate(w) && (w->near_m != 0.0 || w->far_m != 0.0))
+    if (w->near_m < w->far_m)
+        check_gate(rd, w);
+    else if (w->near_m == 0.0 && w->far_m == 0.0)
+        check_margins(rd, w);
+    else
         cfg_fail_key(rd, cfg_is_given(rd, "waveform.far_m", 0) ? "waveform.far_m" : "waveform.near_m", 0,
                      "a window from %.10g to %.10g m; allowed a far_m above %.10g, or 0 for both", w->near_m, w->far_m,
                      w->near_m);
-    else if (rate_bytes > MOST_BYTES_S && cfg_has_profile(rd) && CFG_SOUND(rd, 0, "head.prr_hz"))
-        cfg_fail_key(rd, key, 0, "windows of %u samples for %.10g pulses/s are %.4g MB/s; allowed up to %.4g MB/s",
-                     config_wave_samples(cfg), config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
 }
 
 static void check_waveform_links(struct cfg_reader *rd, const struct config *cfg)
@@ -105,10 +104,10 @@ void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg)
     if (!cfg->signal.on && CFG_SOUND(rd, 0, "signal.model"))
         cfg_fail_key(rd, key, 0, "%s, but no signal is modelled; required is signal.model: on",
                      finds && cfg->head.settings.waves == 0 ? cfg_word(rd, key, (int)w->echoes) : "on");
-    if (w->pulse != WAVEFORM_TABLE && cfg_has_profile(rd) && !(cfg->profile.pulse_width_ns > 0.0))
+    if (w->pulse != WAVEFORM_TABLE && cfg_has_profile(rd) && !(cfg->profile.pulse_width_ns >= 0.01))
         cfg_fail_key(rd, key, 0,
-                     "pulse_width_ns of head profile %s is 0; required is a pulse width, or waveform.pulse: table",
-                     cfg->profile.name);
+                     "pulse_width_ns of head profile %s is %.10g; required is 0.01 or more, or waveform.pulse: table",
+                     cfg->profile.name, cfg->profile.pulse_width_ns);
     if (finds && cfg->noise.range != RANGE_NOISE_OFF && CFG_SOUND(rd, 0, "waveform.echoes"))
         cfg_fail_key(rd, "noise.range", 0,
                      "%s, but echoes are found in samples, which have noise already (waveform.echoes); allowed off",

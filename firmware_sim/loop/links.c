@@ -12,11 +12,11 @@
 /* Returns the bytes per second of the points at the present rates, with one echo per pulse, and one window of its
  * waveform. It is a lower bound. A command can raise the rates later. Further echoes and the frames' headers come on
  * top. A link announces what it loses then. */
-static double stream_rate(const struct config *cfg)
+static double stream_rate(const struct links *links, const struct config *cfg)
 {
     double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0) +
                        (cfg->output.colour != COLOUR_NONE ? NATIVE_COLOUR_LEN : 0);
-    return config_cast_hz(cfg) * point_len + config_wave_bytes_s(cfg);
+    return config_cast_hz(cfg) * point_len + links->waves_bytes_s;
 }
 
 /* A link that can't carry the stream is refused before it loses any of it. Other protocols are not checked: their rates
@@ -27,7 +27,7 @@ static int check_capacity(const struct links *links, const struct config *cfg, c
     struct link_place place;
     pump_get_place(pump, &place);
     if (strcmp(place.protocol, "native") != 0) return SH_OK;
-    double capacity = place.bytes_s, rate = stream_rate(cfg);
+    double capacity = place.bytes_s, rate = stream_rate(links, cfg);
     if (capacity <= 0.0 || capacity >= rate) return SH_OK;
     if (links->source->ops->next != NULL) /* a recording */
         return sh_fail(err, SH_EINPUT,

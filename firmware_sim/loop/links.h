@@ -47,6 +47,7 @@ struct links {
     /* set by the caller */
     struct stream *stream;
     const struct loop_source *source;
+    double waves_bytes_s; /* of waveforms at power-up; 0: none, or not known */
     struct mover mover;
     const struct sh_report *report;        /* NULL: none */
     const struct web_source *web;          /* of links of type web; NULL: none */

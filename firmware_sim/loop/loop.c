@@ -10,6 +10,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 #include "firmware_sim/loop/pump.h"
+#include "firmware_sim/site/waves.h"
 
 static const double SPARE_MS = 250.0; /* a reader may be interrupted so long within a copy before a claim waits */
 
@@ -98,6 +99,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
     if (loop == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     loop->site = site;
     loop->device = device;
+    loop->links.waves_bytes_s = site_wave_bytes_s(site);
     return open_all(loop, out, err);
 }
 

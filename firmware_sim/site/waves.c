@@ -7,7 +7,9 @@
 #include <stdlib.h>
 
 #include "core/csv.h"
+#include "core/light.h"
 #include "core/plan/cost.h"
+#include "drivers/protocol/native_waves.h"
 #include "firmware_sim/config/config.h"
 
 /* ---- the outgoing pulse as a table */
@@ -114,9 +116,63 @@ static int make_waveform(const struct site *site, const struct sh_report *report
     if (rc != SH_OK) return rc;
     fill_spec(cfg, &table, &spec);
     rc = waveform_create(&spec, out, &why);
-    if (rc != SH_OK) return sh_fail(err, rc, "%s: waveform: %.300s", cfg->file, why.text);
+    if (rc != SH_OK) /* Keys are within their limits: the pulse does not fit the sampling. */
+        return sh_fail(err, rc, "%s: waveform.%s: %.300s", cfg->file,
+                       cfg->waveform.pulse == WAVEFORM_TABLE ? "pulse_file" : "sample_ns", why.text);
     warn_digits(cfg, &spec, report);
     return SH_OK;
+}
+
+/* ---- what a usual pulse makes */
+
+static const double USUAL_SIGNAL = 100.0;
+/* What queues of the stream hold of it, 0.3 s and more, must fit into memory. */
+static const double MOST_BYTES_S = 4e8;
+
+/* Windows and samples of a head-on return. The most of eight places between two samples. */
+static struct site_wave_room sample_return(const struct waveform *waveform, double amplitude)
+{
+    enum { PLACES = 8 };
+    const double sample_m = 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(waveform)->sample_s;
+    uint16_t sample[2 * WAVEFORM_MAX_SAMPLES];
+    struct site_wave_room most = {0, 0};
+    for (int i = 0; i < PLACES; i++) {
+        /* Nothing of the window lies before the emission. */
+        const struct waveform_return one = {.range_m = (2 * WAVEFORM_MAX_SAMPLES + (double)i / PLACES) * sample_m,
+                                            .amplitude = amplitude};
+        struct waveform_record record = {.sample = sample, .capacity = 2 * WAVEFORM_MAX_SAMPLES};
+        waveform_sample(waveform, 0, 0, &one, 1, &record);
+        if (record.n_windows > most.windows) most.windows = record.n_windows;
+        if (record.n_samples > most.samples) most.samples = record.n_samples;
+    }
+    return most;
+}
+
+/* Where the usual signal does not reach keep_db, a stronger one counts that does. */
+static struct site_wave_room find_usual(const struct waveform *waveform)
+{
+    struct site_wave_room usual = {0, 0};
+    for (double amplitude = USUAL_SIGNAL; usual.windows == 0; amplitude *= 2.0)
+        usual = sample_return(waveform, amplitude);
+    return usual;
+}
+
+double site_wave_bytes_s(const struct site *site)
+{
+    const struct site_wave_room one = site_usual_waves(site, 1);
+    if (one.windows == 0) return 0.0;
+    return config_cast_hz(site->cfg) * one.windows * (double)native_wave_len((one.samples - 1) / one.windows + 1);
+}
+
+static int check_rate(const struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const double rate_bytes = site_wave_bytes_s(site);
+    if (rate_bytes <= MOST_BYTES_S) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: %s: windows of %u samples for %.10g pulses/s are %.4g MB/s; allowed up to %.4g MB/s", cfg->file,
+                   cfg->waveform.near_m < cfg->waveform.far_m ? "waveform.far_m" : "waveform.after_ns",
+                   site->waves->usual.samples, config_cast_hz(cfg), 1e-6 * rate_bytes, 1e-6 * MOST_BYTES_S);
 }
 
 static const enum waveform_detector detectors[] = {[WAVE_ECHOES_THRESHOLD] = WAVEFORM_THRESHOLD,
@@ -136,7 +192,8 @@ int site_set_up_waves(struct site *site, const struct sh_report *report, struct 
     w->cast.detector = detectors[w->cast.finds ? cfg->waveform.echoes : WAVE_ECHOES_THRESHOLD];
     int rc = make_waveform(site, report, &w->waveform, err);
     w->cast.waveform = w->waveform;
-    return rc;
+    if (rc == SH_OK) w->usual = find_usual(w->waveform);
+    return rc == SH_OK ? check_rate(site, err) : rc;
 }
 
 void site_free_waves(struct site *site)
@@ -148,24 +205,29 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* A block has room for this many windows a pulse, on average. */
-enum { MOST_WINDOWS = 4 };
+/* So many windows of a pulse have room, on average over a block; and so many samples in a block, so that its bytes are
+ * counted in 32 bits: 9000 of a pulse at 10 MHz and 100 ticks a second. */
+enum { MOST_WINDOWS = 4, MOST_SAMPLES = 1 << 30 };
 
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)
 {
     const struct config *cfg = site->cfg;
     if (cfg->head.settings.waves == 0) return (struct site_wave_room){0, 0};
     const int gate = cfg->waveform.near_m < cfg->waveform.far_m;
-    const uint32_t points = site_most_points_per_pulse(site), n = config_wave_samples(cfg);
-    const uint32_t each = gate ? 1 : points < MOST_WINDOWS ? points : MOST_WINDOWS;
-    return (struct site_wave_room){n_pulses * each + WAVEFORM_MAX_WINDOWS,
-                                   n_pulses * each * n + 2 * WAVEFORM_MAX_SAMPLES};
+    const struct site_wave_room one = site->waves->usual;
+    const uint32_t points = site_most_points_per_pulse(site);
+    uint32_t each = gate ? 1 : points < MOST_WINDOWS ? points : MOST_WINDOWS;
+    while (each > 1 && (uint64_t)n_pulses * each * one.samples > MOST_SAMPLES)
+        each--;
+    return (struct site_wave_room){n_pulses * each * one.windows + WAVEFORM_MAX_WINDOWS,
+                                   n_pulses * each * one.samples + 2 * WAVEFORM_MAX_SAMPLES};
 }
 
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses)
 {
     if (site->cfg->head.settings.waves == 0) return (struct site_wave_room){0, 0};
-    return (struct site_wave_room){n_pulses, n_pulses * config_wave_samples(site->cfg)};
+    const struct site_wave_room one = site->waves->usual;
+    return (struct site_wave_room){n_pulses * one.windows, n_pulses * one.samples};
 }
 
 static void describe_digitiser(const struct waveform_spec *spec, struct line_waves *waves)
@@ -200,7 +262,7 @@ static double find_ns(const struct site *site)
 double site_wave_ns(const struct site *site)
 {
     if (site->waves == NULL) return 0.0;
-    return PLAN_COST_WAVE + config_wave_samples(site->cfg) * PLAN_COST_WAVE_SAMPLE + find_ns(site);
+    return PLAN_COST_WAVE + site->waves->usual.samples * PLAN_COST_WAVE_SAMPLE + find_ns(site);
 }
 
 void site_wave_row(const struct site *site, struct plan_row *row)
@@ -211,12 +273,16 @@ void site_wave_row(const struct site *site, struct plan_row *row)
         plan_say(row, "waveform", "none", 0.0, 0.0, "waveform.send is off, and waveform.echoes is model");
         return;
     }
-    const int rings = site->plan.methods.beam == BEAM_RINGS;
-    size_t used = (size_t)snprintf(why, sizeof why, "%u samples for a usual pulse", config_wave_samples(cfg));
+    const enum beam_mode beam = site->plan.methods.beam;
+    size_t used = (size_t)snprintf(why, sizeof why, "%u samples for a usual pulse", site->waves->usual.samples);
     if (cfg->head.settings.waves != 0)
-        used += (size_t)snprintf(why + used, sizeof why - used, ", %.3g MB/s", 1e-6 * config_wave_bytes_s(cfg));
+        used += (size_t)snprintf(why + used, sizeof why - used, ", %.3g MB/s", 1e-6 * site_wave_bytes_s(site));
     if (site->waves->cast.finds)
-        snprintf(why + used, sizeof why - used, "; echoes are found in them, with the noise of the samples");
-    const double error_m = site->waves->cast.finds ? (double)NAN : 0.0; /* of ranges: those of the detector */
-    plan_say(row, "waveform", rings ? "sub-rays" : "closed form", error_m, site_wave_ns(site), why);
+        used += (size_t)snprintf(why + used, sizeof why - used,
+                                 "; echoes are found in them, with the noise of the samples");
+    if (beam == BEAM_SINGLE) snprintf(why + used, sizeof why - used, "; single rays: an edge has no second return");
+    const double error_m = site->waves->cast.finds ? (double)NAN /* of ranges: those of the detector */
+                           : beam == BEAM_SINGLE   ? site->plan.beam.error_m
+                                                   : 0.0;
+    plan_say(row, "waveform", beam == BEAM_RINGS ? "sub-rays" : "closed form", error_m, site_wave_ns(site), why);
 }

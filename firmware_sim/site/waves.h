@@ -14,24 +14,29 @@ struct sh_err;
 struct sh_report;
 struct site;
 
+struct site_wave_room {
+    uint32_t windows, samples;
+};
+
 struct site_waves {
     struct waveform *waveform;
     struct beam beam; /* of single rays, too */
     struct cast_waves cast;
+    struct site_wave_room usual; /* of a usual pulse */
 };
 
-/* Makes site->waves; NULL where the configuration has no waveforms. Warns where digits hide what the head detects. */
+/* Makes site->waves; NULL where the configuration has no waveforms. Warns where digits hide what the head detects.
+ * SH_EINPUT also where the stream would have more than memory can hold of it. */
 int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_waves(struct site *site);
 
 /* A block of so many pulses has room for these windows and samples. Those without room are counted (core/line.h). 0
  * where no waveforms are sent. */
-struct site_wave_room {
-    uint32_t windows, samples;
-};
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
-/* Returns the windows and samples of as many usual pulses. */
+/* What so many usual pulses make, each with a return of 20 dB on a surface that is hit head on. */
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
+/* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
+double site_wave_bytes_s(const struct site *site);
 /* Prepares a caster and a block of so many pulses for the site's waveforms, and for the deviations of echoes that are
  * found in them. Does nothing where there are none. */
 int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *caster, struct line_block *block,

@@ -68,6 +68,9 @@ static void noise_has_kinds_and_sizes(void **ctx)
     expect(&dev, "HELP? HEAD:NOIS:ANGL", "word,\"\",,,OFF,,\"off boot idle spin-down fault\",\"OFF\"");
     refuse(&dev, "HEAD:NOIS:ANGL ON", CMD_E_SETTINGS, "needs mirror_sigma_deg or pan_sigma_deg of the head profile");
     refuse(&dev, "HEAD:NOIS LOUD", CMD_E_DATA_TYPE, "HEAD:NOISe takes OFF, ON, SIGNal, DEF, not 'LOUD'");
+    dev.limits.noise_most = 0; /* of echoes that are found in samples */
+    refuse(&dev, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs waveform.echoes: model");
+    refuse(&dev, "HEAD:NOIS ON", CMD_E_SETTINGS, "HEAD:NOISe ON needs waveform.echoes: model");
     dev.limits.noise_most = 2;
     dev.limits.sigma_min_nm = 3 * MICRO;
     expect(&dev, "HEAD:NOIS SIGNAL", "OK");

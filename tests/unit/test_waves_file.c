@@ -52,6 +52,24 @@ static void test_rows(void **state)
     }
 }
 
+/* A head that has no waveforms: the title alone, and a note. */
+static void test_none(void **state)
+{
+    (void)state;
+    static const struct rig_point p = {5000, 0, 0, 0, 1, 1, 1};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+    for (uint32_t content = 0; content <= 4; content += 4) {
+        rig_begin();
+        rig_wave_descriptor(0, 1, content);
+        rig_anchor(&a);
+        rig_points(0, 0, 0, &p, 1);
+        struct bytes b = record("a.waves.csv");
+        assert_string_equal((const char *)b.data, TITLE);
+        assert_int_equal(strstr(rig_notes, "the head sends none (waveform.send)") != NULL, content == 0);
+        free(b.data);
+    }
+}
+
 /* Without waveforms there is the title; windows without points are counted. */
 static void test_without(void **state)
 {
@@ -100,6 +118,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_none),
         cmocka_unit_test(test_without),
         cmocka_unit_test(test_repair),
     };

@@ -65,6 +65,24 @@ static void test_same_file(void **state)
     assert_int_equal(unlink(part), 0);
     wire_write_text(wire, "a-1.las.part", "left behind");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--quiet", "--split", NULL}, "a-1.las.part");
+    /* Its second file is kept, too, also where it is there alone. */
+    static const struct {
+        const char *file, *left;
+    } second[] = {{"b.las", "b.wdp.part"}, {"b.ptx", "b.ptx.grid"}};
+    for (int i = 0; i < 2; i++) {
+        char says[80], scan_left[40];
+        snprintf(part, sizeof part, "%s", wire_write_text(wire, second[i].left, "left behind"));
+        snprintf(b, sizeof b, "%s", wire_path(wire, second[i].file));
+        snprintf(says, sizeof says, "%s: an earlier recording left 11 bytes there", second[i].left);
+        expect_refusal(wire, (const char *const[]){"record", config, "-o", b, "--quiet", NULL}, says);
+        char *kept = wire_read(part, NULL);
+        assert_string_equal(kept, "left behind");
+        free(kept);
+        snprintf(scan_left, sizeof scan_left, "b-1%s", second[i].left + 1);
+        wire_write_text(wire, scan_left, "left behind");
+        expect_refusal(wire, (const char *const[]){"record", config, "-o", b, "--quiet", "--split", NULL}, scan_left);
+    }
+    snprintf(part, sizeof part, "%s", wire_path(wire, "a.las.part"));
     wire_write_text(wire, "a.las.part", ""); /* nothing is lost */
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
     assert_int_equal(access(part, F_OK), -1);

@@ -206,8 +206,30 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
         part, len, path);
 }
 
-/* What is left of the files of single scans: a later one would stop the recording at its scan. */
-static int check_parts_of_scans(const struct record_file *file, struct sh_err *err)
+/* A second file of a recording: its name ends so in place of FILE's ending. It may be there without FILE.part, where
+ * somebody moved that alone. */
+static const char *second_of(const struct record_files *files, const struct record_file *file)
+{
+    const char *ending = file->ops->ending;
+    if (strcmp(ending, ".las") == 0 && files->recorder.las_minor != 2) return ".wdp.part";
+    return strcmp(ending, ".ptx") == 0 ? ".ptx.grid" : NULL;
+}
+
+static int check_second(const char *second, const char *path, struct sh_err *err)
+{
+    const long long len = newfile_left_len(second);
+    if (len == 0) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: an earlier recording left %lld bytes there, which the repair of its %s.part needs; move it "
+                   "beside that file, or remove it",
+                   second, len, path);
+}
+
+/* What is left of the files of single scans: a later one would stop the recording at its scan. `end` of a name is in
+ * place of that of FILE. */
+static int check_parts_of_scans(const struct record_file *file, const char *end,
+                                int (*check)(const char *left, const char *path, struct sh_err *err),
+                                struct sh_err *err)
 {
     const int folder = (int)(basename(file->path) - file->path);
     char *name = folder > 0 ? strndup(file->path, (size_t)folder) : strdup(".");
@@ -215,12 +237,12 @@ static int check_parts_of_scans(const struct record_file *file, struct sh_err *e
     int rc = SH_OK;
     free(name);
     for (const struct dirent *entry; dir != NULL && rc == SH_OK && (entry = readdir(dir)) != NULL;) {
-        const int n = (int)strlen(entry->d_name) - 5; /* without ".part" */
-        char path[PATH_MAX], part[PATH_MAX + 8];
-        if (n <= 0 || strcmp(entry->d_name + n, ".part") != 0) continue;
-        snprintf(path, sizeof path, "%.*s%.*s", folder, file->path, n, entry->d_name);
-        snprintf(part, sizeof part, "%s.part", path);
-        if (is_name_of_scan(file, path)) rc = check_part(part, path, err);
+        const int n = (int)strlen(entry->d_name) - (int)strlen(end); /* without it */
+        char path[PATH_MAX], left[PATH_MAX];
+        if (n <= 0 || strcmp(entry->d_name + n, end) != 0) continue;
+        snprintf(path, sizeof path, "%.*s%.*s%s", folder, file->path, n, entry->d_name, file->ops->ending);
+        snprintf(left, sizeof left, "%.*s%s", folder, file->path, entry->d_name);
+        if (is_name_of_scan(file, path)) rc = check(left, path, err);
     }
     if (dir != NULL) closedir(dir); /* without it, the file can't be opened either */
     return rc;
@@ -228,11 +250,21 @@ static int check_parts_of_scans(const struct record_file *file, struct sh_err *e
 
 static int check_left(const struct record_files *files, const struct record_file *file, struct sh_err *err)
 {
-    char part[PATH_MAX + 8];
+    const char *second = second_of(files, file);
+    const int stem = (int)(strlen(file->path) - strlen(file->ops->ending));
+    char end[32], left[PATH_MAX + 32];
+    int rc;
     if (files->takes_over || file->ops->repair == NULL) return SH_OK;
-    if (files->split) return check_parts_of_scans(file, err);
-    snprintf(part, sizeof part, "%s.part", file->path);
-    return check_part(part, file->path, err);
+    snprintf(end, sizeof end, "%s.part", file->ops->ending);
+    if (files->split) {
+        rc = check_parts_of_scans(file, end, check_part, err);
+        return rc == SH_OK && second != NULL ? check_parts_of_scans(file, second, check_second, err) : rc;
+    }
+    snprintf(left, sizeof left, "%s.part", file->path);
+    rc = check_part(left, file->path, err);
+    if (rc != SH_OK || second == NULL) return rc;
+    snprintf(left, sizeof left, "%.*s%s", stem, file->path, second);
+    return check_second(left, file->path, err);
 }
 
 int record_files_open(struct record_files *files, struct sh_err *err)

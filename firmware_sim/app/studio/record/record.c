@@ -393,7 +393,7 @@ static const char HELP_NOTES[] =
     "\n"
     "FILE keeps the data that came. Where it can't be completed, as on a full disk, the written data stay as\n"
     "FILE.part, for --repair, with FILE.grid beside a .ptx, and waveforms in X.wdp.part beside X.las. A recorder\n"
-    "does not begin while such a FILE.part exists.\n"
+    "does not begin while one of these exists.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends a recording with complete files. A second signal within a second counts as the same\n"
     "one; a third, or a later one, ends it at once.\n";
