@@ -101,12 +101,32 @@ static void ghosts_need_labels(void **state)
     site_free(site);
 }
 
+/* A single ray without glass has one return, but any number of echoes may be found in its samples. */
+static void found_echoes_have_room(void **state)
+{
+    (void)state;
+    static const char *const finds[] = {"model", "threshold", "fraction", "gaussians"};
+    write_in("room.obj", FLOOR);
+    for (int i = 0; i < 4; i++) {
+        char text[128];
+        struct site *site;
+        snprintf(text, sizeof text, "signal: {model: on}\nwaveform: {send: on, echoes: %s}\n", finds[i]);
+        if (load(text, &site) != SH_OK) fail_msg("%s", err.text);
+        const uint32_t most = i == 0 ? 1 : site_profile(site)->max_echoes;
+        assert_true(site_profile(site)->max_echoes > 1);
+        assert_int_equal(site_points_per_pulse(site), most);
+        assert_int_equal(site_most_points_per_pulse(site), most);
+        site_free(site);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(extinction_replaces_that_of_the_days_air),
         cmocka_unit_test(each_encoder_has_a_phase_of_its_own),
         cmocka_unit_test(ghosts_need_labels),
+        cmocka_unit_test(found_echoes_have_room),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }
