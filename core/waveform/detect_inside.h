@@ -21,6 +21,7 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
+#define FINDER_SHAPE_LAG  8.0          /* and behind it */
 
 /* A term is what fits put together: a Gaussian, or where h is none, h stretched. Its middle is between its half
  * maxima, its sigma what a Gaussian of its width has. */
@@ -42,6 +43,7 @@ struct finder_spread {
 
 /* The pulse h, as detectors know it. Constant after finder_learn. */
 struct finder {
+    int seen;                                    /* the table of h has its peak; else nothing is found */
     double peak;                                 /* of h */
     double width;                                /* of h, full at half maximum */
     double signal;                               /* of one count */
