@@ -102,7 +102,8 @@
     {KEY(waveform.skew), CFG_REAL, NULL, "2", 1, 3,
      .help = "pulse: asymmetric: the time that the pulse takes to fall, over that to rise."},
     {KEY(waveform.bandwidth_mhz), CFG_REAL, "MHz", "0", 0, 100000,
-     .help = "Bandwidth of the receiver, at -3 dB; 0: no limit."},
+     .help = "Bandwidth of the receiver, at -3 dB; 0: no limit. It lowers the pulse's peak, and with it the level of "
+             "waveform.echoes, but not the noise: below 5 times the noise many echoes are of noise alone."},
     {KEY(waveform.sample_ns), CFG_REAL, "ns", "1", 0.05, 100,
      .help = "Time from sample to sample, in whole picoseconds."},
     {KEY(waveform.bits), CFG_COUNT, NULL, "12", 8, 14, .help = "Bits of a sample."},
