@@ -58,6 +58,7 @@ struct finder {
     double reach[2];              /* sigmas: before and after them a term is nothing */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
     double shape[FINDER_SHAPE];   /* h over its peak */
+    uint32_t top;                 /* entry of the first maximum above a half in it */
     double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
 };
 

@@ -105,6 +105,9 @@ static void learn_shape(const struct waveform *waveform, struct finder *finder)
         m[3] += y * x * x * x;
         if (y > LEARN_LEAST) finder->reach[1] = (x / finder->width - finder->middle) * FINDER_FWHM;
     }
+    const double *h = finder->shape;
+    while (finder->top + 2 < FINDER_SHAPE && (h[finder->top] < h[finder->top + 1] || h[finder->top] < 0.5))
+        finder->top++;
     finder->area = waveform_pulse_area_s(waveform) / waveform_spec_of(waveform)->sample_s;
     finder->variance = m[2] / m[0];
     finder->third = m[3] / m[0];
