@@ -193,8 +193,8 @@ int caster_add_waves(struct caster *caster, struct sh_err *err);
 /* Fills block from the run, with attributes where it has room for them. The echo of a single ray has the
  * width of the pulse. That of a footprint, or of returns merged from glass and mirrors, has the width of
  * core/footprint.h. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
- * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns
- * the number of echoes. Allocates nothing. */
+ * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes; where they are
+ * found in waveforms, max_echoes also with single rays). Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 

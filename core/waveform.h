@@ -114,8 +114,15 @@ struct waveform_echo {
     int saturated;    /* a sample of it was at the largest count, or limited */
 };
 
+/* SH_EINPUT, without the file's name: echoes are not found with this pulse, since a long and weak part of it keeps its
+ * centroid away from its peak. Samples of such a pulse are as good as others. */
+int waveform_check_detection(const struct waveform *waveform, struct sh_err *err);
+/* The largest value of h, of a pulse with which echoes are found. */
+double waveform_pulse_peak(const struct waveform *waveform);
+
 /* Finds at most `most` echoes in the order of range; level: amplitude, in thresholds, below which nothing is an echo (1: as
- * detect.h). Returns how many, and adds to *n_crowded those that found no room (the weakest are left out). Pure. */
+ * detect.h). Returns how many, and adds to *n_crowded those that found no room (the weakest are left out). None where
+ * waveform_check_detection fails. Pure. */
 uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded);

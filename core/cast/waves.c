@@ -323,17 +323,29 @@ static void put_echo(const struct wave_chunk *k, uint32_t at, const struct wavef
     if (k->texels) l->colour[at] = part != NULL ? part->colour : 0;
 }
 
+/* Takes away echoes beyond the head's ranges. Returns how many are left. */
+static uint32_t keep_ranges(const struct cast_setup *s, struct waveform_echo *echo, uint32_t n)
+{
+    uint32_t kept = 0;
+    for (uint32_t j = 0; j < n; j++)
+        if (is_in_range(s, echo[j].range_m)) echo[kept++] = echo[j];
+    return kept;
+}
+
 static void find_echoes(const struct wave_chunk *k, const struct wave_pulse *p)
 {
     struct echo_list *l = k->list;
     const uint32_t i = p->number;
     struct waveform_echo echo[LINE_MAX_ECHOES];
     uint32_t crowded = 0;
-    const uint32_t n = waveform_detect(k->how->waveform, k->how->detector, 1.0, &k->work->record, echo,
-                                       caster_max_echoes(k->s), &crowded);
+    /* Those beyond the head's max_echoes go later, so that one out of range does not take the place of another. */
+    const uint32_t found =
+        waveform_detect(k->how->waveform, k->how->detector, 1.0, &k->work->record, echo, LINE_MAX_ECHOES, &crowded);
+    const uint32_t n = keep_ranges(k->s, echo, found);
     const uint32_t rest = n > 1 ? echoes_secondary(l, i, n - 1) : 0, all = n + crowded;
     k->counters->crowded += crowded;
-    k->counters->faint += k->work->merged[i] > all ? k->work->merged[i] - all : 0;
+    const uint32_t missed = k->work->merged[i] > all ? k->work->merged[i] - all : 0, outside = found - n;
+    k->counters->faint += missed > outside ? missed : outside; /* a hit that was found outside counts once */
     if (n == 0) l->range_m[i] = (double)NAN;
     for (uint32_t j = 0; j < n; j++) {
         const uint32_t at = j == 0 ? i : rest + j - 1;

@@ -86,7 +86,8 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
 }
 
 /* The parabola through the logarithms of three samples is exact for a Gaussian. A neighbour of zero or less is noise
- * of a pulse that is short beside the sampling: it counts as 2 % of the top. */
+ * of a pulse that is short beside the sampling: it counts as 2 % of the top. A larger neighbour is noise, too, and says
+ * nothing of a top: the parabola through it may have its own anywhere. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place)
 {
     const double y = run->y[top], least = 0.02 * y;
@@ -94,7 +95,7 @@ double finder_top(const struct finder_run *run, uint32_t top, double *place)
     if (top == 0 || top + 1 == run->n) return y;
     double a = log(fmax(run->y[top - 1], least) / y), b = log(fmax(run->y[top + 1], least) / y);
     double bend = a + b, slope = b - a;
-    if (!(bend < 0.0)) return y;
+    if (a > 0.0 || b > 0.0 || !(bend < 0.0)) return y;
     *place -= 0.5 * slope / bend;
     return y * exp(-0.125 * slope * slope / bend);
 }
@@ -244,7 +245,7 @@ uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector
     double y[WAVEFORM_MAX_SAMPLES];
     uint8_t mark[WAVEFORM_MAX_SAMPLES];
     uint32_t until = 0;
-    for (uint32_t w = 0; w < record->n_windows; w++) {
+    for (uint32_t w = 0; w < record->n_windows && finder->seen; w++) {
         const struct waveform_window *window = &record->window[w];
         struct finder_run run = {finder, y, window->n, NULL, window->first};
         double top = detect_signals(finder, baseline, record->sample + window->at, window->n, y);

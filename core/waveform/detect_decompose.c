@@ -30,9 +30,7 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
-    uint32_t a = 0, b;
-    while (a + 2 < FINDER_SHAPE && (h[a] < h[a + 1] || h[a] < 0.5))
-        a++;
+    uint32_t a = finder->top, b;
     for (b = a; b - a < steps && a > 0 && b + 1 < FINDER_SHAPE;) {
         if (h[a - 1] > h[b + 1])
             a--;

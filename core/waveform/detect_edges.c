@@ -28,7 +28,8 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
     return 1;
 }
 
-/* Another echo may begin once the signal is 5 sigma below the level: noise on a slow tail would cross it again. */
+/* Another echo may begin once the signal is 5 sigma below the level: noise on a slow tail would cross it again. Where
+ * noise is above the level, a sample may be below both at its crossing: the echo has that sample at least. */
 void finder_threshold(const struct finder_run *run, double level, struct finder_list *list)
 {
     const double *y = run->y, at = level * run->finder->peak;
@@ -37,7 +38,7 @@ void finder_threshold(const struct finder_run *run, double level, struct finder_
         if (y[i] < at) continue;
         const uint32_t cross = i;
         struct finder_peak peak = {i, i > 0 ? i - 1 : 0, 0};
-        for (; i < run->n && y[i] >= again; i++)
+        for (; i < run->n && (i == cross || y[i] >= again); i++)
             if (y[i] > y[peak.top]) peak.top = i;
         while (peak.from > 0 && y[peak.from] > 0.0)
             peak.from--;

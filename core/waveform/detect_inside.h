@@ -21,6 +21,7 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
+#define FINDER_SHAPE_LAG  8.0          /* and behind it */
 
 /* A term is what fits put together: a Gaussian, or where h is none, h stretched. Its middle is between its half
  * maxima, its sigma what a Gaussian of its width has. */
@@ -42,6 +43,7 @@ struct finder_spread {
 
 /* This is the pulse h, as detectors know it. It is constant after finder_learn. */
 struct finder {
+    int seen;                                    /* the table of h has its peak; else nothing is found */
     double peak;                                 /* of h */
     double width;                                /* of h, full at half maximum */
     double signal;                               /* of one count */
@@ -56,6 +58,7 @@ struct finder {
     double reach[2];              /* sigmas: before and after them a term is nothing */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
     double shape[FINDER_SHAPE];   /* h over its peak */
+    uint32_t top;                 /* entry of the first maximum above a half in it */
     double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
 };
 

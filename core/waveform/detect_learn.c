@@ -51,11 +51,16 @@ static double learn_half(const struct finder *finder, const struct learn_echo *e
     return side[1] - side[0];
 }
 
-/* Measures peak and width of h, from a first guess: its area over its value at the centroid. */
+/* Measures peak and width of h, from a first guess: its area over its largest value. (At its centroid a pulse of
+ * two humps may be nothing.) */
 static void learn_pulse(const struct waveform *waveform, struct finder *finder, struct learn_echo *echo)
 {
+    const struct waveform_pulse *pulse = &waveform->pulse;
     const double sample_s = waveform_spec_of(waveform)->sample_s, metre = finder->metre;
-    double guess = waveform_pulse_area_s(waveform) / sample_s / learn_signal(waveform, metre, 0.0, 0.0), rise;
+    double most = 0.0, rise;
+    for (uint32_t i = 0; i < pulse->phases * pulse->pitch; i++)
+        most = fmax(most, pulse->h[i]);
+    double guess = waveform_pulse_area_s(waveform) / sample_s / most;
     for (int i = 0; i < 2; i++) {
         echo->n = LEARN_ROOM;
         echo->step = 16.0 * guess / LEARN_ROOM;
@@ -65,6 +70,8 @@ static void learn_pulse(const struct waveform *waveform, struct finder *finder, 
     }
     finder->peak = echo->y[echo->top];
     finder->middle = (echo->from + rise * echo->step) / finder->width + 0.5;
+    const double at = (echo->from + echo->top * echo->step) / finder->width;
+    finder->seen = finder->peak > 0.9 * most && at > 1.0 - FINDER_SHAPE_LEAD && at < FINDER_SHAPE_LAG - 1.0;
 }
 
 /* Finds the crossings of falling levels, from the top outward. At each of them h is last below the level before its
@@ -99,6 +106,9 @@ static void learn_shape(const struct waveform *waveform, struct finder *finder)
         m[3] += y * x * x * x;
         if (y > LEARN_LEAST) finder->reach[1] = (x / finder->width - finder->middle) * FINDER_FWHM;
     }
+    const double *h = finder->shape;
+    while (finder->top + 2 < FINDER_SHAPE && (h[finder->top] < h[finder->top + 1] || h[finder->top] < 0.5))
+        finder->top++;
     finder->area = waveform_pulse_area_s(waveform) / waveform_spec_of(waveform)->sample_s;
     finder->variance = m[2] / m[0];
     finder->third = m[3] / m[0];
@@ -128,7 +138,21 @@ double finder_lead(const struct finder *finder, double part)
     return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
 }
 
-/* Fits the term of an echo, and measures how far the echo differs from it. */
+/* The RMS that a term leaves near its middle. */
+static double learn_rest(const struct finder *finder, const struct learn_echo *echo, const struct finder_term *g)
+{
+    double sum = 0.0, n = 0.0;
+    for (uint32_t i = 0; i < echo->n; i++) {
+        const double d = (i - g->at) / g->sigma, rest = echo->y[i] - g->peak * finder_value(finder, d);
+        if (fabs(d) > FINDER_NEAR) continue;
+        sum += rest * rest;
+        n += 1.0;
+    }
+    return sqrt(sum / fmax(1.0, n));
+}
+
+/* Fits the term of an echo, and measures how far the echo differs from it. Where no term fits, as with some pulses of
+ * several humps, it is that of the half maxima. */
 static void learn_fit(const struct finder *finder, const struct learn_echo *echo, struct finder_spread *spread)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
@@ -136,11 +160,16 @@ static void learn_fit(const struct finder *finder, const struct learn_echo *echo
     const double top = echo->y[echo->top];
     struct finder_term g;
     double rms = finder_fit_near(&run, &peak, &g), rise;
+    const double width = learn_half(finder, echo, &rise);
+    if (rms < 0.0) {
+        g = (struct finder_term){rise + 0.5 * width, width / FINDER_FWHM, top};
+        rms = learn_rest(finder, echo, &g);
+    }
     spread->sigma = g.sigma * echo->step;
     spread->lag = echo->from + g.at * echo->step;
     spread->gain = top / g.peak;
-    spread->misfit = fmax(rms, 0.0) / top;
-    spread->width = learn_half(finder, echo, &rise) * echo->step;
+    spread->misfit = rms / top;
+    spread->width = width * echo->step;
     spread->half_lead = -(echo->from + rise * echo->step);
     spread->tail = 0.0;
     for (uint32_t i = 0; i < echo->n; i++) {
@@ -161,6 +190,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     finder->limit = INFINITY;
     finder->blind = spec->saturation > 0.0 ? (uint32_t)waveform->dead : 0;
     learn_pulse(waveform, finder, &echo);
+    if (!finder->seen) return;
     learn_leads(finder, &echo);
     learn_shape(waveform, finder);
     for (uint32_t k = 0; k < FINDER_SPREADS; k++) {

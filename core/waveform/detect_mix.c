@@ -54,7 +54,12 @@ static void mix_rows(struct mix_walker *walker, uint32_t first, double (*restric
     struct mix_walker w = *walker;
     const uint32_t from = w.lo > first ? w.lo - first : 0;
     const uint32_t to = w.hi - first < MIX_BLOCK ? w.hi - first + 1 : MIX_BLOCK;
-    memset(row, 0, 3 * sizeof *row);
+    for (uint32_t a = 0; a < 3; a++) {
+        for (uint32_t k = 0; k < from; k++)
+            row[a][k] = 0.0;
+        for (uint32_t k = to; k < MIX_BLOCK; k++)
+            row[a][k] = 0.0;
+    }
     for (uint32_t k = from; k < to; k++, w.d += w.step) {
         if (w.finder->gaussian) {
             row[0][k] = w.value;

@@ -84,6 +84,20 @@ double waveform_pulse_area_s(const struct waveform *w)
     return w->pulse.area_s;
 }
 
+double waveform_pulse_peak(const struct waveform *w)
+{
+    return w->finder.peak;
+}
+
+int waveform_check_detection(const struct waveform *w, struct sh_err *err)
+{
+    if (w->finder.seen) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "echoes are not found with this pulse: its largest power is too far from its centroid; allowed is "
+                   "%g widths before to %g behind it",
+                   FINDER_SHAPE_LEAD - 1.0, FINDER_SHAPE_LAG - 1.0);
+}
+
 const struct waveform_spec *waveform_spec_of(const struct waveform *w)
 {
     return &w->spec;

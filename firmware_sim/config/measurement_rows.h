@@ -103,7 +103,8 @@
      .help = "pulse: asymmetric: the time in which the pulse falls, over the time in which it rises. The larger it is, "
              "the finer sample_ns must be: up to 0.37 of the pulse's width with 1.5, 0.2 with 2, 0.09 with 3."},
     {KEY(waveform.bandwidth_mhz), CFG_REAL, "MHz", "0", 0, 100000,
-     .help = "Bandwidth of the receiver, at -3 dB, from 1 on; 0: no limit."},
+     .help = "Bandwidth of the receiver, at -3 dB, from 1 on; 0: no limit. It lowers the pulse's peak, and with it the level of "
+             "waveform.echoes, but not the noise: below 5 times the noise many echoes are of noise alone."},
     {KEY(waveform.sample_ns), CFG_REAL, "ns", "1", 0.05, 100,
      .help = "Time from sample to sample, in whole picoseconds."},
     {KEY(waveform.bits), CFG_COUNT, NULL, "12", 8, 14, .help = "Bits of a sample."},

@@ -47,10 +47,12 @@ uint32_t site_n_served(const struct site *site)
     return n;
 }
 
+/* Noise and long pulses make echoes of their own: those found in samples are not limited by the returns. */
 uint32_t site_points_per_pulse(const struct site *site)
 {
     const struct plan_methods *methods = &site->plan.methods;
-    uint32_t most = methods->beam != BEAM_SINGLE ? LINE_MAX_ECHOES : 1 + methods->depth;
+    const int finds = site->waves != NULL && site->waves->cast.finds;
+    uint32_t most = methods->beam != BEAM_SINGLE || finds ? LINE_MAX_ECHOES : 1 + methods->depth;
     return most < site->cfg->profile.max_echoes ? most : site->cfg->profile.max_echoes;
 }
 

@@ -105,6 +105,42 @@ static void warn_digits(const struct config *cfg, const struct waveform_spec *sp
         cfg->file, count, spec->bits, 10.0 * log10(spec->full_scale / count));
 }
 
+/* Sigmas of noise at the level. A sample of noise alone reaches 5 of them once in 3 million times. */
+#define LEAST_SNR 5.0
+
+/* The receiver's bandwidth with which the pulse's peak is `least` of the outgoing one, to 10 %; 0: none that the
+ * sampling allows. */
+static double bandwidth_of(const struct waveform_spec *spec, double least)
+{
+    struct waveform_spec wide = *spec;
+    struct sh_err none;
+    double peak = 0.0;
+    while (peak < least) {
+        struct waveform *w;
+        wide.bandwidth_hz *= 1.1;
+        if (waveform_create(&wide, &w, &none) != SH_OK) return 0.0;
+        peak = waveform_pulse_peak(w);
+        waveform_free(w);
+    }
+    return wide.bandwidth_hz;
+}
+
+/* The level falls with the pulse's peak, the noise does not. */
+static void warn_noise(const struct config *cfg, const struct waveform *waveform, const struct sh_report *report)
+{
+    const struct waveform_spec *spec = waveform_spec_of(waveform);
+    const double peak = waveform_pulse_peak(waveform), least = LEAST_SNR * spec->noise;
+    char advice[128] = "";
+    if (peak >= least) return;
+    const double enough_hz = spec->bandwidth_hz > 0.0 && least < 1.0 ? bandwidth_of(spec, least) : 0.0;
+    if (enough_hz > 0.0)
+        snprintf(advice, sizeof advice, "; waveform.bandwidth_mhz=%.0f is enough", ceil(1e-6 * enough_hz));
+    sh_warn(report,
+            "%s: waveform.echoes: the level of an echo is %.2g times the noise (threshold_snr %.3g, times the pulse's "
+            "peak of %.2g behind the receiver), so many echoes are of noise alone; from %g times on few are%s",
+            cfg->file, peak / spec->noise, 1.0 / spec->noise, peak, LEAST_SNR, advice);
+}
+
 static int make_waveform(const struct site *site, const struct sh_report *report, struct waveform **out,
                          struct sh_err *err)
 {
@@ -119,7 +155,10 @@ static int make_waveform(const struct site *site, const struct sh_report *report
     if (rc != SH_OK) /* Keys are within their limits: the pulse does not fit the sampling. */
         return sh_fail(err, rc, "%s: waveform.%s: %.300s", cfg->file,
                        cfg->waveform.pulse == WAVEFORM_TABLE ? "pulse_file" : "sample_ns", why.text);
+    if (cfg->waveform.echoes != WAVE_ECHOES_MODEL) rc = waveform_check_detection(*out, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: waveform.echoes: %.300s", cfg->file, why.text);
     warn_digits(cfg, &spec, report);
+    if (cfg->waveform.echoes != WAVE_ECHOES_MODEL) warn_noise(cfg, *out, report);
     return SH_OK;
 }
 

@@ -12,6 +12,7 @@ struct waves {
     struct cast_waves cast;
     double gain; /* of all signals; 0: 1 */
     double count_signal;
+    const struct waveform_spec *spec; /* NULL: SPEC, which all that follows has */
 };
 
 static const struct waveform_spec SPEC = {.shape = WAVEFORM_GAUSSIAN,
@@ -39,9 +40,9 @@ static void open_waves(struct waves *w, const struct beam_view *view, enum beam_
     beam_rig_mode(&w->lit.rig, mode, 4);
     w->lit.rig.setup.pulse_m = w->lit.rig.beam.beam.resolution_m;
     w->count_signal = SPEC.full_scale / (16383.0 - SPEC.baseline_counts);
-    if (waveform_create(&SPEC, &waveform, &err) != 0 || caster_add_waves(w->lit.rig.caster, &err) != 0 ||
-        line_block_alloc_attributes(b, &err) != 0 || line_block_alloc_deviations(b, &err) != 0 ||
-        line_block_alloc_waves(b, room, room, &err) != 0)
+    if (waveform_create(w->spec != NULL ? w->spec : &SPEC, &waveform, &err) != 0 ||
+        caster_add_waves(w->lit.rig.caster, &err) != 0 || line_block_alloc_attributes(b, &err) != 0 ||
+        line_block_alloc_deviations(b, &err) != 0 || line_block_alloc_waves(b, room, room, &err) != 0)
         fail_msg("%s", err.text);
     w->cast.waveform = waveform;
     w->cast.beam = &w->lit.rig.beam.beam;
@@ -344,6 +345,42 @@ static void cut_footprints_have_two_echoes(void **state)
     close_waves(&w);
 }
 
+/* Noise of three times the level makes echoes all over a window of 40 m. Those within the head's ranges are sent, at
+ * most max_echoes a pulse, the strongest. Those outside are counted. */
+static void found_echoes_are_in_range(void **state)
+{
+    (void)state;
+    static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};
+    struct waveform_spec noisy = SPEC;
+    noisy.noise = 3.0;
+    noisy.near_m = 40.0;
+    noisy.far_m = 80.0;
+    struct waves w = {.lit = {.near_m = 20.0, .far_m = 200.0, .rho = {0.8, 0.5}}, .spec = &noisy};
+    const struct line_block *b = &w.lit.rig.block;
+    struct cast_counters before, after;
+    open_waves(&w, &SIDE, BEAM_ADAPTIVE, ROOM);
+    w.cast.finds = 1;
+    w.cast.detector = WAVEFORM_THRESHOLD;
+    for (uint32_t most = 2; most <= LINE_MAX_ECHOES; most += LINE_MAX_ECHOES - 2) {
+        uint32_t echoes = 0;
+        w.lit.rig.setup.range_min_m = 50.0;
+        w.lit.rig.setup.range_max_m = 52.0; /* 13 samples, of which a third is above the level */
+        w.lit.rig.setup.max_echoes = most;
+        caster_get_counters(w.lit.rig.caster, &before);
+        beam_rig_line(&w.lit.rig, 0);
+        caster_get_counters(w.lit.rig.caster, &after);
+        for (uint32_t i = 0; i < b->n_points; i++) {
+            if (b->echo[i] == 0) continue; /* a shot without echo */
+            echoes++;
+            assert_true((b->echo[i] >> 4) <= most);
+            assert_true(b->a[i] >= 50000000 && b->a[i] <= 52000000); /* micrometres */
+        }
+        assert_true(echoes > 0);
+        assert_true(after.faint - before.faint > 2 * PULSES);
+    }
+    close_waves(&w);
+}
+
 /* A laser that does not fire gives no window. */
 static void dark_pulses_have_no_windows(void **state)
 {
@@ -365,6 +402,7 @@ int main(void)
         cmocka_unit_test(windows_belong_to_points),       cmocka_unit_test(points_stay_as_they_are),
         cmocka_unit_test(lost_samples_are_counted),       cmocka_unit_test(echoes_are_found_in_samples),
         cmocka_unit_test(cut_footprints_have_two_echoes), cmocka_unit_test(dark_pulses_have_no_windows),
+        cmocka_unit_test(found_echoes_are_in_range),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

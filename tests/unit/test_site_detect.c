@@ -101,12 +101,61 @@ static void ghosts_need_labels(void **state)
     site_free(site);
 }
 
+/* A single ray without glass has one return, but any number of echoes may be found in its samples. */
+static void found_echoes_have_room(void **state)
+{
+    (void)state;
+    static const char *const finds[] = {"model", "threshold", "fraction", "gaussians"};
+    write_in("room.obj", FLOOR);
+    for (int i = 0; i < 4; i++) {
+        char text[128];
+        struct site *site;
+        snprintf(text, sizeof text, "signal: {model: on}\nwaveform: {send: on, echoes: %s}\n", finds[i]);
+        if (load(text, &site) != SH_OK) fail_msg("%s", err.text);
+        const uint32_t most = i == 0 ? 1 : site_profile(site)->max_echoes;
+        assert_true(site_profile(site)->max_echoes > 1);
+        assert_int_equal(site_points_per_pulse(site), most);
+        assert_int_equal(site_most_points_per_pulse(site), most);
+        site_free(site);
+    }
+}
+
+/* The pulse of 3 ns behind a receiver of 10 MHz, whose answer is 31 ns long (0.312 / B): its peak is a tenth. So the
+ * level is 0.8 times the noise of 1/8. The bandwidth that the warning names is enough. */
+static void a_level_within_noise_is_said(void **state)
+{
+    (void)state;
+    static const char *const finds[] = {"model", "gaussians"};
+    struct site *site;
+    char text[160];
+    write_in("room.obj", FLOOR);
+    for (int i = 0; i < 2; i++) {
+        snprintf(text, sizeof text, "signal: {model: on}\nwaveform: {send: on, echoes: %s, bandwidth_mhz: 10}\n",
+                 finds[i]);
+        if (load(text, &site) != SH_OK) fail_msg("%s", err.text);
+        site_free(site);
+        assert_int_equal(strstr(warned, "of noise alone") != NULL, i);
+    }
+    const char *enough = strstr(warned, "waveform.bandwidth_mhz=");
+    assert_non_null(enough);
+    const double mhz = atof(strchr(enough, '=') + 1);
+    for (int less = 0; less < 2; less++) { /* named to 10 %, and 1 MHz */
+        snprintf(text, sizeof text, "signal: {model: on}\nwaveform: {echoes: gaussians, bandwidth_mhz: %.0f}\n",
+                 less ? 0.9 * mhz - 1.0 : mhz);
+        if (load(text, &site) != SH_OK) fail_msg("%s", err.text);
+        site_free(site);
+        assert_int_equal(strstr(warned, "of noise alone") != NULL, less);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(extinction_replaces_that_of_the_days_air),
         cmocka_unit_test(each_encoder_has_a_phase_of_its_own),
         cmocka_unit_test(ghosts_need_labels),
+        cmocka_unit_test(found_echoes_have_room),
+        cmocka_unit_test(a_level_within_noise_is_said),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }
