@@ -35,7 +35,8 @@ static void prepare(struct wire *wire, char config[256])
 /* ---- answers */
 
 /* Returns the body; free it. */
-static char *get(const struct head *head, const char *path, size_t *len)
+/* The whole answer. */
+static char *ask_path(const struct head *head, const char *path, size_t *len)
 {
     char request[256], *answer = NULL;
     size_t n = 0, room = 0;
@@ -53,6 +54,14 @@ static char *get(const struct head *head, const char *path, size_t *len)
         answer[n] = '\0';
     } while (got > 0);
     close(fd);
+    *len = n;
+    return answer;
+}
+
+static char *get(const struct head *head, const char *path, size_t *len)
+{
+    size_t n;
+    char *answer = ask_path(head, path, &n);
     char *body = strstr(answer, "\r\n\r\n");
     if (strncmp(answer, "HTTP/1.1 200", 12) != 0 || body == NULL) fail_msg("%s: %.60s", path, answer);
     body += 4;
@@ -345,11 +354,15 @@ static void the_points_so_far_are_a_file(void **state)
         if (wire_now_ms() > until) fail_msg("no file: %s", json);
         free(json);
     }
-    char *saved = get(&head, "/saved?from=0", &len);
+    char *saved = get(&head, "/saved?file=1&from=0", &len);
     const char *has = ply_points(saved, len, &n_saved);
     assert_int_equal(n_saved, n_recorded);
     assert_memory_equal(has, want, n_saved);
     free(saved);
+    char *other = ask_path(&head, "/saved?file=2&from=0", &len);
+    assert_non_null(strstr(other, "file 2 is not there; "));
+    assert_int_equal(strncmp(other, "HTTP/1.1 400", 12), 0);
+    free(other);
     free(recorded);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
