@@ -146,6 +146,17 @@ static int needs_front(struct replay *r)
     return 1;
 }
 
+/* A part (`--to`) may end later than its last frame: to seek its end is no failure. */
+static int is_at_end(struct replay *r)
+{
+    const int is_end = r->begin_s > r->options.from_s && r->begin_s <= r->cmd.replay.length_s;
+    if (!is_end) return 0;
+    pthread_mutex_lock(&r->lock);
+    r->position_ns = llround(1e9 * r->begin_s);
+    pthread_mutex_unlock(&r->lock);
+    return 1;
+}
+
 void replay_begin(struct replay *r, uint64_t tick)
 {
     struct sh_err err = {0};
@@ -158,7 +169,9 @@ void replay_begin(struct replay *r, uint64_t tick)
     }
     const int found = replay_look(r);
     if (found <= 0) {
-        replay_stop(r, tick, 0);
+        const int plays_end = found == 0 && is_at_end(r);
+        replay_stop(r, tick, plays_end);
+        if (plays_end) return;
         sh_fail(&err, SH_EINPUT, "%s: it has no frame from %.10g s on", r->options.path, r->begin_s);
         if (found == 0) replay_fail(r, &err);
         return;

@@ -240,6 +240,27 @@ static void test_no_point_is_lost_by_a_seek(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* The end of a part lies between two frames: to seek it plays nothing more, and is no error. */
+static void test_the_end_of_a_part(void **state)
+{
+    char file[352];
+    snprintf(file, sizeof file, "%s", replay_room(*state, "head.shs", 30));
+    struct head head = head_start(
+        *state, file,
+        (const char *const[]){"--link", "type: tcp, port: 0", "--pace", "step", "--to", "0.3001", "--quiet", NULL});
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_tell(sh, "SCAN:REPLay 0.3001");
+    grant(sh, 50);
+    starts_with(sh, "SCAN:REPLay?", "IDLE,0.300100,0.300100", "");
+    assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
+    client_tell(sh, "SCAN:REPLay ,,ON");
+    client_tell(sh, "SCAN:REPLay 0.3001");
+    grant(sh, 50);
+    starts_with(sh, "SCAN:REPLay?", "PLAYING,0.0", ",ON");
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 /* A client's seek: what it reads goes on there, as another sequence, and nothing counts as lost. */
 static void test_seek(void **state)
 {
@@ -379,6 +400,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_settings_are_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_how_it_is_played, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_seek, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_the_end_of_a_part, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_point_is_lost_by_a_seek, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_loop_is_stopped, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_unknown_echoes, wire_setup, wire_teardown),
