@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This row saves the points so far as a file: the head writes it, in the formats of `scanhead record` (GET /save), and the page fetches
 // it in pieces.
-import {make, say} from './page.js';
+import {grouped, make, say} from './page.js';
 import {download, fileName} from './picture.js';
 
 const FORMATS = [['las', 'LAS'], ['ply', 'PLY'], ['e57', 'E57'], ['ptx', 'PTX'], ['pcapng', 'pcapng']];
@@ -36,8 +36,8 @@ export async function fetchSaved(as) {
 // Says what the file lacks.
 export function savedWords({gone, lost_frames}) {
   const lacks = [];
-  if (gone > 0) lacks.push(`${gone.toLocaleString('en')} older points, which the head no longer keeps`);
-  if (lost_frames > 0) lacks.push(`${lost_frames.toLocaleString('en')} frames that were lost`);
+  if (gone > 0) lacks.push(`${grouped(gone)} older points, which the head no longer keeps`);
+  if (lost_frames > 0) lacks.push(`${grouped(lost_frames)} frames that were lost`);
   return lacks.length > 0 ? `Saved, without ${lacks.join(', and ')}.` : 'Saved.';
 }
 
