@@ -7,9 +7,10 @@
 #include <unistd.h>
 
 #include "drivers/link/web_inside.h"
+#include "drivers/link/web_pages.h"
 
 struct fields {
-    struct http_text host, origin, key, version, protocol, upgrade;
+    struct http_text host, origin, site, key, version, protocol, upgrade;
     int n_host, n_length, has_coding, has_origin, has_protocol, is_upgrade, expects_other;
     size_t length;
 };
@@ -22,6 +23,8 @@ static int read_field(struct fields *all, struct http_text line)
         all->host = f.value, all->n_host++;
     else if (http_text_is(f.name, "origin"))
         all->origin = f.value, all->has_origin = 1;
+    else if (http_text_is(f.name, "sec-fetch-site"))
+        all->site = f.value;
     else if (http_text_is(f.name, "sec-websocket-key"))
         all->key = f.value;
     else if (http_text_is(f.name, "sec-websocket-version"))
@@ -67,6 +70,14 @@ static int is_own_origin(const struct fields *f)
     const size_t n = sizeof scheme - 1;
     return f->origin.len == n + f->host.len && strncasecmp(f->origin.s, scheme, n) == 0 &&
            strncasecmp(f->origin.s + n, f->host.s, f->host.len) == 0;
+}
+
+/* An image or a script of another site's page sends no Origin, but browsers then say where it is from. Links to the page
+ * itself are followed. */
+static int is_foreign_part(const struct fields *f, const char *path)
+{
+    struct web_page page;
+    return (http_text_is(f->site, "cross-site") || http_text_is(f->site, "same-site")) && !web_page_at(path, &page);
 }
 
 /* Decodes %41 and the like. 0; 1: the text is cut; 400. */
@@ -156,6 +167,7 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
     *words = "a path must begin with /, and %XX in it must be a byte in hexadecimal, but not 0";
     if (target.path.len == 0 || target.path.s[0] != '/') return 400;
     if (decode(target.path, out->path, sizeof out->path) == 400) return 400;
+    if (is_foreign_part(&f, out->path)) return WEB_FOREIGN;
     const int query = decode(target.query, out->query, sizeof out->query);
     if (query == 400) return 400;
     out->query_long = query == 1;

@@ -42,6 +42,7 @@ static int read_front(struct replay *r, struct sh_err *err)
     if (r->front.len[0] == 0)
         return sh_fail(err, SH_EFORMAT, "%s: it has no descriptor: it is not a recording of a head's stream",
                        r->options.path);
+    r->first_front = r->front;
     return recording_rewind(&r->recording, err);
 }
 

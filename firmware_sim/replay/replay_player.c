@@ -74,14 +74,16 @@ static void replay_add(struct replay *r, const uint8_t *frame, uint32_t len, uin
 }
 
 /* Readers have not seen the frames that were skipped. So they get descriptor, emitter and anchor, like a reader that
- * joins late. */
+ * joins late. After a jump in time they are no repetition: earlier pulses of the same scan follow, and a reader takes
+ * these for another scan unless a descriptor says before that something begins. */
 static void add_front(struct replay *r, uint64_t tick)
 {
     uint8_t frame[REPLAY_FRONT_ROOM];
+    const uint8_t flags = r->times > 1 ? NATIVE_LOCAL : NATIVE_REPEAT | NATIVE_LOCAL;
     for (int i = 0; i < REPLAY_FRONT; i++) {
         if (r->front.len[i] == 0) continue;
         memcpy(frame, r->front.bytes[i], r->front.len[i]);
-        frame[3] |= NATIVE_REPEAT | NATIVE_LOCAL;
+        frame[3] = (uint8_t)((frame[3] & ~NATIVE_REPEAT) | flags);
         native_finish_frame(frame, 0);
         replay_add(r, frame, r->front.len[i], tick);
     }
@@ -133,6 +135,28 @@ void replay_stop(struct replay *r, uint64_t tick, int wants_again)
     pthread_mutex_unlock(&r->lock);
 }
 
+/* Whether readers need a front before the first frame, which then is in r->front. */
+static int needs_front(struct replay *r)
+{
+    const uint8_t *frame = r->frame.bytes;
+    if (r->has_skipped) return frame[1] != NATIVE_DESCRIPTOR || (r->times > 1 && (frame[3] & NATIVE_REPEAT) != 0);
+    /* Of a recording that begins within a scan even the first descriptor is a repetition. */
+    if (r->times == 1 || (r->first_front.bytes[0][3] & NATIVE_REPEAT) == 0) return 0;
+    r->front = r->first_front;
+    return 1;
+}
+
+/* A part (`--to`) may end later than its last frame: to seek its end is no failure. */
+static int is_at_end(struct replay *r)
+{
+    const int is_end = r->begin_s > r->options.from_s && r->begin_s <= r->cmd.replay.length_s;
+    if (!is_end) return 0;
+    pthread_mutex_lock(&r->lock);
+    r->position_ns = llround(1e9 * r->begin_s);
+    pthread_mutex_unlock(&r->lock);
+    return 1;
+}
+
 void replay_begin(struct replay *r, uint64_t tick)
 {
     struct sh_err err = {0};
@@ -145,7 +169,9 @@ void replay_begin(struct replay *r, uint64_t tick)
     }
     const int found = replay_look(r);
     if (found <= 0) {
-        replay_stop(r, tick, 0);
+        const int plays_end = found == 0 && is_at_end(r);
+        replay_stop(r, tick, plays_end);
+        if (plays_end) return;
         sh_fail(&err, SH_EINPUT, "%s: it has no frame from %.10g s on", r->options.path, r->begin_s);
         if (found == 0) replay_fail(r, &err);
         return;
@@ -161,7 +187,7 @@ void replay_begin(struct replay *r, uint64_t tick)
     set_clock(r);
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
-    if (r->has_skipped && r->frame.bytes[1] != NATIVE_DESCRIPTOR) add_front(r, tick);
+    if (needs_front(r)) add_front(r, tick);
 }
 
 void replay_pace(struct replay *r, uint64_t tick)

@@ -61,14 +61,15 @@ struct replay {
     double begin_s;   /* where it begins to play, since its first frame */
     int64_t first_ns; /* of the recording: device time of its first frame */
     struct replay_front front;
-    int playing;         /* changed under the lock */
-    uint64_t start_tick; /* the tick at which it began, or at which counting began anew */
-    int64_t base;        /* the tick of the recording at start_tick */
-    int64_t last;        /* tick of the recording of the frame sent last */
-    double pace;         /* the speed at which frames are sent since start_tick */
-    int64_t shift_ns;    /* of the frames being sent: the run's device time less theirs */
-    uint32_t seq_shift;  /* added to sequence numbers */
-    int has_seq;         /* a frame was sent since power-up; last_seq is its number as it was sent */
+    struct replay_front first_front; /* of the recording */
+    int playing;                     /* changed under the lock */
+    uint64_t start_tick;             /* the tick at which it began, or at which counting began anew */
+    int64_t base;                    /* the tick of the recording at start_tick */
+    int64_t last;                    /* tick of the recording of the frame sent last */
+    double pace;                     /* the speed at which frames are sent since start_tick */
+    int64_t shift_ns;                /* of the frames being sent: the run's device time less theirs */
+    uint32_t seq_shift;              /* added to sequence numbers */
+    int has_seq;                     /* a frame was sent since power-up; last_seq is its number as it was sent */
     uint32_t last_seq;
     int restarts;              /* the next frame begins another sequence */
     int in_range, has_skipped; /* this time: frames are being sent; some were skipped before them */

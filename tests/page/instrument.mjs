@@ -157,7 +157,7 @@ export async function testInstrument(browser) {
     const refused = await page.eval("fetch('/save?as=../x').then(async (answer) => [answer.status, await answer.text()])");
     equal(refused[0], 400, 'status of another format');
     is(refused[1].includes('las, ply, e57'), `it says what is allowed: ${refused[1]}`);
-    equal(await page.eval("fetch('/saved?from=1e9').then((answer) => answer.status)"), 400, 'status of a wrong position');
+    equal(await page.eval("fetch('/saved?file=1&from=1e9').then((answer) => answer.status)"), 400, 'status of a wrong position');
   });
 
   await page.eval('scanhead.view.shading = false, scanhead.view.show({scene: false, stations: false})');
@@ -385,11 +385,15 @@ async function testTimeLines(browser, file) {
     equal(speed, '10', 'its speed');
     await page.until(`scanhead.cloud.total === ${points}`);
     await choose(page, '#seek', String(0.6 * Number(length)));
+    await page.until(`scanhead.cloud.total > 0 && scanhead.cloud.total < ${points}`); // from there on there are fewer
     await other.until('SCAN:REPL?', (reply) => reply.startsWith('IDLE'));
-    await page.until('scanhead.cloud.total > 0');
-    is(await page.eval('scanhead.cloud.total') < points, 'from there on there are fewer points');
     await page.click('#loop');
     await other.until('SCAN:REPL?', (reply) => reply.endsWith('ON'));
+    const came = await page.eval('scanhead.head.figures().points');
+    await page.press('#play');
+    await page.until(`scanhead.head.figures().points > ${came + 3 * points}`);
+    is(await page.eval('scanhead.cloud.total') <= points, 'each round is shown once');
+    equal(await page.eval('scanhead.head.figures().unplaced_points'), 0, 'points without a place');
     equal(page.faults.join('\n'), '', 'errors of its scripts');
     await page.close();
     await end(replay);

@@ -6,6 +6,7 @@ import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit} from '../../drivers/link/web/knobs.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
+import {fetchSaved, savedWords} from '../../drivers/link/web/save.js';
 import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
@@ -267,6 +268,22 @@ test('previews: of one room, only what lies in the section counts, and not what 
   equal(share({middle: [11, 0.5, 0.5], half: [0.2, 1, 0.2]}), [0, 1], 'the wall');
   equal(share({kind: 'height', middle: [500, 500, 0], half: [1, 1, 0.1]}), [1, 1], 'a height cut has the floor, however far its middle');
   equal(share({middle: [50, 0, 0], half: [1, 1, 1]}), [0, 0], 'nothing');
+});
+
+test('a saved file: its number is in each request, another page\'s file is refused, and what it lacks is said', async () => {
+  const asked = [], bytes = Uint8Array.of(7, 8, 9);
+  const answers = (status) => (globalThis.fetch = async (path) => {
+    asked.push(path);
+    return path.startsWith('/saved') ? new Response(bytes) : new Response(JSON.stringify(status(path)));
+  });
+  answers(() => ({state: 'done', as: 'las', file: 4, bytes: 3, gone: 0, lost_frames: 2}));
+  const saved = await fetchSaved('las');
+  equal([asked, saved.blob.size, savedWords(saved)], [['/save?as=las', '/saved?file=4&from=0'], 3, 'Saved, without 2 frames that were lost.']);
+  equal(savedWords({gone: 0, lost_frames: 0}), 'Saved.');
+  answers((path) => (path === '/save' ? {state: 'done', as: 'ply', file: 5, bytes: 3} : {state: 'working', as: 'las', file: 4, bytes: 0}));
+  let said = '';
+  await fetchSaved('las').catch((error) => (said = error.message));
+  equal(said, 'The file is gone: another page began one. Save it again.');
 });
 
 test('targets: the cell of a place, the stations that see it, and what pairs have in common', () => {

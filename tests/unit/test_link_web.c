@@ -172,6 +172,19 @@ static void test_who_asks(void **state)
     snprintf(fields, sizeof fields, "Host: %s\r\nOrigin: null\r\n", place);
     assert_int_equal(web_ask(&bench, place, "GET /scene", fields, &body, &len), 0);
     assert_true(web_ask(&bench, place, "GET /scene", "", &body, &len) != 200);
+    /* Fetch metadata (W3C): a picture of another site's page has no Origin. */
+    static const struct {
+        const char *from, *request;
+        int status;
+    } parts[] = {
+        {"cross-site", "GET /scene", 0},     {"same-site", "GET /scene", 0},     {"same-origin", "GET /scene", 200},
+        {"none", "GET /scene", 200},         {"cross-site", "HEAD /scene?x", 0}, {"cross-site", "GET /", 200},
+        {"cross-site", "GET /main.js", 200}, {"cross-site", "GET /%73cene", 0},
+    };
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        snprintf(fields, sizeof fields, "Host: %s\r\nSec-Fetch-Site: %s\r\n", place, parts[i].from);
+        assert_int_equal(web_ask(&bench, place, parts[i].request, fields, &body, &len), parts[i].status);
+    }
     bench_close(&bench);
 }
 

@@ -210,6 +210,58 @@ static void test_how_it_is_played(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* Takes the frames up to the reply of the last grant. Returns how many points can't be placed; `placed` counts the
+ * others. */
+static uint64_t take_points(struct scanhead *sh, uint64_t *placed)
+{
+    struct scanhead_frame frame;
+    struct scanhead_info info;
+    uint64_t unplaced = 0;
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
+        if (frame.type != SCANHEAD_POINTS) continue;
+        *(scanhead_get_info(sh, &info) == SCANHEAD_OK ? placed : &unplaced) += frame.n_points;
+    }
+    return unplaced;
+}
+
+/* After each jump back within a scan the first points already can be placed: descriptor and anchor come before them. */
+static void test_no_point_is_lost_by_a_seek(void **state)
+{
+    static const char *const seeks[] = {"SCAN:REPLay 0.3", "SCAN:REPLay 0.25", "SCAN:REPLay 0.28", "SCAN:REPLay 0.22"};
+    struct head head;
+    struct scanhead *sh = open_room(*state, &head);
+    for (size_t i = 0; i < sizeof seeks / sizeof *seeks; i++) {
+        uint64_t placed = 0;
+        client_tell(sh, seeks[i]);
+        grant(sh, 30);
+        assert_int_equal(take_points(sh, &placed), 0);
+        assert_true(placed > 100); /* of 300 pulses */
+    }
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* The end of a part lies between two frames: to seek it plays nothing more, and is no error. */
+static void test_the_end_of_a_part(void **state)
+{
+    char file[352];
+    snprintf(file, sizeof file, "%s", replay_room(*state, "head.shs", 30));
+    struct head head = head_start(
+        *state, file,
+        (const char *const[]){"--link", "type: tcp, port: 0", "--pace", "step", "--to", "0.3001", "--quiet", NULL});
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_tell(sh, "SCAN:REPLay 0.3001");
+    grant(sh, 50);
+    starts_with(sh, "SCAN:REPLay?", "IDLE,0.300100,0.300100", "");
+    assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
+    client_tell(sh, "SCAN:REPLay ,,ON");
+    client_tell(sh, "SCAN:REPLay 0.3001");
+    grant(sh, 50);
+    starts_with(sh, "SCAN:REPLay?", "PLAYING,0.0", ",ON");
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 /* A client seeks: its stream goes on there, as another sequence, and nothing counts as lost. */
 static void test_seek(void **state)
 {
@@ -349,6 +401,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_settings_are_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_how_it_is_played, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_seek, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_the_end_of_a_part, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_point_is_lost_by_a_seek, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_loop_is_stopped, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_unknown_echoes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_control_and_steps, wire_setup, wire_teardown),

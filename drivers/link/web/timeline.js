@@ -120,7 +120,7 @@ export class RecordingPlayer {
 }
 
 // This player is for a head that replays a recording (SCAN:REPLay). After a seek the points from before are taken off
-// the picture.
+// the picture, whoever has sought it.
 export class ReplayPlayer {
   changed = () => {};
   follows = false;
@@ -147,6 +147,7 @@ export class ReplayPlayer {
     if (!/ SCAN:REPLay/i.test(await session.command('HELP?'))) return null;
     const player = new ReplayPlayer(session, cloud, tell);
     if (!await player.#ask()) return null;
+    session.head.addEventListener('descriptor', ({detail}) => player.#described(detail));
     session.addEventListener('change', () => player.#allow());
     setInterval(() => !document.hidden && session.link === 'open' && player.#ask(), POLL_MS);
     return player;
@@ -168,10 +169,18 @@ export class ReplayPlayer {
   setLoop(on) { return this.#set('', '', on ? 'ON' : 'OFF'); }
 
   #plays = false;
+  #described_ns = null; // the time of the last descriptor
+
+  // The stream itself says where another time begins: there the recording's first descriptor comes again, or one for readers alone
+  // that is no repetition. Points before it in the stream are of the time before.
+  #described({repeat, local, t_ns}) {
+    const jumps = !repeat && (local || (this.#described_ns !== null && t_ns <= this.#described_ns));
+    this.#described_ns = t_ns;
+    if (jumps) this.#cloud.clear();
+  }
 
   async #set(at, speed, loop = '') {
     try {
-      if (at !== '') this.#cloud.clear();
       await this.#session.command(`SCAN:REPLay ${at},${speed},${loop}`);
     } catch (error) {
       this.#tell(error);

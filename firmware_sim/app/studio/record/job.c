@@ -15,16 +15,22 @@
 
 enum { WAIT_MS = 1000 };
 
+static int is_stopped(const struct record_job *r)
+{
+    return r->stop != NULL && r->stop(r->stop_ctx);
+}
+
 /* A signal while files are completed. */
 static int gives_up(void *ctx)
 {
     const struct record_job *r = ctx;
-    return app_interrupted() && !r->interrupted;
+    return is_stopped(r) || (app_interrupted() && !r->interrupted);
 }
 
 static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct record_job *r = ctx;
+    if (is_stopped(r)) return sh_fail(err, SH_ESTOPPED, "the recording was stopped");
     const int rc = record_files_frame(&r->files, sh, frame, err);
     return rc == SH_OK && r->each ? record_files_frame(&r->parts, sh, frame, err) : rc;
 }
@@ -103,7 +109,7 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     const int whole = rc == SH_OK && recording_check_complete(result, NULL) == SH_OK;
     const int keep = r->only_whole ? whole : result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
-    int after = close_files(r, keep, &why);
+    int after = close_files(r, keep && !is_stopped(r), &why);
     if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;

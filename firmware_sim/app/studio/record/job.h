@@ -24,7 +24,10 @@ struct record_job {
     struct site *site; /* of record_job_off_line: loaded by offline_load, of cfg; NULL: it loads one itself */
     int only_whole;    /* an incomplete recording leaves no files */
     int brief;         /* no line about the result */
-    double wait_s;     /* of record_job_stream: how long the source may take to be there */
+    /* Asked often, by the thread of the job: 1 ends it, and it leaves no files. NULL: never. */
+    int (*stop)(void *ctx);
+    void *stop_ctx;
+    double wait_s;                      /* of record_job_stream: how long the source may take to be there */
     struct recording_options recording; /* how long, and progress; the rest is filled in here */
     struct recording_result result;     /* out */
     /* inner state */

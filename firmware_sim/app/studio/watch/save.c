@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/studio/watch/save.h"
 
+#include <dirent.h>
 #include <errno.h>
+#include <inttypes.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,13 +24,16 @@ struct save {
     struct past *past;
     pthread_t thread;
     int has_thread;          /* it was begun, and not joined */
+    atomic_int ends;         /* no file is wanted any more */
     char folder[FOLDER_LEN]; /* empty: there is none yet */
     char stream[PATH_LEN], file[PATH_LEN];
 
     pthread_mutex_t lock;
     enum save_state state;
     char as[AS_LEN];
+    uint64_t number; /* of the file, from 1 */
     uint64_t bytes;
+    uint64_t gone, lost_frames; /* points that the file lacks; frames that the observer had lost */
     struct sh_err failure;
 };
 
@@ -45,18 +51,36 @@ static int make_folder(struct save *s, struct sh_err *err)
     return rc;
 }
 
+static void note_missing(struct save *s, const uint8_t *head)
+{
+    pthread_mutex_lock(&s->lock);
+    s->gone = le_get64(head + 32);
+    s->lost_frames = le_get64(head + 40);
+    pthread_mutex_unlock(&s->lock);
+}
+
+static int save_ends(void *self)
+{
+    struct save *s = self;
+    return atomic_load(&s->ends);
+}
+
 /* Writes the frames that there are now; those that come meanwhile are left out. */
 static int write_frames(struct save *s, FILE *f, struct sh_err *err)
 {
     char query[32] = "";
     for (uint64_t end = 0, next = 0;;) {
         struct web_body piece;
+        if (save_ends(s)) return sh_fail(err, SH_ESTOPPED, "%s: stopped", s->stream);
         const int rc = past_get(s->past, query, &piece, err);
         if (rc != SH_OK) return rc;
         const uint8_t *head = (const uint8_t *)piece.bytes;
         const size_t len = piece.len - PAST_HEAD_LEN;
         next = le_get64(head + 16);
-        if (end == 0) end = le_get64(head + 24);
+        if (end == 0) {
+            end = le_get64(head + 24);
+            note_missing(s, head);
+        }
         const size_t written = fwrite(piece.bytes + PAST_HEAD_LEN, 1, len, f);
         free(piece.bytes);
         if (written != len) return sh_fail(err, SH_EIO, "%s: %s", s->stream, strerror(errno));
@@ -81,12 +105,24 @@ static int write_file(struct save *s, struct sh_err *err)
     if (job == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a file");
     job->source = s->stream;
     job->brief = job->no_hash = 1;
+    job->stop = save_ends;
+    job->stop_ctx = s;
     job->recording.frames = -1;
     int rc = record_files_add(&job->files, s->file, err);
     if (rc == SH_OK) rc = record_job_stream(job, err);
     if (rc == SH_ECLOSED && job->result.points > 0) rc = SH_OK;
     free(job);
     return rc;
+}
+
+/* A recorder that fails leaves parts, from which `repair` makes a file; here nobody will. */
+static void empty_folder(const struct save *s)
+{
+    DIR *folder = s->folder[0] != '\0' ? opendir(s->folder) : NULL;
+    if (folder == NULL) return;
+    for (const struct dirent *entry; (entry = readdir(folder)) != NULL;)
+        unlinkat(dirfd(folder), entry->d_name, 0);
+    closedir(folder);
 }
 
 static void *make(void *self)
@@ -98,7 +134,10 @@ static void *make(void *self)
     int rc = write_stream(s, &err);
     if (rc == SH_OK) rc = write_file(s, &err);
     if (rc == SH_OK && stat(s->file, &st) != 0) rc = sh_fail(&err, SH_EIO, "%s: %s", s->file, strerror(errno));
-    unlink(s->stream);
+    if (rc == SH_OK)
+        unlink(s->stream);
+    else
+        empty_folder(s);
     pthread_mutex_lock(&s->lock);
     s->state = rc == SH_OK ? SAVE_DONE : SAVE_FAILED;
     s->bytes = (uint64_t)st.st_size;
@@ -122,7 +161,10 @@ static void put_state(struct json *json, const void *ctx)
     json_open_object(json, NULL);
     json_string(json, "state", words[s->state]);
     json_string(json, "as", s->as);
+    json_uint(json, "file", s->number);
     json_uint(json, "bytes", s->state == SAVE_DONE ? s->bytes : 0);
+    json_uint(json, "gone", s->gone);
+    json_uint(json, "lost_frames", s->lost_frames);
     json_close_object(json);
 }
 
@@ -143,7 +185,9 @@ static int begin(struct save *s, const char *as, struct sh_err *err)
     if (rc == SH_OK) rc = make_folder(s, err);
     if (rc != SH_OK) return rc;
     save_join(s);
-    unlink(s->file);
+    empty_folder(s);
+    s->number++;
+    s->gone = s->lost_frames = 0;
     snprintf(s->as, sizeof s->as, "%s", as);
     snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
     snprintf(s->file, sizeof s->file, "%s/points.%s", s->folder, as);
@@ -180,13 +224,28 @@ static int read_piece(const char *path, uint64_t from, struct web_body *out, str
     return rc;
 }
 
+/* "file=NUMBER&from=POSITION". */
+static int read_place(const char *query, uint64_t *number, uint64_t *from, struct sh_err *err)
+{
+    static const char name[] = "file=";
+    const size_t named = sizeof name - 1;
+    const size_t digits = strncmp(query, name, named) == 0 ? strspn(query + named, "0123456789") : 0;
+    if (digits < 1 || digits > 18 || query[named + digits] != '&')
+        return sh_fail(err, SH_EINPUT, "%.64s: allowed is file=NUMBER&from=POSITION", query);
+    *number = strtoull(query + named, NULL, 10);
+    return past_read_position(query + named + digits + 1, from, err);
+}
+
 int save_get_piece(struct save *s, const char *query, struct web_body *out, struct sh_err *err)
 {
-    uint64_t from;
-    int rc = past_read_position(query, &from, err);
+    uint64_t number = 0, from = 0;
+    int rc = read_place(query, &number, &from, err);
     if (rc != SH_OK) return rc;
     pthread_mutex_lock(&s->lock);
-    rc = s->state == SAVE_DONE ? read_piece(s->file, from, out, err) : SH_EINPUT; /* nothing is there */
+    if (number != s->number || s->state != SAVE_DONE)
+        rc = sh_fail(err, SH_EINPUT, "file %" PRIu64 " is not there; /save has the number of the last one", number);
+    else
+        rc = read_piece(s->file, from, out, err);
     pthread_mutex_unlock(&s->lock);
     return rc;
 }
@@ -205,8 +264,9 @@ struct save *save_create(struct past *past)
 void save_free(struct save *s)
 {
     if (s == NULL) return;
+    atomic_store(&s->ends, 1);
     save_join(s);
-    if (s->file[0] != '\0') unlink(s->file);
+    empty_folder(s);
     if (s->folder[0] != '\0') rmdir(s->folder);
     pthread_mutex_destroy(&s->lock);
     free(s);

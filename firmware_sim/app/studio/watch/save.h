@@ -17,13 +17,13 @@ enum { SAVE_PIECE = 4 << 20 }; /* the most bytes of a piece */
 
 /* past must live on until save_free. NULL: no memory. */
 struct save *save_create(struct past *past);
-/* `/save?as=las` begins a file, `/save` asks for it: JSON with `state` (idle, working, done), `as` and `bytes`.
+/* `/save?as=las` begins a file, `/save` asks for it: JSON (README.md).
  * SH_EINPUT: a format that it can't be, or one is being made. A file that could not be made is an error once. */
 int save_get(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
-/* `/saved?from=POSITION` gives bytes of the finished file from that position; at the file's end it gives none.
- * SH_EINPUT: there is no file. */
+/* `/saved?file=NUMBER&from=POSITION` gives bytes of that file from that position; at the file's end it gives none.
+ * SH_EINPUT: the file is not there. */
 int save_get_piece(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
-/* Waits for a file that is being made. save may be NULL. */
+/* Stops a file that is being made. save may be NULL. */
 void save_free(struct save *save);
 
 #endif
