@@ -244,6 +244,46 @@ static void test_search_gives_way(void **state)
     close_room(&r);
 }
 
+static void ask_dragged(struct room *r, int i, int waits)
+{
+    struct web_body body;
+    char query[96];
+    snprintf(query, sizeof query, "station=1&x_m=%g&y_m=1&z_m=1.2&heading_deg=0&step_deg=%d", 1.0 + 0.01 * i,
+             waits ? 4 : 1);
+    if (waits)
+        body = need(r, "/preview", query);
+    else
+        assert_int_equal(preview_get(r->preview, "/preview", query, &body, &err), SH_OK);
+    free(body.bytes);
+}
+
+/* Pages that drag on and on neither keep the suggestion of another page waiting, nor take its preview out. 64 answers
+ * are kept, and that preview is the oldest of 62 when the search is asked for. Only the newest of three places is waited
+ * for each time, so that another one always waits. */
+static void test_drag_beside_search(void **state)
+{
+    (void)state;
+    enum { KEPT = 61, ROUNDS = 20 };
+    struct room r = open_room("");
+    struct web_body leg = need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body body = {NULL, NULL, 0};
+    char query[64];
+    int n = 0;
+    snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
+    while (n < KEPT)
+        ask_dragged(&r, n++, 1);
+    while (body.len == 0 && n < KEPT + 3 * ROUNDS) {
+        free(body.bytes);
+        if (preview_get(r.preview, "/next", query, &body, &err) != SH_OK) fail_msg("after %d places: %s", n, err.text);
+        for (int i = 0; i < 3; i++)
+            ask_dragged(&r, n++, i == 2);
+    }
+    assert_int_not_equal(body.len, 0);
+    free(body.bytes);
+    free(leg.bytes);
+    close_room(&r);
+}
+
 /* The bottom of a closed body lies on the ground: only who stands within the body sees it, and nobody does. */
 static void test_bodies(void **state)
 {
@@ -391,10 +431,18 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),        cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_next),          cmocka_unit_test(test_reach),    cmocka_unit_test(test_search_gives_way),
-        cmocka_unit_test(test_bodies),        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners),
-        cmocka_unit_test(test_without_cells), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),
+        cmocka_unit_test(test_settings),
+        cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_next),
+        cmocka_unit_test(test_reach),
+        cmocka_unit_test(test_search_gives_way),
+        cmocka_unit_test(test_drag_beside_search),
+        cmocka_unit_test(test_bodies),
+        cmocka_unit_test(test_tripod),
+        cmocka_unit_test(test_scanners),
+        cmocka_unit_test(test_without_cells),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

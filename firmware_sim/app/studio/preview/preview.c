@@ -4,8 +4,10 @@
  *     free --asked--> waiting --taken--> working --> done --asked--> its body, again and again
  *
  * A request is known by its text. One for a place stops the search for a next station, which takes longer and then
- * begins again, so that a dragged station does not wait for it. The newest one is worked on first: while a station is dragged, older ones are about
- * places that it has left. One that nobody asked for lately gives its slot away, and so do the oldest answers. */
+ * begins again, so that a dragged station does not wait for it. The newest one is worked on first: while a station is
+ * dragged, older ones are about places that it has left. A search lets some places pass, and is then due: another page
+ * may drag all the time. One that nobody asked for lately gives its slot away, and so do the oldest answers, except
+ * those that a search names. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
 #include <pthread.h>
@@ -20,9 +22,10 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/base/clock.h"
 
-enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20 };
+enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
 static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
+static const int64_t LATELY_NS = 500000000; /* it does so at least every 0.2 s; its way to the head takes some, too */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
 
@@ -32,6 +35,7 @@ struct job {
     struct preview_request request;
     uint32_t number; /* from 1, never used again */
     int64_t asked_ns;
+    int passed; /* of a search: so many others were worked on while it waited */
     struct web_body body;
     int rc;
     struct sh_err err;
@@ -43,7 +47,7 @@ struct preview {
     struct preview_work work;
     struct coverage *blind;                       /* of a scene that has no coverage */
     struct sh_err why;                            /* there is none of these either */
-    atomic_int ending, is_search, is_place_asked; /* of the work at hand; since it began */
+    atomic_int ending, gives_way, is_place_asked; /* the work at hand; since it began */
     pthread_t thread;
     int running;
     pthread_mutex_t lock;
@@ -70,12 +74,38 @@ static struct job *find_job(struct preview *p, const char *text)
     return NULL;
 }
 
-/* The one asked for longest ago of a state; NULL: none. */
+static int is_search(const struct job *job)
+{
+    return job->request.kind == PREVIEW_NEXT || job->request.kind == PREVIEW_REACH;
+}
+
+static int is_asked_within(const struct job *job, int64_t ns)
+{
+    return clock_now_ns() - job->asked_ns <= ns;
+}
+
+/* Whether a search that has no answer yet needs this one. */
+static int is_named(const struct preview *p, uint32_t number)
+{
+    for (int i = 0; i < JOBS; i++) {
+        const struct job *job = &p->job[i];
+        const int waits = job->state == JOB_WAITING && is_asked_within(job, FORGOTTEN_NS);
+        if (!is_search(job) || !(waits || job->state == JOB_WORKING)) continue;
+        for (uint32_t k = 0; k < job->request.n_of; k++)
+            if (job->request.of[k] == number) return 1;
+    }
+    return 0;
+}
+
+/* The one asked for longest ago of a state; NULL: none. Answers that a search names are none of them. */
 static struct job *oldest_of(struct preview *p, enum job_state state)
 {
     struct job *oldest = NULL;
-    for (int i = 0; i < JOBS; i++)
-        if (p->job[i].state == state && (oldest == NULL || p->job[i].asked_ns < oldest->asked_ns)) oldest = &p->job[i];
+    for (int i = 0; i < JOBS; i++) {
+        struct job *job = &p->job[i];
+        if (job->state != state || (oldest != NULL && job->asked_ns >= oldest->asked_ns)) continue;
+        if (state != JOB_DONE || !is_named(p, job->number)) oldest = job;
+    }
     return oldest;
 }
 
@@ -84,20 +114,30 @@ static struct job *free_slot(struct preview *p)
     struct job *job = oldest_of(p, JOB_FREE);
     if (job == NULL) {
         job = oldest_of(p, JOB_WAITING);
-        if (job != NULL && clock_now_ns() - job->asked_ns < FORGOTTEN_NS) job = NULL;
+        if (job != NULL && is_asked_within(job, FORGOTTEN_NS)) job = NULL;
     }
     if (job == NULL) job = oldest_of(p, JOB_DONE);
     if (job != NULL && job->state != JOB_FREE) forget_job(p, job);
     return job;
 }
 
-static struct job *newest_waiting(struct preview *p)
+/* A search that has let enough places pass. One that its page has left is not. */
+static int is_due(const struct job *job)
 {
-    struct job *newest = NULL;
-    for (int i = 0; i < JOBS; i++)
-        if (p->job[i].state == JOB_WAITING && (newest == NULL || p->job[i].number > newest->number))
-            newest = &p->job[i];
-    return newest;
+    return is_search(job) && job->passed >= MOST_PASSED && is_asked_within(job, LATELY_NS);
+}
+
+/* The newest one that waits, unless a search is due. */
+static struct job *next_waiting(struct preview *p)
+{
+    struct job *next = NULL;
+    for (int i = 0; i < JOBS; i++) {
+        struct job *job = &p->job[i];
+        if (job->state != JOB_WAITING) continue;
+        if (is_due(job)) return job;
+        if (next == NULL || job->number > next->number) next = job;
+    }
+    return next;
 }
 
 /* ---- the work */
@@ -106,7 +146,7 @@ static int must_stop(void *ctx)
 {
     const struct preview *p = ctx;
     return atomic_load_explicit(&p->ending, memory_order_relaxed) ||
-           (atomic_load_explicit(&p->is_search, memory_order_relaxed) &&
+           (atomic_load_explicit(&p->gives_way, memory_order_relaxed) &&
             atomic_load_explicit(&p->is_place_asked, memory_order_relaxed));
 }
 
@@ -163,7 +203,9 @@ static void preview_do(struct preview *p, struct job *job)
     struct sh_err err = {0, ""};
     job->state = JOB_WORKING;
     atomic_store(&p->is_place_asked, 0);
-    atomic_store(&p->is_search, job->request.kind == PREVIEW_NEXT || job->request.kind == PREVIEW_REACH);
+    atomic_store(&p->gives_way, is_search(job) && !is_due(job));
+    for (int i = 0; i < JOBS; i++)
+        p->job[i].passed += p->job[i].state == JOB_WAITING;
     pthread_mutex_unlock(&p->lock);
     const int rc = work_on(p, &job->request, job->number, &body, &err);
     pthread_mutex_lock(&p->lock);
@@ -204,10 +246,10 @@ static void *preview_run(void *ctx)
     if (p->work.coverage == NULL && make_blind(p, &p->why) == SH_OK) p->work.coverage = p->blind;
     pthread_mutex_lock(&p->lock);
     while (!atomic_load(&p->ending)) {
-        struct job *job = newest_waiting(p);
+        struct job *job = next_waiting(p);
         if (job == NULL)
             pthread_cond_wait(&p->wake, &p->lock);
-        else if (clock_now_ns() - job->asked_ns > FORGOTTEN_NS)
+        else if (!is_asked_within(job, FORGOTTEN_NS))
             forget_job(p, job);
         else
             preview_do(p, job);
@@ -278,7 +320,7 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
     p->options = *options;
     atomic_init(&p->ending, 0);
-    atomic_init(&p->is_search, 0);
+    atomic_init(&p->gives_way, 0);
     atomic_init(&p->is_place_asked, 0);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->wake, NULL);
