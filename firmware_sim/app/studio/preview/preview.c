@@ -29,14 +29,21 @@ static const int64_t LATELY_NS = 500000000; /* it does so at least every 0.2 s; 
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
 
+/* It is freed once neither its job nor a reader has it. */
+struct answer {
+    struct answer *next;
+    struct web_body body;
+    int holders;
+};
+
 struct job {
     enum job_state state;
     char *text; /* path?query */
     struct preview_request request;
     uint32_t number; /* from 1, never used again */
     int64_t asked_ns;
-    int passed; /* of a search: so many others were worked on while it waited */
-    struct web_body body;
+    int passed;            /* of a search: so many others were worked on while it waited */
+    struct answer *answer; /* NULL: none, or a refusal */
     int rc;
     struct sh_err err;
 };
@@ -54,16 +61,30 @@ struct preview {
     pthread_cond_t wake;
     struct job job[JOBS];
     uint32_t numbers;
-    size_t bytes; /* of all bodies */
+    struct answer *answers;
+    size_t bytes; /* of those that jobs have */
 };
 
 /* ---- slots; the lock is held */
 
+static void let_go(struct preview *p, struct answer *answer)
+{
+    struct answer **at = &p->answers;
+    if (--answer->holders > 0) return;
+    while (*at != answer)
+        at = &(*at)->next;
+    *at = answer->next;
+    free(answer->body.bytes);
+    free(answer);
+}
+
 static void forget_job(struct preview *p, struct job *job)
 {
-    p->bytes -= job->body.len;
+    if (job->answer != NULL) {
+        p->bytes -= job->answer->body.len;
+        let_go(p, job->answer);
+    }
     free(job->text);
-    free(job->body.bytes);
     *job = (struct job){.state = JOB_FREE};
 }
 
@@ -160,10 +181,11 @@ static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *se
         const struct job *job = &p->job[i];
         if (job->number != number || job->state != JOB_DONE || job->rc != SH_OK || job->request.kind != PREVIEW_PLACE)
             continue;
+        const char *bytes = job->answer->body.bytes;
         for (size_t k = 0; k < words; k++)
-            seen->cells[k] = le_get64(job->body.bytes + PREVIEW_CELLS_AT + 8 * k);
-        seen->hits = le_get32(job->body.bytes + PREVIEW_HITS_AT);
-        seen->front = le_get32(job->body.bytes + PREVIEW_FRONT_AT);
+            seen->cells[k] = le_get64(bytes + PREVIEW_CELLS_AT + 8 * k);
+        seen->hits = le_get32(bytes + PREVIEW_HITS_AT);
+        seen->front = le_get32(bytes + PREVIEW_FRONT_AT);
         return SH_OK;
     }
     return sh_fail(err, SH_EINPUT, "preview %u is kept no more; ask for its place again", number);
@@ -207,17 +229,18 @@ static void preview_do(struct preview *p, struct job *job)
     for (int i = 0; i < JOBS; i++)
         p->job[i].passed += p->job[i].state == JOB_WAITING;
     pthread_mutex_unlock(&p->lock);
-    const int rc = work_on(p, &job->request, job->number, &body, &err);
+    int rc = work_on(p, &job->request, job->number, &body, &err);
+    struct answer *answer = rc == SH_OK ? malloc(sizeof *answer) : NULL;
+    if (rc == SH_OK && answer == NULL) rc = sh_fail(&err, SH_ENOMEM, "no memory for a preview");
+    if (rc != SH_OK) free(body.bytes);
     pthread_mutex_lock(&p->lock);
-    if (rc != SH_OK) {
-        free(body.bytes);
-        body = (struct web_body){NULL, NULL, 0};
-    }
     job->state = rc == SH_ESTOPPED ? JOB_WAITING : JOB_DONE;
     if (job->state == JOB_WAITING) return;
     job->rc = rc;
     job->err = err;
-    job->body = body;
+    if (rc != SH_OK) return;
+    *answer = (struct answer){p->answers, body, 1};
+    p->answers = job->answer = answer;
     p->bytes += body.len;
     while (p->bytes > MOST_BYTES) {
         struct job *old = oldest_of(p, JOB_DONE);
@@ -276,15 +299,25 @@ static int add_job(struct preview *p, char *text, const struct preview_request *
     return SH_OK;
 }
 
-static int give(const struct job *job, struct web_body *out, struct sh_err *err)
+/* An answer may have megabytes, and slow readers: all share one. */
+static int lend(struct job *job, struct web_body *out, struct sh_err *err)
 {
     const int is_done = job->state == JOB_DONE;
     if (is_done && job->rc != SH_OK) return sh_fail(err, job->rc, "%s", job->err.text);
-    *out = (struct web_body){is_done ? job->body.type : "application/octet-stream", NULL, is_done ? job->body.len : 0};
-    out->bytes = malloc(out->len + 1);
-    if (out->bytes == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a preview");
-    if (out->len > 0) memcpy(out->bytes, job->body.bytes, out->len);
+    *out = is_done ? job->answer->body : (struct web_body){"application/octet-stream", NULL, 0};
+    if (is_done) job->answer->holders++;
     return SH_OK;
+}
+
+void preview_release(struct preview *p, char *bytes)
+{
+    pthread_mutex_lock(&p->lock);
+    struct answer *answer = p->answers;
+    while (answer != NULL && answer->body.bytes != bytes)
+        answer = answer->next;
+    if (answer != NULL) let_go(p, answer);
+    pthread_mutex_unlock(&p->lock);
+    if (answer == NULL) free(bytes);
 }
 
 int preview_get(struct preview *p, const char *path, const char *query, struct web_body *out, struct sh_err *err)
@@ -304,7 +337,7 @@ int preview_get(struct preview *p, const char *path, const char *query, struct w
         rc = add_job(p, text, &request, &job, err);
     if (rc == SH_OK) {
         job->asked_ns = clock_now_ns();
-        rc = give(job, out, err);
+        rc = lend(job, out, err);
     }
     pthread_mutex_unlock(&p->lock);
     return rc;
