@@ -148,8 +148,12 @@ void web_session_gone(struct web_conn *conn)
 void web_conn_end(struct web_conn *conn)
 {
     web_session_gone(conn);
-    free(conn->owned);
+    if (conn->owned != NULL && conn->lender != NULL && conn->lender->release != NULL)
+        conn->lender->release(conn->lender->ctx, conn->owned);
+    else
+        free(conn->owned);
     conn->owned = NULL;
+    conn->lender = NULL;
     conn->wsi = NULL;
     conn->place.phase = WEB_NOBODY;
 }

@@ -9,7 +9,7 @@
 
 struct web_body {
     const char *type; /* of the content: "application/json" */
-    char *bytes;      /* malloc'd; the link frees them */
+    char *bytes;      /* malloc'd; the link releases them */
     size_t len;
 };
 
@@ -20,6 +20,7 @@ struct web_source {
      * path; with a text: err says what is wrong with the request. Other SH_E: the resource can't be had, and err says
      * why. */
     int (*get)(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err);
+    void (*release)(void *ctx, char *bytes); /* of a body that was sent; NULL: free() */
 };
 
 #endif

@@ -88,6 +88,7 @@ int web_http_begin(struct web_link *web, struct web_conn *conn)
     if (rc == SH_EINPUT && err.text[0] == '\0') return web_http_say(conn, 404, "there is nothing at this path");
     if (rc != SH_OK) return web_http_say(conn, rc == SH_EINPUT ? 400 : 503, err.text);
     conn->bytes = conn->owned = body.bytes;
+    conn->lender = web->source;
     conn->len = body.len;
     return answer(conn, 200, body.type);
 }

@@ -95,7 +95,8 @@ struct web_conn {
     struct web_session *session;
     const char *bytes; /* of the answer that is on its way */
     size_t len, sent;
-    char *owned; /* freed at the end; NULL: built in */
+    char *owned;                     /* released at the end; NULL: built in */
+    const struct web_source *lender; /* of owned; NULL: it is freed */
 };
 
 struct web_link {

@@ -239,6 +239,17 @@ export async function testTools(browser, url, points) {
     await page.key('Escape');
     equal(await page.eval('document.querySelector("#panorama").hidden'), true, 'Escape leaves it');
   });
+
+  await test('an empty field of a section is no number', async () => {
+    await page.press('#tool-section');
+    await page.press('#section-box');
+    const before = await page.eval('scanhead.view.camera.section.middle');
+    await page.fill('#section-x', '');
+    is(/^Refused/.test(await page.until(`[...document.querySelectorAll('#tool [role=status]')].map((e) => e.textContent).join('')`)), 'it is refused');
+    equal((await page.eval('scanhead.view.camera.section.middle')).join(), before.join(), 'its middle');
+    await page.press('#section-off');
+    await page.key('Escape');
+  });
   equal(page.faults.join('\n'), '', 'errors of its scripts');
   await page.close();
 }

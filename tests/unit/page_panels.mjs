@@ -2,7 +2,7 @@
 // The page's panels without a browser: contrast of its colours, a head's description of its settings, events in words,
 // the files of a recording. Expected values are by hand.
 import {readFileSync} from 'node:fs';
-import {duration, metres, grouped, short} from '../../drivers/link/web/page.js';
+import {duration, metres, grouped, numberOf, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit} from '../../drivers/link/web/knobs.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
@@ -11,6 +11,8 @@ import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
 import {batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf, seenWithin} from '../../drivers/link/web/previews.js';
+import {Cloud} from '../../drivers/link/web/cloud.js';
+import {Trial} from '../../drivers/link/web/trial.js';
 import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
 import {Section} from '../../drivers/link/web/section.js';
 import {runTests, test} from './page_tap.mjs';
@@ -225,6 +227,91 @@ test('previews: bytes by hand become points, and cells that are seen', () => {
   equal([b.n, b.shots, b.station, b.scan], [2, 9, 3, 4]);
   equal([[...b.x], [...b.y], [...b.z], [...b.label]], [[13, 10], [20, 24], [1.5, 0.5], [5, 65535]]);
   equal([...p.seen], [2, 0], 'cell 1');
+});
+
+// Runs a trial whose head gives these answers: answer(path) returns {ok, text} or bytes of a preview.
+async function tried(answer, run) {
+  const {fetch} = globalThis, asked = [];
+  globalThis.fetch = async (path, {signal} = {}) => {
+    asked.push(path);
+    signal?.throwIfAborted();
+    const {status = 400, text, bytes} = answer(path);
+    return {ok: bytes !== undefined, status, text: async () => text, arrayBuffer: async () => bytes};
+  };
+  const cloud = new Cloud(), trial = new Trial(cloud, [{number: 1, x_m: 0, y_m: 0, z_m: 1, heading_deg: 0, pitch_deg: 0, roll_deg: 0}]);
+  const rests = async () => {
+    while (trial.isBusy) await new Promise((done) => setTimeout(done, 1));
+  };
+  try {
+    await rests();
+    await run({trial, cloud, asked, rests});
+  } finally {
+    trial.end();
+    globalThis.fetch = fetch;
+  }
+}
+
+const onePoint = () => {
+  const bytes = new ArrayBuffer(72 + 18), v = new DataView(bytes);
+  new Uint8Array(bytes).set(Buffer.from('SHPV'));
+  [[4, 1], [16, 1], [20, 1]].forEach(([at, n]) => v.setUint32(at, n, true));
+  return bytes;
+};
+
+test('a trial: a refused place has no points; the reason stays until one is answered, and points have no time', async () => {
+  let isRight = true;
+  const answer = (path) => (path === '/cells' ? {text: 'no cells'} : isRight ? {bytes: onePoint()} : {text: 'too far'});
+  await tried(answer, async ({trial, cloud, rests}) => {
+    const [s] = trial.stations;
+    equal([cloud.count, s.error, cloud.latest_s === -Infinity], [1, '', true]);
+    isRight = false;
+    trial.change(1, {x_m: 1e9});
+    await rests();
+    equal([cloud.count, s.points, s.error], [0, 0, 'too far']);
+    isRight = true;
+    trial.change(1, {x_m: 0});
+    await rests();
+    equal([cloud.count, s.error], [1, '']);
+  });
+});
+
+test('a trial: a suggestion that is refused is told, not asked for again and again; nor is one beyond 16 stations', async () => {
+  let words = 'height_m=9: allowed is less';
+  const answer = (path) => (path.startsWith('/next') ? {text: words} : path === '/cells' ? {text: 'no cells'} : {bytes: onePoint()});
+  await tried(answer, async ({trial, asked, rests}) => {
+    trial.stations[0].seen = new Uint32Array(2);
+    await trial.suggest();
+    equal([trial.nextError, trial.isBusy], [words, false]);
+    words = 'preview 1 is kept no more; ask for its place again';
+    const renewed = [];
+    for (let i = 0; i < 4; i++) {
+      await trial.suggest();
+      renewed.push(trial.isBusy);
+      await rests();
+    }
+    equal([renewed, trial.nextError], [[true, true, true, false], words]);
+    for (let i = 0; i < 16; i++) trial.add({}, trial.stations[0]);
+    await rests();
+    for (const s of trial.stations) s.seen = new Uint32Array(2);
+    const n = asked.length;
+    await trial.suggest();
+    equal([trial.nextError, asked.length], ['The head suggests a place beside at most 16 stations; there are 17.', n]);
+  });
+});
+
+test('a trial that has ended asks no more for what the head has not worked out yet', async () => {
+  const answer = (path) => (path === '/cells' ? {bytes: new ArrayBuffer(0)} : {bytes: onePoint()});
+  await tried(answer, async ({trial, asked}) => {
+    trial.end();
+    await new Promise((done) => setTimeout(done, 0));
+    const n = asked.filter((path) => path === '/cells').length;
+    await new Promise((done) => setTimeout(done, 60)); // four times the first pause between two questions
+    equal(asked.filter((path) => path === '/cells').length <= n + 1 && trial.isBlind === false, true);
+  });
+});
+
+test('a number that a user has written: an empty text is none', () => {
+  equal(['', ' ', '−1,5', ' 2.5 ', 'x'].map(numberOf).map((v) => (Number.isNaN(v) ? null : v)), [null, null, -1.5, 2.5, null]);
 });
 
 test('previews: damage is refused in words', () => {

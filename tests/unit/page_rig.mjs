@@ -21,9 +21,9 @@ export function throws(run, words) {
 }
 
 // Makes n points; place(i) gives x, y, z.
-export function batch(n, place, {scan = 1, station = 1, pulse0 = 0} = {}) {
+export function batch(n, place, {scan = 1, station = 1, pulse0 = 0, t = new Float32Array(n)} = {}) {
   const f64 = () => new Float64Array(n), f32 = () => new Float32Array(n);
-  const b = {n, shots: n, scan, station, frame: 0, line: 0, pulse0, x: f64(), y: f64(), z: f64(), pulse: f64(), t: f32(), range: f32(),
+  const b = {n, shots: n, scan, station, frame: 0, line: 0, pulse0, x: f64(), y: f64(), z: f64(), pulse: f64(), t, range: f32(),
     reflectance: f32().fill(NaN), amplitude: f32().fill(NaN), label: new Uint16Array(n), echo: new Uint8Array(n).fill(1),
     echoes: new Uint8Array(n).fill(1), rgb: null};
   for (let i = 0; i < n; i++) {

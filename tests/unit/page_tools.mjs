@@ -294,9 +294,38 @@ test('a panorama: points at their angles, the nearest of each direction, other s
   near(panorama.colours('range').limits[0], 7, 0.2, 'limits of the range');
   const filled = pixels.filter((v, i) => i % 4 === 3 && v === 255).length;
   same(filled > 0.95 * pixels.length / 4, true, `${filled} of ${pixels.length / 4} pixels have a colour`);
-  same(panorama.isOld, false, 'nothing has come');
+  same(panorama.isOld(cloud, null), false, 'nothing has come');
   cloud.add(batch(1, () => placeOf(toScene(STATION, 5, 0, 0)), {scan: 2}));
-  same(panorama.isOld, true, 'a point has come');
+  same(panorama.isOld(cloud, null), true, 'a point has come');
+});
+
+test('a panorama and the time line, a section, another cloud: only what is shown, and no point of what was cleared', () => {
+  const cloud = new Cloud();
+  const places = Array.from({length: 90}, (_, i) => placeOf(toScene(STATION, 7, 0, radians(i))));
+  cloud.add(batch(places.length, (i) => places[i], {t: Float32Array.from(places, (_, i) => i)}));
+  const all = ended(new Panorama(cloud, STATION).make());
+  const low = new Section({kind: 'height', middle: [0, 0, -1e3], half: [1, 1, 1]});
+  same(ended(new Panorama(cloud, STATION, low).make()).n, 0, 'nothing is in the section');
+  same([all.isOld(cloud, null), all.isOld(cloud, low), all.isOld(new Cloud(), null)], [false, true, true], 'a section, another cloud');
+  cloud.window = {from: 10, to: 19.5};
+  same(all.isOld(cloud, null), true, 'other times');
+  same(ended(new Panorama(cloud, STATION).make()).n, 10, 'points of these times');
+  cloud.clear();
+  cloud.add(batch(1, () => [900, 0, 0]));
+  same([all.isOld(cloud, null), all.pointAt(0, 0)], [true, null], 'the cloud was cleared');
+});
+
+test('flatness and spacing are of the points that the time line shows', () => {
+  const cloud = new Cloud();
+  const grid = (z, t, scan) => batch(900, (i) => [0.1 * (i % 30), 0.1 * Math.floor(i / 30), z], {t: new Float32Array(900).fill(t), scan});
+  cloud.add(grid(0, 1, 1));
+  cloud.add(grid(0.004, 5, 1));
+  const corners = [[0.45, 0.45], [2.45, 0.45], [2.45, 2.45], [0.45, 2.45]].map(([x, y]) => ({x, y, z: 0, error: null}));
+  const both = ended(pointsOnFace(cloud, camera(), corners, 0.05)).places.length / 3;
+  const near2 = ended(spacingAround(cloud, [1.5, 1.5, 0], 0.5));
+  cloud.window = {from: 0, to: 2};
+  same(ended(pointsOnFace(cloud, camera(), corners, 0.05)).places.length / 3, both / 2, 'half of the points');
+  same(ended(spacingAround(cloud, [1.5, 1.5, 0], 0.5)) > 1.2 * near2, true, 'points are further apart'); // by the root of 2
 });
 
 test('pixels of a panorama are wider where lines are further apart than the points in them', () => {

@@ -130,7 +130,7 @@ static void test_points(void **state)
         assert_true(off_walls(p) < 3 * 0x1p-21);
         assert_true(fabs(sqrt(range2) - (double)le_get_float(at + 12 * (size_t)n + 4 * i)) < 3 * 0x1p-21);
     }
-    free(b.bytes);
+    preview_release(r.preview, b.bytes);
     close_room(&r);
 }
 
@@ -150,8 +150,8 @@ static void test_settings(void **state)
         behind += le_get_float(xyz_of(&east) + 12 * i) < 0.0f;
     assert_true(behind < points_of(&east)); /* lines go up to 60 degrees, so none goes over the zenith */
     assert_int_equal(behind, 0);
-    free(near_by.bytes);
-    free(east.bytes);
+    preview_release(r.preview, near_by.bytes);
+    preview_release(r.preview, east.bytes);
     close_room(&r);
 }
 
@@ -192,8 +192,8 @@ static void test_cells(void **state)
         }
     }
     assert_true(dark > 100 && lit > 20);
-    free(cells.bytes);
-    free(leg.bytes);
+    preview_release(r.preview, cells.bytes);
+    preview_release(r.preview, leg.bytes);
     close_room(&r);
 }
 
@@ -218,9 +218,9 @@ static void test_reach(void **state)
         if ((le_get64(reach.bytes + 16 + 8 * (i / 64)) >> i % 64 & 1) == 0)
             hidden_m2 += (double)le_get_float(cells.bytes + 48 + 4 * i);
     assert_true(hidden_m2 < 0.01 * AREA_M2);
-    free(cells.bytes);
-    free(leg.bytes);
-    free(reach.bytes);
+    preview_release(r.preview, cells.bytes);
+    preview_release(r.preview, leg.bytes);
+    preview_release(r.preview, reach.bytes);
     close_room(&r);
 }
 
@@ -233,15 +233,74 @@ static void test_search_gives_way(void **state)
     char query[96];
     assert_int_equal(preview_get(r.preview, "/reach", "station=1&height_m=1.2", &body, &err), SH_OK);
     for (int i = 0; i < 20; i++) {
-        free(body.bytes);
+        preview_release(r.preview, body.bytes);
         snprintf(query, sizeof query, "station=1&x_m=%g&y_m=1&z_m=1.2&heading_deg=0", 1.0 + 0.1 * i);
         body = need(&r, "/preview", query);
         assert_int_equal(points_of(&body), 50 * 180);
     }
-    free(body.bytes);
+    preview_release(r.preview, body.bytes);
     reach = need(&r, "/reach", "station=1&height_m=1.2");
     assert_true(le_get32(reach.bytes + 12) > 50);
-    free(reach.bytes);
+    preview_release(r.preview, reach.bytes);
+    close_room(&r);
+}
+
+static void ask_dragged(struct room *r, int i, int waits)
+{
+    struct web_body body;
+    char query[96];
+    snprintf(query, sizeof query, "station=1&x_m=%g&y_m=1&z_m=1.2&heading_deg=0&step_deg=%d", 1.0 + 0.01 * i,
+             waits ? 4 : 1);
+    if (waits)
+        body = need(r, "/preview", query);
+    else
+        assert_int_equal(preview_get(r->preview, "/preview", query, &body, &err), SH_OK);
+    preview_release(r->preview, body.bytes);
+}
+
+/* Pages that drag on and on neither keep the suggestion of another page waiting, nor take its preview out. 64 answers
+ * are kept, and that preview is the oldest of 62 when the search is asked for. Only the newest of three places is waited
+ * for each time, so that another one always waits. */
+static void test_drag_beside_search(void **state)
+{
+    (void)state;
+    enum { KEPT = 61, ROUNDS = 20 };
+    struct room r = open_room("");
+    struct web_body leg = need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body body = {NULL, NULL, 0};
+    char query[64];
+    int n = 0;
+    snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
+    while (n < KEPT)
+        ask_dragged(&r, n++, 1);
+    while (body.len == 0 && n < KEPT + 3 * ROUNDS) {
+        preview_release(r.preview, body.bytes);
+        if (preview_get(r.preview, "/next", query, &body, &err) != SH_OK) fail_msg("after %d places: %s", n, err.text);
+        for (int i = 0; i < 3; i++)
+            ask_dragged(&r, n++, i == 2);
+    }
+    assert_int_not_equal(body.len, 0);
+    preview_release(r.preview, body.bytes);
+    preview_release(r.preview, leg.bytes);
+    close_room(&r);
+}
+
+/* All readers of an answer share it, and it stays for them once 64 later ones have taken its slot. */
+static void test_shared(void **state)
+{
+    (void)state;
+    static const char query[] = "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0";
+    struct room r = open_room("");
+    struct web_body one = need(&r, "/preview", query), two = need(&r, "/preview", query);
+    assert_ptr_equal(one.bytes, two.bytes);
+    for (int i = 0; i < 64; i++)
+        ask_dragged(&r, i, 1);
+    struct web_body again = need(&r, "/preview", query);
+    assert_ptr_not_equal(one.bytes, again.bytes);
+    preview_release(r.preview, two.bytes);
+    assert_int_equal(points_of(&one), points_of(&again));
+    preview_release(r.preview, one.bytes);
+    preview_release(r.preview, again.bytes);
     close_room(&r);
 }
 
@@ -270,9 +329,9 @@ static void test_bodies(void **state)
     }
     assert_true(bottom > 50);
     assert_int_equal(seen, 0);
-    free(cells.bytes);
-    free(leg.bytes);
-    free(reach.bytes);
+    preview_release(r.preview, cells.bytes);
+    preview_release(r.preview, leg.bytes);
+    preview_release(r.preview, reach.bytes);
     close_room(&r);
 }
 
@@ -302,8 +361,8 @@ static void test_next(void **state)
     assert_true(number_of(json, "none_m2") < 0.1 * AREA_M2);
     assert_int_equal(ask(&r, "/next", "station=1&p1=999", &none), SH_EINPUT);
     assert_non_null(strstr(err.text, "preview 999 is kept no more"));
-    free(leg.bytes);
-    free(next.bytes);
+    preview_release(r.preview, leg.bytes);
+    preview_release(r.preview, next.bytes);
     close_room(&r);
 }
 
@@ -320,8 +379,8 @@ static void test_tripod(void **state)
     assert_true(fabs((double)le_get_float(b.bytes + 60) - 1.3 * tan(opening_rad)) < 1e-6);
     assert_true(fabs((double)le_get_float(b.bytes + 64) - 1.5 * sin(opening_rad)) < 1e-6);
     assert_true(isnan(le_get_float(none.bytes + 56)));
-    free(b.bytes);
-    free(none.bytes);
+    preview_release(r.preview, b.bytes);
+    preview_release(r.preview, none.bytes);
     close_room(&r);
 }
 
@@ -337,8 +396,8 @@ static void test_scanners(void **state)
     const uint32_t pulses = le_get32(fine.bytes + 20);
     assert_true(pulses >= 16 * 1808 && pulses <= 16 * 1809);
     assert_int_equal(le_get32(coarse.bytes + 20), pulses);
-    free(coarse.bytes);
-    free(fine.bytes);
+    preview_release(r.preview, coarse.bytes);
+    preview_release(r.preview, fine.bytes);
     close_room(&r);
 }
 
@@ -354,7 +413,7 @@ static void test_without_cells(void **state)
     struct web_body b = need(&r, "/preview", "station=1&x_m=4.25&y_m=0.75&z_m=1.5&heading_deg=33&step_deg=2");
     assert_int_equal(le_get32(b.bytes + 12), 0);
     assert_int_equal(points_of(&b), 50 * 180);
-    free(b.bytes);
+    preview_release(r.preview, b.bytes);
     assert_int_equal(ask(&r, "/cells", "", &body), SH_ESTATE);
     assert_non_null(strstr(err.text, "too many triangles"));
     assert_int_equal(ask(&r, "/next", "station=1", &body), SH_ESTATE);
@@ -392,10 +451,19 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),        cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_next),          cmocka_unit_test(test_reach),    cmocka_unit_test(test_search_gives_way),
-        cmocka_unit_test(test_bodies),        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners),
-        cmocka_unit_test(test_without_cells), cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),
+        cmocka_unit_test(test_settings),
+        cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_next),
+        cmocka_unit_test(test_reach),
+        cmocka_unit_test(test_search_gives_way),
+        cmocka_unit_test(test_drag_beside_search),
+        cmocka_unit_test(test_shared),
+        cmocka_unit_test(test_bodies),
+        cmocka_unit_test(test_tripod),
+        cmocka_unit_test(test_scanners),
+        cmocka_unit_test(test_without_cells),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

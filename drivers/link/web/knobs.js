@@ -262,7 +262,7 @@ export class Knobs extends EventTarget {
   #nudge(knob, event) {
     if (knob.field.tagName === 'SELECT' || knob.field.readOnly) return;
     const number = Number(knob.field.value);
-    if (!Number.isFinite(number)) return;
+    if (!Number.isFinite(number) || knob.field.value.trim() === '') return;
     event.preventDefault();
     const decimals = (knob.field.value.split('.')[1] ?? '').length;
     const by = 10 ** -decimals * (event.shiftKey ? 10 : 1) * (event.key === 'ArrowUp' ? 1 : -1);

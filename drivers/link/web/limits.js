@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 // This class has the rows of the display for colour scales and their limits. Limits leave out a share of the points, or
 // are set by hand.
-import {kept, make, say} from './page.js';
+import {kept, make, numberOf, say} from './page.js';
 import {MODES} from './view_colours.js';
 import {SCALES} from './view_ramps.js';
 
 const SHARES = [['0.01', '1 % to 99 %'], ['0.05', '5 % to 95 %'], ['0', 'All points'], ['hand', 'By hand']];
-const numberOf = (field) => (field.value.trim() === '' ? NaN : Number(field.value.trim().replace('−', '-')));
 
 export class Limits {
   #view;
@@ -75,7 +74,7 @@ export class Limits {
   // Returns whether the limits hold.
   #apply() {
     const p = this.#parts, isByHand = p.share.value === 'hand' && this.#mode !== 'age';
-    const [low, high] = [numberOf(p.low), numberOf(p.high)], isRight = low < high;
+    const [low, high] = [numberOf(p.low.value), numberOf(p.high.value)], isRight = low < high;
     p.hand.hidden = !isByHand;
     const isBegun = p.low.value.trim() !== '' && p.high.value.trim() !== '';
     say(p.says, !isByHand || isRight || !isBegun ? '' : 'Two numbers; the first has to be the lower one.');

@@ -5,6 +5,7 @@
 // as in core/studio/deviation.h. Along the beam it is the error of the range; across the beam it is the error of the
 // angles times the range. The error of a figure follows from its points to first order, by differences.
 
+import {isOutside, isPointOutside} from './cloud.js';
 import {add, dot, sub} from './view_camera.js';
 import {headAxes} from './view_stations.js';
 import {isWithin} from './section.js';
@@ -140,7 +141,7 @@ const FURTHER = 4; // points up to so many depths from the plane are counted, as
 // Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value
 // is {places (relative to the cloud's origin), plane, beyond}; `beyond` counts points a little further from the plane.
 export function* pointsOnFace(cloud, camera, corners, depth_m) {
-  const origin = cloud.origin;
+  const {origin, window} = cloud;
   const own = corners.map((p) => sub(placeOf(p), origin));
   const plane = planeThrough(own.flat());
   const across = unit(cross(Math.abs(plane.normal[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], plane.normal)), up = cross(plane.normal, across);
@@ -150,19 +151,21 @@ export function* pointsOnFace(cloud, camera, corners, depth_m) {
   const section = camera.section?.relativeTo(origin) ?? null;
   const found = {places: new Float32Array(3000), n: 0, plane, beyond: 0};
   for (const block of [...cloud.blocks]) {
-    if ([0, 1, 2].some((a) => block.lo[a] > plane.middle[a] + reach || block.hi[a] < plane.middle[a] - reach)) continue;
-    takeOnFace(block, {plane, polygon, flat, section, depth_m, reach}, found);
+    if (isOutside(window, block) || [0, 1, 2].some((a) => block.lo[a] > plane.middle[a] + reach || block.hi[a] < plane.middle[a] - reach)) continue;
+    takeOnFace(block, {plane, polygon, flat, section, window, depth_m, reach}, found);
     yield;
   }
   return {plane, beyond: found.beyond, places: found.places.subarray(0, 3 * found.n)};
 }
 
-function takeOnFace({position, n}, {plane, polygon, flat, section, depth_m, reach}, found) {
+function takeOnFace(block, {plane, polygon, flat, section, window, depth_m, reach}, found) {
+  const {position, n} = block;
   const [nx, ny, nz] = plane.normal, [mx, my, mz] = plane.middle;
   for (let i = 0; i < 3 * n; i += 3) {
     const x = position[i] - mx, y = position[i + 1] - my, z = position[i + 2] - mz;
     const away = Math.abs(x * nx + y * ny + z * nz);
     if (!(away <= FURTHER * depth_m) || x * x + y * y + z * z > reach * reach) continue;
+    if (isPointOutside(window, block, i / 3)) continue;
     const p = position.subarray(i, i + 3);
     if (!isInPolygon(polygon, ...flat(p)) || (section !== null && !isWithin(section, ...p))) continue;
     if (away > depth_m) {
@@ -209,14 +212,15 @@ const NEIGHBOURS = 8;
 // Steps towards the mean distance of the points around a place. It follows from the area of the k nearest points, which
 // has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m.
 export function* spacingAround(cloud, place, first_m) {
-  const p = sub(place, cloud.origin);
+  const {window} = cloud, p = sub(place, cloud.origin);
   for (let r = Math.max(1e-4, first_m); r < 6; r *= 3) {
     const near = [];
-    for (const {lo, hi, n, position} of [...cloud.blocks]) {
-      if ([0, 1, 2].some((a) => lo[a] > p[a] + r || hi[a] < p[a] - r)) continue;
+    for (const block of [...cloud.blocks]) {
+      const {lo, hi, n, position} = block;
+      if (isOutside(window, block) || [0, 1, 2].some((a) => lo[a] > p[a] + r || hi[a] < p[a] - r)) continue;
       for (let i = 0; i < 3 * n; i += 3) {
         const d2 = (position[i] - p[0]) ** 2 + (position[i + 1] - p[1]) ** 2 + (position[i + 2] - p[2]) ** 2;
-        if (d2 <= r * r) near.push(d2);
+        if (d2 <= r * r && !isPointOutside(window, block, i / 3)) near.push(d2);
       }
       yield;
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool measures between points that are picked in the picture or the panorama. A click takes the point nearest to
 // it; with keys, Enter takes the one in the middle of the picture.
-import {grouped, make, say} from './page.js';
+import {grouped, make, numberOf, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
 import {runSlowly} from './view_pick.js';
 
@@ -132,7 +132,7 @@ export class MeasureTool {
   }
 
   #endOutline() {
-    const depth_m = Number(this.#depth.value.replace(',', '.'));
+    const depth_m = numberOf(this.#depth.value);
     if (this.#picked.length < 3) return say(this.#says, 'An outline has at least three corners.');
     if (!(depth_m > 0 && depth_m <= 10)) return say(this.#says, 'Refused: the depth is a number from above 0 to 10 m.');
     const corners = this.#picked.splice(0), {cloud, camera} = this.#view;

@@ -29,6 +29,9 @@ export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// Returns the number that a user has written, NaN for none: an empty text is not 0.
+export const numberOf = (text) => (text.trim() === '' ? NaN : Number(text.trim().replace('−', '-').replace(',', '.')));
+
 // Calls at most once in every `ms`; the last call always comes through.
 export function atMostEvery(ms, call) {
   let timer = 0, last = -Infinity;

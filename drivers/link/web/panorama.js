@@ -2,6 +2,8 @@
 // A panorama shows the points of one station as its head sees them. Azimuth goes from the head's forward direction to
 // the right, elevation upward. Each pixel has its nearest point. The module is pure.
 
+import {isOutside, isPointOutside} from './cloud.js';
+import {isWithin} from './section.js';
 import {dot, sub} from './view_camera.js';
 import {headAxes} from './view_stations.js';
 import {GREY, NONE, robustLimits, tableOf, valuesOf} from './view_colours.js';
@@ -14,7 +16,8 @@ const EMPTY = 0xffffffff;
 const SHAPES = [1, 0.125, 0.25, 0.5, 2, 4, 8]; // of pixels: height over width
 const TRIED = 500_000; // points for choosing one of them
 
-// A station is {number, x_m, y_m, z_m, heading_deg, pitch_deg, roll_deg}.
+// A station is {number, x_m, y_m, z_m, heading_deg, pitch_deg, roll_deg}. Points outside the cloud's window of times, or
+// outside the section, are left out.
 export class Panorama {
   width = 0;
   height = 0;
@@ -26,10 +29,17 @@ export class Panorama {
   #block; // per pixel: which of the blocks, and which of its points
   #point;
   #range; // from the head
+  #held = 0; // points of the blocks
+  #window;
+  #origin; // a cloud that was cleared has another one, and blocks of before lie elsewhere in it
+  #section; // as relativeTo() returns it, or null
 
-  constructor(cloud, station) {
+  constructor(cloud, station, section = null) {
     this.cloud = cloud;
     this.station = station;
+    this.#window = cloud.window;
+    this.#origin = cloud.origin;
+    this.#section = section?.relativeTo(cloud.origin) ?? null;
     this.#axes = headAxes(station);
     this.at = [station.x_m, station.y_m, station.z_m];
   }
@@ -41,11 +51,15 @@ export class Panorama {
     return [Math.atan2(x, y), Math.atan2(z, Math.hypot(x, y)), Math.hypot(x, y, z)];
   }
 
-  // Calls take(i, azimuth, elevation, range) for each point of a block.
-  #each({position, n}, take) {
+  // Calls take(i, azimuth, elevation, range) for each point of a block that is shown.
+  #each(block, take) {
+    const {position, n} = block, window = this.#window, section = this.#section;
+    if (isOutside(window, block)) return;
     const [[a, b, c], [d, e, f], [g, h, k]] = this.#axes;
-    const [ox, oy, oz] = sub(this.cloud.origin, this.at);
+    const [ox, oy, oz] = sub(this.#origin, this.at);
     for (let i = 0, p = 0; i < n; i++, p += 3) {
+      if (isPointOutside(window, block, i)) continue;
+      if (section !== null && !isWithin(section, position[p], position[p + 1], position[p + 2])) continue;
       const dx = position[p] + ox, dy = position[p + 1] + oy, dz = position[p + 2] + oz;
       const x = a * dx + b * dy + c * dz, y = d * dx + e * dy + f * dz, z = g * dx + h * dy + k * dz;
       const flat = Math.sqrt(x * x + y * y), range = Math.sqrt(x * x + y * y + z * z);
@@ -65,8 +79,9 @@ export class Panorama {
         hi[0] = Math.max(hi[0], azimuth);
         lo[1] = Math.min(lo[1], elevation);
         hi[1] = Math.max(hi[1], elevation);
+        this.n++;
       });
-      this.n += block.n;
+      this.#held += block.n;
       yield;
     }
     if (this.n === 0) return this;
@@ -139,9 +154,10 @@ export class Panorama {
     return null;
   }
 
-  // Returns {block, i} of the point of a pixel, or null. It is null, too, once the block was closed: make it again.
+  // Returns {block, i} of the point of a pixel, or null. It is null, too, once the block was closed
+  // or the cloud was cleared: make it again.
   pointAt(x, y) {
-    if (this.n === 0 || x < 0 || y < 0 || x >= this.width || y >= this.height) return null;
+    if (this.n === 0 || this.cloud.origin !== this.#origin || x < 0 || y < 0 || x >= this.width || y >= this.height) return null;
     const pixel = this.#shown(y * this.width + x);
     if (pixel === null) return null;
     const [block, wasClosed] = this.#blocks[this.#block[pixel]];
@@ -173,10 +189,13 @@ export class Panorama {
     return {pixels, limits};
   }
 
-  // Returns whether points came or went since it was made.
-  get isOld() {
+  // Returns whether points came or went since it was made, or others are shown now.
+  isOld(cloud, section) {
+    if (cloud !== this.cloud || cloud.origin !== this.#origin) return true;
+    const cut = section?.relativeTo(cloud.origin) ?? null;
+    if (JSON.stringify([cloud.window, cut]) !== JSON.stringify([this.#window, this.#section])) return true;
     const now = this.cloud.blocks.filter((block) => block.station === this.station.number);
-    return now.length !== this.#blocks.length || now.reduce((sum, block) => sum + block.n, 0) !== this.n
+    return now.length !== this.#blocks.length || now.reduce((sum, block) => sum + block.n, 0) !== this.#held
       || now.some((block, k) => block !== this.#blocks[k][0] || block.closed !== this.#blocks[k][1]);
   }
 }

@@ -56,7 +56,7 @@ export class PanoramaTool {
     this.#timer = setInterval(() => {
       this.#fillStations();
       const isDue = !document.hidden && this.#stop === null && performance.now() > this.#rests_until;
-      if (isDue && (this.panorama === null || this.panorama.isOld)) this.#make();
+      if (isDue && (this.panorama === null || this.isOld)) this.#make();
     }, AGAIN_MS);
   }
 
@@ -86,7 +86,7 @@ export class PanoramaTool {
     const station = this.#view.stations.get(Number(this.#station.value)), {cloud} = this.#view;
     if (!station || cloud.origin === null) return this.#empty(station);
     this.#began = performance.now();
-    this.#stop = runSlowly(new Panorama(cloud, station).make(), (panorama) => {
+    this.#stop = runSlowly(new Panorama(cloud, station, this.#view.camera.section).make(), (panorama) => {
       this.#stop = null;
       this.#rests_until = performance.now() + 3 * (performance.now() - this.#began);
       if (panorama.n === 0) return this.#empty(station);
@@ -113,7 +113,7 @@ export class PanoramaTool {
   // Intensity is the reflectance; where that is not known, it is the amplitude.
   get mode() {
     if (this.#mode.value !== 'intensity') return this.#mode.value;
-    return this.#view.cloud.blocks.some((block) => block.reflectance !== null) ? 'reflectance' : 'amplitude';
+    return (this.panorama ?? this.#view).cloud.blocks.some((block) => block.reflectance !== null) ? 'reflectance' : 'amplitude';
   }
 
   #paint() {
@@ -133,10 +133,14 @@ export class PanoramaTool {
     return [Math.floor((e.clientX - left) / width * this.#canvas.width), Math.floor((e.clientY - top) / height * this.#canvas.height)];
   }
 
-  // Returns the figures of the point of a pixel, or null.
+  // Whether the picture shows other points now.
+  get isOld() { return this.panorama.isOld(this.#view.cloud, this.#view.camera.section); }
+
+  // Returns the figures of the point of a pixel, or null: also while the picture shows another cloud.
   pointAt([x, y]) {
-    const found = this.panorama?.pointAt(x, y) ?? null;
-    return found && pointOf(this.#view.cloud, found.block, found.i);
+    const {panorama} = this;
+    const found = panorama?.cloud === this.#view.cloud ? panorama.pointAt(x, y) : null;
+    return found && pointOf(panorama.cloud, found.block, found.i);
   }
 
   #point(pixel) {

@@ -4,16 +4,16 @@
 
 import {isWithin} from './section.js';
 
-const AGAIN_MS = 15;
+const AGAIN_MS = 15, AGAIN_MOST_MS = 200; // an answer is asked for again, ever less often
 
-// Returns the bytes of an answer, once the head has it. It throws an Error with the head's words.
-export async function ask(path) {
-  for (;;) {
-    const answer = await fetch(path, {cache: 'no-store'});
+// Returns the bytes of an answer, once the head has it. It throws an Error with the head's words, or once `signal` aborts.
+export async function ask(path, signal) {
+  for (let wait_ms = AGAIN_MS; ; wait_ms = Math.min(AGAIN_MOST_MS, 1.5 * wait_ms)) {
+    const answer = await fetch(path, {cache: 'no-store', signal});
     if (!answer.ok) throw Object.assign(new Error((await answer.text()).trim()), {status: answer.status});
     const bytes = await answer.arrayBuffer();
     if (bytes.byteLength > 0) return bytes;
-    await new Promise((done) => setTimeout(done, AGAIN_MS));
+    await new Promise((done) => setTimeout(done, wait_ms));
   }
 }
 
@@ -71,7 +71,7 @@ export function batchOf(preview, station, scan) {
   const {n, xyz} = preview;
   const axis = (a) => Float64Array.from({length: n}, (_, i) => xyz[3 * i + a] + preview.origin[a]);
   return {n, shots: preview.pulses, scan, frame: 0, line: 0, station, pulse0: 0, x: axis(0), y: axis(1), z: axis(2),
-    t: new Float32Array(n), range: preview.range, label: preview.label, reflectance: null, amplitude: null,
+    t: new Float32Array(n).fill(NaN), range: preview.range, label: preview.label, reflectance: null, amplitude: null,
     echo: new Uint8Array(n).fill(1), echoes: new Uint8Array(n).fill(1), rgb: null,
     pulse: Float64Array.from({length: n}, (_, i) => i)};
 }

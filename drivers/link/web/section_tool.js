@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool looks into a house, by a section box, or by a cut between two heights. Its handles are sliders on the
 // picture, for pointer, touch and keys. The section stays after the tool is left, until it is switched off.
-import {byId, make, say} from './page.js';
+import {byId, make, numberOf, say} from './page.js';
 import {alongLine, Section} from './section.js';
 import {arrowStep, degrees, headingTo, onPlane, sub} from './view_camera.js';
 
@@ -104,7 +104,7 @@ export class SectionTool {
 
   #typed() {
     const s = this.#section;
-    const v = Object.fromEntries([...this.#fields].map(([id, {input}]) => [id, Number(input.value.replace('−', '-').replace(',', '.'))]));
+    const v = Object.fromEntries([...this.#fields].map(([id, {input}]) => [id, numberOf(input.value)]));
     const isSound = Object.values(v).every(Number.isFinite) && v.wide > 0 && v.deep > 0;
     if (!isSound || !s.between(v.from, v.to)) {
       this.#show();

@@ -11,6 +11,7 @@ const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station rests so long before the finer ones
 const COVER_MS = 500; // while a station is dragged, its cells come so far apart
 const MOST_OF = 16; // stations that a suggestion may be about
+const MOST_RENEWED = 3; // times in a row that the head no longer has what a suggestion is about
 
 // These are settings of a station that a preview takes; null: as at power-up.
 export const SETTINGS = ['step_deg', 'far_m', 'line0_deg', 'line1_deg', 'pan0_deg', 'pan1_deg'];
@@ -33,8 +34,9 @@ export class Trial extends EventTarget {
   next = null;  // the suggestion: {x_m, y_m, z_m, heading_deg, gain_m2, none_m2}
   #cloud;
   #scans = 0;
-  #on = true;
+  #ended = new AbortController();
   #asksReach = false;
+  #renewed = 0; // so often all was renewed for one suggestion
 
   // cloud gets the points; list has the stations as /head has them.
   constructor(cloud, list, step_deg = 2) {
@@ -55,17 +57,19 @@ export class Trial extends EventTarget {
 
   async #learnCells() {
     try {
-      this.cells = parseCells(await ask('/cells'));
+      this.cells = parseCells(await ask('/cells', this.#ended.signal));
     } catch (error) {
+      if (!this.#on) return;
       this.isBlind = true;
       this.error = error.message;
     }
-    this.#count();
+    if (this.#on) this.#count();
   }
 
-  end() {
-    this.#on = false;
-  }
+  // Nothing is asked for any more, and nothing changes.
+  end() { this.#ended.abort(); }
+
+  get #on() { return !this.#ended.signal.aborted; }
 
   get(number) { return this.stations.find((s) => s.number === number); }
 
@@ -122,7 +126,7 @@ export class Trial extends EventTarget {
   async #ask(station, more) {
     const settings = pick(station, SETTINGS);
     const place = Object.fromEntries(PLACE.map((key) => [key, round(station[key])]));
-    return parsePreview(await ask(pathOf('preview', {station: station.of, ...place, ...settings, ...more})));
+    return parsePreview(await ask(pathOf('preview', {station: station.of, ...place, ...settings, ...more}), this.#ended.signal));
   }
 
   async #look(station, of) {
@@ -131,7 +135,9 @@ export class Trial extends EventTarget {
       if (!this.#has(station)) return;
       this.#take(station, shown, of);
     } catch (error) {
-      Object.assign(station, {seen: null, error: error.message});
+      if (!this.#has(station)) return;
+      Object.assign(station, {seen: null, points: 0, error: error.message});
+      this.#cloud.replace({station: station.number, scan: ++this.#scans}); // they are of another place
       return;
     }
     for (const step_deg of COVER_STEPS_DEG) {
@@ -154,7 +160,7 @@ export class Trial extends EventTarget {
   #take(station, shown, of) {
     const scan = ++this.#scans;
     const {above_m, hides_m, feet_m, n} = shown;
-    Object.assign(station, {above_m, hides_m, points: n, shown: of});
+    Object.assign(station, {above_m, hides_m, points: n, shown: of, error: ''});
     if (station.tripod) station.tripod = {...station.tripod, foot_radius_m: feet_m};
     this.#cloud.replace({station: station.number, scan});
     this.#cloud.add(batchOf(shown, station.number, scan));
@@ -174,7 +180,7 @@ export class Trial extends EventTarget {
     if (this.#asksReach) return;
     this.#asksReach = true;
     try {
-      this.reach = parseReach(await ask(this.#about('reach')));
+      this.reach = parseReach(await ask(this.#about('reach'), this.#ended.signal));
       if (this.#on) this.#count();
     } catch { /* shares are then of all surfaces */ }
   }
@@ -194,18 +200,26 @@ export class Trial extends EventTarget {
 
   // Asks where one more station would add most; the result is in `next`.
   async suggest() {
-    if (this.stations.length === 0 || this.isBusy) return;
+    if (this.stations.length === 0 || this.isBusy) return undefined;
     const all = this.stations.filter((s) => s.seen), before = this.#stamp();
+    if (all.length > MOST_OF) {
+      this.nextError = `The head suggests a place beside at most ${MOST_OF} stations; there are ${all.length}.`;
+      return this.#tell('change');
+    }
     try {
-      const found = JSON.parse(new TextDecoder().decode(await ask(this.#about('next'))));
-      if (!this.#on || before !== this.#stamp()) return; // something has moved meanwhile
+      const found = JSON.parse(new TextDecoder().decode(await ask(this.#about('next'), this.#ended.signal)));
+      if (!this.#on || before !== this.#stamp()) return undefined; // something has moved meanwhile
       this.next = found.place ? {...found.place, pitch_deg: 0, roll_deg: 0, gain_m2: found.gain_m2, none_m2: found.none_m2} : null;
       this.nextError = found.place ? '' : 'No place would add anything.';
+      this.#renewed = 0;
     } catch (error) {
-      if (error.status === 400 && all.length > 0 && before === this.#stamp()) all.forEach((s) => this.renew(s)); // kept no more
-      else this.nextError = error.message;
+      if (!this.#on || before !== this.#stamp()) return undefined;
+      const isGone = error.status === 400 && /is kept no more/.test(error.message) && this.#renewed++ < MOST_RENEWED;
+      this.nextError = isGone ? 'Places are looked at again.' : error.message;
+      if (isGone) all.forEach((s) => this.renew(s));
+      else this.#renewed = 0;
     }
-    this.#tell('change');
+    return this.#tell('change');
   }
 
   #stamp() { return this.stations.map((s) => `${s.number}.${s.wanted}`).join(); }

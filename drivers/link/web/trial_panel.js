@@ -3,7 +3,7 @@
 // alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
 // it is open.
 
-import {bodyOf, grouped, kept, make, percent, say} from './page.js';
+import {bodyOf, grouped, kept, make, numberOf, percent, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
@@ -40,8 +40,9 @@ export class TrialPanel {
   #box = make('div', {id: 'trial', class: 'trial'});
   #open = make('button', {type: 'button', id: 'try', hidden: true, click: () => this.begin(),
     title: 'Moves stations in this page alone, and shows at once what they see'}, 'Try places');
-  #items = new Map(); // it maps a number to {item, fields, place, says, head}
+  #items = new Map(); // it maps a number to {item, fields, place, says, mark}
   #timer = 0;
+  #isApplying = false;
   #run = '';
   #targets;
   #colours = tableOf('station');
@@ -87,6 +88,7 @@ export class TrialPanel {
     this.list = make('ol', {class: 'stations'});
     this.says = make('p', {class: 'note', role: 'status', id: 'trial-says'});
     this.take = button('trial-take', 'Add it', () => this.#takeNext());
+    this.add = button('trial-add', 'Add a station', () => this.#add());
     this.apply = button('trial-apply', 'Move the head’s stations', () => this.#apply());
     this.text = make('textarea', {id: 'trial-text', readonly: true, rows: 6, 'aria-label': 'Stations for a configuration', spellcheck: 'false'});
     this.#box.append(this.note,
@@ -95,7 +97,7 @@ export class TrialPanel {
       make('div', {class: 'row'}, make('label', {for: 'trial-paint'}, 'Painted'), this.paint),
       make('div', {class: 'row'}, make('label', {for: 'trial-step'}, 'Points every'), this.step),
       this.list,
-      make('div', {class: 'actions'}, button('trial-add', 'Add a station', () => this.#add())),
+      make('div', {class: 'actions'}, this.add),
       make('label', {class: 'tick'}, this.suggests, 'Show the best next place'), this.says,
       make('div', {class: 'actions'}, this.take), this.#targets.element,
       make('details', {class: 'as-text', toggle: (e) => e.target.open && this.#write()}, make('summary', {}, 'As a configuration'), this.text),
@@ -128,7 +130,7 @@ export class TrialPanel {
     this.#box.hidden = false;
     this.#open.hidden = true;
     this.#show();
-    this.#box.querySelector('#trial-add').focus();
+    (this.add.disabled ? this.#box.querySelector('#trial-end') : this.add).focus();
   }
 
   end() {
@@ -195,7 +197,7 @@ export class TrialPanel {
       return {key, input, box: make('div', {}, make('label', {for: id}, label), input)};
     };
     const fields = [...PLACE, ...SETTINGS.map((key) => [key, NAMES[key]])].map(([key, label]) => field(key, label));
-    const place = make('span', {class: 'place'}), says = make('p', {class: 'refusal', role: 'status'});
+    const place = make('span', {class: 'place'}), mark = make('span', {class: 'refusal'}), says = make('p', {class: 'refusal', role: 'status'});
     const actions = make('div', {class: 'actions'},
       make('button', {type: 'button', click: () => this.#view.lookFrom(number)}, 'Look from here'),
       make('button', {type: 'button', click: () => this.#back(number)}, isAdded ? 'Remove' : 'As it was'));
@@ -203,28 +205,28 @@ export class TrialPanel {
     const badge = make('span', {class: 'number'}, String(number));
     badge.style.boxShadow = `inset 0 -0.25rem ${css(colour)}`;
     const item = make('li', {}, make('details', {name: 'trial-station'},
-      make('summary', {}, badge, make('span', {class: 'name'}, isAdded ? 'added' : name ?? ''), place), form));
-    return {item, fields, place, says};
+      make('summary', {}, badge, make('span', {class: 'name'}, isAdded ? 'added' : name ?? ''), place, mark), form));
+    return {item, fields, place, says, mark};
   }
 
   #fill(station) {
-    const {fields, place, says} = this.#items.get(station.number);
+    const {fields, place, says, mark} = this.#items.get(station.number);
     say(place, [station.x_m, station.y_m, station.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−'));
     for (const {key, input} of fields) {
       if (document.activeElement !== input) input.value = shown(station[key]);
     }
     says.hidden = station.error === '';
     say(says, station.error);
+    say(mark, station.error && (station.seen || station.points > 0 ? 'See inside' : 'Nothing is seen from here'));
   }
 
   #edit(number, key, input) {
-    const text = input.value.trim().replace('−', '-');
-    const value = text === '' && SETTINGS.includes(key) ? null : Number(text);
-    const isNumber = value === null || (text !== '' && Number.isFinite(value));
+    const value = input.value.trim() === '' && SETTINGS.includes(key) ? null : numberOf(input.value);
+    const isNumber = value === null || Number.isFinite(value);
     if (isNumber) input.removeAttribute('aria-invalid');
     else input.setAttribute('aria-invalid', 'true');
     if (isNumber) return this.#trial.change(number, {[key]: value});
-    this.#trial.get(number).error = `${input.value} is no number.`;
+    this.#trial.get(number).error = `${input.value.trim() || 'An empty field'} is no number.`;
     return this.#fill(this.#trial.get(number));
   }
 
@@ -280,8 +282,10 @@ export class TrialPanel {
     const {next, stations, nextError, sum} = this.#trial;
     const moved = stations.filter((s) => !s.isAdded && PLACE.some(([key]) => Math.abs(s[key] - s.was[key]) > 1e-9));
     const not = this.#session.whyNot('idle');
-    this.apply.disabled = not !== '' || moved.length === 0;
-    this.apply.title = not || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
+    this.add.disabled = stations.length === 0;
+    this.add.title = stations.length === 0 ? 'No station has a known place' : '';
+    this.apply.disabled = not !== '' || this.#isApplying || moved.length === 0;
+    this.apply.title = not || (this.#isApplying && 'Their places are being sent') || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
     this.take.disabled = !next;
     for (const field of [this.paint, this.suggests]) field.disabled = this.#trial.isBlind;
     say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
@@ -319,6 +323,8 @@ export class TrialPanel {
 
   // Sends the tried places to the head. Its stations then stand there for everybody.
   async #apply() {
+    this.#isApplying = true;
+    this.#allow();
     for (const s of this.#trial.stations.filter((s) => !s.isAdded)) {
       const place = PLACE.map(([key]) => Math.round(s[key] * 1e4) / 1e4);
       if (PLACE.every(([key]) => Math.abs(s[key] - s.was[key]) <= 1e-9)) continue;
@@ -329,6 +335,7 @@ export class TrialPanel {
         s.error = `Refused: ${why(error)}`;
       }
     }
+    this.#isApplying = false;
     if (this.#trial) this.#show();
   }
 }

@@ -7,7 +7,6 @@ import {hasBit} from './previews.js';
 import {searchSlowly} from './view_pick.js';
 
 const NEEDED = 3;
-const TAP_PX = 6;
 
 // Returns the cell that a place lies on, by the nearest piece; one in another plane counts as farther away. null: none
 // is near.
@@ -53,19 +52,20 @@ export class TargetList {
   constructor(view) {
     this.#view = view;
     this.element.append(make('div', {class: 'actions'}, this.#put), this.#list, this.#says);
-    let from = [0, 0];
-    view?.canvas.addEventListener('pointerdown', ({offsetX, offsetY}) => {
-      from = [offsetX, offsetY];
-    });
-    view?.canvas.addEventListener('click', ({offsetX, offsetY}) => {
-      if (this.#armed && Math.hypot(offsetX - from[0], offsetY - from[1]) < TAP_PX) this.#at(offsetX, offsetY); // else it was a drag
-    });
-    view?.canvas.addEventListener('keydown', (e) => {
-      if (!this.#armed || (e.key !== 'Enter' && e.key !== 'Escape')) return;
-      e.stopImmediatePropagation();
-      if (e.key === 'Enter') this.#at(view.camera.width / 2, view.camera.height / 2);
-      else this.#arm(false);
-    }, {capture: true});
+  }
+
+  // While one is to be put, clicks and these keys are its own, also where a tool is open.
+  tap({x, y}) {
+    this.#at(x, y);
+    return true;
+  }
+
+  key({key}) {
+    const {width, height} = this.#view.camera;
+    if (key === 'Enter') this.#at(width / 2, height / 2);
+    else if (key === 'Escape') this.#arm(false);
+    else return false;
+    return true;
   }
 
   // trial: that of the targets from now on; null: there is none any more.
@@ -80,6 +80,7 @@ export class TargetList {
 
   #arm(on) {
     this.#armed = on;
+    if (this.#view) this.#view.once = on ? this : null;
     this.#put.setAttribute('aria-pressed', String(on));
     if (this.#trial) this.show();
   }

@@ -32,6 +32,7 @@ export class View extends EventTarget {
   movable = true; // stations can be dragged
   camera = new Camera();
   tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}, each returns whether it has used it
+  once = null; // it takes them before the tool does, as {tap, key}
   shading = true;
   #gl;
   #painter;
@@ -146,8 +147,9 @@ export class View extends EventTarget {
     this.#ask('restart');
   }
 
-  // Shows the points of another cloud from now on. The one before keeps its own.
+  // Shows the points of another cloud from now on, of the same times. The one before keeps its own.
   useCloud(cloud) {
+    cloud.window = this.cloud.window;
     this.cloud.changed = null;
     this.cloud = this.#points.cloud = cloud;
     this.#scale.use(cloud);

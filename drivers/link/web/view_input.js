@@ -62,7 +62,7 @@ export class Input {
     view.touched();
     if (this.#down.size === 1) {
       this.#moved = 0;
-      const hit = e.button === 0 && !view.tool ? view.stations.hit(view.camera, p.x, p.y) : null;
+      const hit = e.button === 0 && !view.tool && !view.once ? view.stations.hit(view.camera, p.x, p.y) : null;
       if (hit && view.movable) {
         view.stations.grab(view.camera, hit, p.x, p.y);
         this.#gesture = {kind: 'station'};
@@ -156,7 +156,7 @@ export class Input {
     const now = performance.now();
     const twice = now - this.#tap.time < 350 && Math.hypot(p.x - this.#tap.x, p.y - this.#tap.y) < 20;
     this.#tap = {time: twice ? 0 : now, ...p};
-    if (view.tool?.tap(p)) return;
+    if ((view.once ?? view.tool)?.tap(p)) return;
     if (twice) view.lookAt(p);
     else if (kind !== 'station' && view.stations.hit(view.camera, p.x, p.y) === null) view.stations.select(null);
     view.hover(p);
@@ -189,7 +189,7 @@ export class Input {
       e.preventDefault();
       view.touched();
     };
-    if (view.tool?.key(e)) return used();
+    if ((view.once ?? view.tool)?.key(e)) return used();
     if ((view.movable || e.key === 'Escape') && stations.key(camera, e.key, e.shiftKey)) return used();
     const arrow = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]}[e.key];
     if (arrow) {

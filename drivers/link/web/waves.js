@@ -36,7 +36,7 @@ export function rangesOf(cloud, {pulse, scan, station}) {
 }
 
 export class WavePlot {
-  #cloud;
+  #cloud; // that of the head; tried points have no pulse of it
   #point = null;
   #svg = makeSvg('svg', {class: 'wave', viewBox: `0 0 ${WIDTH} 78`, role: 'img'});
   #title = make('p', {class: 'note'});
@@ -48,7 +48,7 @@ export class WavePlot {
     parent.append(this.#box);
     view.addEventListener('pick', ({detail}) => {
       const point = detail?.point ?? null, {descriptor} = head;
-      const has = point !== null && (descriptor?.content & HAS_WAVEFORMS) !== 0;
+      const has = point !== null && view.cloud === this.#cloud && (descriptor?.content & HAS_WAVEFORMS) !== 0;
       this.#point = has ? point : null;
       if (has) head.askWaves(point.pulse, point.scan);
       else this.#box.hidden = true;

@@ -5,8 +5,9 @@
  *
  * A request is known by its text. One for a place stops the search for a next station, which takes longer. The search
  * begins again afterwards, so that a dragged station does not wait for it. The newest request is worked on first: while
- * a station is dragged, older ones are about places that it has left. A request that nobody asked for lately gives its
- * slot away, and so do the oldest answers. */
+ * a station is dragged, older ones are about places that it has left. A search lets some places pass, and is then due:
+ * another page may drag all the time. A request that nobody asked for lately gives its slot away, and so do the oldest
+ * answers, except those that a search names. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
 #include <pthread.h>
@@ -21,11 +22,19 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/base/clock.h"
 
-enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20 };
+enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
 static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
+static const int64_t LATELY_NS = 500000000; /* it does so at least every 0.2 s; its way to the head takes some, too */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
+
+/* An answer is freed once neither its job nor a reader has it. */
+struct answer {
+    struct answer *next;
+    struct web_body body;
+    int holders;
+};
 
 struct job {
     enum job_state state;
@@ -33,7 +42,8 @@ struct job {
     struct preview_request request;
     uint32_t number; /* from 1, never used again */
     int64_t asked_ns;
-    struct web_body body;
+    int passed;            /* of a search: so many others were worked on while it waited */
+    struct answer *answer; /* NULL: none, or a refusal */
     int rc;
     struct sh_err err;
 };
@@ -44,23 +54,37 @@ struct preview {
     struct preview_work work;
     struct coverage *blind;                       /* of a scene that has no coverage */
     struct sh_err why;                            /* there is none of these either */
-    atomic_int ending, is_search, is_place_asked; /* of the work at hand; since it began */
+    atomic_int ending, gives_way, is_place_asked; /* the work at hand; since it began */
     pthread_t thread;
     int running;
     pthread_mutex_t lock;
     pthread_cond_t wake;
     struct job job[JOBS];
     uint32_t numbers;
-    size_t bytes; /* of all bodies */
+    struct answer *answers;
+    size_t bytes; /* of those that jobs have */
 };
 
 /* ---- slots; the lock is held */
 
+static void let_go(struct preview *p, struct answer *answer)
+{
+    struct answer **at = &p->answers;
+    if (--answer->holders > 0) return;
+    while (*at != answer)
+        at = &(*at)->next;
+    *at = answer->next;
+    free(answer->body.bytes);
+    free(answer);
+}
+
 static void forget_job(struct preview *p, struct job *job)
 {
-    p->bytes -= job->body.len;
+    if (job->answer != NULL) {
+        p->bytes -= job->answer->body.len;
+        let_go(p, job->answer);
+    }
     free(job->text);
-    free(job->body.bytes);
     *job = (struct job){.state = JOB_FREE};
 }
 
@@ -71,12 +95,39 @@ static struct job *find_job(struct preview *p, const char *text)
     return NULL;
 }
 
-/* Returns the job of a state that was asked for longest ago; NULL: there is none. */
+static int is_search(const struct job *job)
+{
+    return job->request.kind == PREVIEW_NEXT || job->request.kind == PREVIEW_REACH;
+}
+
+static int is_asked_within(const struct job *job, int64_t ns)
+{
+    return clock_now_ns() - job->asked_ns <= ns;
+}
+
+/* Whether a search that has no answer yet needs this one. */
+static int is_named(const struct preview *p, uint32_t number)
+{
+    for (int i = 0; i < JOBS; i++) {
+        const struct job *job = &p->job[i];
+        const int waits = job->state == JOB_WAITING && is_asked_within(job, FORGOTTEN_NS);
+        if (!is_search(job) || !(waits || job->state == JOB_WORKING)) continue;
+        for (uint32_t k = 0; k < job->request.n_of; k++)
+            if (job->request.of[k] == number) return 1;
+    }
+    return 0;
+}
+
+/* Returns the job of a state that was asked for longest ago; NULL: there is none. Answers that a search names do not
+ * count. */
 static struct job *oldest_of(struct preview *p, enum job_state state)
 {
     struct job *oldest = NULL;
-    for (int i = 0; i < JOBS; i++)
-        if (p->job[i].state == state && (oldest == NULL || p->job[i].asked_ns < oldest->asked_ns)) oldest = &p->job[i];
+    for (int i = 0; i < JOBS; i++) {
+        struct job *job = &p->job[i];
+        if (job->state != state || (oldest != NULL && job->asked_ns >= oldest->asked_ns)) continue;
+        if (state != JOB_DONE || !is_named(p, job->number)) oldest = job;
+    }
     return oldest;
 }
 
@@ -85,20 +136,30 @@ static struct job *free_slot(struct preview *p)
     struct job *job = oldest_of(p, JOB_FREE);
     if (job == NULL) {
         job = oldest_of(p, JOB_WAITING);
-        if (job != NULL && clock_now_ns() - job->asked_ns < FORGOTTEN_NS) job = NULL;
+        if (job != NULL && is_asked_within(job, FORGOTTEN_NS)) job = NULL;
     }
     if (job == NULL) job = oldest_of(p, JOB_DONE);
     if (job != NULL && job->state != JOB_FREE) forget_job(p, job);
     return job;
 }
 
-static struct job *newest_waiting(struct preview *p)
+/* A search that has let enough places pass. One that its page has left is not. */
+static int is_due(const struct job *job)
 {
-    struct job *newest = NULL;
-    for (int i = 0; i < JOBS; i++)
-        if (p->job[i].state == JOB_WAITING && (newest == NULL || p->job[i].number > newest->number))
-            newest = &p->job[i];
-    return newest;
+    return is_search(job) && job->passed >= MOST_PASSED && is_asked_within(job, LATELY_NS);
+}
+
+/* The newest one that waits, unless a search is due. */
+static struct job *next_waiting(struct preview *p)
+{
+    struct job *next = NULL;
+    for (int i = 0; i < JOBS; i++) {
+        struct job *job = &p->job[i];
+        if (job->state != JOB_WAITING) continue;
+        if (is_due(job)) return job;
+        if (next == NULL || job->number > next->number) next = job;
+    }
+    return next;
 }
 
 /* ---- the work */
@@ -107,7 +168,7 @@ static int must_stop(void *ctx)
 {
     const struct preview *p = ctx;
     return atomic_load_explicit(&p->ending, memory_order_relaxed) ||
-           (atomic_load_explicit(&p->is_search, memory_order_relaxed) &&
+           (atomic_load_explicit(&p->gives_way, memory_order_relaxed) &&
             atomic_load_explicit(&p->is_place_asked, memory_order_relaxed));
 }
 
@@ -121,10 +182,11 @@ static int copy_seen(struct preview *p, uint32_t number, struct preview_seen *se
         const struct job *job = &p->job[i];
         if (job->number != number || job->state != JOB_DONE || job->rc != SH_OK || job->request.kind != PREVIEW_PLACE)
             continue;
+        const char *bytes = job->answer->body.bytes;
         for (size_t k = 0; k < words; k++)
-            seen->cells[k] = le_get64(job->body.bytes + PREVIEW_CELLS_AT + 8 * k);
-        seen->hits = le_get32(job->body.bytes + PREVIEW_HITS_AT);
-        seen->front = le_get32(job->body.bytes + PREVIEW_FRONT_AT);
+            seen->cells[k] = le_get64(bytes + PREVIEW_CELLS_AT + 8 * k);
+        seen->hits = le_get32(bytes + PREVIEW_HITS_AT);
+        seen->front = le_get32(bytes + PREVIEW_FRONT_AT);
         return SH_OK;
     }
     return sh_fail(err, SH_EINPUT, "preview %u is kept no more; ask for its place again", number);
@@ -164,19 +226,22 @@ static void preview_do(struct preview *p, struct job *job)
     struct sh_err err = {0, ""};
     job->state = JOB_WORKING;
     atomic_store(&p->is_place_asked, 0);
-    atomic_store(&p->is_search, job->request.kind == PREVIEW_NEXT || job->request.kind == PREVIEW_REACH);
+    atomic_store(&p->gives_way, is_search(job) && !is_due(job));
+    for (int i = 0; i < JOBS; i++)
+        p->job[i].passed += p->job[i].state == JOB_WAITING;
     pthread_mutex_unlock(&p->lock);
-    const int rc = work_on(p, &job->request, job->number, &body, &err);
+    int rc = work_on(p, &job->request, job->number, &body, &err);
+    struct answer *answer = rc == SH_OK ? malloc(sizeof *answer) : NULL;
+    if (rc == SH_OK && answer == NULL) rc = sh_fail(&err, SH_ENOMEM, "no memory for a preview");
+    if (rc != SH_OK) free(body.bytes);
     pthread_mutex_lock(&p->lock);
-    if (rc != SH_OK) {
-        free(body.bytes);
-        body = (struct web_body){NULL, NULL, 0};
-    }
     job->state = rc == SH_ESTOPPED ? JOB_WAITING : JOB_DONE;
     if (job->state == JOB_WAITING) return;
     job->rc = rc;
     job->err = err;
-    job->body = body;
+    if (rc != SH_OK) return;
+    *answer = (struct answer){p->answers, body, 1};
+    p->answers = job->answer = answer;
     p->bytes += body.len;
     while (p->bytes > MOST_BYTES) {
         struct job *old = oldest_of(p, JOB_DONE);
@@ -205,10 +270,10 @@ static void *preview_run(void *ctx)
     if (p->work.coverage == NULL && make_blind(p, &p->why) == SH_OK) p->work.coverage = p->blind;
     pthread_mutex_lock(&p->lock);
     while (!atomic_load(&p->ending)) {
-        struct job *job = newest_waiting(p);
+        struct job *job = next_waiting(p);
         if (job == NULL)
             pthread_cond_wait(&p->wake, &p->lock);
-        else if (clock_now_ns() - job->asked_ns > FORGOTTEN_NS)
+        else if (!is_asked_within(job, FORGOTTEN_NS))
             forget_job(p, job);
         else
             preview_do(p, job);
@@ -235,15 +300,25 @@ static int add_job(struct preview *p, char *text, const struct preview_request *
     return SH_OK;
 }
 
-static int give(const struct job *job, struct web_body *out, struct sh_err *err)
+/* An answer may have megabytes, and slow readers: all share one. */
+static int lend(struct job *job, struct web_body *out, struct sh_err *err)
 {
     const int is_done = job->state == JOB_DONE;
     if (is_done && job->rc != SH_OK) return sh_fail(err, job->rc, "%s", job->err.text);
-    *out = (struct web_body){is_done ? job->body.type : "application/octet-stream", NULL, is_done ? job->body.len : 0};
-    out->bytes = malloc(out->len + 1);
-    if (out->bytes == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a preview");
-    if (out->len > 0) memcpy(out->bytes, job->body.bytes, out->len);
+    *out = is_done ? job->answer->body : (struct web_body){"application/octet-stream", NULL, 0};
+    if (is_done) job->answer->holders++;
     return SH_OK;
+}
+
+void preview_release(struct preview *p, char *bytes)
+{
+    pthread_mutex_lock(&p->lock);
+    struct answer *answer = p->answers;
+    while (answer != NULL && answer->body.bytes != bytes)
+        answer = answer->next;
+    if (answer != NULL) let_go(p, answer);
+    pthread_mutex_unlock(&p->lock);
+    if (answer == NULL) free(bytes);
 }
 
 int preview_get(struct preview *p, const char *path, const char *query, struct web_body *out, struct sh_err *err)
@@ -263,7 +338,7 @@ int preview_get(struct preview *p, const char *path, const char *query, struct w
         rc = add_job(p, text, &request, &job, err);
     if (rc == SH_OK) {
         job->asked_ns = clock_now_ns();
-        rc = give(job, out, err);
+        rc = lend(job, out, err);
     }
     pthread_mutex_unlock(&p->lock);
     return rc;
@@ -279,7 +354,7 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for previews");
     p->options = *options;
     atomic_init(&p->ending, 0);
-    atomic_init(&p->is_search, 0);
+    atomic_init(&p->gives_way, 0);
     atomic_init(&p->is_place_asked, 0);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->wake, NULL);

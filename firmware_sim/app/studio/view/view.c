@@ -64,7 +64,7 @@ static void say_what_is_shown(const struct viewed *v)
 static int show(const struct view_options *o, struct viewed *v, struct sh_err *err)
 {
     struct view_serve serving = {.viewed = v, .report = &app_report_seconds};
-    const struct web_source source = {&serving, view_serve_get};
+    const struct web_source source = {.ctx = &serving, .get = view_serve_get};
     struct link_spec spec = {.type = LINK_WEB, .port = (int)o->port, .max_sessions = LINK_MAX_SESSIONS, .web = &source};
     const struct link_ops *ops = link_ops_get(LINK_WEB);
     char endpoint[256];

@@ -23,6 +23,16 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
     return w->preview != NULL ? preview_get(w->preview, path, query, out, err) : SH_EINPUT;
 }
 
+/* Previews are lent; all else is a copy. */
+static void release(void *ctx, char *bytes)
+{
+    struct watch *w = ctx;
+    if (w->preview != NULL)
+        preview_release(w->preview, bytes);
+    else
+        free(bytes);
+}
+
 static int watch_make_room(struct watch *w, struct sh_err *err)
 {
     const uint32_t n = w->site->n_stations;
@@ -83,7 +93,7 @@ static int open_watch(const struct config *cfg, const struct site *site, const s
     w->cfg = cfg;
     w->site = site;
     w->options = *options;
-    w->source = (struct web_source){w, get};
+    w->source = (struct web_source){w, get, release};
     w->fd = w->link.fd = -1;
     atomic_init(&w->ending, 0);
     pthread_mutex_init(&w->lock, NULL);
