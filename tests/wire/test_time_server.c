@@ -112,15 +112,64 @@ static struct head scanner_start(struct wire *wire, const struct server *s, cons
     return head;
 }
 
-/* Asks until the state is that word. Returns the reply. */
-static const char *until_state(struct scanhead *sh, const char *state)
+static int has_state(const char *reply, const char *state)
+{
+    return strncmp(reply, state, strlen(state)) == 0 && reply[strlen(state)] == ',';
+}
+
+/* Asks until the state is one of two words. Returns the reply. */
+static const char *until_states(struct scanhead *sh, const char *state, const char *other)
 {
     int64_t since_ns = 0;
     for (;;) {
         const char *reply = client_ask(sh, "TIME:SERVer? STATe");
-        if (strncmp(reply, state, strlen(state)) == 0 && reply[strlen(state)] == ',') return reply;
+        if (has_state(reply, state) || has_state(reply, other)) return reply;
         wire_soon(&since_ns, client_time_ns(sh), state);
     }
+}
+
+static const char *until_state(struct scanhead *sh, const char *state)
+{
+    return until_states(sh, state, state);
+}
+
+/* Lets it ask again, at most a second after the last request: any change of its settings begins anew with the
+ * server. */
+static double ask_again(struct server *server)
+{
+    static int update_s = 60;
+    char request[40];
+    snprintf(request, sizeof request, "sWN TSCTCupdatetime +%d", ++update_s);
+    cola_client_expect(&scanner, request, "sWA TSCTCupdatetime");
+    return server_wait(server);
+}
+
+/* An answer of the server. */
+struct reply {
+    double t_s; /* since 1970, or after T1 */
+    int after_t1, leap, stratum;
+    const char *kiss;
+};
+
+/* Answers the request of T1, and waits for the state that follows from it. The head waits a second for an answer. On a
+ * busy machine one may come later. Then the head asks again. Returns T1 of the request that was answered in time. */
+static double serve(struct scanhead *sh, struct server *server, double t1_s, struct reply r, const char *state)
+{
+    for (;;) {
+        server_answer(server, r.t_s + (r.after_t1 ? t1_s : SECONDS_1900), r.leap, r.stratum, r.kiss);
+        if (has_state(until_states(sh, state, "SILENT"), state)) return t1_s;
+        t1_s = ask_again(server);
+    }
+}
+
+static struct reply at(double t_s)
+{
+    return (struct reply){t_s, 0, 0, 1, "TEST"};
+}
+
+static struct reply after_t1(double t_s)
+{
+    return (struct reply){t_s, 1, 0, 1, "TEST"};
 }
 
 /* ---- the tests */
@@ -142,12 +191,11 @@ static void scans_have_the_servers_time(void **state)
     cola_client_expect(&scanner, "sWN TSCTCSrvAddr 7F 00 00 01", "sWA TSCTCSrvAddr");
     cola_client_expect(&scanner, "sWN TSCTCupdatetime 5", "sWA TSCTCupdatetime");
     cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
-    const double t1_s = server_wait(&server) - SECONDS_1900;
+    double t1_s = server_wait(&server);
     static const uint8_t rest[39] = {0};
     assert_int_equal(server.request[0], 0x23); /* version 4, client */
     assert_memory_equal(server.request + 1, rest, sizeof rest);
-    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
-    until_state(sh, "SET");
+    t1_s = serve(sh, &server, t1_s, at(SERVER_S), "SET") - SECONDS_1900;
 
     /* T4 = T1 + delay, since T2 = T3. The time is a double of 0.25 us near 2^32 s; delay is a float of 24 bits */
     const double delay_s = read_s("TSCTCdelay");
@@ -165,17 +213,6 @@ static void scans_have_the_servers_time(void **state)
     close(scanner.fd);
     close(server.fd);
     head_end(&head, SIGTERM);
-}
-
-/* Lets it ask again, at most a second after the last request: any change of its settings begins anew with the
- * server. */
-static double ask_again(struct server *server)
-{
-    static int update_s = 60;
-    char request[40];
-    snprintf(request, sizeof request, "sWN TSCTCupdatetime +%d", ++update_s);
-    cola_client_expect(&scanner, request, "sWA TSCTCupdatetime");
-    return server_wait(server);
 }
 
 /* A wrong, a silent and a refusing server set nothing; a time zone adds hours. Refused answers leave the clock as it
@@ -196,46 +233,37 @@ static void wrong_servers(void **state)
     server.request[47] ^= 1; /* an answer to another request is passed over */
     server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
     server.request[47] ^= 1;
-    server_answer(&server, SERVER_S + SECONDS_1900, 3, 1, "TEST");
-    until_state(sh, "UNSYNCHRONISED");
+    serve(sh, &server, 0.0, (struct reply){SERVER_S, 0, 3, 1, "TEST"}, "UNSYNCHRONISED");
     client_until_soon(sh, SCANHEAD_EV_ERROR, &frame);
     read_times(&start_us, &date_us);
     assert_true(llabs(date_us - start_us) <= 1); /* still 1970 */
-    ask_again(&server);
-    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
-    until_state(sh, "SET");
+    serve(sh, &server, ask_again(&server), at(SERVER_S), "SET");
     read_times(&start0_us, &date0_us);
     const int64_t since_us = date0_us - (int64_t)(1e6 * SERVER_S) - 3600 * SECOND_US;
     assert_true(since_us > -SECOND_US && since_us < SOON_MS * 1000); /* the zone, and not the moment, is tested here */
 
-    double t1_s = ask_again(&server); /* by UTC; the clock shows local time */
+    const double t1_s = ask_again(&server); /* by UTC; the clock shows local time */
     assert_true(fabs(t1_s - SECONDS_1900 - SERVER_S) < 1e-3 * SOON_MS);
-    server_answer(&server, t1_s + 18001.0, 0, 1, "TEST");
-    until_state(sh, "OFFSET");
-    t1_s = ask_again(&server);
-    server_answer(&server, t1_s + 3.0, 0, 0, "DENY");
-    until_state(sh, "KISS");
+    serve(sh, &server, t1_s, after_t1(18001.0), "OFFSET");
+    serve(sh, &server, ask_again(&server), (struct reply){3.0, 1, 0, 0, "DENY"}, "KISS");
     read_times(&start_us, &date_us);
     assert_true(llabs(date_us - date0_us - (start_us - start0_us)) <= 2);
 
-    t1_s = ask_again(&server); /* a step within the limit is taken */
-    server_answer(&server, t1_s + 17999.0, 0, 1, "TEST");
-    until_state(sh, "SET");
+    serve(sh, &server, ask_again(&server), after_t1(17999.0), "SET"); /* a step within the limit is taken */
     read_times(&start_us, &date_us);
     const int64_t step_us = date_us - date0_us - (start_us - start0_us);
     assert_true(step_us <= 17999 * SECOND_US + 2 &&
                 step_us > 17998 * SECOND_US); /* less half of the delay, below 1 s */
     cola_client_expect(&scanner, "sWN TSCRole 0", "sWA TSCRole");
     cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
-    t1_s = server_wait(&server); /* the limit is for a clock that this role has set */
-    server_answer(&server, t1_s + 20000.0, 0, 1, "TEST");
-    until_state(sh, "SET");
+    /* The limit is for a clock that this role has set. */
+    serve(sh, &server, server_wait(&server), after_t1(20000.0), "SET");
     ask_again(&server);
     unsigned good, refused, none;
     assert_int_equal(sscanf(until_state(sh, "SILENT"), "SILENT,%*d,%*d,%*d,%u,%u,%u", &good, &refused, &none), 3);
     assert_int_equal(good, 3);
     assert_int_equal(refused, 3);
-    assert_int_equal(none, 1);
+    assert_true(none >= 1);                                                        /* more where answers came late */
     cola_client_expect(&scanner, "sWN TSCTCSrvAddr C0 0 2 1", "sWA TSCTCSrvAddr"); /* 192.0.2.1: not this machine */
     until_state(sh, "REFUSED");
     cola_client_expect(&scanner, "sMN mSCreboot", "sAN mSCreboot");
@@ -312,22 +340,17 @@ static void injected_faults(void **state)
     struct head head = scanner_start(wire, &server, "");
     struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
     cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
-    server_wait(&server);
-    server_answer(&server, SERVER_S + SECONDS_1900, 0, 1, "TEST");
-    until_state(sh, "SET");
+    serve(sh, &server, server_wait(&server), at(SERVER_S), "SET");
     read_times(&start0_us, &date0_us);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         inject(sh, cases[i].fault);
-        const double t1_s = ask_again(&server);
-        server_answer(&server, t1_s, 0, 1, "TEST");
-        until_state(sh, cases[i].state);
+        serve(sh, &server, ask_again(&server), after_t1(0.0), cases[i].state);
         client_tell(sh, "FAUL:CLE ALL");
     }
     read_times(&start_us, &date_us);
     assert_true(llabs(date_us - date0_us - (start_us - start0_us)) <= 2);
     inject(sh, "{kind: ntp_step, jump_s: 100}"); /* this one is believed */
-    server_answer(&server, ask_again(&server), 0, 1, "TEST");
-    until_state(sh, "SET");
+    serve(sh, &server, ask_again(&server), after_t1(0.0), "SET");
     read_times(&start_us, &date_us);
     const int64_t step_us = date_us - date0_us - (start_us - start0_us);
     assert_true(step_us <= 100 * SECOND_US + 2 && step_us > 99 * SECOND_US); /* less half of the delay, below 1 s */
