@@ -94,7 +94,7 @@ static void welcome(struct web_link *web, int fd, const struct sockaddr_storage 
     unsigned char address[sizeof web->conn->place.address];
     web_address(from, address);
     const int at = web_places_take((struct web_places){&web->conn[0].place, sizeof web->conn[0]}, address,
-                                   web_lws.lws_now_usecs() / LWS_US_PER_MS);
+                                   web_lws.lws_now_usecs());
     if (at < 0) {
         web_accept_say(fd, 503, "all connections of this link are taken", 0);
         close(fd);

@@ -125,7 +125,7 @@ static inline struct web_link *web_link_of(struct lws *wsi)
 static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 {
     conn->place.phase = phase;
-    conn->place.since_ms = web_lws.lws_now_usecs() / 1000;
+    conn->place.since_us = web_lws.lws_now_usecs();
 }
 
 /* web.c */

@@ -32,7 +32,7 @@ static int count_of(struct web_places places, const unsigned char address[8])
 }
 
 /* Rank of a client in making room: the lowest goes first; 0: it stays. */
-static int rank_of(const struct web_place *place, int64_t now_ms)
+static int rank_of(const struct web_place *place, int64_t now_us)
 {
     switch (place->phase) {
     case WEB_LINGERING:
@@ -41,23 +41,23 @@ static int rank_of(const struct web_place *place, int64_t now_ms)
     case WEB_ASKING:
         return 2;
     case WEB_ANSWERING:
-        return now_ms - place->since_ms >= WEB_GOODBYE_MS ? 3 : 0;
+        return now_us - place->since_us >= 1000 * WEB_GOODBYE_MS ? 3 : 0;
     default:
         return 0;
     }
 }
 
 /* address NULL: among all, those of the address with the most places first. */
-static int find_silent(struct web_places places, const unsigned char *address, int64_t now_ms)
+static int find_silent(struct web_places places, const unsigned char *address, int64_t now_us)
 {
     int found = -1, found_n = 0, found_rank = 0;
     for (int i = 0; i < WEB_PLACES; i++) {
         const struct web_place *place = at(places, i);
-        const int rank = rank_of(place, now_ms), n = count_of(places, place->address);
+        const int rank = rank_of(place, now_us), n = count_of(places, place->address);
         if (rank == 0 || (address != NULL && memcmp(place->address, address, 8) != 0)) continue;
         const int sooner = found < 0 || n > found_n ||
                            (n == found_n && (rank < found_rank ||
-                                             (rank == found_rank && place->since_ms < at(places, found)->since_ms)));
+                                             (rank == found_rank && place->since_us < at(places, found)->since_us)));
         if (!sooner) continue;
         found = i;
         found_n = n;
@@ -66,10 +66,10 @@ static int find_silent(struct web_places places, const unsigned char *address, i
     return found;
 }
 
-int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_ms)
+int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_us)
 {
-    if (count_of(places, address) >= WEB_PLACES_OF_ONE) return find_silent(places, address, now_ms);
+    if (count_of(places, address) >= WEB_PLACES_OF_ONE) return find_silent(places, address, now_us);
     for (int i = 0; i < WEB_PLACES; i++)
         if (at(places, i)->phase == WEB_NOBODY) return i;
-    return find_silent(places, NULL, now_ms);
+    return find_silent(places, NULL, now_us);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The clients that hold the connections of a web link, and which one makes room for another. Private to the web link.
  *
- * Pure; times are of one clock, in ms. */
+ * Pure; times are of one clock, in us, since many clients may come within a millisecond. */
 #ifndef DRIVERS_LINK_WEB_PLACES_H
 #define DRIVERS_LINK_WEB_PLACES_H
 
@@ -27,7 +27,7 @@ enum web_phase {
 struct web_place {
     enum web_phase phase;
     unsigned char address[8]; /* web_address() */
-    int64_t since_ms;         /* ANSWERING: when it last took something. Else: of the phase */
+    int64_t since_us;         /* ANSWERING: when it last took something. Else: of the phase */
 };
 
 /* One address is: 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
@@ -42,6 +42,6 @@ struct web_places {
 /* The index of a place for a new client from this address. If its phase isn't NOBODY, its present client has to go: the
  * oldest silent one of that address if the address holds as many as it may, else of the address that holds the most.
  * -1: no client is silent. */
-int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_ms);
+int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_us);
 
 #endif

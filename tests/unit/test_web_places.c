@@ -13,20 +13,20 @@
 static struct web_place place[WEB_PLACES];
 static const struct web_places places = {place, sizeof place[0]};
 
-static void fill(int from, int to, unsigned char address, enum web_phase phase, int64_t since_ms)
+static void fill(int from, int to, unsigned char address, enum web_phase phase, int64_t since_us)
 {
     for (int i = from; i < to; i++) {
         memset(&place[i], 0, sizeof place[i]);
         place[i].phase = phase;
         place[i].address[0] = address;
-        place[i].since_ms = since_ms + i;
+        place[i].since_us = since_us + i;
     }
 }
 
-static int take(unsigned char address, int64_t now_ms)
+static int take(unsigned char address, int64_t now_us)
 {
     const unsigned char all[8] = {address};
-    return web_places_take(places, all, now_ms);
+    return web_places_take(places, all, now_us);
 }
 
 static void test_who_goes(void **state)
@@ -37,7 +37,7 @@ static void test_who_goes(void **state)
     fill(0, WEB_PLACES_OF_ONE, 1, WEB_ASKING, 0);
     assert_int_equal(take(2, 100), WEB_PLACES_OF_ONE); /* for others there is room */
     assert_int_equal(take(1, 100), 0);                 /* its own oldest */
-    place[7].since_ms = -1;
+    place[7].since_us = -1;
     assert_int_equal(take(1, 100), 7);
     place[9].phase = WEB_LINGERING; /* it has had its answer */
     assert_int_equal(take(1, 100), 9);
@@ -55,9 +55,9 @@ static void test_answers(void **state)
     (void)state;
     fill(0, WEB_PLACES_OF_ONE, 1, WEB_ANSWERING, 0);
     fill(WEB_PLACES_OF_ONE, WEB_PLACES, 0, WEB_NOBODY, 0);
-    assert_int_equal(take(1, WEB_GOODBYE_MS - 1), -1);
-    assert_int_equal(take(1, WEB_GOODBYE_MS), 0);
-    assert_int_equal(take(2, WEB_GOODBYE_MS - 1), WEB_PLACES_OF_ONE);
+    assert_int_equal(take(1, 1000 * WEB_GOODBYE_MS - 1), -1);
+    assert_int_equal(take(1, 1000 * WEB_GOODBYE_MS), 0);
+    assert_int_equal(take(2, 1000 * WEB_GOODBYE_MS - 1), WEB_PLACES_OF_ONE);
 }
 
 static void test_addresses(void **state)
