@@ -37,8 +37,7 @@ function readable(text) {
 const decimals = (text) => (/^\d*\.(\d*)$/.exec(text)?.[1] ?? '').length;
 
 // Writes a limit in few figures, where it has no more: 1200000 becomes '1.2 M'. A limit one step beside a round number
-// that is not
-// allowed is shown by that number: 59.999999 -> '< 60'; the tooltip has all figures.
+// that is not allowed is shown by that number: 59.999999 -> '< 60'; the tooltip has all figures.
 export function limit(text, step = '', isUpper = false) {
   const round = Number(Number(text).toFixed(Math.max(0, decimals(step) - 2)));
   const off = Math.abs(round - Number(text));
