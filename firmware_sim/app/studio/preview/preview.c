@@ -22,7 +22,7 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/base/clock.h"
 
-enum { JOBS = 64, LOWEST = 19, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
+enum { JOBS = 64, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
 static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
 static const int64_t LATELY_NS = 500000000; /* it does so at least every 0.2 s; its way to the head takes some, too */
@@ -266,7 +266,7 @@ static int make_blind(struct preview *p, struct sh_err *err)
 static void *preview_run(void *ctx)
 {
     struct preview *p = ctx;
-    setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    setpriority(PRIO_PROCESS, (id_t)gettid(), p->options.nice);
     if (p->work.coverage == NULL && make_blind(p, &p->why) == SH_OK) p->work.coverage = p->blind;
     pthread_mutex_lock(&p->lock);
     while (!atomic_load(&p->ending)) {

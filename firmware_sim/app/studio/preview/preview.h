@@ -22,6 +22,7 @@ struct preview_options {
      * there is no coverage, and previews have points alone. */
     struct coverage *coverage;
     double cell_m;
+    int nice;                       /* of the thread that works, as setpriority() has it */
     const struct sh_report *report; /* hears why a scanner of the scene can't be previewed */
 };
 
