@@ -140,7 +140,7 @@ static int needs_front(struct replay *r)
 {
     const uint8_t *frame = r->frame.bytes;
     if (r->has_skipped) return frame[1] != NATIVE_DESCRIPTOR || (r->times > 1 && (frame[3] & NATIVE_REPEAT) != 0);
-    /* Of a recording that begins within a scan even the first descriptor is a repetition. */
+    /* Where a recording begins within a scan, even its first descriptor is a repetition. */
     if (r->times == 1 || (r->first_front.bytes[0][3] & NATIVE_REPEAT) == 0) return 0;
     r->front = r->first_front;
     return 1;

@@ -165,7 +165,7 @@ static int make_waveform(const struct site *site, const struct sh_report *report
 /* ---- what a usual pulse makes */
 
 static const double USUAL_SIGNAL = 100.0;
-/* What queues of the stream hold of it, 0.3 s and more, must fit into memory. */
+/* Queues hold 0.3 s and more of the stream, which must fit into memory. */
 static const double MOST_BYTES_S = 4e8;
 
 /* Windows and samples of a head-on return. The most of eight places between two samples. */
@@ -244,7 +244,7 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* So many windows of a pulse have room, on average over a block; and so many samples in a block, so that its bytes are
+/* A block has room for this many windows a pulse, on average, and for this many samples, so that its bytes are
  * counted in 32 bits: 9000 of a pulse at 10 MHz and 100 ticks a second. */
 enum { MOST_WINDOWS = 4, MOST_SAMPLES = 1 << 30 };
 

@@ -33,7 +33,8 @@ void site_free_waves(struct site *site);
 /* A block of so many pulses has room for these windows and samples. Those without room are counted (core/line.h). 0
  * where no waveforms are sent. */
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
-/* What so many usual pulses make, each with a return of 20 dB on a surface that is hit head on. */
+/* Returns the windows and samples of as many usual pulses, each with a return of 20 dB on a surface that is hit head
+ * on. */
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
 /* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double site_wave_bytes_s(const struct site *site);

@@ -134,6 +134,24 @@ static void it_begins_anew_as_it_began(void **state)
 
 enum { EVENTS = 6, TICK_NS = 1000000, MOST = 40 };
 
+static struct config *config_new(void)
+{
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_non_null(cfg);
+    cfg->loop.tick_hz = 1e9 / TICK_NS;
+    return cfg;
+}
+
+/* A recording of n events, one a tick. */
+static void write_events(int n)
+{
+    FILE *f = begin_file();
+    put_descriptor(f);
+    for (int ms = 0; ms < n; ms++)
+        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
+    assert_int_equal(fclose(f), 0);
+}
+
 static struct {
     uint64_t tick;
     struct native_header header;
@@ -142,9 +160,7 @@ static struct {
 /* Plays from a tick on, until the end or `most` frames. Returns how many were sent. */
 static int play(const struct replay_options *given, uint64_t first_tick, int most)
 {
-    struct config *cfg = calloc(1, sizeof *cfg);
-    assert_non_null(cfg);
-    cfg->loop.tick_hz = 1e9 / TICK_NS;
+    struct config *cfg = config_new();
     struct replay_options options = *given;
     options.path = path;
     options.start = 1;
@@ -224,11 +240,7 @@ static void each_time_has_its_numbers(void **state)
 static void a_part_begins_with_the_head(void **state)
 {
     (void)state;
-    FILE *f = begin_file();
-    put_descriptor(f);
-    for (int ms = 0; ms < 20; ms++)
-        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
-    assert_int_equal(fclose(f), 0);
+    write_events(20);
     const int n = play(&(struct replay_options){.speed = 1, .from_s = 0.005, .to_s = 0.012}, 3, MOST);
     assert_int_equal(n, 1 + 8);
     assert_int_equal(played[0].header.type, NATIVE_DESCRIPTOR);
@@ -284,16 +296,10 @@ static void a_command_seeks_paces_and_loops(void **state)
                 {8, "", "19 "},
                 {9, "SCAN:REPL ,1", "0 "}, /* anew, by the loop */
                 {10, "SCAN:REPL ,,OFF", "1 "}};
-    struct config *cfg = calloc(1, sizeof *cfg);
+    struct config *cfg = config_new();
     struct replay *r;
     struct sh_err err;
-    assert_non_null(cfg);
-    cfg->loop.tick_hz = 1e9 / TICK_NS;
-    FILE *f = begin_file();
-    put_descriptor(f);
-    for (int ms = 0; ms < 20; ms++)
-        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
-    assert_int_equal(fclose(f), 0);
+    write_events(20);
     const struct replay_options options = {.path = path, .speed = 1, .start = 1};
     if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
     assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.000000,0.019000,1,OFF");
@@ -327,16 +333,10 @@ static void what_a_replay_refuses(void **state)
                 {"SCAN:REPL 0,1,AGAIN", "ERR -104", "ON or OFF"},
                 {"SCAN:REPL 0,1,ON,1", "ERR -108", "takes a time"},
                 {"SCAN:REPL? 1", "ERR -108", ""}};
-    struct config *cfg = calloc(1, sizeof *cfg);
+    struct config *cfg = config_new();
     struct replay *r;
     struct sh_err err;
-    assert_non_null(cfg);
-    cfg->loop.tick_hz = 1e9 / TICK_NS;
-    FILE *f = begin_file();
-    put_descriptor(f);
-    for (int ms = 0; ms < 3; ms++)
-        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
-    assert_int_equal(fclose(f), 0);
+    write_events(3);
     struct replay_options options = {.path = path, .speed = 1};
     if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

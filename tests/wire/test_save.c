@@ -34,7 +34,7 @@ static char *save_outcome(const struct head *head)
     return answer;
 }
 
-/* What a page saves has the bytes of what `record` writes of the same scan. */
+/* The file that a page saves has the bytes that `record` writes of the same scan. */
 static void the_points_so_far_are_a_file(void **state)
 {
     struct wire *wire = *state;

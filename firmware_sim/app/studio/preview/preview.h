@@ -30,7 +30,7 @@ struct preview_options {
 int preview_create(const struct preview_options *options, struct preview **out, struct sh_err *err);
 /* /preview, /next, /reach and /cells; as web_source's get. Any thread. */
 int preview_get(struct preview *preview, const char *path, const char *query, struct web_body *out, struct sh_err *err);
-/* Of each body, once it has been sent: bodies are shared. */
+/* Gives a body back once it has been sent, since readers share it. */
 void preview_release(struct preview *preview, char *bytes);
 void preview_free(struct preview *preview);
 

@@ -225,8 +225,8 @@ static int check_second(const char *second, const char *path, struct sh_err *err
                    second, len, path);
 }
 
-/* What is left of the files of single scans: a later one would stop the recording at its scan. `end` of a name is in
- * place of that of FILE. */
+/* Refuses what is left of the files of single scans, since a later one would stop the recording at its scan. `end` of a
+ * name is in place of that of FILE. */
 static int check_parts_of_scans(const struct record_file *file, const char *end,
                                 int (*check)(const char *left, const char *path, struct sh_err *err),
                                 struct sh_err *err)
