@@ -30,6 +30,7 @@ export class Point {
     view?.addEventListener('pick', ({detail}) => {
       this.#next = detail?.point ?? null;
       this.#isAsked ||= detail?.isAsked ?? false;
+      if (this.#isAsked) say(byId('point-says'), ''); // a screen reader doesn't read a text that stays as it was
       this.#timer ||= setTimeout(() => this.#show(), 60);
     });
   }
