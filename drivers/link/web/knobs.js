@@ -127,7 +127,6 @@ export class Knobs extends EventTarget {
       await this.#read();
     } catch { /* the head is gone; it comes again with 'open' */ }
     this.#loading = false;
-    this.#allow();
   }
 
   #build(settings) {
@@ -139,14 +138,12 @@ export class Knobs extends EventTarget {
       [...has.keys()].indexOf(a) - [...has.keys()].indexOf(b)).join();
     if (same) {
       for (const [header, setting] of has) this.#describe(this.#knobs.get(header), setting);
-      return;
+    } else {
+      this.#knobs.clear();
+      this.#form.replaceChildren(...groups.map(([title, rows]) => [title, rows.filter(([header]) => has.has(header))])
+        .filter(([, own]) => own.length > 0).map(([title, own]) => this.#makeGroup(title, own, has)));
     }
-    this.#knobs.clear();
-    this.#form.replaceChildren();
-    for (const [title, rows] of groups) {
-      const own = rows.filter(([header]) => has.has(header));
-      if (own.length > 0) this.#form.append(this.#makeGroup(title, own, has));
-    }
+    this.#allow(); // before the values have come, too
   }
 
   // The title of a group has the unit if all its settings have the same one.
@@ -234,7 +231,6 @@ export class Knobs extends EventTarget {
     await this.#read();
     if (before === [...this.#knobs.values()].map((knob) => knob.value).join()) return;
     this.#build(await describeSettings(this.#session)); // limits depend on other settings
-    this.#allow();
   }
 
   async #set(knob) {
@@ -254,7 +250,6 @@ export class Knobs extends EventTarget {
       await this.#read();
       this.#build(await describeSettings(this.#session));
     } catch { /* gone */ }
-    this.#allow();
   }
 
   // Arrow keys change the last figure that is shown by one; the head has the last word, as always.
