@@ -61,11 +61,36 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
     } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
         s->lost.lagging = 0;
     }
-    s->lost.have_seq |= tick->n_frames != 0;
+    s->lost.have_seq = 1;
     s->lost.next_seq = tick->first_seq + tick->n_frames;
     s->lost.next_pulse = tick->pulses_before + tick->n_cast;
     if (s->cursor >= s->came_at) pump->counts.received_pulses += tick->n_cast;
     return frames;
+}
+
+void session_know_next(struct pump *pump, struct session *s)
+{
+    struct ring *ring = &pump->stream->ring;
+    struct ring_copy tick = {.buf = NULL};
+    s->lost.have_seq = s->cursor == 0 || ring_look(ring, s->reader, s->cursor - 1, &tick) == RING_READ;
+    ring_leave(ring, s->reader);
+    if (!s->lost.have_seq) return;
+    s->lost.next_seq = tick.first_seq + tick.n_frames;
+    s->lost.next_pulse = tick.pulses_before + tick.n_cast;
+}
+
+/* Frames are rare where nothing is scanned, and empty ticks wake nobody. So a session may find all that it has not
+ * taken overtaken, and nothing of it lost. */
+void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick)
+{
+    struct ring *ring = &pump->stream->ring;
+    struct ring_copy tick = {.buf = NULL};
+    const uint64_t oldest = released - ring->queue_ticks;
+    const int is_whole = s->lost.have_seq && ring_look(ring, s->reader, oldest, &tick) == RING_READ &&
+                         tick.first_seq == s->lost.next_seq;
+    ring_leave(ring, s->reader);
+    s->cursor = is_whole ? oldest : released - ring->queue_ticks / 2; /* half a queue of room to recover */
+    if (s->cursor > off_tick) s->cursor = off_tick;
 }
 
 /* Frames of the stream, and pulses in them, that are in the session's buffer and were not written as a whole.

@@ -133,6 +133,12 @@ static inline int session_index(const struct pump *pump, const struct session *s
 int pump_power(struct pump *pump, uint32_t full);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
+/* Learns the number of the next frame from the tick before the cursor, if the ring still has it. So a loss shows even if
+ * it is that of the session's first frames. */
+void session_know_next(struct pump *pump, struct session *s);
+/* Moves the cursor, whose tick the ring no longer has: to the oldest tick if nothing is lost before it, else with room
+ * to recover; not beyond off_tick. */
+void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick);
 /* Compares the number of a tick's first frame with the expected one, and counts a gap. A native reader gets an event
  * frame before the tick's frames. These lie at the end of its buffer, with REPLY_ROOM / 8 bytes free after them.
  * `released`: ticks released when the tick was read. Returns how many frames are missing. */

@@ -275,8 +275,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
-        s->cursor = released - ring->queue_ticks / 2; /* the number of the next tick's frames shows the loss */
-        if (s->cursor > off_tick) s->cursor = off_tick;
+        session_catch_up(pump, s, released, off_tick); /* the number of the next tick's frames shows a loss */
         return 1;
     }
     if (got == RING_LOST && ops->gap != NULL) ops->gap(s->protocol, 1); /* the head could not compute it */

@@ -45,6 +45,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
         return;
     }
     s->open = 1;
+    session_know_next(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, pump->holds);
     const struct loop_source *source = pump->links->source;
     char who[COMMAND_PEER_LEN];
@@ -69,7 +70,10 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
     if (pump->protocol->passes_native) return;
     clear(s);
     faulty_forget(pump->link, session_index(pump, s));
-    if (session_restart_protocol(pump, s) == SH_OK) return;
+    if (session_restart_protocol(pump, s) == SH_OK) {
+        session_know_next(pump, s);
+        return;
+    }
     source_report(pump->links->source, CMD_E_REFUSED, "no memory for a session");
     session_cut(pump, s);
     if (pump->ops->end != NULL) pump->ops->end(pump->link, session_index(pump, s));
@@ -142,8 +146,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
-        s->cursor = released - ring->queue_ticks / 2; /* half a queue of room to recover */
-        if (s->cursor > off_tick) s->cursor = off_tick;
+        session_catch_up(pump, s, released, off_tick);
         return 1;
     }
     s->cursor++;

@@ -166,6 +166,48 @@ static void test_attributes(void **state)
     overtake(*state, "loop: {queue_ms: 500, late_ms: 10000}\noutput: {attributes: on}\n");
 }
 
+/* Asks and does not read, until the answers fill all buffers on the way. */
+static void fill_with_answers(int fd)
+{
+    char lines[600];
+    for (size_t i = 0; i < sizeof lines; i++)
+        lines[i] = "*IDN?\n"[i % 6];
+    struct pollfd slot = {.fd = fd, .events = POLLOUT};
+    while (poll(&slot, 1, 300) == 1)
+        send(fd, lines, sizeof lines, MSG_DONTWAIT);
+}
+
+/* A reader whose first frames are lost is told so, too: no frame came before them whose number could show it. */
+static void test_first_frames_lost(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = RATE;
+    struct scanhead_frame frame;
+    config.frames = 1;
+    config.pan_stop_deg = 45;
+    config.more = "loop: {queue_ms: 50, late_ms: 10000}\n";
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1}, slow = {.hold_fd = -1};
+    client_wait_state(fast.sh, "idle");
+    const int fd = raw_connect(head_endpoint(&head, "tcp"));
+    fill_with_answers(fd);
+    client_tell(fast.sh, "SCAN:STAR");
+    follow(&fast);
+    check_nothing_bad(&fast);
+    slow.sh = client_from_fd(fd);
+    while (slow.pulses + slow.told_pulses < fast.pulses + fast.told_pulses) {
+        client_next(slow.sh, &frame);
+        take(&slow, &frame);
+    }
+    assert_int_equal(slow.pulses + slow.told_pulses, fast.pulses + fast.told_pulses);
+    assert_true(slow.told_pulses > 0);
+    scanhead_close(fast.sh);
+    scanhead_close(slow.sh);
+    head_end(&head, SIGTERM);
+    assert_int_equal(stats_uint(wire, "pulses"), slow.pulses + slow.told_pulses);
+}
+
 static void test_fast(void **state)
 {
     struct wire *wire = *state;
@@ -310,6 +352,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_realtime, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_attributes, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_first_frames_lost, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_lost, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_head_ends_first, wire_setup, wire_teardown),
