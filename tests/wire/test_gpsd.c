@@ -189,8 +189,9 @@ static void check_gpsd(struct wire *wire, int quality, int status)
         assert_true(fabs(number(line, "altHAE") - HEIGHT_M) <= HEIGHT_TOLERANCE_M);
         assert_true(fabs(number(line, "geoidSep") - 22.4321) <= 0.5e-3); /* gpsd gives three decimals */
         assert_true(number(line, "speed") == 0);
-        /* gpsd may report the same moment twice, as sentences come, but misses none. */
-        if (before >= 0 && tenths != before) assert_int_equal(tenths, before + 2);
+        /* gpsd may report the same moment twice, as sentences come. A busy machine may let it read so late that a whole
+         * fix is lost on the way; a fix is every 0.2 s. */
+        if (before >= 0 && tenths != before) assert_true(tenths > before && (tenths - before) % 2 == 0);
         n += tenths != before;
         before = tenths;
         /* Its time is in the past: the head's own clock, asked now, is not before it. */
