@@ -55,25 +55,39 @@ static void to_generic(struct set *set)
     set->path[used] = '\0';
 }
 
-static int fail_unknown(struct cfg_reader *rd, struct set *set)
+/* Cuts the path after its longest beginning that is a known key, which may be none. */
+static const struct cfg_key *cut_to_known(const struct cfg_reader *rd, char *path)
 {
-    char parent[CFG_PATH_MAX];
+    const struct cfg_key *key = NULL;
+    for (size_t len = strlen(path); key == NULL && len > 0;) {
+        while (len > 0 && path[--len] != '.' && path[len] != '[')
+            continue;
+        path[len] = '\0';
+        key = cfg_find(&rd->table, path);
+    }
+    return key;
+}
+
+static int fail_unknown(struct cfg_reader *rd, const struct set *set)
+{
+    char parent[CFG_PATH_MAX], name[CFG_PATH_MAX];
     snprintf(parent, sizeof parent, "%s", set->path);
-    char *dot = strrchr(parent, '.');
-    const char *word = dot == NULL ? set->path : set->path + (dot - parent) + 1;
-    *(dot == NULL ? parent : dot) = '\0';
-    /* A parent that is no section has no known keys: list those at the top. */
-    const struct cfg_key *section = cfg_find(&rd->table, parent);
-    if (rd->in_scanner && (strncmp(set->path, "surfaces.", 9) == 0 || strncmp(set->path, "surfaces[", 9) == 0))
+    const struct cfg_key *key = cut_to_known(rd, parent);
+    const char *rest = set->path + strlen(parent);
+    if (rd->in_scanner && strcmp(parent, "surfaces") == 0)
         return cfg_fail(rd, CFG_FROM_SET, set->name,
                         "surfaces of a scanner are set as one list; allowed "
                         "surfaces=[{...}, ...]");
-    if (rd->in_scanner && (section == NULL || section->type != CFG_MAP))
-        return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->path);
-    if (rd->in_scanner) return cfg_fail_unknown(rd, CFG_FROM_SET, parent, 0, word);
-    if (parent[0] != '\0' && (section == NULL || section->type != CFG_MAP))
-        return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->name);
-    return cfg_fail_unknown(rd, CFG_FROM_SET, parent, set->item, word);
+    if (key == NULL || (key->type == CFG_MAP && rest[0] == '['))
+        return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, rd->in_scanner ? set->path : set->name);
+    const uint32_t item = rd->in_scanner ? 0 : set->item;
+    if (key->type == CFG_MAP) return cfg_fail_unknown(rd, CFG_FROM_SET, parent, item, rest + 1);
+    cfg_name(parent, item, name);
+    if (key->type == CFG_LIST)
+        return cfg_fail(rd, CFG_FROM_SET, set->name, "unknown key; %s is a list; allowed an index, as in %s[0]", name,
+                        name);
+    return cfg_fail(rd, CFG_FROM_SET, set->name, "unknown key; %s has no keys that can be set; allowed %s=VALUE", name,
+                    name);
 }
 
 /* Makes sure that the element exists; the number after the last one appends. */
