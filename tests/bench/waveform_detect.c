@@ -17,6 +17,7 @@
 #include "core/waveform.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
+#include "tests/common/wave_spec.h"
 
 enum { PULSES = 2000, ROUNDS = 11, MOST_RETURNS = 40, MOST_ECHOES = 15, SAMPLES = 160, SCENES = 7 };
 static const char *const SCENE[SCENES] = {"single", "tilted", "pair", "foliage", "limited", "nothing", "skew"};
@@ -55,18 +56,8 @@ static void aim(int scene, uint64_t p, struct pulse *pulse)
 
 static struct waveform *make(int scene)
 {
-    struct waveform_spec spec = {.shape = WAVEFORM_GAUSSIAN,
-                                 .width_s = 4e-9,
-                                 .skew = 1.0,
-                                 .sample_s = 1e-9,
-                                 .bits = 12,
-                                 .baseline_counts = 200.0,
-                                 .full_scale = 100.0,
-                                 .noise = 0.125,
-                                 .keep = 0.5,
-                                 .before_s = 25e-9,
-                                 .after_s = 25e-9,
-                                 .seed = 7};
+    struct waveform_spec spec = wave_spec();
+    spec.before_s = spec.after_s = 25e-9;
     if (scene == 5) {
         spec.near_m = 60.0;
         spec.far_m = 69.5;

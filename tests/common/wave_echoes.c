@@ -10,22 +10,6 @@
 
 const char *const wave_detector_name[WAVE_DETECTORS] = {"threshold", "fraction", "gaussians"};
 
-struct waveform_spec wave_spec(void)
-{
-    return (struct waveform_spec){.shape = WAVEFORM_GAUSSIAN,
-                                  .width_s = 4e-9,
-                                  .skew = 1.0,
-                                  .sample_s = 1e-9,
-                                  .bits = 12,
-                                  .baseline_counts = 200.0,
-                                  .full_scale = 100.0,
-                                  .noise = 0.125,
-                                  .keep = 0.5,
-                                  .before_s = 12e-9,
-                                  .after_s = 12e-9,
-                                  .seed = 7};
-}
-
 void wave_open(struct wave_echoes *w, const struct waveform_spec *spec)
 {
     struct sh_err err;

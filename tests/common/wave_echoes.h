@@ -3,7 +3,7 @@
 #ifndef TESTS_COMMON_WAVE_ECHOES_H
 #define TESTS_COMMON_WAVE_ECHOES_H
 
-#include "core/waveform.h"
+#include "tests/common/wave_spec.h"
 
 enum { WAVE_MOST = 16, WAVE_DETECTORS = 3 };
 extern const char *const wave_detector_name[WAVE_DETECTORS];
@@ -16,9 +16,6 @@ struct wave_echoes {
     uint32_t most, n, n_crowded;
 };
 
-/* Returns a Gaussian pulse of 4 ns, sampled each ns with 12 bits, noise 1/8 of the threshold, full scale 100
- * thresholds. */
-struct waveform_spec wave_spec(void);
 /* Room for 16 echoes a pulse. Fails the test where the spec is refused. */
 void wave_open(struct wave_echoes *w, const struct waveform_spec *spec);
 void wave_close(struct wave_echoes *w);

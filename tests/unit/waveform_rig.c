@@ -3,19 +3,18 @@
 
 #include <math.h>
 
+#include "tests/common/wave_spec.h"
+
 struct waveform_spec waveform_rig_spec(void)
 {
-    return (struct waveform_spec){.shape = WAVEFORM_GAUSSIAN,
-                                  .width_s = 4e-9,
-                                  .skew = 1.0,
-                                  .sample_s = 1e-9,
-                                  .bits = 12,
-                                  .baseline_counts = 100.0,
-                                  .full_scale = 1000.0,
-                                  .keep = 1.0,
-                                  .before_s = 5e-9,
-                                  .after_s = 8e-9,
-                                  .seed = 7};
+    struct waveform_spec spec = wave_spec();
+    spec.baseline_counts = 100.0;
+    spec.full_scale = 1000.0;
+    spec.noise = 0.0;
+    spec.keep = 1.0;
+    spec.before_s = 5e-9;
+    spec.after_s = 8e-9;
+    return spec;
 }
 
 struct waveform *waveform_rig_open(const struct waveform_spec *spec)
