@@ -12,7 +12,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/command/head.h"
 
-enum { NEXT_MS = 100, QUIET = 20, LOWEST = 19 };
+enum { NEXT_MS = 100, QUIET = 20 };
 /* The stream comes tick by tick. Taken in larger pieces it costs half: so much of 2.2 million pulses a second fits into
  * the socket, and the link's queue has the rest. */
 static const int64_t NAP_NS = 4000000;
@@ -227,7 +227,7 @@ static int next_frame(const struct watch *w, struct scanhead_frame *frame)
  * waits for keeps the head's priority: else, on a busy machine, the whole head would be as slow as the observer. */
 static void be_last(void)
 {
-    setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    setpriority(PRIO_PROCESS, (id_t)gettid(), WATCH_NICE);
 }
 
 void *watch_observe(void *watch)

@@ -16,8 +16,9 @@
 #include "core/bytes.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/record/job.h"
+#include "firmware_sim/app/studio/watch/watch.h"
 
-enum { AS_LEN = 9, FOLDER_LEN = 400, PATH_LEN = FOLDER_LEN + 32, LOWEST = 19 };
+enum { AS_LEN = 9, FOLDER_LEN = 400, PATH_LEN = FOLDER_LEN + 32 };
 enum save_state { SAVE_IDLE, SAVE_WORKING, SAVE_DONE, SAVE_FAILED };
 
 struct save {
@@ -130,7 +131,7 @@ static void *make(void *self)
     struct save *s = self;
     struct sh_err err = {0};
     struct stat st = {0};
-    setpriority(PRIO_PROCESS, (id_t)gettid(), LOWEST);
+    setpriority(PRIO_PROCESS, (id_t)gettid(), WATCH_NICE);
     int rc = write_stream(s, &err);
     if (rc == SH_OK) rc = write_file(s, &err);
     if (rc == SH_OK && stat(s->file, &st) != 0) rc = sh_fail(&err, SH_EIO, "%s: %s", s->file, strerror(errno));

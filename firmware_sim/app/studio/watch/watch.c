@@ -76,11 +76,11 @@ static void close_watch(struct watch *w)
 /* Stations that can be moved can be tried at other places. */
 static int open_preview(struct watch *w, struct sh_err *err)
 {
-    const struct preview_options options = {.nice = 19, /* a busy head is not disturbed */
-                                            .cfg = w->cfg,
+    const struct preview_options options = {.cfg = w->cfg,
                                             .site = w->site,
                                             .coverage = w->seen.coverage,
                                             .cell_m = w->seen.cell_m,
+                                            .nice = WATCH_NICE,
                                             .report = w->options.report};
     if (site_why_fixed(w->site) != NULL) return SH_OK;
     return preview_create(&options, &w->preview, err);

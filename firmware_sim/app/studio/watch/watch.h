@@ -11,6 +11,9 @@
 
 #include "firmware_sim/app/run/page.h"
 
+/* The lowest priority, as setpriority() has it: a busy head is not disturbed. */
+enum { WATCH_NICE = 19 };
+
 /* main.c gives it to run_take_page. */
 extern const struct run_page watch_page;
 
