@@ -17,6 +17,11 @@ enum { PREVIEW_MOST_PULSES = 1500000, PREVIEW_MOST_OF = 16, PREVIEW_MOST_PIECES 
 
 enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_REACH, PREVIEW_CELLS };
 
+/* A box that is turned about the vertical, clockwise from above: half of its size to the right, ahead and up. */
+struct preview_section {
+    double middle_m[3], half_m[3], heading_deg; /* half_m[0] INFINITY: there is none */
+};
+
 /* Angles and lengths of a member that is INFINITY are those of the scanner at power-up. */
 struct preview_request {
     enum preview_kind kind;
@@ -27,6 +32,7 @@ struct preview_request {
     /* of PREVIEW_NEXT and PREVIEW_REACH */
     uint32_t n_of, of[PREVIEW_MOST_OF]; /* numbers of previews, whose cells are seen already */
     double height_m;                    /* of the head above the floor */
+    struct preview_section section;     /* of PREVIEW_NEXT: only cells with their middles in it count */
 };
 
 /* Returns SH_EINPUT with an empty text where nothing is at that path. */

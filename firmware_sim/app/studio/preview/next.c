@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/bytes.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/preview/inside.h"
@@ -56,6 +57,49 @@ static void keep_seen(struct coverage *coverage, const struct preview_seen *seen
     }
 }
 
+/* ---- a section of the scene */
+
+struct middles {
+    double (*sum_m)[3]; /* by cell, of its pieces' middles */
+    uint32_t *n;
+};
+
+static void add_middle(void *ctx, uint32_t cell, int n, const double corner[4][3])
+{
+    const struct middles *m = ctx;
+    for (int i = 0; i < 3; i++)
+        m->sum_m[cell][i] += (corner[0][i] + corner[1][i] + corner[2][i] + corner[n - 1][i]) / 4;
+    m->n[cell]++;
+}
+
+static int is_within(const struct preview_section *s, const double sum_m[3], uint32_t n)
+{
+    const double c = cos(angle_rad(s->heading_deg)), sine = sin(angle_rad(s->heading_deg));
+    const double dx = sum_m[0] / n - s->middle_m[0], dy = sum_m[1] / n - s->middle_m[1];
+    return fabs(c * dx - sine * dy) <= s->half_m[0] && fabs(sine * dx + c * dy) <= s->half_m[1] &&
+           fabs(sum_m[2] / n - s->middle_m[2]) <= s->half_m[2];
+}
+
+/* Cells outside of the section are kept as seen, so that nothing is gained by them. The page counts by the same middles
+ * (middlesOf in previews.js). */
+static int keep_outside(struct coverage *coverage, const struct preview_section *section, struct sh_err *err)
+{
+    const uint32_t n = coverage_cells(coverage);
+    struct middles m = {calloc(n, sizeof *m.sum_m), calloc(n, sizeof *m.n)};
+    uint64_t *outside = calloc(preview_words(coverage), sizeof *outside);
+    const int rc = m.sum_m != NULL && m.n != NULL && outside != NULL
+                       ? SH_OK
+                       : sh_fail(err, SH_ENOMEM, "no memory for the cells of a section");
+    if (rc == SH_OK) coverage_pieces(coverage, add_middle, &m);
+    for (uint32_t i = 0; i < n && rc == SH_OK; i++)
+        if (!is_within(section, m.sum_m[i], m.n[i])) outside[i / 64] |= UINT64_C(1) << i % 64;
+    if (rc == SH_OK) coverage_keep_cells(coverage, outside);
+    free(m.sum_m);
+    free(m.n);
+    free(outside);
+    return rc;
+}
+
 /* This has the places to stand on, and the rays that they are compared by. */
 struct stand {
     struct preview_site *of;
@@ -81,6 +125,8 @@ static int stand_open(const struct preview_work *work, const struct preview_requ
     s->result.station = calloc(s->of->site.n_stations, sizeof *s->result.station);
     if (s->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
     keep_seen(work->coverage, seen, r->n_of, &s->result.station[0].pulses);
+    if (isfinite(r->section.half_m[0])) rc = keep_outside(work->coverage, &r->section, err);
+    if (rc != SH_OK) return rc;
     return coverage_next_open(&s->options, &s->result, &work->stop, &s->next, &s->finder, err);
 }
 

@@ -49,13 +49,19 @@ static int read_place(const struct preview_options *o, const char *query, struct
 static int read_next(const struct preview_options *o, enum preview_kind kind, const char *query,
                      struct preview_request *r, struct sh_err *err)
 {
-    enum { STATION, HEIGHT, OF };
+    enum { STATION, HEIGHT, OF, MIDDLE = OF + PREVIEW_MOST_OF, HALF = MIDDLE + 3, TURN = HALF + 3, ALL };
+    static const char *const of_section[] = {"middle_x_m", "middle_y_m", "middle_z_m",
+                                             "half_x_m",   "half_y_m",   "half_z_m"};
     static const char *const names[PREVIEW_MOST_OF] = {"p1", "p2",  "p3",  "p4",  "p5",  "p6",  "p7",  "p8",
                                                        "p9", "p10", "p11", "p12", "p13", "p14", "p15", "p16"};
-    struct page_word w[OF + PREVIEW_MOST_OF + 1] = {
+    struct page_word w[ALL + 1] = {
         [STATION] = {"station", 1, n_stations(o), 1, (double)NAN}, [HEIGHT] = {"height_m", 0, 1000, 0, HEIGHT_M}};
     for (uint32_t i = 0; i < PREVIEW_MOST_OF; i++)
         w[OF + i] = (struct page_word){names[i], 1, UINT32_MAX, 1, 0};
+    for (int i = 0; i < 6 && kind == PREVIEW_NEXT; i++)
+        w[MIDDLE + i] =
+            (struct page_word){of_section[i], i < 3 ? -FAR_AWAY_M : 0, FAR_AWAY_M, 0, i < 3 ? 0 : (double)INFINITY};
+    if (kind == PREVIEW_NEXT) w[TURN] = (struct page_word){"turn_deg", -360, 360, 0, 0};
     const int rc = page_read_query(w, query, err);
     if (rc != SH_OK) return rc;
     *r = (struct preview_request){.kind = kind,
@@ -64,7 +70,12 @@ static int read_next(const struct preview_options *o, enum preview_kind kind, co
                                   .step_deg = NEXT_STEP_DEG,
                                   .far_m = (double)INFINITY,
                                   .line_deg = {(double)INFINITY, (double)INFINITY},
-                                  .pan_deg = {(double)INFINITY, (double)INFINITY}};
+                                  .pan_deg = {(double)INFINITY, (double)INFINITY},
+                                  .section.heading_deg = w[TURN].value};
+    for (int i = 0; i < 3; i++) {
+        r->section.middle_m[i] = w[MIDDLE + i].value;
+        r->section.half_m[i] = kind == PREVIEW_NEXT ? w[HALF + i].value : (double)INFINITY;
+    }
     for (uint32_t i = 0; i < PREVIEW_MOST_OF; i++)
         if (w[OF + i].value != 0.0) r->of[r->n_of++] = (uint32_t)w[OF + i].value;
     return SH_OK;
