@@ -151,17 +151,18 @@ export async function trialTests(page, other, SIZE) {
     const said = `document.querySelector('#trial-section').textContent`;
     equal(await page.eval(said), 'For one room alone: put a Section around it.', 'without a section');
     await page.eval(`document.querySelector('#tool-section').click(), document.querySelector('#section-height').click()`);
-    await page.fill('#section-from', '-0.1');
-    await page.fill('#section-to', '0.1');
-    const [seen, all] = await page.eval(`(() => {
-      const {cells, sum, reach} = scanhead.trial, heights = new Map(), m2 = [0, 0];
+    await page.fill('#section-from', '-0.13');
+    await page.fill('#section-to', '0.13'); // no cell has its middle there
+    const [seen, all, whole] = await page.eval(`(() => {
+      const {cells, sum, reach} = scanhead.trial, heights = new Map(), m2 = [0, 0, 0];
       for (let i = 0; i < cells.pieces; i++) {
         const of = heights.get(cells.cell[i]) ?? [];
         heights.set(cells.cell[i], of);
         for (let k = 2; k < 12; k += 3) of.push(cells.corners[12 * i + k] + cells.origin[2]);
       }
       for (const [c, of] of heights) {
-        if (Math.abs(of.reduce((a, b) => a + b) / of.length) > 0.1) continue;
+        if (Math.abs(of.reduce((a, b) => a + b) / of.length) > 0.13) continue;
+        m2[2] += cells.area[c];
         if (sum.counts[c] === 0 && reach && !(reach[c >>> 5] >>> (c & 31) & 1)) continue;
         m2[1] += cells.area[c];
         if (sum.counts[c] > 0) m2[0] += cells.area[c];
@@ -171,6 +172,11 @@ export async function trialTests(page, other, SIZE) {
     const words = (await page.eval(said)).match(/^In the section: ([\d.]+).% of (\d+).m²$/);
     is(words !== null && all > 10, `what is said: ${words}`);
     near(Number(words[1]), 100 * seen / all, 0.05001, 'per cent of the cells around the floor');
+    await page.click('#trial-suggest');
+    const next = await page.until('scanhead.trial.next');
+    is(next.gain_m2 > 0 && next.gain_m2 + next.none_m2 <= whole - seen + M2, `a suggestion is about the section: ${next.gain_m2} m2 and ${next.none_m2} m2 of ${whole - seen}`);
+    is((await page.eval(`document.querySelector('#trial').textContent`)).includes('more of the section'), 'and says so');
+    await page.click('#trial-suggest');
     await page.eval(`document.querySelector('#section-off').click(), document.querySelector('#tool-section').click()`);
     equal(await page.eval(said), 'For one room alone: put a Section around it.', 'after it');
   });

@@ -6,8 +6,7 @@ import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
 // These are the names of the settings for people, in the order of the page. A setting that is not here stands under
-// "More" with its
-// header.
+// "More" with its header.
 const GROUPS = [
   ['Rates', [['HEAD:PRR', 'Pulses'], ['HEAD:LINes', 'Lines'], ['HEAD:PAN', 'Pan']]],
   ['Angular step', [['SCAN:STEP', 'Both ways'], ['SCAN:STEP:LINE', 'In the line'], ['SCAN:STEP:PAN', 'Line to line']]],
@@ -54,14 +53,20 @@ export function limit(text, step = '', isUpper = false) {
   return readable(text.replace(/^-?\d*\.\d+$/, (all) => inward(all, isUpper)));
 }
 
-// A number with more than four figures after its point is rounded to four: a lower limit up, an upper one down, so that
-// the shown number is allowed.
-function inward(text, isUpper) {
+// A number with more than four figures after its point is rounded to four; after its first figure, where that comes
+// later.
+function inFew(text, round) {
   const value = Number(text), places = Math.min(12, 3 - Math.min(-1, Math.floor(Math.log10(Math.abs(value) || 1))));
   if ((text.split('.')[1] ?? '').length <= places) return text;
   const scale = 10 ** places;
-  return String(Number(((isUpper ? Math.floor : Math.ceil)(value * scale) / scale).toFixed(places)));
+  return String(Number((round(value * scale) / scale).toFixed(places)));
 }
+
+// Returns a value in few figures; a word stays as it is.
+export const few = (text) => (/^-?\d*\.\d+$/.test(text) ? inFew(text, Math.round) : text);
+
+// A lower limit is rounded up, an upper one down, so that the shown number is allowed.
+const inward = (text, isUpper) => inFew(text, isUpper ? Math.floor : Math.ceil);
 
 // Returns whether no other value can be set now: only one is allowed or, as with a pan that stands still, only the
 // present one.
@@ -162,7 +167,7 @@ export class Knobs extends EventTarget {
 
   #makeKnob(setting, name, says) {
     const id = `knob-${setting.header.replaceAll(':', '-').toLowerCase()}`;
-    const knob = {setting, value: '', says};
+    const knob = {setting, value: '', shown: '', says}; // shown is its value, in few figures
     const attributes = {id, name: setting.header, 'aria-describedby': `${id}-hint ${says.id}`, autocomplete: 'off'};
     const isChoice = setting.kind === 'word' || setting.values.length > 0;
     knob.field = isChoice ? make('select', attributes) : make('input', {...attributes, type: 'text', inputmode: 'decimal', spellcheck: 'false'});
@@ -209,13 +214,14 @@ export class Knobs extends EventTarget {
   #put(knob, value) {
     knob.value = value;
     const option = knob.setting.values.find((word) => (knob.setting.kind === 'word' ? sameWord(word, value) : Number(word) === Number(value)));
-    knob.field.value = option ?? value;
+    knob.shown = knob.field.value = option ?? few(value);
+    knob.field.title = knob.shown === value || option ? '' : value; // it has all figures
   }
 
   async #read() {
     await Promise.all([...this.#knobs.values()].map(async (knob) => {
       const value = await this.#session.command(`${knob.setting.header}?`);
-      if (knob.field !== document.activeElement || knob.field.value === knob.value) this.#put(knob, value);
+      if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#put(knob, value);
       else knob.value = value; // the user types: the text stays, Escape brings the present value
     }));
     this.dispatchEvent(new Event('values'));
@@ -235,7 +241,7 @@ export class Knobs extends EventTarget {
 
   async #set(knob) {
     const value = knob.field.value.trim();
-    if (value === '' || value === knob.value) return this.#put(knob, knob.value);
+    if (value === '' || value === knob.shown) return this.#put(knob, knob.value);
     knob.box.dataset.waiting = '';
     try {
       const reply = await this.#session.command(`${knob.setting.header} ${value}`);

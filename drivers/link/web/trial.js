@@ -31,6 +31,7 @@ export class Trial extends EventTarget {
   step_deg; // of stations without a step of their own
   error = ''; // it says why there are no cells
   nextError = ''; // it says why there is no suggestion
+  section = null; // only what is in it counts for a suggestion
   next = null;  // the suggestion: {x_m, y_m, z_m, heading_deg, gain_m2, none_m2}
   #cloud;
   #scans = 0;
@@ -189,7 +190,16 @@ export class Trial extends EventTarget {
   #about(name) {
     const like = this.stations[0], seen = this.stations.filter((s) => s.seen).slice(0, MOST_OF);
     const height_m = like.above_m > 0 ? round(like.above_m) : null;
-    return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer]))});
+    return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer])),
+      ...(name === 'next' ? this.#box() : {})});
+  }
+
+  // Returns the section as a request has it.
+  #box() {
+    if (!this.section) return {};
+    const {middle, limits, heading_deg} = this.section;
+    return Object.fromEntries(['x', 'y', 'z'].flatMap((axis, a) => [[`middle_${axis}_m`, round(middle[a])], [`half_${axis}_m`, round(limits[a])]])
+      .concat([['turn_deg', turned(round(heading_deg))]]));
   }
 
   // Returns true where the stations see the backs of most faces: these then look the other way.
@@ -222,7 +232,7 @@ export class Trial extends EventTarget {
     return this.#tell('change');
   }
 
-  #stamp() { return this.stations.map((s) => `${s.number}.${s.wanted}`).join(); }
+  #stamp() { return JSON.stringify([this.stations.map((s) => [s.number, s.wanted]), this.#box()]); }
 
   // Returns the stations as a configuration has them.
   get text() {

@@ -56,7 +56,7 @@ export class TrialPanel {
     this.#body.prepend(make('div', {class: 'actions'}, this.#open), this.#box);
     this.#make();
     session.addEventListener('change', () => this.#trial && this.#allow());
-    view?.addEventListener('section', () => this.#trial && this.#within());
+    view?.addEventListener('section', () => this.#trial && this.#cut());
   }
 
   // A head that has no previews offers no trial. A trial ends when another run of the head begins, since that may have
@@ -115,6 +115,7 @@ export class TrialPanel {
     this.before = view.cloud;
     view.useCloud(this.#cloud);
     this.#trial = new Trial(this.#cloud, list, Number(this.step.value));
+    this.#trial.section = view.camera.section;
     this.#stations.setTrial(this);
     this.#targets.begin(this.#trial);
     window.scanhead.trial = this.#trial;
@@ -248,9 +249,17 @@ export class TrialPanel {
     this.#within();
   }
 
+  // A suggestion is about what is in the section.
+  #cut() {
+    this.#trial.section = this.#view.camera.section;
+    this.#trial.next = null;
+    this.#suggestSoon();
+    this.#show();
+  }
+
   // Says how much of what is in the section is seen, so that one room can be judged.
   #within() {
-    const {sum, cells, reach} = this.#trial, {section} = this.#view.camera;
+    const {sum, cells, reach, section} = this.#trial;
     if (!sum || !section) return say(this.inSection, sum ? 'For one room alone: put a Section around it.' : '');
     const {seen_m2, all_m2} = seenWithin(cells, sum.counts, reach, section);
     return say(this.inSection, all_m2 > 0 ? `In the section: ${percent(seen_m2 / all_m2)} of ${grouped(all_m2)}\u00a0m²` : 'Nothing of it is in the section.');
@@ -279,7 +288,7 @@ export class TrialPanel {
   }
 
   #allow() {
-    const {next, stations, nextError, sum} = this.#trial;
+    const {next, stations, nextError} = this.#trial;
     const moved = stations.filter((s) => !s.isAdded && PLACE.some(([key]) => Math.abs(s[key] - s.was[key]) > 1e-9));
     const not = this.#session.whyNot('idle');
     this.add.disabled = stations.length === 0;
@@ -288,8 +297,16 @@ export class TrialPanel {
     this.apply.title = not || (this.#isApplying && 'Their places are being sent') || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
     this.take.disabled = !next;
     for (const field of [this.paint, this.suggests]) field.disabled = this.#trial.isBlind;
-    say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all.`
+    say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${this.#gain()}.`
       : this.suggests.checked ? nextError || 'Looking for it.' : 'It can be clicked in the picture.');
+  }
+
+  // Says what the suggested place adds, of the section if there is one.
+  #gain() {
+    const {next, sum, cells, reach, section} = this.#trial;
+    if (!section) return `${percent(next.gain_m2 / this.#all())} more, ${percent(1 - (next.none_m2 - sum.hidden_m2) / this.#all())} in all`;
+    const {seen_m2, all_m2} = seenWithin(cells, sum.counts, reach, section);
+    return `${percent(next.gain_m2 / all_m2)} more of the section, ${percent((seen_m2 + next.gain_m2) / all_m2)} in all`;
   }
 
   // ---- what is done
