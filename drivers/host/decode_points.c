@@ -342,6 +342,28 @@ int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, ui
     return n;
 }
 
+/* The loops are apart because one size of figures a loop makes the better vectors. */
+static void put_points(const struct scanhead_columns *from, int n, struct scanhead_point *points)
+{
+    VEC_LOOP
+    for (int i = 0; i < n; i++) {
+        points[i].x = from->x[i];
+        points[i].y = from->y[i];
+        points[i].z = from->z[i];
+        points[i].range_m = from->range_m[i];
+        points[i].mirror_rad = from->mirror_rad[i];
+        points[i].pan_rad = from->pan_rad[i];
+        points[i].reflectance_db = from->reflectance_db[i];
+        points[i].t_ns = from->t_ns[i];
+    }
+    VEC_LOOP
+    for (int i = 0; i < n; i++) {
+        points[i].echo = from->echo[i];
+        points[i].echo_count = from->echo_count[i];
+        points[i].label = from->label[i];
+    }
+}
+
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max)
 {
@@ -355,18 +377,7 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
     for (int at = 0; at < n; at += BLOCK, points += BLOCK) {
         const int m = n - at < BLOCK ? n - at : BLOCK;
         columns_of_block(sh, frame, first + (uint32_t)at, m, &b, &columns);
-        for (int i = 0; i < m; i++)
-            points[i] = (struct scanhead_point){.x = b.x[i],
-                                                .y = b.y[i],
-                                                .z = b.z[i],
-                                                .range_m = b.range_m[i],
-                                                .mirror_rad = mirror_rad[i],
-                                                .pan_rad = pan_rad[i],
-                                                .reflectance_db = reflectance_db[i],
-                                                .t_ns = t_ns[i],
-                                                .echo = b.echo[i],
-                                                .echo_count = b.echo_count[i],
-                                                .label = label[i]};
+        put_points(&columns, m, points);
     }
     return n;
 }
