@@ -25,8 +25,7 @@ void host_turn_table(struct scanhead *sh)
 {
     for (int i = 0; i < HOST_TURN_PARTS; i++) {
         double a = TWO_PI * i / HOST_TURN_PARTS;
-        sh->sin_part[i] = sin(a);
-        sh->cos_part[i] = cos(a);
+        sh->turn_part[i] = (struct host_turn_part){sin(a), cos(a)};
     }
 }
 
@@ -190,23 +189,45 @@ VEC_CLONES static void set_turns(const uint32_t *restrict count, int n, double p
         turn[i] = count[i] * per_count;
 }
 
-/* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
- * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of u itself. Angles in
- * turns need no reduction by an inexact pi. */
-VEC_CLONES static void sincos_turns(const double *restrict sin_part, const double *restrict cos_part,
-                                    const double *restrict u, int n, double *restrict s, double *restrict c)
+/* The table's part that is nearest to u[n] >= 0 turns, and the rest beside it in radians. */
+VEC_CLONES static void split_turns(const double *restrict u, int n, uint32_t *restrict part, double *restrict rest_rad)
 {
     for (int i = 0; i < n; i++) {
-        const double part = u[i] * HOST_TURN_PARTS;
+        const double parts = u[i] * HOST_TURN_PARTS;
         uint64_t k;
-        const double whole = floor_of(part + 0.5, &k);
-        const double r = (part - whole) * (TWO_PI / HOST_TURN_PARTS), r2 = r * r;
+        const double whole = floor_of(parts + 0.5, &k);
+        part[i] = (uint32_t)k & (HOST_TURN_PARTS - 1);
+        rest_rad[i] = (parts - whole) * (TWO_PI / HOST_TURN_PARTS);
+    }
+}
+
+/* |r| <= pi/256, so the first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of
+ * the angle itself. */
+VEC_CLONES static void add_rests(const struct host_turn_part *restrict part, const double *restrict rest_rad, int n,
+                                 double *restrict s, double *restrict c)
+{
+    for (int i = 0; i < n; i++) {
+        const double r = rest_rad[i], r2 = r * r;
         const double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120));
         const double cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)));
-        const double sk = sin_part[k & (HOST_TURN_PARTS - 1)], ck = cos_part[k & (HOST_TURN_PARTS - 1)];
+        const double sk = part[i].sine, ck = part[i].cosine;
         s[i] = sk + (ck * sin_r + sk * cos_r_1);
         c[i] = ck + (ck * cos_r_1 - sk * sin_r);
     }
+}
+
+/* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, a series the rest. Angles in turns need no
+ * reduction by an inexact pi. The table is read between the vectors: a part as a whole, which costs less than picking
+ * its figures into them. */
+static void sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c)
+{
+    uint32_t k[BLOCK];
+    double rest_rad[BLOCK];
+    struct host_turn_part part[BLOCK];
+    split_turns(u, n, k, rest_rad);
+    for (int i = 0; i < n; i++)
+        part[i] = table[k[i]];
+    add_rests(part, rest_rad, n, s, c);
 }
 
 /* u[n] turns, folded into [lo, lo + 1), as radians. */
@@ -253,8 +274,8 @@ static void set_positions(const struct scanhead *sh, struct block *b, int n, int
         set_ranges(b, n, sh->descriptor.range_scale_m, b->range_m);
         range_m = b->range_m;
     }
-    sincos_turns(sh->sin_part, sh->cos_part, b->mirror, m, b->sin_m, b->cos_m);
-    sincos_turns(sh->sin_part, sh->cos_part, b->pan, n, b->sin_pan, b->cos_pan);
+    sincos_turns(sh->turn_part, b->mirror, m, b->sin_m, b->cos_m);
+    sincos_turns(sh->turn_part, b->pan, n, b->sin_pan, b->cos_pan);
     if (one_mirror) {
         set_all(b->sin_m, n, b->sin_m[0]);
         set_all(b->cos_m, n, b->cos_m[0]);
