@@ -31,15 +31,26 @@ void host_turn_table(struct scanhead *sh)
 
 /* ---- what all layouts share */
 
-VEC_CLONES static void take_words(const uint8_t *restrict row, int n, struct block *restrict b)
+VEC_CLONES static void split_fours(const uint32_t (*restrict four)[4], int n, struct block *restrict b)
 {
     for (int i = 0; i < n; i++) {
-        b->a[i] = le_get32(row + NATIVE_POINT_LEN * i);
-        b->b[i] = le_get32(row + NATIVE_POINT_LEN * i + 4);
-        b->c[i] = le_get32(row + NATIVE_POINT_LEN * i + 8);
-        b->middle[i] = le_get32(row + NATIVE_POINT_LEN * i + 12);
-        b->tail[i] = le_get32(row + NATIVE_POINT_LEN * i + 16);
+        b->a[i] = le32toh(four[i][0]);
+        b->b[i] = le32toh(four[i][1]);
+        b->c[i] = le32toh(four[i][2]);
+        b->middle[i] = le32toh(four[i][3]);
     }
+}
+
+/* Words that are four apart come into columns by shuffles; those that are five apart don't. */
+static void take_words(const uint8_t *row, int n, struct block *b)
+{
+    uint32_t four[BLOCK][4];
+    _Static_assert(NATIVE_POINT_LEN == sizeof four[0] + sizeof b->tail[0], "five words a row");
+    for (int i = 0; i < n; i++, row += NATIVE_POINT_LEN) {
+        memcpy(four[i], row, sizeof four[i]);
+        b->tail[i] = le_get32(row + sizeof four[i]);
+    }
+    split_fours((const uint32_t(*)[4])four, n, b);
 }
 
 VEC_INLINE struct native_point point_of_middle(uint32_t middle)
