@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "core/bvh.h"
 #include "drivers/host/scanhead.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/made_stream.h"
@@ -80,7 +81,10 @@ static void print(uint32_t rounds, int raw)
             for (int way = 0; way < WAYS; way++)
                 printf("%s:%s_ns %.3f\n", WAY[way], LAYOUT[layout], ns[layout][way][i]);
     if (raw) return;
-    printf("%-10s %9s %9s %9s   ns a point; recorded: columns without range and angles\n", "", WAY[0], WAY[1], WAY[2]);
+    char engine[128];
+    bvh_engine(engine, sizeof engine);
+    printf("%s\n%-10s %9s %9s %9s   ns a point; recorded: columns without range and angles\n", engine, "", WAY[0],
+           WAY[1], WAY[2]);
     for (int layout = 0; layout < LAYOUTS; layout++)
         printf("%-10s %9.2f %9.2f %9.2f\n", LAYOUT[layout], bench_median(ns[layout][0], rounds),
                bench_median(ns[layout][1], rounds), bench_median(ns[layout][2], rounds));

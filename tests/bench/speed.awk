@@ -10,12 +10,12 @@ function median(of, n, i, j, t, x) {
 function row(text, figure, unit, most, a, b, said) {
     if (!n["native", figure]) return
     a = median("native" SUBSEP figure, n["native", figure])
-    said = most == "" ? "" : a <= most ? "reached" : "missed"
+    said = most == "" ? "" : (a <= most) ? "reached" : "missed"
     printf "%-48s %8.3f %-12s %6s %-8s", text, a, unit, most, said
     if (n["avx2", figure]) {
         b = median("avx2" SUBSEP figure, n["avx2", figure])
         printf " %8.3f", b
-        if (unit != "x" && unit != "M points/s") printf " %6.2f %s", b / a, b <= 1.6 * a ? "reached" : "missed"
+        if (unit != "x" && unit != "M points/s") printf " %6.2f %s", b / a, (b <= 1.6 * a) ? "reached" : "missed"
     }
     print ""
 }
@@ -23,10 +23,10 @@ function row(text, figure, unit, most, a, b, said) {
 function rate(text, figure, least, a, b) {
     if (!n["native", figure]) return
     a = 1000 / median("native" SUBSEP figure, n["native", figure])
-    printf "%-48s %8.1f %-12s %6s %-8s", text, a, "M points/s", least, a >= least ? "reached" : "missed"
+    printf "%-48s %8.1f %-12s %6s %-8s", text, a, "M points/s", least, (a >= least) ? "reached" : "missed"
     if (n["avx2", figure]) {
         b = 1000 / median("avx2" SUBSEP figure, n["avx2", figure])
-        printf " %8.1f %6.2f %s", b, a / b, a <= 1.6 * b ? "reached" : "missed"
+        printf " %8.1f %6.2f %s", b, a / b, (a <= 1.6 * b) ? "reached" : "missed"
     }
     print ""
 }

@@ -92,19 +92,12 @@ while [ "$turn" -le "$turns" ]; do
     if is_wanted realtime; then
         loop_programs "--no-hash"
         ${cost#pinned } --config "$out/null.yaml" --pace realtime "${programs[@]}" | keep_loop null >>"$out/figures"
-        programs=()
-        for set in $sets; do
-            printf '#!/bin/bash\nexec bash "%s" "%s" "$@"\n' "$here/speed_read.sh" "${folder[$set]}/scanhead" >"$out/read_$set"
-            chmod +x "$out/read_$set"
-            programs+=("$out/read_$set")
-        done
-        ${cost#pinned } --config "$out/links.yaml" --pace realtime "${programs[@]}" | keep_loop read >>"$out/figures"
+        loop_programs ""
+        ${cost#pinned } --config "$out/links.yaml" --pace realtime --clients "${programs[@]}" | keep_loop read >>"$out/figures"
     fi
     turn=$((turn + 1))
 done
 
-engine() {
-    "${folder[native]}/scanhead" plan "$out/null.yaml" | grep -o 'Embree [0-9.]*, packets of [0-9]*, [A-Za-z0-9.-]*' | head -n 1
-}
-echo "$(sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo | head -n 1); $(engine); $((turns * rounds)) pairs, processor $processor"
+engine=$("${folder[native]}/tests/bench/decode" --rounds 1 | head -n 1)
+echo "$(sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo | head -n 1); $engine; $((turns * rounds)) pairs, processor $processor"
 awk -f "$here/speed.awk" "$out/figures"
