@@ -5,7 +5,7 @@
 # A turn runs each program with so many rounds, first of BUILD, then of AVX2_BUILD; figures are medians of the rounds of
 # all turns, by default 3 times 5. Programs run on one processor, the last one that this may use. LIST names parts of
 # panorama, decode, live, loop, realtime, with commas between.
-set -eu
+set -euo pipefail
 turns=3 rounds=5 only=panorama,decode,live,loop,realtime
 while [ $# -gt 0 ]; do
     case $1 in
