@@ -91,9 +91,9 @@ while [ "$turn" -le "$turns" ]; do
     fi
     if is_wanted realtime; then
         loop_programs "--no-hash"
-        ${cost#pinned } --config "$out/null.yaml" --pace realtime "${programs[@]}" | keep_loop null >>"$out/figures"
+        ${cost#pinned } --seconds 8 --config "$out/null.yaml" --pace realtime "${programs[@]}" | keep_loop null >>"$out/figures"
         loop_programs ""
-        ${cost#pinned } --config "$out/links.yaml" --pace realtime --clients "${programs[@]}" | keep_loop read >>"$out/figures"
+        ${cost#pinned } --seconds 8 --config "$out/links.yaml" --pace realtime --clients "${programs[@]}" | keep_loop read >>"$out/figures"
     fi
     turn=$((turn + 1))
 done

@@ -234,7 +234,7 @@ static void expect_columns(const struct kind *k, const struct scanhead_columns *
 {
     const double *const figure[FIGURES] = {
         to->x, to->y, to->z, to->range_m, to->mirror_rad, to->pan_rad, to->reflectance_db};
-    const struct scanhead_point *p = &want[first];
+    const struct scanhead_point *p = &want[n > 0 ? first : 0];
     for (int j = 0; j < FIGURES; j++)
         for (uint32_t i = 0; figure[j] != NULL && i < n; i++)
             if (!is_same(figure[j][i], figures_of(&p[i])[j]))
