@@ -8,9 +8,7 @@
 #include "core/vecmath.h"
 #include "drivers/host/host.h"
 
-#define TWO_PI 6.283185307179586476925
-
-enum { BLOCK = 128 };
+enum { BLOCK = HOST_BLOCK };
 
 /* Rows of the wire as columns, and room for columns that nobody wants but others are computed from. */
 struct block {
@@ -20,14 +18,6 @@ struct block {
     double x[BLOCK], y[BLOCK], z[BLOCK], range_m[BLOCK];
     uint8_t echo[BLOCK], echo_count[BLOCK];
 };
-
-void host_turn_table(struct scanhead *sh)
-{
-    for (int i = 0; i < HOST_TURN_PARTS; i++) {
-        double a = TWO_PI * i / HOST_TURN_PARTS;
-        sh->turn_part[i] = (struct host_turn_part){sin(a), cos(a)};
-    }
-}
 
 /* ---- what all layouts share */
 
@@ -185,69 +175,10 @@ static void columns_geo(const struct scanhead *sh, struct block *b, int n, const
 
 /* ---- polar */
 
-/* The largest whole number that is not above |x| < 2^51. */
-VEC_INLINE double floor_of(double x, uint64_t *bits)
-{
-    const double near = vec_round(x, bits);
-    const uint64_t above = near > x;
-    *bits -= above;
-    return near - (double)(int)above;
-}
-
 VEC_CLONES static void set_turns(const uint32_t *restrict count, int n, double per_count, double *restrict turn)
 {
     for (int i = 0; i < n; i++)
         turn[i] = count[i] * per_count;
-}
-
-/* The table's part that is nearest to u[n] >= 0 turns, and the rest beside it in radians. */
-VEC_CLONES static void split_turns(const double *restrict u, int n, uint32_t *restrict part, double *restrict rest_rad)
-{
-    for (int i = 0; i < n; i++) {
-        const double parts = u[i] * HOST_TURN_PARTS;
-        uint64_t k;
-        const double whole = floor_of(parts + 0.5, &k);
-        part[i] = (uint32_t)k & (HOST_TURN_PARTS - 1);
-        rest_rad[i] = (parts - whole) * (TWO_PI / HOST_TURN_PARTS);
-    }
-}
-
-/* |r| <= pi/256, so the first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of
- * the angle itself. */
-VEC_CLONES static void add_rests(const struct host_turn_part *restrict part, const double *restrict rest_rad, int n,
-                                 double *restrict s, double *restrict c)
-{
-    for (int i = 0; i < n; i++) {
-        const double r = rest_rad[i], r2 = r * r;
-        const double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120));
-        const double cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)));
-        const double sk = part[i].sine, ck = part[i].cosine;
-        s[i] = sk + (ck * sin_r + sk * cos_r_1);
-        c[i] = ck + (ck * cos_r_1 - sk * sin_r);
-    }
-}
-
-/* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, a series the rest. Angles in turns need no
- * reduction by an inexact pi. The table is read between the vectors: a part as a whole, which costs less than picking
- * its figures into them. */
-static void sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c)
-{
-    uint32_t k[BLOCK];
-    double rest_rad[BLOCK];
-    struct host_turn_part part[BLOCK];
-    split_turns(u, n, k, rest_rad);
-    for (int i = 0; i < n; i++)
-        part[i] = table[k[i]];
-    add_rests(part, rest_rad, n, s, c);
-}
-
-/* u[n] turns, folded into [lo, lo + 1), as radians. */
-VEC_CLONES static void fold(const double *restrict u, int n, double lo, double *restrict rad)
-{
-    for (int i = 0; i < n; i++) {
-        uint64_t unused;
-        rad[i] = TWO_PI * (u[i] - floor_of(u[i] - lo, &unused));
-    }
 }
 
 VEC_CLONES static void set_ranges(const struct block *restrict b, int n, double scale, double *restrict range_m)
@@ -285,8 +216,8 @@ static void set_positions(const struct scanhead *sh, struct block *b, int n, int
         set_ranges(b, n, sh->descriptor.range_scale_m, b->range_m);
         range_m = b->range_m;
     }
-    sincos_turns(sh->turn_part, b->mirror, m, b->sin_m, b->cos_m);
-    sincos_turns(sh->turn_part, b->pan, n, b->sin_pan, b->cos_pan);
+    host_sincos_turns(sh->turn_part, b->mirror, m, b->sin_m, b->cos_m);
+    host_sincos_turns(sh->turn_part, b->pan, n, b->sin_pan, b->cos_pan);
     if (one_mirror) {
         set_all(b->sin_m, n, b->sin_m[0]);
         set_all(b->cos_m, n, b->cos_m[0]);
@@ -307,10 +238,10 @@ static void columns_polar(const struct scanhead *sh, struct block *b, int n, con
     if (to->range_m != NULL) set_ranges(b, n, d->range_scale_m, to->range_m);
     if (to->x != NULL || to->y != NULL || to->z != NULL) set_positions(sh, b, n, one_mirror, to);
     if (to->mirror_rad != NULL) {
-        fold(b->mirror, m, lo, to->mirror_rad);
+        host_fold_turns(b->mirror, m, lo, to->mirror_rad);
         if (one_mirror) set_all(to->mirror_rad, n, to->mirror_rad[0]);
     }
-    if (to->pan_rad != NULL) fold(b->pan, n, 0, to->pan_rad);
+    if (to->pan_rad != NULL) host_fold_turns(b->pan, n, 0, to->pan_rad);
 }
 
 /* ---- blocks */
@@ -374,10 +305,17 @@ int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, ui
     return n;
 }
 
+/* A block of points. */
+struct points_room {
+    double x[BLOCK], y[BLOCK], z[BLOCK], range_m[BLOCK], mirror_rad[BLOCK], pan_rad[BLOCK], reflectance_db[BLOCK];
+    int64_t t_ns[BLOCK];
+    uint16_t label[BLOCK];
+    uint8_t echo[BLOCK], echo_count[BLOCK];
+};
+
 /* The loops are apart because one size of figures a loop makes the better vectors. */
-static void put_points(const struct scanhead_columns *from, int n, struct scanhead_point *points)
+static void put_points(const struct points_room *restrict from, int n, struct scanhead_point *restrict points)
 {
-    VEC_LOOP
     for (int i = 0; i < n; i++) {
         points[i].x = from->x[i];
         points[i].y = from->y[i];
@@ -388,7 +326,6 @@ static void put_points(const struct scanhead_columns *from, int n, struct scanhe
         points[i].reflectance_db = from->reflectance_db[i];
         points[i].t_ns = from->t_ns[i];
     }
-    VEC_LOOP
     for (int i = 0; i < n; i++) {
         points[i].echo = from->echo[i];
         points[i].echo_count = from->echo_count[i];
@@ -400,16 +337,14 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
                     struct scanhead_point *points, uint32_t max)
 {
     struct block b;
-    double mirror_rad[BLOCK], pan_rad[BLOCK], reflectance_db[BLOCK];
-    int64_t t_ns[BLOCK];
-    uint16_t label[BLOCK];
-    const struct scanhead_columns columns = {b.x,  b.y,   b.z,    b.range_m,   mirror_rad, pan_rad, reflectance_db,
-                                             t_ns, label, b.echo, b.echo_count};
+    struct points_room r;
+    const struct scanhead_columns columns = {
+        r.x, r.y, r.z, r.range_m, r.mirror_rad, r.pan_rad, r.reflectance_db, r.t_ns, r.label, r.echo, r.echo_count};
     const int n = points_from(sh, frame, first, max);
     for (int at = 0; at < n; at += BLOCK, points += BLOCK) {
         const int m = n - at < BLOCK ? n - at : BLOCK;
         columns_of_block(sh, frame, first + (uint32_t)at, m, &b, &columns);
-        put_points(&columns, m, points);
+        put_points(&r, m, points);
     }
     return n;
 }
