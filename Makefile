@@ -215,7 +215,8 @@ $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS)
 # Its bus is the unit tests' stand-in for libusb, which checks its user with cmocka.
 $(BUILD)/tests/bench/live: $(BUILD)/tests/unit/fake_libusb.c.o
-$(BUILD)/tests/bench/live: private override LDLIBS := -Wl,--as-needed -lcmocka $(LDLIBS)
+$(BUILD)/tests/bench/live: private override LDFLAGS += -Wl,--as-needed
+$(BUILD)/tests/bench/live: private override LDLIBS += -lcmocka
 # stb_image_write shifts into the sign bit.
 $(BUILD)/tests/common/chart.c.o: private override SAN =
 # What computes, with sanitizers: a sixth of the code, which takes most of the time.
@@ -433,7 +434,7 @@ bench-waves: deps-build
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
 	@$(BUILD)/tests/bench/kernels
-	@$(call make_avx2,tests/bench/kernels)
+	+@$(call make_avx2,tests/bench/kernels)
 	@$(if $(AVX2),echo "AVX2:" && $(AVX2)/tests/bench/kernels)
 # The real loop, processor time a pulse, with and without stream_sha256. In turns with others: make bench-loop
 # WITH="'/path/scanhead' '/other --option'".

@@ -10,7 +10,7 @@
 
 enum { BLOCK = HOST_BLOCK };
 
-/* Rows of the wire as columns, and room for columns that nobody wants but others are computed from. */
+/* It holds the rows of the wire as columns, and columns that nobody wants but others are computed from. */
 struct block {
     uint32_t a[BLOCK], b[BLOCK], c[BLOCK], middle[BLOCK], tail[BLOCK];
     double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];
@@ -98,7 +98,7 @@ static void set_all(double *to, int n, double value)
 
 /* ---- geo */
 
-/* One coordinate. */
+/* This computes one coordinate. */
 VEC_CLONES static void set_places(const uint32_t *restrict count, const uint32_t *restrict tail, int n, double anchor,
                                   double scale, double *restrict at)
 {
@@ -135,7 +135,7 @@ static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
     p[2] = (n * (1 - e2) + h) * s;
 }
 
-/* From the anchor, straight through space. */
+/* Ranges go from the anchor straight through space. */
 static void set_geodetic_ranges(const double anchor[3], const struct block *b, int n, const struct scanhead_columns *to)
 {
     double from[3], at[3];
@@ -246,7 +246,7 @@ static void columns_polar(const struct scanhead *sh, struct block *b, int n, con
 
 /* ---- blocks */
 
-/* n <= BLOCK points from `first` on. */
+/* Takes n <= BLOCK points from `first` on. */
 static void columns_of_block(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, int n,
                              struct block *b, const struct scanhead_columns *to)
 {
@@ -263,7 +263,7 @@ static void columns_of_block(const struct scanhead *sh, const struct scanhead_fr
                    to->echo_count != NULL ? to->echo_count : b->echo_count);
 }
 
-/* How many points there are from `first` on, at most max; or an error. */
+/* Returns how many points there are from `first` on, at most max; or an error. */
 static int points_from(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, uint32_t max)
 {
     int rc = host_check_last(sh, frame, SCANHEAD_POINTS);
@@ -305,7 +305,7 @@ int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, ui
     return n;
 }
 
-/* A block of points. */
+/* It holds a block of points. */
 struct points_room {
     double x[BLOCK], y[BLOCK], z[BLOCK], range_m[BLOCK], mirror_rad[BLOCK], pan_rad[BLOCK], reflectance_db[BLOCK];
     int64_t t_ns[BLOCK];

@@ -71,7 +71,7 @@ static void write_all(int fd, uint32_t times)
     _exit(0);
 }
 
-/* Sets what the client opens. Returns the sender, or -1. */
+/* Sets `source`, which the client opens. Returns the sender, or -1. */
 static pid_t send_by_tcp(uint32_t times, char *source, size_t len)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};

@@ -19,7 +19,7 @@ function row(text, figure, unit, most, a, b, said) {
     }
     print ""
 }
-# Points a second, of nanoseconds.
+# Nanoseconds become points a second.
 function rate(text, figure, least, a, b) {
     if (!n["native", figure]) return
     a = 1000 / median("native" SUBSEP figure, n["native", figure])

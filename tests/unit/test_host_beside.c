@@ -78,7 +78,7 @@ static void test_all_values(void **state)
     scanhead_close(sh);
 }
 
-/* Some, and none. */
+/* Some are asked for, or none. */
 static void test_parts(void **state)
 {
     (void)state;

@@ -111,7 +111,7 @@ static uint32_t next_random(void)
     return (uint32_t)(x >> 20);
 }
 
-/* Any number, the ends of its range, and counts at and beside the borders of the table's parts of a turn. */
+/* Returns any number, an end of its range, or a count at or beside a border of the table's parts of a turn. */
 static uint32_t make_word(double counts_per_turn)
 {
     static const uint32_t ends[] = {0, 1, 2, 0x7fffffff, 0x80000000, 0x80000001, 0xfffffffe, UINT32_MAX};
@@ -229,7 +229,7 @@ static void expect_points(const struct kind *k)
     }
 }
 
-/* The n columns from `first` on; what comes after them in `room` is as it was. */
+/* The n points from `first` on are in the columns; after them `room` is as it was. */
 static void expect_columns(const struct kind *k, const struct scanhead_columns *to, uint32_t first, uint32_t n)
 {
     const double *const figure[FIGURES] = {
@@ -284,7 +284,7 @@ static void test_all_kinds(void **state)
     }
 }
 
-/* Parts of a frame, and nothing beyond them. */
+/* Parts of a frame are written, and nothing beyond them. */
 static void test_parts(void **state)
 {
     static const uint32_t part[][2] = {{0, 0},   {0, 1},      {1, 7}, {5, 127},  {5, 128},
@@ -304,7 +304,7 @@ static void test_parts(void **state)
     }
 }
 
-/* Each column alone, and none. */
+/* Each column is written alone, or none is. */
 static void test_chosen(void **state)
 {
     (void)state;
