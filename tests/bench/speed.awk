@@ -51,6 +51,7 @@ END {
     row("  scanhead_columns, polar", "columns:polar_ns", "ns a point", "")
     row("  scanhead_points, UTM", "points:utm_ns", "ns a point", 12)
     row("  scanhead_columns, UTM", "columns:utm_ns", "ns a point", "")
+    row("  scanhead_points, geodetic", "points:geodetic_ns", "ns a point", 12)
     row("  scanhead_columns as a recorder, geodetic", "recorded:geodetic_ns", "ns a point", "")
     rate("live client on one core: TCP on loopback", "tcp:columns_ns", 20)
     rate("  Unix socket", "unix:columns_ns", 20)
