@@ -9,13 +9,17 @@
 #include "drivers/host/source.h"
 #include "drivers/protocol/native.h"
 
-enum { HOST_QUEUE_BYTES = 64 << 20, HOST_TURN_PARTS = 256 };
+enum { HOST_QUEUE_BYTES = 64 << 20, HOST_TURN_PARTS = 256, HOST_BLOCK = 128 };
 
 /* A frame kept while a command waits for its reply. */
 struct host_node {
     struct host_node *next;
     size_t len;
     uint8_t raw[];
+};
+
+struct host_turn_part {
+    double sine, cosine;
 };
 
 struct host_surface {
@@ -78,7 +82,7 @@ struct scanhead {
     int hashing;
     struct sha256_ctx sha256;
     struct sh_err err;
-    double sin_part[HOST_TURN_PARTS], cos_part[HOST_TURN_PARTS]; /* of whole parts of a turn */
+    struct host_turn_part turn_part[HOST_TURN_PARTS]; /* of whole parts of a turn */
 };
 
 /* notices.c: hands on what the parser notices. Called once, after native_parser_init. */
@@ -103,6 +107,11 @@ int host_has_content(const struct scanhead *sh, enum native_content content);
 int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);
 void host_forget_poses(struct scanhead *sh);
 
+/* turns.c: sines and cosines of n <= HOST_BLOCK angles, u >= 0 turns: the table gives whole 1/256 turns, a series the
+ * rest. */
 void host_turn_table(struct scanhead *sh);
+void host_sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c);
+/* Angles of u turns in radians, folded into [lo, lo + 1) turns. */
+void host_fold_turns(const double *u, int n, double lo, double *rad);
 
 #endif

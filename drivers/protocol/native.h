@@ -198,19 +198,25 @@ struct native_point {
     uint8_t echo, echo_count; /* both 0: shot without echo */
 };
 
+/* Takes the five words of a point apart. */
+static inline struct native_point native_point_of(const uint32_t word[5])
+{
+    return (struct native_point){.a = word[0],
+                                 .b = word[1],
+                                 .c = word[2],
+                                 .refl_cdb = (int16_t)(uint16_t)word[3],
+                                 .label = (uint16_t)(word[3] >> 16),
+                                 .dt_ns = word[4] & 0xffffffu,
+                                 .echo = (uint8_t)(word[4] >> 24 & 15u),
+                                 .echo_count = (uint8_t)(word[4] >> 28)};
+}
+
 /* Point i < n_points of a checked points payload. Inline, for readers of millions a second. */
 static inline void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out)
 {
     const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + (size_t)i * NATIVE_POINT_LEN;
-    uint32_t tail = le_get32(p + 16);
-    out->a = le_get32(p);
-    out->b = le_get32(p + 4);
-    out->c = le_get32(p + 8);
-    out->refl_cdb = (int16_t)le_get16(p + 12);
-    out->label = le_get16(p + 14);
-    out->dt_ns = tail & 0xffffffu;
-    out->echo = (uint8_t)(tail >> 24 & 15u);
-    out->echo_count = (uint8_t)(tail >> 28);
+    const uint32_t word[5] = {le_get32(p), le_get32(p + 4), le_get32(p + 8), le_get32(p + 12), le_get32(p + 16)};
+    *out = native_point_of(word);
 }
 
 struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4. Begin of a colours
@@ -225,6 +231,14 @@ struct native_attribute {
     int16_t amplitude_cdb; /* 0.01 dB above the detection threshold */
     uint16_t width_cns;    /* 0.01 ns, full at half maximum */
 };
+
+/* Attribute i < n_points of a checked attributes payload. */
+static inline void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out)
+{
+    const uint8_t *p = payload + NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)i * NATIVE_ATTRIBUTE_LEN;
+    out->amplitude_cdb = (int16_t)le_get16(p);
+    out->width_cns = le_get16(p + 2);
+}
 
 enum native_pose_flags { /* the values of core/pose.h */
                          NATIVE_POSE_EXTRAPOLATED = 1,
@@ -303,7 +317,6 @@ int native_decode_emitter(const uint8_t *payload, size_t len, struct native_emit
 void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *out); /* i < n_beams */
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
-void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3]); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out);
