@@ -12,32 +12,31 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/bytes.h"
 #include "drivers/protocol/native.h"
-#include "drivers/record/las_header.h"
+#include "drivers/record/las_columns.h"
 #include "drivers/record/las_repair.h"
 #include "drivers/record/recorder.h"
 
-#define M_PER_PS                  (0.5 * 299792458e-12) /* range, of a pulse's way out and back */
-#define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / NATIVE_RAD_PER_DEG / 0.006)
-
-enum { LAS_BATCH_LEN = TRACK_BATCH * LAS_POINT_LEN_MAX };
+#define M_PER_PS (0.5 * 299792458e-12) /* range, of a pulse's way out and back */
 
 struct las {
     struct recorder base;
     struct las_facts facts;
     int begun, time_came_late;
     size_t front_len;
-    uint64_t n_empty, n_no_angle;
+    uint64_t n_no_angle;
     uint64_t n_beyond_returns, n_returns_cut, n_waves_left_out; /* LAS 1.2 */
     struct las_waves waves;
-    struct las_packet packet[TRACK_BATCH]; /* of the points of the batch */
+    struct las_columns columns;   /* of the batch */
+    double place[3][TRACK_BATCH]; /* likewise, on the way to counts or angles */
 };
 
 static int las_begin(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
     las->facts.track = &las->base.track;
+    las->base.track.no_empty = 1;
+    las->base.track.spared = TRACK_RANGE;
     las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
     las->facts.has_colour = las->base.track.has_colours;
     for (int i = 0; i < 3; i++)
@@ -141,83 +140,140 @@ static int too_far(const struct las *las, const double p[3], struct sh_err *err)
                    2147483647 * las->base.track.scale_m, las->base.track.scale_m);
 }
 
-/* The angle from straight down, in the head's frame. */
-static uint16_t scan_angle(struct las *las, const double p_socs[3])
+/* ---- the batch's columns. Those that fail return how many points come before. */
+
+/* Leaves out echoes that the version has no room for. */
+static int leave_out_beyond(struct las *las, int n)
 {
-    float flat = sqrtf((float)(p_socs[0] * p_socs[0] + p_socs[1] * p_socs[1]));
-    float up = atan2f(flat, (float)-p_socs[2]);
-    if (isnan(up)) {
-        las->n_no_angle++;
-        return 0;
+    const uint8_t *echo = las->base.track.points.echo;
+    uint16_t index[TRACK_BATCH];
+    int kept = 0;
+    for (int i = 0; i < n; i++) {
+        index[kept] = (uint16_t)i;
+        kept += echo[i] <= LAS_12_RETURNS;
     }
-    return (uint16_t)lrintf(up * (float)SCAN_ANGLE_COUNTS_PER_RAD);
+    las->n_beyond_returns += (uint64_t)(n - kept);
+    if (kept < n) track_pick(&las->base.track, index, kept);
+    return kept;
 }
 
-/* 0 where not modelled, so that the rest keeps its 0.01 dB: 1 is -327.67 dB. */
-static uint16_t intensity(double reflectance_db)
+static int check_count(const struct las *las, int n, int *rc, struct sh_err *err)
 {
-    return isnan(reflectance_db) ? 0 : (uint16_t)(lrint(reflectance_db * 100) + 32768);
+    const uint64_t room = UINT32_MAX - las->facts.n_points;
+    if (las->facts.minor != 2 || (uint64_t)n <= room) return n;
+    *rc = sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; use --las-version 1.4, or --split",
+                  las->base.file.path);
+    return (int)room;
 }
 
-static int set_xyz(struct las *las, int32_t n[3], const double p[3], struct sh_err *err)
+/* Points that have waited got their times before they waited. */
+static int set_times(struct las *las, int n, int *rc, struct sh_err *err)
 {
-    struct las_facts *f = &las->facts;
-    for (int i = 0; i < 3; i++) {
-        double from_offset = p[i] - f->offset[i];
-        if (i == 0 && is_swapped(las)) from_offset = remainder(from_offset, 360);
-        double counts = rint(from_offset / f->scale[i]);
-        if (!(fabs(counts) <= INT32_MAX)) return too_far(las, p, err);
-        n[i] = (int32_t)counts;
+    const struct track *t = &las->base.track;
+    double *to = las->columns.time_s;
+    int known = 0;
+    if (!las->facts.gps_time) {
+        track_seconds(t, n, to);
+        return n;
     }
-    return 0;
+    if (t->waited)
+        memcpy(to, t->gps_s, (size_t)n * sizeof *to);
+    else if (scanhead_gps_times(t->sh, t->points.t_ns, (uint32_t)n, to) == 0)
+        return n;
+    while (t->waited && known < n && !isnan(to[known]))
+        known++;
+    if (known < n)
+        *rc = sh_fail(err, SH_EFORMAT, "%s: the head no longer reports the time; a LAS file holds one kind of time",
+                      las->base.file.path);
+    return known;
 }
 
-/* The time of point i of the batch. One that has waited got its time before it waited. */
-static int has_time(const struct track *t, int i, double *gps_s)
+static void copy_places(struct las *las, int n)
 {
-    *gps_s = t->gps_s[i];
-    return t->waited ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->points.t_ns[i], gps_s) == 0;
+    const struct track_points *p = &las->base.track.points;
+    const double *from[3] = {p->x, p->y, p->z};
+    for (int k = 0; k < 3; k++)
+        memcpy(las->place[k], from[k], (size_t)n * sizeof *from[k]);
 }
 
-static int set_time(const struct las *las, double *time_s, int i, struct sh_err *err)
+static int set_counts(struct las *las, int n, int *rc, struct sh_err *err)
 {
-    *time_s = (double)las->base.track.points.t_ns[i] / 1e9;
-    if (las->facts.gps_time && !has_time(&las->base.track, i, time_s))
-        return sh_fail(err, SH_EFORMAT, "%s: the head no longer reports the time; a LAS file holds one kind of time",
-                       las->base.file.path);
-    return 0;
-}
-
-/* Turns p into the head's frame, accurately enough for an angle. */
-static void set_socs(const struct track *t, double p[3])
-{
-    if (t->info.crs == NATIVE_CRS_GEODETIC) {
-        const double m_deg = 6371000 * NATIVE_RAD_PER_DEG, north = (p[0] - t->pose.shift_m[0]) * m_deg;
-        const double east = remainder(p[1] - t->pose.shift_m[1], 360) * m_deg * cos(p[0] * NATIVE_RAD_PER_DEG);
-        p[0] = t->pose.shift_m[0] + east;
-        p[1] = t->pose.shift_m[1] + north;
+    const struct track *t = &las->base.track;
+    const struct las_facts *f = &las->facts;
+    const int asked = n;
+    double *at[3] = {las->place[0], las->place[1], las->place[2]}, lon_offset = f->offset[0];
+    copy_places(las, n);
+    if (!t->info.geo) station_pose_forward_all(&t->pose, n, at[0], at[1], at[2]);
+    if (is_swapped(las)) {
+        at[0] = las->place[1];
+        at[1] = las->place[0];
+        lon_offset = 0;
+        for (int i = 0; i < n; i++)
+            at[0][i] = remainder(at[0][i] - f->offset[0], 360);
     }
-    station_pose_reverse(&t->pose, p);
+    for (int k = 0; k < 3; k++)
+        n = las_set_counts(at[k], n, k == 0 ? lon_offset : f->offset[k], f->scale[k], las->columns.xyz[k]);
+    if (n == asked) return n;
+    double p[3] = {t->points.x[n], t->points.y[n], t->points.z[n]};
+    if (!t->info.geo) station_pose_forward(&t->pose, p);
+    if (is_swapped(las)) swap(p);
+    *rc = too_far(las, p, err);
+    return n;
 }
 
-/* 0.01 dB and 0.01 ns, as on the wire. */
-static void set_attribute(struct las_point *to, const struct scanhead_attribute *a, double deviation)
+/* Makes metres of geodetic coordinates about the pose's place, accurately enough for an angle. */
+static void make_level(const struct track *t, double *x, double *y, int n)
 {
-    int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
-    int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
-    to->amplitude = (uint16_t)amplitude;
-    to->width = (uint16_t)width;
-    to->deviation = isnan(deviation) ? UINT16_MAX : (uint16_t)lrint(1000 * fmin(deviation, 65.534));
+    const double *s = t->pose.shift_m, m_deg = 6371000 * NATIVE_RAD_PER_DEG;
+    for (int i = 0; i < n; i++) {
+        const double north = (x[i] - s[0]) * m_deg;
+        const double east = remainder(y[i] - s[1], 360) * m_deg * cos(x[i] * NATIVE_RAD_PER_DEG);
+        x[i] = s[0] + east;
+        y[i] = s[1] + north;
+    }
+}
+
+/* Of points in the head's frame, into which those of a CRS are taken back. */
+static void set_angles(struct las *las, int n)
+{
+    const struct track *t = &las->base.track;
+    const double *x = t->points.x, *y = t->points.y, *z = t->points.z;
+    if (t->info.moving || las->facts.minor == 2) return;
+    if (t->info.geo) {
+        copy_places(las, n);
+        if (t->info.crs == NATIVE_CRS_GEODETIC) make_level(t, las->place[0], las->place[1], n);
+        station_pose_reverse_all(&t->pose, n, las->place[0], las->place[1], las->place[2]);
+        x = las->place[0], y = las->place[1], z = las->place[2];
+    }
+    las->n_no_angle += las_set_scan_angles(x, y, z, n, las->columns.scan_angle);
 }
 
 /* LAS 1.2 counts to five. */
-static void set_returns(struct las *las, struct las_point *to, int i)
+static void set_returns(struct las *las, int n)
 {
-    to->echo = las->base.track.points.echo[i];
-    to->echo_count = las->base.track.points.echo_count[i];
-    if (las->facts.minor != 2 || to->echo_count <= LAS_12_RETURNS) return;
-    to->echo_count = LAS_12_RETURNS;
-    las->n_returns_cut++;
+    const struct track_points *p = &las->base.track.points;
+    const int most = las->facts.minor == 2 ? LAS_12_RETURNS : LAS_RETURNS, shift = las->facts.minor == 2 ? 3 : 4;
+    for (int i = 0; i < n; i++) {
+        const int is_cut = p->echo_count[i] > most;
+        las->columns.returns[i] = (uint8_t)(p->echo[i] | (is_cut ? most : p->echo_count[i]) << shift);
+        las->n_returns_cut += (uint64_t)is_cut;
+    }
+}
+
+/* 0.01 dB and 0.01 ns, as on the wire. */
+static void set_attributes(struct las *las, int n)
+{
+    const struct track *t = &las->base.track;
+    struct las_columns *c = &las->columns;
+    for (int i = 0; i < n && t->has_attributes; i++) {
+        const struct scanhead_attribute *a = &t->attribute[i];
+        const int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
+        const int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
+        const double deviation = t->deviation[i];
+        c->amplitude[i] = (uint16_t)amplitude;
+        c->width[i] = (uint16_t)width;
+        c->deviation[i] = isnan(deviation) ? UINT16_MAX : (uint16_t)lrint(1000 * fmin(deviation, 65.534));
+    }
 }
 
 /* ---- waveforms */
@@ -228,9 +284,9 @@ static int put_packets(struct las *las, int n, struct sh_err *err)
     const struct track *t = &las->base.track;
     int rc = 0, is_new, any_new = 0;
     for (int i = 0; rc == 0 && i < n; i++) {
-        las->packet[i] = (struct las_packet){0};
+        las->columns.packet[i] = (struct las_packet){0};
         if (t->wave[i] == NULL) continue;
-        rc = las_waves_put(&las->waves, t->n_scans, t->wave[i], &las->packet[i], &is_new, err);
+        rc = las_waves_put(&las->waves, t->n_scans, t->wave[i], &las->columns.packet[i], &is_new, err);
         any_new |= is_new;
     }
     return rc == 0 && any_new ? write_front(las, err) : rc;
@@ -238,20 +294,21 @@ static int put_packets(struct las *las, int n, struct sh_err *err)
 
 /* The specification puts a packet's first sample at point + location * (dx, dy, dz), which is nearer to the head
  * than the point. So (dx, dy, dz) leads back to the head, as readers take it. */
-static void set_wave(struct las *las, struct las_point *to, int i)
+static void set_wave(struct las *las, int i)
 {
     struct track *t = &las->base.track;
-    double beam[3];
-    if (las->packet[i].kind == 0) return;
-    if (!track_beam(t, i, beam)) {
+    struct las_columns *c = &las->columns;
+    double beam[3] = {0, 0, 0};
+    int is_there = c->packet[i].kind != 0;
+    if (is_there && !track_beam(t, i, beam)) {
         t->missing.n_without_waves++;
-        return;
+        c->packet[i] = (struct las_packet){0};
+        is_there = 0;
     }
     if (is_swapped(las)) swap(beam);
-    to->packet = las->packet[i];
-    to->location_ps = (float)(t->wave_at[i] * t->wave[i]->sample_ps);
+    c->location_ps[i] = is_there ? (float)(t->wave_at[i] * t->wave[i]->sample_ps) : 0;
     for (int k = 0; k < 3; k++)
-        to->back_ps[k] = (float)(-beam[k] * M_PER_PS);
+        c->back_ps[i][k] = is_there ? (float)(-beam[k] * M_PER_PS) : 0;
 }
 
 /* Completes the packets. An internal record follows the points. Until it is copied, the header says that the packets
@@ -267,70 +324,41 @@ static int end_waves(struct las *las, struct sh_err *err)
     return rc;
 }
 
-/* Point i of the batch. */
-static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
+/* Sets the columns of the first of n points that the file can hold, and returns how many these are. */
+static int set_columns(struct las *las, int n, int *rc, struct sh_err *err)
 {
-    struct track *t = &las->base.track;
-    const struct track_points *p = &t->points;
-    struct las_point las_point = {
-        .intensity = intensity(p->reflectance_db[i]), .station = (uint16_t)t->info.station, .label = p->label[i]};
-    double p_crs[3] = {p->x[i], p->y[i], p->z[i]}, p_socs[3] = {p->x[i], p->y[i], p->z[i]};
-    if (!t->info.geo)
-        station_pose_forward(&t->pose, p_crs);
-    else
-        set_socs(t, p_socs);
-    if (is_swapped(las)) swap(p_crs);
-    int rc = set_time(las, &las_point.time_s, i, err);
-    if (rc == 0) rc = set_xyz(las, las_point.xyz, p_crs, err);
-    if (rc != 0) return rc;
-    set_returns(las, &las_point, i);
-    if (!t->info.moving && las->facts.minor != 2) las_point.scan_angle = scan_angle(las, p_socs);
-    if (t->has_attributes) set_attribute(&las_point, &t->attribute[i], t->deviation[i]);
-    if (t->has_colours) memcpy(las_point.rgb, t->rgb[i], sizeof las_point.rgb);
-    if (las->facts.has_waves) set_wave(las, &las_point, i);
-    las_put_point(&las->facts, &las_point, to);
-    return 0;
-}
-
-/* Has the version no room for it? Counts why. */
-static int is_left_out(struct las *las, int i)
-{
-    const struct track_points *p = &las->base.track.points;
-    const int is_empty = p->echo_count[i] == 0, beyond = las->facts.minor == 2 && p->echo[i] > LAS_12_RETURNS;
-    las->n_empty += (uint64_t)is_empty;
-    las->n_beyond_returns += (uint64_t)(!is_empty && beyond);
-    return is_empty || beyond;
-}
-
-static int check_count(const struct las *las, struct sh_err *err)
-{
-    if (las->facts.minor != 2 || las->facts.n_points < UINT32_MAX) return 0;
-    return sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; use --las-version 1.4, or --split",
-                   las->base.file.path);
+    n = check_count(las, n, rc, err);
+    n = set_times(las, n, rc, err);
+    n = set_counts(las, n, rc, err);
+    set_angles(las, n);
+    set_returns(las, n);
+    las_set_intensities(las->base.track.points.reflectance_db, n, las->columns.intensity);
+    set_attributes(las, n);
+    for (int i = 0; i < n && las->facts.has_waves; i++)
+        set_wave(las, i);
+    return n;
 }
 
 static int las_points(void *rec, int n, struct sh_err *err)
 {
     struct las *las = rec;
+    const struct track *t = &las->base.track;
     struct outfile *file = &las->base.file;
+    const size_t len = las_point_len(&las->facts);
     double s;
+    if (las->facts.minor == 2) n = leave_out_beyond(las, n);
     int rc = las->facts.has_waves ? put_packets(las, n, err) : 0;
-    if (rc == 0 && OUTFILE_BUFFER - file->len < LAS_BATCH_LEN) rc = las_waves_flush(&las->waves, err);
+    if (rc == 0 && OUTFILE_BUFFER - file->len < (size_t)n * len) rc = las_waves_flush(&las->waves, err);
     if (rc != 0) return rc;
-    uint8_t *to = outfile_room(file, LAS_BATCH_LEN, err), *at = to;
+    uint8_t *to = outfile_room(file, (size_t)n * len, err);
     if (to == NULL) return SH_EIO;
-    if (!las->facts.gps_time && !las->time_came_late)
-        las->time_came_late = scanhead_gps_time(las->base.track.sh, 0, &s) == 0;
-    for (int i = 0; i < n; i++) {
-        if (is_left_out(las, i)) continue;
-        las->n_waves_left_out += las->base.track.has_waves && !las->facts.has_waves && las->base.track.wave[i] != NULL;
-        rc = check_count(las, err);
-        if (rc == 0) rc = put_point(las, at, i, err);
-        if (rc != 0) break;
-        las_count_record(&las->facts, at);
-        at += las_point_len(&las->facts);
-    }
-    outfile_used(file, (size_t)(at - to)); /* also before a failure: the file may be kept */
+    if (!las->facts.gps_time && !las->time_came_late) las->time_came_late = scanhead_gps_time(t->sh, 0, &s) == 0;
+    for (int i = 0; i < n && t->has_waves && !las->facts.has_waves; i++)
+        las->n_waves_left_out += t->wave[i] != NULL;
+    n = set_columns(las, n, &rc, err);
+    las_put_rows(&las->facts, &las->columns, n, to);
+    las_count_rows(&las->facts, &las->columns, n);
+    outfile_used(file, (size_t)n * len); /* also before a failure: the file may be kept */
     return rc;
 }
 
@@ -363,7 +391,7 @@ static int las_finish(void *rec, struct sh_err *err)
     if (rc == 0 && las->facts.has_waves && las->base.options.las_wdp) rc = las_waves_keep(&las->waves, err);
     if (rc != 0) return rc;
     report_waves(las);
-    recorder_report(rec, las->n_empty, "shots without echo left out; LAS has no place for them");
+    recorder_report(rec, las->base.track.missing.n_empty, "shots without echo left out; LAS has no place for them");
     recorder_report(rec, las->n_beyond_returns,
                     "echoes left out: the sixth and later ones of a pulse; LAS 1.2 holds five");
     recorder_report(rec, las->n_returns_cut,
