@@ -82,7 +82,7 @@ static void set_point(int i, int kind)
 {
     static const double none[] = {INFINITY, -INFINITY, NAN};
     struct track_points *p = &track.points;
-    p->x[i] = p->y[i] = p->z[i] = kind == KIND_EMPTY ? NAN : i;
+    p->x[i] = p->y[i] = p->z[i] = kind == KIND_EMPTY ? (double)NAN : i;
     if (kind == KIND_NOWHERE) (i % 3 == 0 ? p->x : i % 3 == 1 ? p->y : p->z)[i] = none[i / 3 % 3];
     p->range_m[i] = p->reflectance_db[i] = i;
     p->t_ns[i] = i;
