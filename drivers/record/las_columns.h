@@ -26,7 +26,7 @@ void las_set_intensities(const double *reflectance_db, int n, uint16_t *to);
 /* The angle from straight down, of points in the head's frame, in steps of 0.006 degrees: las_scan_angle of each.
  * Returns how many have none; theirs is 0. */
 uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, int n, uint16_t *to);
-/* The formula. SCAN_ANGLE_NONE: the position is NaN. */
+/* This is the formula. It gives SCAN_ANGLE_NONE where the angle is NaN. */
 enum { SCAN_ANGLE_NONE = UINT16_MAX };
 uint16_t las_scan_angle(double x, double y, double z);
 

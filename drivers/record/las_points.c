@@ -109,7 +109,7 @@ static void make_level(const struct track *t, double *x, double *y, int n)
     }
 }
 
-/* Of points in the head's frame, into which those of a CRS are taken back. */
+/* Angles are seen in the head's frame, so points of a CRS are taken back into it. */
 static void set_angles(struct las *las, int n)
 {
     const struct track *t = &las->base.track;

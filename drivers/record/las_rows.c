@@ -7,8 +7,8 @@
 #include "core/bytes.h"
 #include "core/vecmath.h"
 
-/* What all formats begin with: x, y, z, intensity, returns; classification, flags and user data, which are 0; scan angle
- * (0 in LAS 1.2, where the station is in its place); station; time. Each store may go into the next figure's place. */
+/* All formats begin with x, y, z, intensity and returns. Then come classification, flags and user data, which are 0,
+ * scan angle (not in LAS 1.2), station and time. Each store may go into the next figure's place. */
 static void put_common(const struct las_facts *f, const struct las_columns *c, int n, uint8_t *to)
 {
     const size_t len = las_point_len(f), time_at = las_time_at(f);

@@ -110,7 +110,7 @@ static void put_floats(struct ply_rows *rows, const double *v)
     rows->to += 4;
 }
 
-/* x, y, z and, with its column, range. */
+/* Puts x, y, z and, where it is a column, range. */
 static void put_lengths(struct ply_rows *rows, const struct track_points *p, unsigned columns)
 {
     const double *const v[4] = {p->x, p->y, p->z, p->range_m};
@@ -133,7 +133,7 @@ static void put_echoes(struct ply_rows *rows, const struct track_points *p)
     rows->to += 2;
 }
 
-/* NULL: the same number in all rows. */
+/* Where v is NULL, all rows have the same number. */
 static void put_shorts(struct ply_rows *rows, const uint16_t *v, uint16_t same)
 {
     const size_t len = rows->len;
