@@ -157,63 +157,33 @@ static uint64_t first_row(const struct track *t, const struct scanhead_frame *fr
     return whole_u32(since_s * t->info.prr_hz);
 }
 
-/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. No head sends a frame that
- * begins with a later echo; such an echo goes to the row before. */
-static uint64_t number_rows(struct track *t, uint64_t row, int n)
-{
-    for (int i = 0; i < n; i++) {
-        if (t->point[i].echo <= 1) row++;
-        t->row[i] = (uint32_t)(row > 0 ? row - 1 : 0);
-    }
-    return row;
-}
-
-static void keep_point(struct track *t, int from, int to)
-{
-    t->point[to] = t->point[from];
-    t->row[to] = t->row[from];
-    t->index[to] = t->index[from];
-    t->frame[to] = t->frame[from];
-}
-
-/* Returns how many points are left. */
-static int leave_out_nowhere(struct track *t, int n)
-{
-    int kept = 0;
-    for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &t->point[i];
-        if (p->echo_count != 0 && track_is_nowhere(t, p->x, p->y, p->z)) continue;
-        if (kept != i) keep_point(t, i, kept);
-        kept++;
-    }
-    return kept;
-}
-
 /* Positions of the geo layout need no pose. The frame scalar does; it is NaN where the pose was lost. */
 static void set_geo_frames(struct track *t, int n)
 {
     struct scanhead_pose pose;
     for (int i = 0; i < n; i++)
-        t->frame[i] = scanhead_pose(t->sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
+        t->frame[i] = scanhead_pose(t->sh, t->points.t_ns[i], &pose) == SCANHEAD_OK ? pose.frame : NAN;
 }
 
 /* Returns how many points are left, or a negative error. */
 static int place_moving(struct track *t, int n, struct sh_err *err)
 {
+    uint16_t index[TRACK_BATCH];
     int kept = 0;
     if (t->info.geo) {
         set_geo_frames(t, n);
         return n;
     }
-    int lost = scanhead_to_scene(t->sh, t->point, (uint32_t)n, t->frame);
+    const int lost = track_to_scene(t, n);
     if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(t->sh));
     for (int i = 0; i < n; i++) {
-        if (t->point[i].echo_count != 0 && isnan(t->point[i].x)) {
+        if (t->points.echo_count[i] != 0 && isnan(t->points.x[i])) {
             t->missing.n_without_pose++;
             continue;
         }
-        keep_point(t, i, kept++);
+        index[kept++] = (uint16_t)i;
     }
+    if (kept < n) track_pick(t, index, kept);
     return kept;
 }
 
@@ -221,7 +191,7 @@ static void count_unheld(struct track *t, int n)
 {
     if (t->ops->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
     for (int i = 0; i < n; i++)
-        t->missing.n_attributes_unheld += t->point[i].echo_count != 0;
+        t->missing.n_attributes_unheld += t->points.echo_count[i] != 0;
 }
 
 /* Takes the present batch: n points of the frame, from `first` on. */
@@ -231,7 +201,7 @@ static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err
         t->index[i] = first + (uint32_t)i;
     int kept = t->info.moving ? place_moving(t, n, err) : n;
     if (kept < 0) return kept;
-    kept = leave_out_nowhere(t, kept);
+    kept = track_leave_out(t, kept);
     count_unheld(t, kept);
     t->waited = 0;
     if (!track_waits(t)) return track_give(t, kept, err);
@@ -257,11 +227,12 @@ static int begin_scan(struct track *t, struct sh_err *err)
 /* Takes all points of the frame. row: that of the first one. */
 static int take_batches(struct track *t, const struct scanhead_frame *frame, uint64_t row, struct sh_err *err)
 {
+    const struct scanhead_columns to = track_columns_to(t);
     int rc = 0;
     for (uint32_t first = 0; rc == 0 && first < frame->n_points;) {
-        int n = scanhead_points(t->sh, frame, first, t->point, TRACK_BATCH);
+        int n = scanhead_columns(t->sh, frame, first, &to, TRACK_BATCH);
         if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(t->sh));
-        row = number_rows(t, row, n);
+        row = track_number_rows(t, row, n);
         rc = take_batch(t, first, n, err);
         first += (uint32_t)n;
     }

@@ -25,13 +25,24 @@
 
 enum { TRACK_BATCH = 256 };
 
+/* Points in columns, as scanhead_columns() writes them. */
+struct track_points {
+    double x[TRACK_BATCH], y[TRACK_BATCH], z[TRACK_BATCH], range_m[TRACK_BATCH], reflectance_db[TRACK_BATCH];
+    int64_t t_ns[TRACK_BATCH];
+    uint16_t label[TRACK_BATCH];
+    uint8_t echo[TRACK_BATCH], echo_count[TRACK_BATCH];
+};
+
+/* Columns that a recorder may do without. They are not computed unless the track needs them itself. */
+enum track_column { TRACK_RANGE = 1 << 0, TRACK_REFLECTANCE = 1 << 1, TRACK_TIME = 1 << 2, TRACK_LABEL = 1 << 3 };
+
 struct track_waiting;
 struct track_waves;
 
 struct track_ops {
     /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
     int (*scan)(void *rec, struct sh_err *err);
-    /* n points of track->point. In the geo layout they are in the CRS; in the polar layout in the head's
+    /* n points of track->points. In the geo layout they are in the CRS; in the polar layout in the head's
      * frame, or in the scene frame where the head moves. NULL: no points wanted. */
     int (*points)(void *rec, int n, struct sh_err *err);
     int metres;           /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
@@ -45,6 +56,7 @@ struct track_ops {
 struct track_missing {
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
+    uint64_t n_empty;              /* shots without echo, with no_empty */
     uint64_t n_nowhere;            /* echoes whose coordinates are infinite or NaN, of a broken stream */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
@@ -71,6 +83,8 @@ struct track {
     const struct track_ops *ops;
     void *rec; /* what ops are called with */
     struct colour_choice colour;
+    int no_empty;    /* 1: shots without echo are left out and counted */
+    unsigned spared; /* enum track_column: the recorder reads none of these; may change when a scan begins */
     /* of the frame that the points at hand are in */
     struct scanhead *sh;    /* of the last frame of any kind */
     struct scanhead *named; /* heads in a scene have the same labels: the head that names most of them */
@@ -92,7 +106,7 @@ struct track {
     double cast_share;               /* of a line's pulses, 0..1: those in the blind part are not cast */
     struct scanhead_emitter emitter; /* of the last descriptor */
     double scale_m; /* of coordinates in the recording: the stream's; coarser where the head moves far */
-    struct scanhead_point point[TRACK_BATCH];
+    struct track_points points;
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     int has_attributes;        /* wanted, and sent: */
@@ -119,8 +133,16 @@ struct track {
  * station number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
-/* 1 where an echo's position is infinite or NaN, as in a broken stream. It is counted, and the caller leaves it out.
- * Points come out of the track with finite coordinates; a recorder that transforms them asks again. */
+/* For recorders: leaves only points index[0..n-1] of the batch in it; the indices rise. */
+void track_pick(struct track *track, const uint16_t *index, int n);
+/* Leaves echoes out whose positions are infinite or NaN, as in a broken stream, and with no_empty shots without echo.
+ * Both are counted. Returns how many of the n points of the batch are left. The track has done this before it gives
+ * points out; a recorder that has moved them asks again. */
+int track_leave_out(struct track *track, int n);
+/* Writes the times of the n points in seconds, as t_ns / 1e9. */
+void track_seconds(const struct track *track, int n, double *to);
+
+/* The same question for one point. 1: it is counted, and the caller leaves it out. */
 static inline int track_is_nowhere(struct track *track, double x, double y, double z)
 {
     if ((x - x) + (y - y) + (z - z) == 0) return 0; /* a difference is NaN where one of them is not finite */

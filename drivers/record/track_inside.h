@@ -1,9 +1,50 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to drivers/record/track*.c: points that wait for attributes, colours and waveforms. */
+/* Private to drivers/record/track*.c: columns of a batch, and points that wait for attributes, colours and waveforms.
+ */
 #ifndef DRIVERS_RECORD_TRACK_INSIDE_H
 #define DRIVERS_RECORD_TRACK_INSIDE_H
 
 #include "drivers/record/track.h"
+
+/* ---- the batch's columns (track_columns.c) */
+
+/* Point i of the batch as a struct, without encoder angles; and the way back. */
+static inline struct scanhead_point track_get_point(const struct track *track, int i)
+{
+    const struct track_points *p = &track->points;
+    return (struct scanhead_point){.x = p->x[i],
+                                   .y = p->y[i],
+                                   .z = p->z[i],
+                                   .range_m = p->range_m[i],
+                                   .reflectance_db = p->reflectance_db[i],
+                                   .t_ns = p->t_ns[i],
+                                   .label = p->label[i],
+                                   .echo = p->echo[i],
+                                   .echo_count = p->echo_count[i]};
+}
+
+static inline void track_set_point(struct track *track, int i, const struct scanhead_point *from)
+{
+    struct track_points *p = &track->points;
+    p->x[i] = from->x;
+    p->y[i] = from->y;
+    p->z[i] = from->z;
+    p->range_m[i] = from->range_m;
+    p->reflectance_db[i] = from->reflectance_db;
+    p->t_ns[i] = from->t_ns;
+    p->label[i] = from->label;
+    p->echo[i] = from->echo;
+    p->echo_count[i] = from->echo_count;
+}
+
+/* Where the library writes points. */
+struct scanhead_columns track_columns_to(struct track *track);
+/* Numbers the rows of n points. `row` is the number of pulses of the line before them; returns that after them. */
+uint64_t track_number_rows(struct track *track, uint64_t row, int n);
+/* As scanhead_to_scene. */
+int track_to_scene(struct track *track, int n);
+
+/* ---- points that wait (track_waiting.c) */
 
 /* Whether frames that follow the points are wanted, and sent. */
 int track_waits(const struct track *track);
