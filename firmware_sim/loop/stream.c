@@ -12,7 +12,8 @@ int stream_create(struct stream *stream, const struct ring_size *size, int64_t t
 {
     stream->tick_ns = tick_ns;
     /* In real time casters are woken early, so that most of the time ahead is left if they have to wait for a
-     * processor. Fewer ticks a wake-up would cost more: their caches are cold each time. In the paces that wait, some threads fill the queue while others empty it. */
+     * processor. Fewer ticks a wake-up would cost more, since caches are cold each time. In the paces that wait, some
+     * threads fill the queue while others empty it. */
     stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 4);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);

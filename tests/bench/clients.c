@@ -43,8 +43,9 @@ void bench_clients_begin(struct bench_clients *clients, int ready_fd, int reads)
     static const char KEY[] = "\"endpoint\":\"";
     char text[8192];
     size_t len = 0;
-    for (ssize_t n = 1; n > 0 && len<sizeof text - 1; len += n> 0 ? (size_t)n : 0)
-        n = read(ready_fd, text + len, sizeof text - 1 - len);
+    ssize_t n;
+    while ((n = read(ready_fd, text + len, sizeof text - 1 - len)) > 0)
+        len += (size_t)n;
     close(ready_fd);
     text[len] = '\0';
     for (char *at = text, *end; reads && (at = strstr(at, KEY)) != NULL; at = end + 1) {
