@@ -41,7 +41,8 @@ struct link_spec {
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
     int waits; /* enum link_waits; its owner sees to it */
-    int clean; /* 1: it gets no injected faults; its owner sees to it */
+    int latency_ms;               /* in real time bytes may wait so long for others; its owner sees to it */
+    int clean;                    /* 1: it gets no injected faults; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */

@@ -59,12 +59,12 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     static const char *const has[] = {
         [LINK_NULL] = "type, waits, protocol",
         [LINK_FILE] = "type, path, waits, protocol",
-        [LINK_PTY] = "type, path, baud, waits, protocol",
-        [LINK_TCP] = "type, address, port, max_sessions, waits, protocol",
+        [LINK_PTY] = "type, path, baud, latency_ms, waits, protocol",
+        [LINK_TCP] = "type, address, port, max_sessions, latency_ms, waits, protocol",
         [LINK_USB] = ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
-                      "waits, protocol"),
-        [LINK_UDP] = "type, address, port, interface, source, source_port, ttl, waits, protocol",
-        [LINK_WEB] = "type, address, port, max_sessions, waits, protocol"};
+                      "latency_ms, waits, protocol"),
+        [LINK_UDP] = "type, address, port, interface, source, source_port, ttl, latency_ms, waits, protocol",
+        [LINK_WEB] = "type, address, port, max_sessions, latency_ms, waits, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;

@@ -3,6 +3,7 @@
 
 static int64_t due_of(const struct pace *pace, uint64_t tick)
 {
+    if (tick < pace->with) tick = pace->with;
     return pace->epoch_ns + (int64_t)(tick + 1) * pace->tick_ns;
 }
 

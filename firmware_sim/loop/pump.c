@@ -60,6 +60,14 @@ static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t i
     return rc;
 }
 
+/* Returns how many ticks of real time go out together. Nobody waits at a file for its end. */
+static uint64_t ticks_a_wake_up(const struct stream *stream, const struct link_spec *spec)
+{
+    const uint64_t most = stream->lazy_ticks;
+    const uint64_t ticks = (uint64_t)(1000000 * (int64_t)spec->latency_ms / stream->tick_ns) + 1;
+    return spec->type == LINK_NULL || spec->type == LINK_FILE || ticks > most ? most : ticks;
+}
+
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
 {
     *out = NULL;
@@ -96,7 +104,7 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
         pump_close(pump);
         return rc;
     }
-    pump->listener = stream_listen(links->stream, pump->wake_fd, 1);
+    pump->listener = stream_listen(links->stream, pump->wake_fd, ticks_a_wake_up(links->stream, spec));
     *out = pump;
     return SH_OK;
 }

@@ -241,7 +241,8 @@ int session_write(struct pump *pump, struct session *s, int index)
             stream_note_written(pump->stream, s->reader, s->cursor); /* bytes that a fault holds back hold up nobody */
             return 0;
         }
-        if (n > 0) n = pump->ops->write(pump->link, index, s->out + s->out_pos, write_to(pump, s) - s->out_pos);
+        const uint32_t most = write_to(pump, s) - s->out_pos;
+        if (n > 0) n = pump->ops->write(pump->link, index, s->out + s->out_pos, most);
         if (n == 0) return 1;
         if (n < 0) {
             if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */
@@ -249,5 +250,6 @@ int session_write(struct pump *pump, struct session *s, int index)
             return 0;
         }
         s->out_pos += (uint32_t)n;
+        if ((uint32_t)n < most) return 1; /* asking again would cost another call, and bring nothing */
     }
 }

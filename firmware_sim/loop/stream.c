@@ -12,8 +12,9 @@ int stream_create(struct stream *stream, const struct ring_size *size, int64_t t
 {
     stream->tick_ns = tick_ns;
     /* In real time casters are woken early, so that most of the time ahead is left if they have to wait for a
-     * processor. In the paces that wait, some threads fill the queue while others empty it. */
-    stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 8);
+     * processor. Fewer ticks a wake-up would cost more, since caches are cold each time. In the paces that wait, some
+     * threads fill the queue while others empty it. */
+    stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 4);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);
     atomic_store(&stream->awaited, UINT64_MAX);
@@ -188,6 +189,26 @@ int stream_lose(struct stream *stream, uint64_t tick)
     stream->line_broken = 1;
     wake(stream, tick, 0);
     return 1;
+}
+
+static uint64_t earlier(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* Whether a tick has frames is not known yet. If it has, they may wait for `every` - 1 more ticks. */
+uint64_t stream_next_wake(const struct stream *stream, uint64_t tick)
+{
+    const uint64_t power = stream_power_tick(stream, stream->power_passed);
+    uint64_t next = tick + stream->say_ticks - stream->unsaid - 1; /* casters */
+    for (uint32_t i = 0; i < stream->n_listeners; i++) {
+        const struct stream_listener *listener = &stream->listener[i];
+        uint64_t at = listener->pending ? tick : earlier(atomic_load(&listener->wake_tick), power);
+        if (atomic_load(&listener->wants_frames)) at = earlier(at, tick + listener->every - 1);
+        if (at < listener->quiet_until) at = listener->quiet_until;
+        next = earlier(next, at);
+    }
+    return next > tick ? next : tick;
 }
 
 /* Either this thread sees that the tick became ready, or its caster sees that the tick is awaited. */

@@ -8,8 +8,9 @@
  * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
  * or of commands.
  *
- * Wake-ups. In real time a link is woken at each tick that it wants. Casters are woken once an eighth of the ticks
- * ahead is free, and the hash once an eighth of the queue was released: they have time. In the paces that wait for
+ * Wake-ups. In real time a link is woken at each tick that it wants, or once in `every` ticks. Casters are woken once a
+ * quarter of the ticks ahead is free, and the hash once an eighth of the queue was released: they have time. The pacing
+ * thread sleeps up to the next tick that wakes one of them. In the paces that wait for
  * readers, wake-ups are saved up, since nobody waits for a single tick, and ticks pass from thread to thread in
  * batches. One rule prevents a deadlock: a thread that is about to sleep first wakes all threads that can go on by its
  * work. Casters announce the ticks that they made, the pacing thread those that it released, readers how far they are.
@@ -113,6 +114,9 @@ void stream_free(struct stream *stream);
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */
 int stream_lose(struct stream *stream, uint64_t tick);
+/* Real time: ticks from `tick` to this one may be released together, when that one is due. Nobody waits for more than
+ * they accept. */
+uint64_t stream_next_wake(const struct stream *stream, uint64_t tick);
 /* Real time: waits until a tick that is late is ready, up to a time at most. May return before. */
 void stream_await(struct stream *stream, uint64_t tick, int64_t until_ns);
 /* True when every active reader has gone on so far that this tick may be released. */

@@ -11,10 +11,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "tests/bench/bench.h"
+#include "tests/bench/clients.h"
 #include "tests/bench/options.h"
 
 enum { MAX_PROGRAMS = 8, MAX_ROUNDS = 99, MAX_WORDS = 32, PATH_ROOM = 64 };
@@ -23,25 +25,30 @@ static const char HELP[] =
     "loop_cost [options] PROGRAM...: processor time a pulse of whole programs, in turns\n\n"
     "  --config FILE   what to scan; default: closed terrain of 100,000 triangles at 300 kHz\n"
     "  --pace PACE     fast (default) or realtime, which gives the share of one processor as well\n"
+    "  --clients       read from all pty and tcp links of the configuration, in processes of their own\n"
     "  --seconds S     of device time in the long scan, default 16; the short one has an eighth\n"
     "  --rounds N      default 9, at most 99\n\n"
     "A PROGRAM is a path of scanhead and more of its options, with blanks between. Columns: medians of the rounds,\n"
-    "the spread of the middle half, and the median of the ratios to the first program of the same round.\n";
+    "the spread of the middle half, and the median of the ratios to the first program of the same round; then medians of\n"
+    "what the long scan had: how often its threads were taken off a processor (switch/s), how late ticks were released\n"
+    "(us), frames that clients lost (lost).\n";
 
 struct options {
     const char *config, *pace;
     double seconds;
     uint32_t rounds, n;
     char **program;
+    int clients; /* 1: links are read */
 };
 
 struct figures {
-    double cpu_s, wall_s, pulses;
+    double cpu_s, wall_s, pulses, switches, p50_us, p99_us, lost_frames;
     char sha256[65]; /* empty if the program kept none */
 };
 
 struct costs {
     double ns[MAX_ROUNDS], share[MAX_ROUNDS], ratio[MAX_ROUNDS];
+    double switches_s[MAX_ROUNDS], p50_us[MAX_ROUNDS], p99_us[MAX_ROUNDS], lost_frames[MAX_ROUNDS];
     uint64_t pulses;
     char sha256[65];
     int differs; /* it differs between its own rounds */
@@ -98,7 +105,10 @@ static int read_figures(struct figures *out, struct sh_err *err)
     text[n] = '\0';
     *out = (struct figures){.cpu_s = number_of(text, "\"cpu_s\":"),
                             .wall_s = number_of(text, "\"wall_s\":"),
-                            .pulses = number_of(text, "\"pulses\":")};
+                            .pulses = number_of(text, "\"pulses\":"),
+                            .p50_us = number_of(text, "\"late_p50_us\":"),
+                            .p99_us = number_of(text, "\"late_p99_us\":"),
+                            .lost_frames = number_of(text, "\"reader_lost_frames\":")};
     const char *hash = strstr(text, "\"stream_sha256\": \"");
     if (hash != NULL) sscanf(hash + 18, "%64[0-9a-f]", out->sha256);
     if (out->cpu_s < 0.0 || out->pulses <= 0.0) return sh_fail(err, SH_EFORMAT, "%s: no figures", stats_path);
@@ -107,19 +117,21 @@ static int read_figures(struct figures *out, struct sh_err *err)
     return SH_OK;
 }
 
-/* This does not return. */
-static void become(const struct options *o, const char *program, double seconds)
+/* This does not return. ready_fd: where the head says that its links are open. */
+static void become(const struct options *o, const char *program, double seconds, int ready_fd)
 {
-    char words[512], duration[32], *arg[MAX_WORDS + 1], *save = NULL;
+    char words[512], duration[32], ready[16], *arg[MAX_WORDS + 1], *save = NULL;
     int n = 0;
     snprintf(words, sizeof words, "%s", program);
     snprintf(duration, sizeof duration, "%.3f", seconds);
+    snprintf(ready, sizeof ready, "%d", ready_fd);
     arg[n++] = strtok_r(words, " ", &save);
     const char *const fixed[] = {"run",        o->config != NULL ? o->config : config_path,
                                  "--start",    "--quiet",
                                  "--pace",     o->pace,
                                  "--stats",    stats_path,
                                  "--threads",  "1",
+                                 "--ready-fd", ready,
                                  "--duration", duration};
     for (size_t i = 0; i < sizeof fixed / sizeof *fixed; i++)
         arg[n++] = (char *)(uintptr_t)fixed[i];
@@ -141,17 +153,41 @@ static void show_messages(void)
     if (f != NULL) fclose(f);
 }
 
+/* Waits for the head and its clients. */
+static int wait_for(pid_t head, struct bench_clients *clients, double *switches)
+{
+    struct rusage usage = {0};
+    int status = -1;
+    if (wait4(head, &status, 0, &usage) != head) status = -1;
+    *switches = (double)(usage.ru_nvcsw + usage.ru_nivcsw);
+    bench_clients_end(clients);
+    return status;
+}
+
 static int run_once(const struct options *o, const char *program, double seconds, struct figures *out,
                     struct sh_err *err)
 {
-    int status;
+    struct bench_clients clients = {0};
+    int ready[2];
+    double switches;
     unlink(stats_path);
+    if (pipe(ready) != 0) return sh_fail(err, SH_EIO, "pipe: %s", strerror(errno));
     pid_t pid = fork();
     if (pid < 0) return sh_fail(err, SH_EIO, "fork: %s", strerror(errno));
-    if (pid == 0) become(o, program, seconds);
-    if (waitpid(pid, &status, 0) == pid && status == 0) return read_figures(out, err);
-    show_messages();
-    return sh_fail(err, SH_EIO, "%s failed", program);
+    if (pid == 0) {
+        close(ready[0]);
+        become(o, program, seconds, ready[1]);
+    }
+    close(ready[1]);
+    bench_clients_begin(&clients, ready[0], o->clients);
+    const int status = wait_for(pid, &clients, &switches);
+    if (status != 0) {
+        show_messages();
+        return sh_fail(err, SH_EIO, "%s failed", program);
+    }
+    int rc = read_figures(out, err);
+    out->switches = switches;
+    return rc;
 }
 
 /* ---- all of them */
@@ -166,6 +202,10 @@ static int run_pair(const struct options *o, const char *program, struct costs *
     const double pulses = many.pulses - few.pulses, cpu_s = many.cpu_s - few.cpu_s;
     costs->ns[round] = 1e9 * cpu_s / pulses;
     costs->share[round] = 100.0 * cpu_s / (many.wall_s - few.wall_s);
+    costs->switches_s[round] = (many.switches - few.switches) / (many.wall_s - few.wall_s);
+    costs->p50_us[round] = many.p50_us;
+    costs->p99_us[round] = many.p99_us;
+    costs->lost_frames[round] = many.lost_frames;
     costs->pulses = (uint64_t)pulses;
     if (round != 0 && strcmp(costs->sha256, many.sha256) != 0) costs->differs = 1;
     memcpy(costs->sha256, many.sha256, sizeof costs->sha256);
@@ -177,7 +217,9 @@ static void print_costs(const struct options *o, struct costs *costs, const stru
     const uint32_t n = o->rounds;
     const double ratio = bench_median(costs->ratio, n), share = bench_median(costs->share, n);
     const double ns = bench_median(costs->ns, n); /* they are sorted now */
-    printf("%9.1f %9.1f %9.1f %8.3f %8.1f  %-9s  %s\n", ns, costs->ns[n / 4], costs->ns[n - 1 - n / 4], ratio, share,
+    printf("%9.1f %9.1f %9.1f %8.3f %8.1f %9.0f %8.0f %8.0f %8.0f  %-9s  %s\n", ns, costs->ns[n / 4],
+           costs->ns[n - 1 - n / 4], ratio, share, bench_median(costs->switches_s, n), bench_median(costs->p50_us, n),
+           bench_median(costs->p99_us, n), bench_median(costs->lost_frames, n),
            costs->sha256[0] == '\0'                    ? "none"
            : costs->differs                            ? "CHANGES"
            : first->sha256[0] == '\0'                  ? "-"
@@ -197,7 +239,8 @@ static int measure(const struct options *o, struct sh_err *err)
         }
     printf("%s, pace %s, %u rounds, %llu pulses each\n", o->config != NULL ? o->config : "terrain of 100k, 300 kHz",
            o->pace, o->rounds, (unsigned long long)costs[0].pulses);
-    printf("%9s %9s %9s %8s %8s  %-9s  %s\n", "ns/pulse", "from", "to", "ratio", "core %", "sha256", "program");
+    printf("%9s %9s %9s %8s %8s %9s %8s %8s %8s  %-9s  %s\n", "ns/pulse", "from", "to", "ratio", "core %", "switch/s",
+           "late p50", "late p99", "lost", "sha256", "program");
     for (uint32_t i = 0; i < o->n; i++)
         for (uint32_t round = 0; round < o->rounds; round++)
             costs[i].ratio[round] = costs[i].ns[round] / costs[0].ns[round];
@@ -208,16 +251,20 @@ static int measure(const struct options *o, struct sh_err *err)
 
 static int parse(struct options *o, int argc, char **argv)
 {
-    static const struct option table[] = {
-        {"config", required_argument, NULL, 'c'},  {"pace", required_argument, NULL, 'p'},
-        {"seconds", required_argument, NULL, 's'}, {"rounds", required_argument, NULL, 'r'},
-        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
+    static const struct option table[] = {{"config", required_argument, NULL, 'c'},
+                                          {"pace", required_argument, NULL, 'p'},
+                                          {"seconds", required_argument, NULL, 's'},
+                                          {"rounds", required_argument, NULL, 'r'},
+                                          {"clients", no_argument, NULL, 'k'},
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
     *o = (struct options){.pace = "fast", .seconds = 16.0, .rounds = 9};
     for (int c; (c = getopt_long(argc, argv, "", table, NULL)) >= 0;) {
         if (c == 'c') o->config = optarg;
         if (c == 'p') o->pace = optarg;
         if (c == 's') o->seconds = strtod(optarg, NULL);
         if (c == 'r') o->rounds = (uint32_t)strtoul(optarg, NULL, 10);
+        if (c == 'k') o->clients = 1;
         if (c == 'h') fputs(HELP, stdout);
         if (c == 'h' || c == '?') return c == 'h' ? BENCH_OK : BENCH_USAGE;
     }

@@ -52,6 +52,7 @@ const struct bad bad[] = {
     {"port: 0", "port: 1.5", 15, "links[0].port", "not a whole number"},
     {"port: 0", "max_sessions: 9", 15, "links[0].max_sessions", "1 to 8"},
     {"port: 0", "max_sessions: 0", 15, "links[0].max_sessions", "1 to 8"},
+    {"port: 0", "latency_ms: 21", 15, "links[0].latency_ms", "0 to 20"},
     {"crs: local", "utm_zone: 61", 17, "output.utm_zone", "0 to 60"},
     {FRAMES_AT_4("frames: -1"), 4, "head.frames", "0 to 1000000"},
     {"output:", "noise: {seed: 18446744073709551616}\noutput:", 16, "noise.seed", "0 to 18446744073709551615"},

@@ -24,6 +24,7 @@ struct machine {
     int64_t cast_ns; /* NEVER: casters make nothing */
     int64_t still_at_ns, still_ns;
     uint64_t ahead_ticks, n_ticks, n_lost;
+    uint64_t together; /* so many ticks go out together; 0: each one alone */
     int64_t now_ns;
     int64_t ready_ns[MAX_TICKS];                  /* when the tick is made */
     int64_t let_ns[MAX_TICKS], out_ns[MAX_TICKS]; /* released or lost, and so may be followed; out: published */
@@ -78,6 +79,7 @@ static void run(struct machine *m, uint64_t n_ticks)
     for (uint64_t tick = m->n_ticks; tick < n_ticks;) {
         const int64_t ready_ns = ready_at(m, tick);
         if (m->naive_credit) m->pace.credit_ns = 0;
+        if (tick > m->pace.with) m->pace.with = tick + m->together;
         const enum pace_step step = pace_look(&m->pace, tick, ready_ns <= m->now_ns, m->now_ns, &until_ns);
         switch (step) {
         case PACE_SLEEP:
@@ -118,6 +120,24 @@ static void known_latenesses(void **state)
     assert_true(lateness_us(&m->pace.wake, 1.0) == 0.031 && lateness_us(&m->pace.late, 1.0) == 1.031);
     assert_int_equal(atomic_load(&m->counters.late_max_ns), 1031);
     assert_int_equal(atomic_load(&m->counters.late_blocks), 0);
+}
+
+/* Ticks that go out together are due together: their thread wakes up once, and none of them is late. */
+static void ticks_go_out_together(void **state)
+{
+    (void)state;
+    struct machine *m = machine_of(MS, 100 * MS, 64);
+    m->wake_ns = 31;
+    m->cost_ns = 1000;
+    m->together = 9;
+    run(m, 301); /* the first one alone, and thirty times ten */
+    assert_int_equal(lateness_count(&m->pace.late), 301);
+    assert_int_equal(lateness_count(&m->pace.wake), 31);
+    for (uint64_t tick = 1; tick < 301; tick++) {
+        const uint64_t last = (tick + 9) / 10 * 10;
+        assert_int_equal(late_of(m, tick), (int64_t)(last - tick) * MS + 31 + (int64_t)(tick - (last - 10)) * 1000);
+    }
+    assert_true(atomic_load(&m->counters.late_max_ns) == 10031 && atomic_load(&m->counters.late_blocks) == 0);
 }
 
 /* A delay of exactly one tick does not count as more than one. */
@@ -232,6 +252,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(known_latenesses),
+        cmocka_unit_test(ticks_go_out_together),
         cmocka_unit_test(late_ticks_are_counted),
         cmocka_unit_test(a_stall_is_caught_up),
         cmocka_unit_test(a_late_tick_goes_out_at_once),

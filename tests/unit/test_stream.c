@@ -3,6 +3,8 @@
 #include "tests/common/cases.h"
 
 #include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/loop/stream.h"
@@ -203,6 +205,77 @@ static void grants_add_up(void **state)
     assert_int_equal(stream.granted, 2);
 }
 
+/* ---- who is woken in real time */
+
+enum { LISTENERS = 3, POWER_TICK = 57, END_TICK = 100 };
+
+/* What is due to each listener, and to casters (the last one): the first tick that it wants and was not woken for. */
+struct due {
+    uint64_t from[LISTENERS + 1];
+};
+
+static void open_listeners(uint64_t *seed)
+{
+    stream.say_ticks = (uint64_t)case_between(seed, 1, 12);
+    stream.n_casters = 1;
+    for (int i = 0; i < LISTENERS; i++)
+        stream_listen(&stream, eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), (uint64_t)case_between(seed, 1, 10));
+    stream_power(&stream, POWER_TICK);
+}
+
+static void change_listeners(uint64_t *seed, uint64_t tick)
+{
+    for (int i = 0; i < LISTENERS; i++) {
+        if (case_between(seed, 0, 3) != 0) continue;
+        const uint64_t wake = tick + (uint64_t)case_between(seed, 0, 15);
+        stream_wake_at(&stream, &stream.listener[i], case_between(seed, 0, 4) == 0,
+                       case_between(seed, 0, 1) == 0 ? UINT64_MAX : wake);
+    }
+}
+
+static void release_noting(uint64_t tick, int frames, struct due *due)
+{
+    eventfd_t count;
+    release(make_tick(tick, frames, -1, 0), tick);
+    for (int i = 0; i < LISTENERS; i++) {
+        const struct stream_listener *l = &stream.listener[i];
+        const int wants = (frames && l->wants_frames) || l->wake_tick <= tick || tick == POWER_TICK;
+        if (wants && due->from[i] == UINT64_MAX) due->from[i] = tick;
+        if (eventfd_read(l->fd, &count) == 0) due->from[i] = UINT64_MAX;
+    }
+    if (due->from[LISTENERS] == UINT64_MAX) due->from[LISTENERS] = tick;
+    while (sem_trywait(&stream.work.signals) == 0)
+        due->from[LISTENERS] = UINT64_MAX;
+}
+
+/* Ticks that are released together wait for the last one of them. Nobody then waits for longer than `every` ticks, or
+ * casters than say_ticks, from the first tick that it wants on. */
+static void nobody_is_woken_too_late(void **state)
+{
+    (void)state;
+    for (uint64_t seed = 1; seed < 400; seed += 2) {
+        uint64_t rng = seed;
+        struct due due;
+        memset(&due, 0xff, sizeof due);
+        close_stream(NULL);
+        open_stream(NULL);
+        open_listeners(&rng);
+        for (uint64_t tick = 0, next; tick < END_TICK; tick = next + 1) {
+            change_listeners(&rng, tick);
+            next = stream_next_wake(&stream, tick);
+            for (uint64_t t = tick; t <= next; t++) {
+                release_noting(t, (int)case_between(&rng, 0, 1), &due);
+                for (int i = 0; i <= LISTENERS; i++) {
+                    const uint64_t most = i < LISTENERS ? stream.listener[i].every : stream.say_ticks;
+                    assert_true(due.from[i] == UINT64_MAX || next < due.from[i] + most);
+                }
+            }
+        }
+        for (int i = 0; i < LISTENERS; i++)
+            close(stream.listener[i].fd);
+    }
+}
+
 int main(void)
 {
 #define WITH_STREAM(test) cmocka_unit_test_setup_teardown(test, open_stream, close_stream)
@@ -213,6 +286,7 @@ int main(void)
         WITH_STREAM(a_scan_end_that_comes_late_counts_its_own_scan),
         WITH_STREAM(active_readers_hold_back),
         WITH_STREAM(grants_add_up),
+        WITH_STREAM(nobody_is_woken_too_late),
     };
     return cmocka_run_group_tests_name("stream", tests, NULL, NULL);
 }

@@ -203,6 +203,56 @@ static void a_stepped_loop_never_stands_still(void **state)
     }
 }
 
+/* ---- ticks that go out together */
+
+/* Reads all that comes. */
+static void *read_on(void *arg)
+{
+    static uint8_t bytes[65536];
+    while (read(*(const int *)arg, bytes, sizeof bytes) > 0)
+        continue;
+    return NULL;
+}
+
+/* Returns how many ticks the pacing thread released for each time that it slept, over a run in real time. */
+static double ticks_a_sleep(const struct link_spec *link)
+{
+    static const char *const sets[] = {"head.prr_hz=1000", "head.frames=0"};
+    const struct loop_options options = {.extra = link};
+    const int64_t until_ns = clock_now_ns() + DEADLINE_NS;
+    struct sh_err err;
+    struct loop *loop;
+    struct loop_stats stats;
+    struct rig *rig = rig_open(&(struct device_options){.start = 1, .duration_s = 0.3}, sets, 2);
+    need(loop_create(rig->site, rig->device, &options, &loop, &err), &err);
+    need(loop_start(loop, &err), &err);
+    while (!loop_is_over(loop) && clock_now_ns() < until_ns)
+        poll(NULL, 0, 2);
+    assert_true(loop_is_over(loop));
+    loop_join(loop, &stats);
+    const double ticks = (double)lateness_count(stats.late), sleeps = (double)lateness_count(stats.wake);
+    assert_int_equal(stats.counters.lost_ticks, 0);
+    loop_free(loop);
+    rig_close(rig);
+    return ticks / sleeps;
+}
+
+/* A machine that stands still only makes for fewer sleeps. Casters are woken once 17 of 65 ticks ahead are free, a null
+ * link every 32nd tick (an eighth of 250 ms, and the current one), and a link with a latency of 8 ms every 9th. So there
+ * are at least 17 * 32 / (17 + 32) = 11.1, and 17 * 9 / (17 + 9) = 5.9 ticks a sleep, less some at both ends of the run. */
+static void ticks_that_nobody_awaits_go_out_together(void **state)
+{
+    (void)state;
+    int fd[2];
+    pthread_t thread;
+    assert_true(ticks_a_sleep(&(struct link_spec){.type = LINK_NULL}) > 10.0);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd), 0);
+    assert_int_equal(pthread_create(&thread, NULL, read_on, &fd[1]), 0);
+    assert_true(ticks_a_sleep(&(struct link_spec){.type = LINK_FD, .fd = fd[0], .latency_ms = 8}) > 5.0);
+    pthread_join(thread, NULL);
+    close(fd[1]);
+}
+
 int main(void)
 {
     signal(SIGPIPE, SIG_IGN);
@@ -211,6 +261,7 @@ int main(void)
         cmocka_unit_test(rings_are_not_counted),
         cmocka_unit_test(a_fast_loop_never_stands_still),
         cmocka_unit_test(a_stepped_loop_never_stands_still),
+        cmocka_unit_test(ticks_that_nobody_awaits_go_out_together),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
