@@ -149,7 +149,7 @@ static void put_group(struct build_shared *b, uint32_t group, int write)
                    end = n - first < BUILD_GROUP ? n : first + BUILD_GROUP;
     for (uint32_t face = 0; face < SIGHT_FACES; face++) {
         double rect[2][2];
-        struct range r;
+        struct range r = {0};
         if (g->beside >> face & 1) continue;
         const int known = build_group_rect(g, face, rect);
         if (known)

@@ -9,7 +9,7 @@
 
 /* Where fewer rays than this come to a triangle, its group is a candidate as a whole. Examining a triangle costs as
  * much as it saves for so many rays. */
-static const double GROUP_RAYS = 16.0;
+static const double GROUP_RAYS = 64.0;
 
 static uint32_t triangles_of(const struct build_shared *b, uint32_t group)
 {
