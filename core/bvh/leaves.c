@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/planes.h"
 #include "core/huge_pages.h"
 
 /* The corner of a triangle that is not on its common edge with another one; 3: they share no edge. */
@@ -32,35 +33,50 @@ static float above(double x)
     return -below(-x);
 }
 
-/* As bvh_leaf_length reads it. */
+/* As bvh_leaf_size_m reads it. */
 static uint32_t length_bits(double length_m)
 {
-    const float f = above(length_m);
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    return (bits + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
+    return (bvh_float_bits(above(length_m)) + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
 }
 
-static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
+/* The corners from the BVH's origin. Returns how far triangle 1 follows triangle 0. */
+static uint32_t find_corners(const struct bvh *bvh, uint32_t first, uint32_t second, double v[4][3])
 {
     const struct scene *scene = bvh->scene;
     const uint32_t *a = scene->triangle[first], *b = second != BVH_NO_TRIANGLE ? scene->triangle[second] : a;
     const int odd = second != BVH_NO_TRIANGLE ? odd_corner(a, b) : 0;
     uint32_t corner[4] = {a[odd], a[(odd + 1) % 3], a[(odd + 2) % 3], a[odd]};
     if (second != BVH_NO_TRIANGLE) corner[3] = b[odd_corner(b, a)];
-    double far_m = 0.0, edge_m = 0.0;
-    for (int i = 0; i < 4; i++) {
-        double v[3];
-        memcpy(leaf->corner_m[i], scene->vertex_m[corner[i]], sizeof leaf->corner_m[i]);
-        vec3_sub(leaf->corner_m[i], bvh->origin_m, v);
-        far_m = fmax(far_m, vec3_length(v));
-    }
+    for (int i = 0; i < 4; i++)
+        vec3_sub(scene->vertex_m[corner[i]], bvh->origin_m, v[i]);
+    return second != BVH_NO_TRIANGLE ? second - first : 0;
+}
+
+/* Sets base_m near corner 0, with the lowest bits of `rest`. */
+static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t rest)
+{
+    const uint32_t mask = (1U << BVH_LEAF_BITS) - 1;
+    for (int j = 0; j < 3; j++)
+        leaf->base_m[j] = bvh_bits_float((bvh_float_bits((float)corner0_m[j]) & ~mask) |
+                                         (rest >> j * BVH_LEAF_BITS & mask));
+}
+
+/* The base moves by up to 2^-17 of its distance when its lowest bits are set, so that is in the size. */
+static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
+{
+    double v[4][3], size_m = 0.0;
+    const uint32_t ahead = find_corners(bvh, first, second, v);
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < i; j++)
-            if (i != 3 || j != 0) edge_m = fmax(edge_m, vec3_distance(leaf->corner_m[i], leaf->corner_m[j]));
+            size_m = fmax(size_m, vec3_distance(v[i], v[j]));
+    size_m += 0x1p-16 * vec3_length(v[0]);
+    set_base(leaf, v[0], length_bits(size_m) << BVH_LEAF_AHEAD_BITS | ahead);
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 3; j++)
+            leaf->corner_m[j][i] = (float)(v[i][j] - (double)leaf->base_m[j]);
     leaf->triangle = first;
-    leaf->rest = (second != BVH_NO_TRIANGLE ? second - first : 0) | length_bits(edge_m) << BVH_LEAF_EDGE |
-                 length_bits(far_m) << BVH_LEAF_FAR;
+    bvh_set_plane(bvh, first, &leaf->plane[0]);
+    bvh_set_plane(bvh, first + ahead, &leaf->plane[1]);
 }
 
 /* The radius of the scene about the origin. */
@@ -181,15 +197,17 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct bvh *bvh = args->geometryUserPtr;
     const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
-    double lo[3], hi[3];
-    for (int j = 0; j < 3; j++) {
-        lo[j] = hi[j] = leaf->corner_m[0][j];
-        for (int i = 1; i < 4; i++) {
-            lo[j] = fmin(lo[j], leaf->corner_m[i][j]);
-            hi[j] = fmax(hi[j], leaf->corner_m[i][j]);
+    const uint32_t ahead = bvh_leaf_ahead(bvh_leaf_rest(leaf));
+    double lo[3], hi[3], v[4][3], far_m = 0.0;
+    find_corners(bvh, leaf->triangle, ahead != 0 ? leaf->triangle + ahead : (uint32_t)BVH_NO_TRIANGLE, v);
+    memcpy(lo, v[0], sizeof lo);
+    memcpy(hi, v[0], sizeof hi);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 3; j++) {
+            lo[j] = fmin(lo[j], v[i][j]);
+            hi[j] = fmax(hi[j], v[i][j]);
         }
-        lo[j] -= bvh->origin_m[j];
-        hi[j] -= bvh->origin_m[j];
+        far_m = fmax(far_m, vec3_length(v[i]));
     }
-    bvh_pad_box(bvh, lo, hi, bvh_leaf_far_m(leaf), args->bounds_o);
+    bvh_pad_box(bvh, lo, hi, far_m, args->bounds_o);
 }
