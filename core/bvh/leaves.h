@@ -23,7 +23,7 @@ struct bvh_leaf {
 _Static_assert(sizeof(struct bvh_leaf) == 128, "there are half as many as triangles");
 
 enum {
-    BVH_LEAF_BITS = 6,      /* of each number of base_m */
+    BVH_LEAF_BITS = 6,       /* of each number of base_m */
     BVH_LEAF_AHEAD_BITS = 4, /* how far triangle 1 follows triangle 0 in the scene's list, 0: there is none */
     BVH_LEAF_AHEAD = 1 << BVH_LEAF_AHEAD_BITS,
     BVH_LENGTH_BITS = 17, /* a length lacks the sign and so many bits of a float, and is rounded up */

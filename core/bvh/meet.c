@@ -57,7 +57,8 @@ struct edges {
     float m[EDGES][3], e[EDGES][3], doubt;
 };
 
-VEC_INLINE void find_edges(const struct bvh_query *query, const struct bvh_leaf *leaf, float size_m, struct edges *edges)
+VEC_INLINE void find_edges(const struct bvh_query *query, const struct bvh_leaf *leaf, float size_m,
+                           struct edges *edges)
 {
     float base[3], p[3][4];
     for (int j = 0; j < 3; j++) {
@@ -300,14 +301,24 @@ static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *le
     if (bvh_leaf_ahead(rest) != 0 && any(found, EITHER << SECOND)) meet_triangle(query, tfar, leaf, 1, found);
 }
 
+/* Leaves that lie together are mostly met together: so many more are fetched. It is the wait for them that costs. Those
+ * after the last are not read. */
+enum { AHEAD = 5 };
+
 void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)
 {
     struct bvh_query *query = (struct bvh_query *)(void *)args->context;
     const struct bvh_leaf *leaf = &query->bvh->leaf[args->primID];
     struct lanes found = {{0}};
-    __builtin_prefetch(leaf);
-    __builtin_prefetch(leaf->plane);
-    for (uint32_t i = 0; i < args->N; i++)
-        found.of[i] = args->valid[i] != 0 ? 0xff : 0;
+    for (int i = 0; i <= AHEAD; i++) {
+        __builtin_prefetch(&leaf[i]);
+        __builtin_prefetch(leaf[i].plane);
+    }
+    if (args->N == BVH_PACKET)
+        for (uint32_t i = 0; i < BVH_PACKET; i++)
+            found.of[i] = args->valid[i] != 0 ? 0xff : 0;
+    else
+        for (uint32_t i = 0; i < args->N; i++)
+            found.of[i] = args->valid[i] != 0 ? 0xff : 0;
     meet(query, bvh_field(args->rayhit, args->N, tfar), leaf, &found);
 }

@@ -48,7 +48,7 @@ struct build_candidate {
     double edge_slope[3]; /* |f[1]| + |f[2]| */
     double plane[3], plane_slope;
     double slack, graze;
-    double near_m; /* no point of it is nearer to the station */
+    double near_m;     /* no point of it is nearer to the station */
     uint32_t triangle; /* BVH_NO_TRIANGLE: it is a group */
     uint32_t record;   /* BUILD_NO_RECORD: not yet in a list */
 };
@@ -71,9 +71,9 @@ struct build_shared {
     uint32_t *binned;                /* triangles and groups by region */
     struct build_group *group;       /* [n_groups] */
     uint32_t n_groups;
-    _Atomic uint32_t next;           /* region to be divided */
-    _Atomic uint64_t bytes;          /* taken, of spec->memory_bytes */
-    _Atomic uint64_t given_back;     /* of these, at the end */
+    _Atomic uint32_t next;       /* region to be divided */
+    _Atomic uint64_t bytes;      /* taken, of spec->memory_bytes */
+    _Atomic uint64_t given_back; /* of these, at the end */
     struct build_arena leaf, list, record;
     _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
     int may_coarsen;           /* 1: where the memory is full, the build begins again with larger cells */
@@ -107,7 +107,7 @@ void build_record(const struct build_candidate *c, uint32_t face, struct sight_r
 struct build_work {
     struct build_candidate *candidate;
     size_t n, room, groups; /* groups: of the n */
-    uint16_t *where; /* [where_room] of candidates, while a square is looked at */
+    uint16_t *where;        /* [where_room] of candidates, while a square is looked at */
     size_t where_room;
     uint32_t *stack; /* numbers of candidates, square within square */
     size_t stack_room;

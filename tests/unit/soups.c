@@ -160,5 +160,5 @@ static void soup_of_dust(struct soup *s, uint64_t *state)
     }
 }
 
-void (*const SOUPS[N_SOUPS])(struct soup *, uint64_t *) = {soup_of_any, soup_of_overlaps, soup_of_layers, soup_of_folds,
-                                                           soup_of_boxes, soup_of_dust};
+void (*const SOUPS[N_SOUPS])(struct soup *, uint64_t *) = {soup_of_any,   soup_of_overlaps, soup_of_layers,
+                                                           soup_of_folds, soup_of_boxes,    soup_of_dust};
