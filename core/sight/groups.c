@@ -7,10 +7,6 @@
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
 
-/* Where fewer rays than this come to a triangle, its group is a candidate as a whole. Examining a triangle costs as
- * much as it saves for so many rays. */
-static const double GROUP_RAYS = 64.0;
-
 static uint32_t triangles_of(const struct build_shared *b, uint32_t group)
 {
     const uint32_t left = bvh_scene(b->sight->bvh)->n_triangles - group * BUILD_GROUP;
@@ -95,7 +91,7 @@ static int is_whole(const struct build_shared *b, const struct build_group *g, u
         if (!build_group_rect(g, face, rect)) return 0;
         area += area_on((const double(*)[2])rect);
     }
-    return area * b->spec->rays < n * GROUP_RAYS * faces_area;
+    return area * b->spec->rays < n * SIGHT_GROUP_RAYS * faces_area;
 }
 
 int build_groups(struct build_shared *b, struct sh_err *err)
