@@ -124,9 +124,11 @@ struct plan_sight_need {
     const char *why_not;   /* no map is possible; NULL: it is */
 };
 
-/* Shares of the pulses by what their cell shows: one triangle, nothing, a few triangles, many. */
+/* Shares of the pulses by what their cell shows: one triangle, nothing, a few triangles, many; or triangles that so few
+ * rays meet that the map leaves them to the BVH (small). */
 struct plan_sight_found {
-    double one, nothing, few, ask;
+    double one, nothing, few, ask, small;
+    double per_pulse; /* triangles that are seen otherwise, by the pulses */
 };
 
 /* Chooses (*map: 1: one is made) and fills row. Casts some pulses of the places, unless a map can't pay anyway. */
@@ -135,8 +137,8 @@ int plan_sight(const struct plan_sight_need *need, const struct plan_places *pla
 
 /* The steps of plan_sight. 0: so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
-/* Casts rays around pulses of the head, at the corners of cells cell_rad across. */
-void plan_sample_sight(struct plan_sample *sample, double cell_rad, struct plan_sight_found *found);
+/* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as of struct sight_spec. */
+void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
 /* Returns whether a map is made. found NULL: nothing was sampled. */
 int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
 

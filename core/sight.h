@@ -20,6 +20,10 @@
 
 struct sight;
 
+/* Triangles that fewer rays come to are left to the BVH, unless larger ones follow them in the scene's list. To examine
+ * one costs as much as it saves for so many rays. */
+#define SIGHT_GROUP_RAYS 64.0
+
 struct sight_spec {
     const struct bvh *bvh; /* must outlive the sight */
     double station_m[3];   /* where the rays begin, prcs */

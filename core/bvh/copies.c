@@ -174,7 +174,9 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
         set_floats(in, nested, BVH_PACKET);
     else
         set_floats(in, nested, query->width);
-    in->dir_float = query->width == BVH_PACKET ? bvh_field(&nested->rays, BVH_PACKET, dir_x) : NULL;
+    in->dir_float = bvh_field(&nested->rays, query->width, dir_x);
+    in->apart_m = 0.0;
+    if (in->has_own) bvh_turn_origins(in, query->width);
     return 1;
 }
 

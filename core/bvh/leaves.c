@@ -7,6 +7,7 @@
 #include <stdlib.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/bvh/planes.h"
 #include "core/huge_pages.h"
 
 /* The corner of a triangle that is not on its common edge with another one; 3: they share no edge. */
@@ -32,35 +33,50 @@ static float above(double x)
     return -below(-x);
 }
 
-/* As bvh_leaf_length reads it. */
+/* As bvh_leaf_size_m reads it. */
 static uint32_t length_bits(double length_m)
 {
-    const float f = above(length_m);
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    return (bits + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
+    return (bvh_float_bits(above(length_m)) + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
 }
 
-static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
+/* The corners from the BVH's origin. Returns how far triangle 1 follows triangle 0. */
+static uint32_t find_corners(const struct bvh *bvh, uint32_t first, uint32_t second, double v[4][3])
 {
     const struct scene *scene = bvh->scene;
     const uint32_t *a = scene->triangle[first], *b = second != BVH_NO_TRIANGLE ? scene->triangle[second] : a;
     const int odd = second != BVH_NO_TRIANGLE ? odd_corner(a, b) : 0;
     uint32_t corner[4] = {a[odd], a[(odd + 1) % 3], a[(odd + 2) % 3], a[odd]};
     if (second != BVH_NO_TRIANGLE) corner[3] = b[odd_corner(b, a)];
-    double far_m = 0.0, edge_m = 0.0;
-    for (int i = 0; i < 4; i++) {
-        double v[3];
-        memcpy(leaf->corner_m[i], scene->vertex_m[corner[i]], sizeof leaf->corner_m[i]);
-        vec3_sub(leaf->corner_m[i], bvh->origin_m, v);
-        far_m = fmax(far_m, vec3_length(v));
-    }
+    for (int i = 0; i < 4; i++)
+        vec3_sub(scene->vertex_m[corner[i]], bvh->origin_m, v[i]);
+    return second != BVH_NO_TRIANGLE ? second - first : 0;
+}
+
+/* Sets base_m near corner 0, with the lowest bits of `rest`. */
+static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t rest)
+{
+    const uint32_t mask = (1U << BVH_LEAF_BITS) - 1;
+    for (int j = 0; j < 3; j++)
+        leaf->base_m[j] =
+            bvh_bits_float((bvh_float_bits((float)corner0_m[j]) & ~mask) | (rest >> j * BVH_LEAF_BITS & mask));
+}
+
+/* The base moves by up to 2^-17 of its distance when its lowest bits are set, so that is in the size. */
+static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
+{
+    double v[4][3], size_m = 0.0;
+    const uint32_t ahead = find_corners(bvh, first, second, v);
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < i; j++)
-            if (i != 3 || j != 0) edge_m = fmax(edge_m, vec3_distance(leaf->corner_m[i], leaf->corner_m[j]));
+            size_m = fmax(size_m, vec3_distance(v[i], v[j]));
+    size_m += 0x1p-16 * vec3_length(v[0]);
+    set_base(leaf, v[0], length_bits(size_m) << BVH_LEAF_AHEAD_BITS | ahead);
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 3; j++)
+            leaf->corner_m[j][i] = (float)(v[i][j] - (double)leaf->base_m[j]);
     leaf->triangle = first;
-    leaf->rest = (second != BVH_NO_TRIANGLE ? second - first : 0) | length_bits(edge_m) << BVH_LEAF_EDGE |
-                 length_bits(far_m) << BVH_LEAF_FAR;
+    bvh_set_plane(bvh, first, &leaf->plane[0]);
+    bvh_set_plane(bvh, first + ahead, &leaf->plane[1]);
 }
 
 /* The radius of the scene about the origin. */
@@ -145,24 +161,96 @@ static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint
     return best;
 }
 
-int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+/* ---- their order */
+
+/* Leaves lie in memory in the order of a curve through space (G. Morton, 1966): rays that follow each other meet leaves
+ * that lie together. The order changes no hit. */
+struct place {
+    uint64_t key;
+    uint32_t first, second; /* triangles */
+};
+enum { KEY_BITS = 16, DIGIT_BITS = 8, DIGITS = 1 << DIGIT_BITS };
+
+/* Two zeros behind each bit. */
+static uint64_t spread_bits(uint64_t x)
 {
-    const struct scene *scene = bvh->scene;
-    const uint32_t n = scene->n_triangles;
+    x = (x | x << 16) & UINT64_C(0x0000ff0000ff);
+    x = (x | x << 8) & UINT64_C(0x00f00f00f00f);
+    x = (x | x << 4) & UINT64_C(0x0c30c30c30c3);
+    return (x | x << 2) & UINT64_C(0x249249249249);
+}
+
+static uint64_t key_of(const struct scene *scene, uint32_t triangle, double per_m)
+{
+    uint64_t key = 0;
+    for (int j = 0; j < 3; j++) {
+        double sum = 0.0;
+        for (int i = 0; i < 3; i++)
+            sum += scene->vertex_m[scene->triangle[triangle][i]][j] - scene->min_m[j];
+        key |= spread_bits((uint64_t)(sum * per_m)) << j;
+    }
+    return key;
+}
+
+/* Sorts by the digits of the keys, the lowest first. The result is in `at` again. */
+static void sort_places(struct place *at, struct place *other, uint32_t n)
+{
+    for (int shift = 0; shift < 3 * KEY_BITS; shift += DIGIT_BITS) {
+        uint32_t to[DIGITS] = {0}, sum = 0;
+        for (uint32_t i = 0; i < n; i++)
+            to[at[i].key >> shift & (DIGITS - 1)]++;
+        for (int d = 0; d < DIGITS; d++) {
+            const uint32_t count = to[d];
+            to[d] = sum;
+            sum += count;
+        }
+        for (uint32_t i = 0; i < n; i++)
+            other[to[at[i].key >> shift & (DIGITS - 1)]++] = at[i];
+        struct place *swap = at;
+        at = other;
+        other = swap;
+    }
+}
+_Static_assert(3 * KEY_BITS / DIGIT_BITS % 2 == 0, "back where it began");
+
+/* Returns how many leaves there are. */
+static uint32_t find_places(const struct scene *scene, uint64_t *taken, struct place *place)
+{
     uint32_t leaves = 0;
-    measure(bvh);
-    bvh->leaf = huge_pages_alloc(((size_t)n + 1) * sizeof *bvh->leaf);
-    uint64_t *taken = calloc((size_t)n / 64 + 1, sizeof *taken);
-    int rc = bvh->leaf != NULL && taken != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
-    for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
-        if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
+    double size_m = 0.0;
+    for (int j = 0; j < 3; j++)
+        size_m = fmax(size_m, scene->max_m[j] - scene->min_m[j]);
+    const double per_m = size_m > 0.0 ? (double)((1 << KEY_BITS) - 1) / (3.0 * size_m) : 0.0;
+    for (uint32_t i = 0; i < scene->n_triangles; i++) {
         if (is_taken(taken, i)) continue;
         const uint32_t second = partner(scene, i, taken);
         if (second != BVH_NO_TRIANGLE) taken[second / 64] |= UINT64_C(1) << second % 64;
-        fill_leaf(bvh, i, second, &bvh->leaf[leaves++]);
+        place[leaves++] = (struct place){key_of(scene, i, per_m), i, second};
     }
+    return leaves;
+}
+
+int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+{
+    const struct scene *scene = bvh->scene;
+    const size_t n = scene->n_triangles;
+    measure(bvh);
+    struct place *place = malloc((2 * n + 1) * sizeof *place);
+    uint64_t *taken = calloc(n / 64 + 1, sizeof *taken);
+    int rc = place != NULL && taken != NULL ? sh_check_stop(report, err) : SH_ENOMEM;
+    if (rc == SH_OK) {
+        bvh->n_leaves = find_places(scene, taken, place);
+        sort_places(place, place + bvh->n_leaves, bvh->n_leaves);
+        bvh->leaf = huge_pages_alloc((bvh->n_leaves + 1) * sizeof *bvh->leaf);
+        if (bvh->leaf == NULL) rc = SH_ENOMEM;
+    }
+    if (rc == SH_ENOMEM) sh_fail(err, rc, "bvh: no memory for %zu triangles", n);
+    for (uint32_t i = 0; i < bvh->n_leaves && rc == SH_OK; i++) {
+        if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
+        fill_leaf(bvh, place[i].first, place[i].second, &bvh->leaf[i]);
+    }
+    free(place);
     free(taken);
-    bvh->n_leaves = leaves;
     return rc;
 }
 
@@ -181,15 +269,17 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct bvh *bvh = args->geometryUserPtr;
     const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
-    double lo[3], hi[3];
-    for (int j = 0; j < 3; j++) {
-        lo[j] = hi[j] = leaf->corner_m[0][j];
-        for (int i = 1; i < 4; i++) {
-            lo[j] = fmin(lo[j], leaf->corner_m[i][j]);
-            hi[j] = fmax(hi[j], leaf->corner_m[i][j]);
+    const uint32_t ahead = bvh_leaf_ahead(bvh_leaf_rest(leaf));
+    double lo[3], hi[3], v[4][3], far_m = 0.0;
+    find_corners(bvh, leaf->triangle, ahead != 0 ? leaf->triangle + ahead : (uint32_t)BVH_NO_TRIANGLE, v);
+    memcpy(lo, v[0], sizeof lo);
+    memcpy(hi, v[0], sizeof hi);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 3; j++) {
+            lo[j] = fmin(lo[j], v[i][j]);
+            hi[j] = fmax(hi[j], v[i][j]);
         }
-        lo[j] -= bvh->origin_m[j];
-        hi[j] -= bvh->origin_m[j];
+        far_m = fmax(far_m, vec3_length(v[i]));
     }
-    bvh_pad_box(bvh, lo, hi, bvh_leaf_far_m(leaf), args->bounds_o);
+    bvh_pad_box(bvh, lo, hi, far_m, args->bounds_o);
 }

@@ -8,43 +8,61 @@
 #include "core/bvh.h"
 #include "core/embree.h"
 
-/* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. One that stands alone has corner 0 for 3. */
+/* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. One that stands alone has corner 0 for 3.
+ *
+ * Leaves take most of a ray's time to arrive in the cache, so each is two lines of it that lie together: in the first
+ * the corners in single precision, from a point near them, for judging rays; in the second the planes in double, for
+ * those that hit. The corners in double are in the scene. */
 struct bvh_leaf {
-    double corner_m[4][3]; /* prcs */
-    uint32_t triangle;     /* 0 */
-    /* Bit fields. 4 bits: how far triangle 1 follows triangle 0 in the scene's list, 0: there is none. Then two
-     * lengths of 14 bits each. */
-    uint32_t rest;
-};
-_Static_assert(sizeof(struct bvh_leaf) == 104, "there are half as many as triangles");
-enum { BVH_LEAF_AHEAD = 16, BVH_LEAF_EDGE = 4, BVH_LEAF_FAR = 18 };
+    /* That point, exact as it stands, from the BVH's origin. Its lowest bits have the figures of bvh_leaf_rest. */
+    float base_m[3];
+    float corner_m[3][4]; /* x, y, z of the corners, from base_m */
+    uint32_t triangle;    /* 0 */
+    struct bvh_plane plane[2];
+} __attribute__((aligned(128)));
+_Static_assert(sizeof(struct bvh_leaf) == 128, "there are half as many as triangles");
 
-/* Lengths lack the sign and 17 bits of a float, and are rounded up by less than 1/64. */
-enum { BVH_LENGTH_BITS = 17, BVH_LENGTH_MASK = 0x3fff };
-static inline double bvh_leaf_length(const struct bvh_leaf *leaf, int at)
+enum {
+    BVH_LEAF_BITS = 6,       /* of each number of base_m */
+    BVH_LEAF_AHEAD_BITS = 4, /* how far triangle 1 follows triangle 0 in the scene's list, 0: there is none */
+    BVH_LEAF_AHEAD = 1 << BVH_LEAF_AHEAD_BITS,
+    BVH_LENGTH_BITS = 17, /* a length lacks the sign and so many bits of a float, and is rounded up */
+};
+static inline uint32_t bvh_float_bits(float f)
 {
-    const uint32_t bits = (leaf->rest >> at & BVH_LENGTH_MASK) << BVH_LENGTH_BITS;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    return bits;
+}
+static inline float bvh_bits_float(uint32_t bits)
+{
     float f;
     memcpy(&f, &bits, sizeof f);
-    return (double)f;
+    return f;
 }
-/* Upper bounds of its farthest corner's distance from the BVH's origin, and of its longest edge. */
-static inline double bvh_leaf_far_m(const struct bvh_leaf *leaf)
+static inline uint32_t bvh_leaf_rest(const struct bvh_leaf *leaf)
 {
-    return bvh_leaf_length(leaf, BVH_LEAF_FAR);
+    const uint32_t mask = (1U << BVH_LEAF_BITS) - 1;
+    return (bvh_float_bits(leaf->base_m[0]) & mask) | (bvh_float_bits(leaf->base_m[1]) & mask) << BVH_LEAF_BITS |
+           (bvh_float_bits(leaf->base_m[2]) & mask) << 2 * BVH_LEAF_BITS;
 }
-static inline double bvh_leaf_edge_m(const struct bvh_leaf *leaf)
+/* An upper bound of the edges' lengths, and of the corners' distances from base_m. */
+static inline float bvh_leaf_size_m(uint32_t rest)
 {
-    return bvh_leaf_length(leaf, BVH_LEAF_EDGE);
+    return bvh_bits_float(rest >> BVH_LEAF_AHEAD_BITS << BVH_LENGTH_BITS);
 }
+static inline uint32_t bvh_leaf_ahead(uint32_t rest)
+{
+    return rest % BVH_LEAF_AHEAD;
+}
+
 static inline int bvh_leaf_has_two(const struct bvh_leaf *leaf)
 {
-    return leaf->rest % BVH_LEAF_AHEAD != 0;
+    return bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0;
 }
-/* which: 0, or 1 where there are two. */
 static inline uint32_t bvh_leaf_triangle(const struct bvh_leaf *leaf, int which)
 {
-    return leaf->triangle + (which == 0 ? 0 : leaf->rest % BVH_LEAF_AHEAD);
+    return leaf->triangle + (which == 0 ? 0 : bvh_leaf_ahead(bvh_leaf_rest(leaf)));
 }
 
 /* Fills the leaves, and sets n_leaves. */

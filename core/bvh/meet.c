@@ -16,16 +16,14 @@
 /* A leaf's edges, from one corner to another: three of triangle 0, whose second one triangle 1 has the other way. */
 enum { EDGES = 5 };
 static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2, 0, 3, 2};
-/* The corners of each triangle. */
-static const uint8_t corner_of[2][3] = {{0, 1, 2}, {1, 3, 2}};
 
-/* An edge's side is (p x (q - p)) . d. Its error in double is at most 9 units of 2^-53 of |p| |q - p|: 1 for the
- * difference, 3 for the cross product, 5 for the dot product of three terms. The bound counts it twice, for here
- * and for edges.h, and adds the 8 units within which edges.h takes an edge for hit. */
-#define SIDE_DOUBT (32.0 * 0x1p-53)
-/* The same in single precision, which is tried first where all rays begin at one point: the cross product is made
- * in double and rounded, 1; the direction 1; the dot product 5. */
-#define FLOAT_DOUBT (12.0 * 0x1p-24)
+/* An edge's side is (p x (q - p)) . d. In single precision its error is at most 15 units of 2^-24 of |p| times the
+ * leaf's size, which no edge exceeds, and no distance of a corner from the leaf's base: the base from the ray's origin,
+ * rounded, 1; the corner added to it 2; the edge 3; the cross product 3; the direction 1; the dot product 5. Where rays
+ * begin at points o of their own, p counts from one of these, c, and the side is (p x (q - p)) . d + (q - p) . ((o - c)
+ * x d). The second term rounds like the first, with |o - c| for |p|; the sum 1. What double precision leaves in doubt
+ * (edges.h) is far less than the rest of the bound. */
+#define SIDE_DOUBT (24.0F * 0x1p-24F)
 /* Where a plane is seen at a smaller sine, the range comes from the edges. */
 #define FLAT 1e-6
 
@@ -46,15 +44,7 @@ static int any(const struct lanes *lanes, uint8_t bits)
 
 /* Judges by the sides of a triangle's edges: inside where all certainly have one sign, outside where two have
  * different ones. */
-VEC_INLINE int64_t judge(double a, double b, double c, double doubt)
-{
-    const double ab_lo = a < b ? a : b, ab_hi = a < b ? b : a, lo = ab_lo < c ? ab_lo : c, hi = ab_hi < c ? c : ab_hi;
-    const int64_t in = (int64_t)(lo > doubt) | (int64_t)(hi < -doubt),
-                  out = (int64_t)(hi > doubt) & (int64_t)(lo < -doubt);
-    return in | (1 - (in | out)) << 1;
-}
-
-VEC_INLINE int32_t judge_floats(float a, float b, float c, float doubt)
+VEC_INLINE int32_t judge(float a, float b, float c, float doubt)
 {
     const float ab_lo = a < b ? a : b, ab_hi = a < b ? b : a, lo = ab_lo < c ? ab_lo : c, hi = ab_hi < c ? c : ab_hi;
     const int32_t in = (int32_t)(lo > doubt) | (int32_t)(hi < -doubt),
@@ -62,84 +52,72 @@ VEC_INLINE int32_t judge_floats(float a, float b, float c, float doubt)
     return in | (1 - (in | out)) << 1;
 }
 
-/* For rays from one point: the moment p x (q - p) of an edge is then the same for all of them. */
-VEC_INLINE void find_moments(const struct bvh_query *query, const struct bvh_leaf *leaf, double moment[EDGES][3])
+/* What judging needs of a leaf: edges, and their moments p x (q - p), the same for all rays from one point. */
+struct edges {
+    float m[EDGES][3], e[EDGES][3], doubt;
+};
+
+VEC_INLINE void find_edges(const struct bvh_query *query, const struct bvh_leaf *leaf, float size_m,
+                           struct edges *edges)
 {
-    double p[4][3], e[3];
-    for (int i = 0; i < 4; i++)
-        vec3_sub(leaf->corner_m[i], query->at, p[i]);
-    for (int k = 0; k < EDGES; k++) {
-        vec3_sub(p[edge_to[k]], p[edge_from[k]], e);
-        vec3_cross(p[edge_from[k]], e, moment[k]);
+    float base[3], p[3][4];
+    for (int j = 0; j < 3; j++) {
+        base[j] = (float)((double)leaf->base_m[j] - query->at_local[j]);
+        for (int i = 0; i < 4; i++)
+            p[j][i] = base[j] + leaf->corner_m[j][i];
     }
+    for (int k = 0; k < EDGES; k++) {
+        float *e = edges->e[k], *m = edges->m[k];
+        const int from = edge_from[k], to = edge_to[k];
+        for (int j = 0; j < 3; j++)
+            e[j] = leaf->corner_m[j][to] - leaf->corner_m[j][from];
+        m[0] = p[1][from] * e[2] - p[2][from] * e[1];
+        m[1] = p[2][from] * e[0] - p[0][from] * e[2];
+        m[2] = p[0][from] * e[1] - p[1][from] * e[0];
+    }
+    const float far_m = fabsf(base[0]) + fabsf(base[1]) + fabsf(base[2]) + size_m + (float)query->apart_m;
+    edges->doubt = SIDE_DOUBT * 1.001F * far_m * size_m;
 }
 
-/* Judges in single precision. Returns whether a valid ray is in doubt. */
-VEC_INLINE int judge_fast(const double moment[EDGES][3], const float *dir, float doubt, struct lanes *found)
+/* Judges a packet of that width, which Embree has, or fewer rays. found: all bits of the rays that Embree asks for. */
+VEC_INLINE void judge_packet(const struct bvh_query *query, const struct edges *edges, uint32_t width,
+                             struct lanes *found)
 {
-    const float *dx = dir, *dy = dir + BVH_PACKET, *dz = dir + 2 * BVH_PACKET;
-    float m[EDGES][3];
+    const float *dx = query->dir_float, *dy = dx + query->width, *dz = dy + query->width;
+    const float(*m)[3] = edges->m, doubt = edges->doubt;
     int32_t wide[BVH_PACKET];
-    for (int k = 0; k < EDGES; k++)
-        for (int j = 0; j < 3; j++)
-            m[k][j] = (float)moment[k][j];
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    for (uint32_t i = 0; i < width; i++) {
         const float x = dx[i], y = dy[i], z = dz[i];
         const float s0 = m[0][0] * x + m[0][1] * y + m[0][2] * z, s1 = m[1][0] * x + m[1][1] * y + m[1][2] * z,
                     s2 = m[2][0] * x + m[2][1] * y + m[2][2] * z, s3 = m[3][0] * x + m[3][1] * y + m[3][2] * z,
                     s4 = m[4][0] * x + m[4][1] * y + m[4][2] * z;
-        wide[i] = judge_floats(s0, s1, s2, doubt) | judge_floats(s3, s4, -s1, doubt) << SECOND;
+        wide[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
     }
-    for (uint32_t i = 0; i < BVH_PACKET; i++)
+    for (uint32_t i = 0; i < width; i++)
         found->of[i] &= (uint8_t)wide[i];
-    return any(found, DOUBT | DOUBT << SECOND);
 }
 
-VEC_INLINE void judge_from_one(const struct bvh_query *query, const double m[EDGES][3], double doubt, int64_t *found)
+/* The same where rays begin at points of their own. */
+VEC_INLINE void judge_packet_own(const struct bvh_query *query, const struct edges *edges, uint32_t width,
+                                 struct lanes *found)
 {
-    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
+    const float *dx = query->dir_float, *dy = dx + query->width, *dz = dy + query->width;
+    const float *ux = query->turned[0], *uy = query->turned[1], *uz = query->turned[2];
+    const float(*m)[3] = edges->m, (*e)[3] = edges->e, doubt = edges->doubt;
+    int32_t wide[BVH_PACKET];
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        const double x = dx[i], y = dy[i], z = dz[i];
-        const double s0 = m[0][0] * x + m[0][1] * y + m[0][2] * z, s1 = m[1][0] * x + m[1][1] * y + m[1][2] * z,
-                     s2 = m[2][0] * x + m[2][1] * y + m[2][2] * z, s3 = m[3][0] * x + m[3][1] * y + m[3][2] * z,
-                     s4 = m[4][0] * x + m[4][1] * y + m[4][2] * z;
-        found[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
+    for (uint32_t i = 0; i < width; i++) {
+        const float x = dx[i], y = dy[i], z = dz[i], u = ux[i], v = uy[i], w = uz[i];
+        const float s0 = (m[0][0] * x + m[0][1] * y + m[0][2] * z) + (e[0][0] * u + e[0][1] * v + e[0][2] * w),
+                    s1 = (m[1][0] * x + m[1][1] * y + m[1][2] * z) + (e[1][0] * u + e[1][1] * v + e[1][2] * w),
+                    s2 = (m[2][0] * x + m[2][1] * y + m[2][2] * z) + (e[2][0] * u + e[2][1] * v + e[2][2] * w),
+                    s3 = (m[3][0] * x + m[3][1] * y + m[3][2] * z) + (e[3][0] * u + e[3][1] * v + e[3][2] * w),
+                    s4 = (m[4][0] * x + m[4][1] * y + m[4][2] * z) + (e[4][0] * u + e[4][1] * v + e[4][2] * w);
+        wide[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
     }
-}
-
-/* A corner from a ray's origin, or a direction. */
-struct place {
-    double x, y, z;
-};
-
-VEC_INLINE struct place place_of(const double corner[3], double ox, double oy, double oz)
-{
-    return (struct place){corner[0] - ox, corner[1] - oy, corner[2] - oz};
-}
-
-VEC_INLINE double side_of(struct place p, struct place q, struct place dir)
-{
-    const double ex = q.x - p.x, ey = q.y - p.y, ez = q.z - p.z;
-    return (p.y * ez - p.z * ey) * dir.x + (p.z * ex - p.x * ez) * dir.y + (p.x * ey - p.y * ex) * dir.z;
-}
-
-VEC_INLINE void judge_from_own(const struct bvh_query *query, const struct bvh_leaf *leaf, double doubt, int64_t *found)
-{
-    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
-    const double *px = query->org[0], *py = query->org[1], *pz = query->org[2];
-    const double(*c)[3] = leaf->corner_m;
-    VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        const double ox = px[i], oy = py[i], oz = pz[i];
-        const struct place d = {dx[i], dy[i], dz[i]};
-        const struct place p0 = place_of(c[0], ox, oy, oz), p1 = place_of(c[1], ox, oy, oz),
-                           p2 = place_of(c[2], ox, oy, oz), p3 = place_of(c[3], ox, oy, oz);
-        const double s0 = side_of(p0, p1, d), s1 = side_of(p1, p2, d), s2 = side_of(p2, p0, d), s3 = side_of(p1, p3, d),
-                     s4 = side_of(p3, p2, d);
-        found[i] = judge(s0, s1, s2, doubt) | judge(s3, s4, -s1, doubt) << SECOND;
-    }
+    for (uint32_t i = 0; i < width; i++)
+        found->of[i] &= (uint8_t)wide[i];
 }
 
 /* ---- hits */
@@ -202,19 +180,25 @@ static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle,
 static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
 {
     const uint32_t triangle = bvh_leaf_triangle(leaf, which);
-    const struct bvh_plane *plane = &query->bvh->plane[triangle];
-    double v[3][3], dir[3], o[3];
+    const struct bvh_plane *plane = &leaf->plane[which];
+    const struct scene *scene = query->bvh->scene;
+    const uint32_t *corner = scene->triangle[triangle];
+    double v[3][3], dir[3], o[3], side[3];
     for (int j = 0; j < 3; j++) {
         dir[j] = query->dir[j][lane];
         o[j] = query->has_own ? query->local[j][lane] : query->at_local[j];
         for (int i = 0; i < 3; i++)
-            v[i][j] = leaf->corner_m[corner_of[which][i]][j] - (query->has_own ? query->org[j][lane] : query->at[j]);
+            v[i][j] = scene->vertex_m[corner[i]][j] - (query->has_own ? query->org[j][lane] : query->at[j]);
     }
-    double side[3];
-    for (int i = 0; i < 3; i++)
-        side[i] = edge_side(v[i], v[(i + 1) % 3], dir);
-    query->decided++;
+    int near = 0;
+    for (int i = 0; i < 3; i++) {
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        side[i] = edge_side(a, b, dir);
+        near |= fabs(side[i]) <= 4.0 * blur(a, b);
+    }
+    query->decided += (uint64_t)near;
     const int met = is_inside(side);
+    if (!met && !near) return;
     if (is_edge_on(v, side) || vec3_is_any_zero(v) || (!met && !is_near_miss(v, side, dir))) return;
     const double along = vec3_dot(plane->n, dir);
     double range_m = (plane->d - vec3_dot(plane->n, o)) / along;
@@ -282,7 +266,7 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
     int64_t becomes[BVH_PACKET];
     uint32_t takes[BVH_PACKET], others = 0;
     if (any(found, (uint8_t)(INSIDE << shift))) {
-        find_ranges(query, &query->bvh->plane[triangle], range_m, becomes);
+        find_ranges(query, &leaf->plane[which], range_m, becomes);
         for (uint32_t i = 0; i < BVH_PACKET; i++) {
             const uint32_t in = (uint32_t)found->of[i] >> shift & INSIDE;
             takes[i] = in & (becomes[i] == NEARER) & !may_pass;
@@ -300,43 +284,41 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
     }
 }
 
-/* Where all rays are beside the two triangles. found: all bits of the rays that Embree asks for. */
-VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *leaf, struct lanes *found)
-{
-    const double size = (bvh_leaf_far_m(leaf) + query->far_m) * bvh_leaf_edge_m(leaf);
-    const struct lanes valid = *found;
-    int64_t wide[BVH_PACKET];
-    if (query->has_own) {
-        judge_from_own(query, leaf, SIDE_DOUBT * size, wide);
-    } else {
-        double moment[EDGES][3];
-        find_moments(query, leaf, moment);
-        if (query->dir_float != NULL &&
-            !judge_fast((const double(*)[3])moment, query->dir_float, (float)(FLOAT_DOUBT * size), found))
-            return;
-        judge_from_one(query, (const double(*)[3])moment, SIDE_DOUBT * size, wide);
-    }
-    for (uint32_t i = 0; i < BVH_PACKET; i++)
-        found->of[i] = valid.of[i] & (uint8_t)wide[i];
-}
-
 VEC_CLONES
 static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, struct lanes *found)
 {
-    const int two = bvh_leaf_has_two(leaf);
-    __builtin_prefetch(&query->bvh->plane[leaf->triangle]);
-    if (two) __builtin_prefetch(&query->bvh->plane[bvh_leaf_triangle(leaf, 1)]);
+    const uint32_t rest = bvh_leaf_rest(leaf);
+    struct edges edges;
     query->leaves++;
-    judge_all(query, leaf, found);
+    find_edges(query, leaf, bvh_leaf_size_m(rest), &edges);
+    if (query->has_own)
+        judge_packet_own(query, &edges, BVH_PACKET, found);
+    else if (query->width == BVH_PACKET)
+        judge_packet(query, &edges, BVH_PACKET, found);
+    else
+        judge_packet(query, &edges, BVH_PACKET / 2, found);
     if (any(found, EITHER)) meet_triangle(query, tfar, leaf, 0, found);
-    if (two && any(found, EITHER << SECOND)) meet_triangle(query, tfar, leaf, 1, found);
+    if (bvh_leaf_ahead(rest) != 0 && any(found, EITHER << SECOND)) meet_triangle(query, tfar, leaf, 1, found);
 }
+
+/* Leaves that lie together are mostly met together: so many more are fetched. It is the wait for them that costs. Those
+ * after the last are not read. */
+enum { AHEAD = 5 };
 
 void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)
 {
     struct bvh_query *query = (struct bvh_query *)(void *)args->context;
+    const struct bvh_leaf *leaf = &query->bvh->leaf[args->primID];
     struct lanes found = {{0}};
-    for (uint32_t i = 0; i < args->N; i++)
-        found.of[i] = args->valid[i] != 0 ? 0xff : 0;
-    meet(query, bvh_field(args->rayhit, args->N, tfar), &query->bvh->leaf[args->primID], &found);
+    for (int i = 0; i <= AHEAD; i++) {
+        __builtin_prefetch(&leaf[i]);
+        __builtin_prefetch(leaf[i].plane);
+    }
+    if (args->N == BVH_PACKET)
+        for (uint32_t i = 0; i < BVH_PACKET; i++)
+            found.of[i] = args->valid[i] != 0 ? 0xff : 0;
+    else
+        for (uint32_t i = 0; i < args->N; i++)
+            found.of[i] = args->valid[i] != 0 ? 0xff : 0;
+    meet(query, bvh_field(args->rayhit, args->N, tfar), leaf, &found);
 }

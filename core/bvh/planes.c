@@ -21,10 +21,9 @@ static double difference(double a, double b, double c, double d)
 }
 
 /* It passes through the triangle's centre. */
-static void set_plane(struct bvh *bvh, uint32_t triangle)
+void bvh_set_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane)
 {
     const struct scene *scene = bvh->scene;
-    struct bvh_plane *plane = &bvh->plane[triangle];
     const uint32_t *corner = scene->triangle[triangle];
     double v[3], e1[3], e2[3], centre[3];
     vec3_sub(scene->vertex_m[corner[0]], bvh->origin_m, v);
@@ -45,7 +44,7 @@ int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_e
     if (bvh->plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
     for (uint32_t i = 0; i < n; i++) {
         if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
-        set_plane(bvh, i);
+        bvh_set_plane(bvh, i, &bvh->plane[i]);
     }
     bvh->plane[n] = (struct bvh_plane){.n = {NAN, NAN, NAN}, .d = NAN};
     return SH_OK;

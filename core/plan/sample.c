@@ -8,6 +8,8 @@
 #include "core/plan.h"
 #include "core/plan/cost.h"
 #include "core/rng.h"
+#include "core/sight.h"
+#include "core/vec3.h"
 
 /* Rays whose ranges differ by more do not hit one smooth surface: at 80 deg, 100 m and 0.35 mrad, the mean
  * over a footprint differs from its centre by 2 um. */
@@ -348,7 +350,33 @@ static uint32_t count_different(const uint32_t *triangle)
     return n;
 }
 
-void plan_sample_sight(struct plan_sample *s, double cell_rad, struct plan_sight_found *found)
+/* The number of rays that meet the triangle, where it is not hidden; `rays` go in all directions. */
+static double rays_on(const struct bvh *bvh, const struct bvh_rays *cast, double rays)
+{
+    struct bvh_plane plane;
+    const double dir[3] = VEC3_AT(cast->dir, 0), range_m = cast->range_m[0];
+    bvh_get_plane(bvh, cast->triangle[0], &plane);
+    const double across_m2 = 0.5 * fabs(vec3_dot(plane.n, dir));
+    return rays * across_m2 / (4.0 * M_PI * range_m * range_m);
+}
+
+/* Adds a pulse to the kind of its cell. */
+static void count_cell(const struct bvh *bvh, const struct bvh_rays *cast, double rays, struct plan_sight_found *found)
+{
+    const uint32_t kinds = count_different(cast->triangle);
+    const double met_by = cast->triangle[0] != BVH_NO_TRIANGLE ? rays_on(bvh, cast, rays) : INFINITY;
+    if (met_by < SIGHT_GROUP_RAYS) {
+        found->small += 1.0;
+        return;
+    }
+    found->per_pulse += 1.0 / met_by;
+    *(kinds > SIGHT_FEW                      ? &found->ask
+      : kinds > 1                            ? &found->few
+      : cast->triangle[0] == BVH_NO_TRIANGLE ? &found->nothing
+                                             : &found->one) += 1.0;
+}
+
+void plan_sample_sight(struct plan_sample *s, double cell_rad, double all_rays, struct plan_sight_found *found)
 {
     struct look look;
     double d[3][SIGHT_RAYS], range_m[SIGHT_RAYS];
@@ -365,14 +393,11 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, struct plan_sight
                                       .triangle = triangle};
         square_around(p, look.pulse, cell_rad, d);
         caster_hits(s->caster, p->setup.bvh, &rays);
-        const uint32_t kinds = count_different(triangle);
-        *(kinds > SIGHT_FEW                ? &found->ask
-          : kinds > 1                      ? &found->few
-          : triangle[0] == BVH_NO_TRIANGLE ? &found->nothing
-                                           : &found->one) += 1.0;
+        count_cell(p->setup.bvh, &rays, all_rays, found);
     }
     if (n == 0) found->ask = n = 1;
     found->few += 0.5 * found->ask; /* about half of those that look so are decided by lists */
     found->ask *= 0.5;
-    *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n, found->ask / n};
+    *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n,
+                                       found->ask / n, found->small / n,   found->per_pulse / n};
 }

@@ -45,15 +45,22 @@ static double least_build_ns(const struct plan_sight_need *need)
     return PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * need->n_triangles;
 }
 
+/* The cost without that of cells. */
+static double triangles_build_ns(const struct plan_sight_need *need, const struct plan_sight_found *f)
+{
+    return least_build_ns(need) + PLAN_COST_SIGHT_SEEN * fmin(0.5 * need->n_triangles, f->per_pulse * need->pulses);
+}
+
 /* Costs of a scan, ns: per pulse, except build. */
 struct costs {
     double bvh, map, build;
 };
 
 /* The share of the cells with more than one triangle that the memory holds. */
-static double fitting(const struct plan_sight_need *need, double mixed)
+static double fitting(const struct plan_sight_need *need, const struct plan_sight_found *f, double mixed)
 {
-    const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) + PLAN_SIGHT_RECORD_BYTES * need->n_triangles;
+    const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) +
+                         PLAN_SIGHT_RECORD_BYTES * fmin(need->n_triangles, 4.0 * f->per_pulse * need->pulses);
     return fmin(1.0, (double)need->memory_bytes / bytes);
 }
 
@@ -61,13 +68,13 @@ static double fitting(const struct plan_sight_need *need, double mixed)
  * crosses half as many of these, so their share is twice as large. */
 static void coarsen(const struct plan_sight_found *f, struct plan_sight_found *coarse)
 {
-    const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(1.0, 2.0 * mixed);
+    const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(mixed + all, 2.0 * mixed);
     *coarse = *f;
     if (!(mixed > 0.0) || !(all > 0.0)) return;
     coarse->few *= wider / mixed;
     coarse->ask *= wider / mixed;
-    coarse->one *= (1.0 - wider) / all;
-    coarse->nothing *= (1.0 - wider) / all;
+    coarse->one *= (mixed + all - wider) / all;
+    coarse->nothing *= (mixed + all - wider) / all;
 }
 
 static void estimate(const struct plan_sight_need *need, const struct plan_sight_found *found, struct costs *c)
@@ -75,20 +82,21 @@ static void estimate(const struct plan_sight_need *need, const struct plan_sight
     const struct plan_ray_cost *cost = ray_cost(need->packet);
     const struct plan_sight_found *f = found;
     struct plan_sight_found coarse;
-    double mixed = (f->few + f->ask) * need->share * cells(need), fits = fitting(need, mixed);
-    c->build = least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+    double mixed = (f->few + f->ask) * need->share * cells(need), fits = fitting(need, f, mixed);
+    c->build = triangles_build_ns(need, f) + PLAN_COST_SIGHT_CELL * fits * mixed;
     if (fits < 1.0) {
         coarsen(f, &coarse);
         f = &coarse;
         mixed = (f->few + f->ask) * need->share * cells(need) / 4.0;
-        fits = fitting(need, mixed);
-        c->build += least_build_ns(need) + PLAN_COST_SIGHT_CELL * fits * mixed;
+        fits = fitting(need, f, mixed);
+        c->build += triangles_build_ns(need, f) + PLAN_COST_SIGHT_CELL * fits * mixed;
     }
     const double few = fits * f->few, ask = f->ask + f->few - few;
     c->bvh = found->nothing * cost->out + (1.0 - found->nothing) * (cost->met + plane_ns(need->n_triangles)) +
-             (found->few + found->ask) * cost->border;
+             (found->few + found->ask + found->small) * cost->border;
     c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need->n_triangles) +
-             few * PLAN_COST_SIGHT_FEW + ask * (c->bvh + PLAN_COST_SIGHT_ASK);
+             few * PLAN_COST_SIGHT_FEW + ask * (c->bvh + PLAN_COST_SIGHT_ASK) +
+             f->small * (cost->met + plane_ns(need->n_triangles) + cost->border + PLAN_COST_SIGHT_SMALL);
 }
 
 static int pays(const struct plan_sight_need *need, const struct costs *c)
@@ -153,7 +161,7 @@ int plan_sight(const struct plan_sight_need *need, const struct plan_places *pla
         struct plan_sample *sample;
         int rc = plan_sample_create(places, report, &sample, err);
         if (rc != SH_OK) return rc;
-        plan_sample_sight(sample, sqrt(4.0 * M_PI / cells(need)), &found);
+        plan_sample_sight(sample, sqrt(4.0 * M_PI / cells(need)), need->pulses / need->share, &found);
         plan_sample_free(sample);
         rc = sh_check_stop(report, err);
         if (rc != SH_OK) return rc;

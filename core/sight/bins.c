@@ -12,20 +12,16 @@ struct range {
     uint32_t u0, u1, v0, v1;
 };
 
-/* The side planes of the face's pyramid, a little wider than the face. */
-#define WIDER  (1.0 + 4.0 * SIGHT_PAD)
-#define BESIDE (1e6 * SIGHT_TILT_DOUBT)
-
 /* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along.
  * Corners that touch a side count as within: a triangle seen edge-on may be hit a little beside its end. That is
  * SIGHT_TILT_DOUBT over 1e-6, the sine below which core/bvh limits ranges to those between the edges. */
 static int is_beside(const double w[3], const double a[3], const double b[3], double far_m)
 {
-    const double behind = -BESIDE * far_m;
+    const double behind = -BUILD_BESIDE * far_m;
     int out = 15;
     if (w[0] < behind && w[1] < behind && w[2] < behind) return 1;
     for (int i = 0; i < 3; i++) {
-        const double k = WIDER * w[i] + BESIDE * far_m;
+        const double k = BUILD_WIDER * w[i] + BUILD_BESIDE * far_m;
         out &= (a[i] > k) | (-a[i] > k) << 1 | (b[i] > k) << 2 | (-b[i] > k) << 3;
     }
     return out != 0;
@@ -109,40 +105,69 @@ static void find_seen(struct build_shared *b)
             }
 }
 
-static void bins_count(struct build_shared *b, uint32_t region, uint32_t triangle)
+static void bins_count(struct build_shared *b, uint32_t region, uint32_t number)
 {
     b->bin[region + 1]++;
-    b->kept[triangle]++;
+    if ((number & BUILD_IS_GROUP) == 0) b->kept[number]++;
 }
 
-/* Counts triangle by region into bin, or, after that, writes it there. */
-static void bins_put(struct build_shared *b, uint32_t triangle, int write)
+/* Counts a triangle or a group by region into bin, or, after that, writes it there. */
+static void put_range(struct build_shared *b, uint32_t face, const struct range *r, uint32_t number, int write)
 {
-    double v[3][3];
+    for (uint32_t j = r->v0; j <= r->v1; j++)
+        for (uint32_t i = r->u0; i <= r->u1; i++) {
+            const uint32_t at = region_number(b, face, i, j);
+            if (!b->seen[at]) continue;
+            if (write)
+                b->binned[b->bin[at]++] = number;
+            else
+                bins_count(b, at, number);
+        }
+}
+
+/* The triangles first .. end of a group that is not a candidate itself. `all` holds its triangles, where it is known. */
+static void put_triangles(struct build_shared *b, uint32_t face, uint32_t first, uint32_t end, const struct range *all,
+                          int write)
+{
+    const int in_one = all != NULL && all->u0 == all->u1 && all->v0 == all->v1;
     struct range r;
-    sight_corners(b->sight, triangle, v);
-    const double far_m = farthest(v);
+    for (uint32_t t = first; t < end; t++) {
+        double v[3][3];
+        if (in_one) {
+            put_range(b, face, all, t, write);
+            continue;
+        }
+        sight_corners(b->sight, t, v);
+        if (range_of(v, farthest(v), face, b->regions, &r)) put_range(b, face, &r, t, write);
+    }
+}
+
+static void put_group(struct build_shared *b, uint32_t group, int write)
+{
+    const struct build_group *g = &b->group[group];
+    const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles, first = group * BUILD_GROUP,
+                   end = n - first < BUILD_GROUP ? n : first + BUILD_GROUP;
     for (uint32_t face = 0; face < SIGHT_FACES; face++) {
-        if (!range_of(v, far_m, face, b->regions, &r)) continue;
-        for (uint32_t j = r.v0; j <= r.v1; j++)
-            for (uint32_t i = r.u0; i <= r.u1; i++) {
-                const uint32_t at = region_number(b, face, i, j);
-                if (!b->seen[at]) continue;
-                if (write)
-                    b->binned[b->bin[at]++] = triangle;
-                else
-                    bins_count(b, at, triangle);
-            }
+        double rect[2][2];
+        struct range r = {0};
+        if (g->beside >> face & 1) continue;
+        const int known = build_group_rect(g, face, rect);
+        if (known)
+            r = (struct range){region_at(rect[0][0], b->regions), region_at(rect[0][1], b->regions),
+                               region_at(rect[1][0], b->regions), region_at(rect[1][1], b->regions)};
+        if (g->whole)
+            put_range(b, face, &r, group | BUILD_IS_GROUP, write);
+        else
+            put_triangles(b, face, first, end, known ? &r : NULL, write);
     }
 }
 
 static int put_all(struct build_shared *b, int write, struct sh_err *err)
 {
-    const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;
     int rc = SH_OK;
-    for (uint32_t t = 0; t < n && rc == SH_OK; t++) {
-        if ((t & 0xffff) == 0) rc = sh_check_stop(b->report, err);
-        bins_put(b, t, write);
+    for (uint32_t g = 0; g < b->n_groups && rc == SH_OK; g++) {
+        if ((g & 0xfff) == 0) rc = sh_check_stop(b->report, err);
+        put_group(b, g, write);
     }
     return rc;
 }

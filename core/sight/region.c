@@ -20,6 +20,8 @@ struct seen {
     uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
     uint32_t *above;   /* where the stack is free */
     uint32_t cover;    /* hides all others of the list; or NO_CANDIDATE */
+    uint32_t groups;   /* of the candidates; */
+    int filled;        /* one of them may be seen in all of the square */
     uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
     uint32_t own_leaf;
 };
@@ -47,8 +49,11 @@ struct quarters {
     quad first, plane[3], slope, slack;
 };
 
-/* Flags of a candidate in the four quarters: outside, covers. */
-enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4 }; /* four bits each, one a quarter */
+/* Flags of a candidate in the four quarters: outside, covers; four bits each, one a quarter. A group covers what
+ * its rectangle does. */
+enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4, GROUP_SHIFT = 8 };
+/* Where groups alone may be seen, squares of so many cells are small enough. */
+enum { GROUPS_SIZE = SIGHT_TILE / 2 };
 
 VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
 {
@@ -69,6 +74,18 @@ VEC_INLINE void find_clear(const struct build_candidate *c, const quad *middle, 
     *clear = (quad_mask)(*middle - r > 2.0 * c->graze) & (quad_mask)(*middle + r < SIGHT_NEAR);
 }
 
+/* The flags of a group. */
+VEC_INLINE uint16_t place_group(const struct build_candidate *c, const struct quarters *four)
+{
+    const double half = four->half, *u = c->rect[0], *v = c->rect[1];
+    const quad from_u = four->u - u[0], from_v = four->v - v[0];
+    const quad_mask outside = (quad_mask)(from_u > u[1] + half) | (quad_mask)(-from_u > u[1] + half) |
+                              (quad_mask)(from_v > v[1] + half) | (quad_mask)(-from_v > v[1] + half);
+    const quad_mask filled = (quad_mask)(from_u <= u[1] - half) & (quad_mask)(-from_u <= u[1] - half) &
+                             (quad_mask)(from_v <= v[1] - half) & (quad_mask)(-from_v <= v[1] - half);
+    return (uint16_t)(bits_of(&outside) | bits_of(&filled) << COVERS_SHIFT | 1U << GROUP_SHIFT);
+}
+
 /* Finds which candidates lie outside of each quarter, which cover it, and which of those comes first in its
  * middle. Rays here are 1 to sqrt(3) long, since a direction's largest component is 1. So doubts count twice. */
 VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
@@ -80,6 +97,10 @@ VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, s
         const struct build_candidate *c = &w->candidate[number];
         quad_mask outside = {0, 0, 0, 0}, covers = {-1, -1, -1, -1}, better;
         quad e;
+        if (c->triangle == BVH_NO_TRIANGLE) {
+            w->where[i] = place_group(c, four);
+            continue;
+        }
         for (int k = 0; k < 3; k++) {
             const double r = 2.0 + c->edge_slope[k] * four->half;
             at_middles(c->edge[k], four, &e);
@@ -137,7 +158,7 @@ VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarte
 VEC_CLONES
 static void region_look(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
-    uint32_t n[4] = {0, 0, 0, 0};
+    uint32_t n[4] = {0, 0, 0, 0}, groups[4] = {0, 0, 0, 0}, filled = 0;
     find_covers(w, in, four);
     const int hides = in->n > 1 && take_covers(w, four);
     for (uint32_t i = 0; i < in->n; i++) {
@@ -149,13 +170,18 @@ static void region_look(const struct build_work *w, const struct seen *in, struc
             behind &= (quad_mask)(((quad_mask){number, number, number, number}) != four->cover);
             gone |= bits_of(&behind);
         }
+        const uint32_t group = where >> GROUP_SHIFT;
+        filled |= group != 0 ? ~gone & where >> COVERS_SHIFT : 0;
         for (int k = 0; k < 4; k++) {
             four->seen[k].list[n[k]] = number | (where >> (COVERS_SHIFT + k) & 1) << COVERS_BIT;
             n[k] += ~(gone >> k) & 1;
+            groups[k] += ~(gone >> k) & group;
         }
     }
     for (int k = 0; k < 4; k++) {
         four->seen[k].n = n[k];
+        four->seen[k].groups = groups[k];
+        four->seen[k].filled = (int)(filled >> k & 1);
         four->seen[k].cover = (uint32_t)four->cover[k];
     }
 }
@@ -188,7 +214,7 @@ static uint32_t record_of(const struct division *d, struct build_candidate *c)
 
 static uint32_t make_list(const struct division *d, const struct seen *seen)
 {
-    if (seen->n > SIGHT_MAX_LIST) return SIGHT_ASK;
+    if (seen->n > SIGHT_MAX_LIST || seen->groups > 0) return SIGHT_ASK;
     const uint64_t at = build_take(d->b, &d->b->list, seen->n + 1, sizeof(uint32_t));
     if (at == UINT64_MAX) return SIGHT_ASK;
     uint32_t *list = &d->b->sight->list[at];
@@ -216,7 +242,7 @@ static void end_few(struct division *d, const struct square *q, const struct see
 
 static int all_cover(const struct seen *seen)
 {
-    uint32_t all = COVERS;
+    uint32_t all = seen->groups == 0 ? COVERS : 0;
     for (uint32_t i = 0; i < seen->n; i++)
         all &= seen->list[i];
     return all != 0;
@@ -286,6 +312,8 @@ static void divide(struct division *d, const struct square *q, const struct seen
         region_end(d, q, SIGHT_NOTHING, NOTHING);
     else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
         region_end(d, q, d->w->candidate[seen->cover].triangle, ONE);
+    else if (seen->groups == seen->n && (seen->filled || q->size <= GROUPS_SIZE))
+        region_end(d, q, SIGHT_ASK, ASK);
     else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
         end_few(d, q, seen);
     else if (q->size == SIGHT_TILE)
@@ -329,15 +357,24 @@ static int may_take(struct build_shared *b, struct build_work *w, size_t n)
 static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face, int *fits)
 {
     const size_t n = b->bin[region + 1] - b->bin[region];
-    w->n = 0;
+    w->n = w->groups = 0;
     *fits = may_take(b, w, n);
     if (!*fits) return SH_OK;
     if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) ||
         !grow(&w->where, &w->where_room, n, sizeof *w->where) ||
         !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
         return SH_ENOMEM;
-    for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
-        w->n += (size_t)build_candidate(b, face, b->binned[i], &w->candidate[w->n]);
+    for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++) {
+        const uint32_t number = b->binned[i];
+        struct build_candidate *c = &w->candidate[w->n];
+        if ((number & BUILD_IS_GROUP) == 0) {
+            w->n += (size_t)build_candidate(b, face, number, c);
+            continue;
+        }
+        build_group_candidate(&b->group[number & ~BUILD_IS_GROUP], face, c);
+        w->n++;
+        w->groups++;
+    }
     for (uint32_t i = 0; i < w->n; i++)
         w->stack[i] = i;
     return SH_OK;
@@ -366,6 +403,7 @@ int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
                         .n = (uint32_t)w->n,
                         .above = w->n > 0 ? w->stack + w->n : w->stack,
                         .cover = NO_CANDIDATE,
+                        .groups = (uint32_t)w->groups,
                         .own_leaf = NO_LEAF};
     seen.leaf = &seen.own_leaf;
     if (fits)

@@ -145,6 +145,7 @@ static void sight_finish(struct build_shared *b)
 static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
 {
     int rc = take_arrays(b, err);
+    if (rc == SH_OK) rc = build_groups(b, err);
     if (rc == SH_OK) rc = build_bins(b, err);
     if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
@@ -155,6 +156,7 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
     free(b->kept);
     free(b->bin);
     free(b->binned);
+    free(b->group);
     return rc;
 }
 

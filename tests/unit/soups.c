@@ -135,5 +135,30 @@ static void soup_of_boxes(struct soup *s, uint64_t *state)
     }
 }
 
-void (*const SOUPS[N_SOUPS])(struct soup *, uint64_t *) = {soup_of_any, soup_of_overlaps, soup_of_layers, soup_of_folds,
-                                                           soup_of_boxes};
+/* Dust: many small triangles that follow each other in the list lie close together, before and behind large ones. */
+static void soup_of_dust(struct soup *s, uint64_t *state)
+{
+    enum { GRAINS = 32, LARGE = 40 };
+    double middle[3] = {0}, size = 1.0;
+    for (uint32_t i = 0; i + LARGE < MOST; i++) {
+        double a[3], b[3], c[3];
+        if (i % GRAINS == 0) {
+            any_point(state, 10.0, middle);
+            size = exp(between(state, -6.0, 0.0));
+        }
+        near_point(state, middle, size, a);
+        near_point(state, a, 0.3 * size, b);
+        near_point(state, a, 0.3 * size, c);
+        add(s, a, b, c);
+    }
+    for (uint32_t i = (uint32_t)case_between(state, 0, LARGE); i < LARGE; i++) {
+        double a[3], b[3], c[3];
+        any_point(state, 10.0, a);
+        near_point(state, a, 8.0, b);
+        near_point(state, a, 8.0, c);
+        add(s, a, b, c);
+    }
+}
+
+void (*const SOUPS[N_SOUPS])(struct soup *, uint64_t *) = {soup_of_any,   soup_of_overlaps, soup_of_layers,
+                                                           soup_of_folds, soup_of_boxes,    soup_of_dust};

@@ -23,7 +23,7 @@ void any_point(uint64_t *state, double half, double p[3]);
 void add(struct soup *s, const double a[3], const double b[3], const double c[3]);
 
 /* The kinds. Each adds its triangles, which may be none. */
-enum { N_SOUPS = 5 };
+enum { N_SOUPS = 6 };
 extern void (*const SOUPS[N_SOUPS])(struct soup *, uint64_t *state);
 
 #endif

@@ -6,6 +6,7 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/leaves.h"
+#include "core/bvh/planes.h"
 #include "core/rng.h"
 #include "tests/common/generate.h"
 #include "tests/unit/bvh_rig.h"
@@ -42,30 +43,51 @@ static struct scene *torn(const struct scene *s)
     return scene;
 }
 
-/* The triangle's corners are those of the leaf, one by one. */
+static void corner_of(const struct bvh *bvh, const struct bvh_leaf *leaf, int k, double v[3])
+{
+    for (int j = 0; j < 3; j++)
+        v[j] = bvh->origin_m[j] + (double)leaf->base_m[j] + (double)leaf->corner_m[j][k];
+}
+
+/* The triangle's corners are those of the leaf, one by one: up to rounding to float of the leaf's size, and of the
+ * coordinates in double, which are up to 5e6 m here. Planes are those of the triangles, bit by bit. */
 static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, int which)
 {
     static const int of[2][3] = {{0, 1, 2}, {1, 3, 2}};
     const uint32_t *corner = bvh->scene->triangle[bvh_leaf_triangle(leaf, which)];
+    const double most_m = 0x1p-24 * (double)bvh_leaf_size_m(bvh_leaf_rest(leaf)) + 4e-9;
+    struct bvh_plane plane;
     for (int i = 0; i < 3; i++) {
         int found = 0;
-        for (int k = 0; k < 3; k++)
-            found += memcmp(leaf->corner_m[of[which][k]], bvh->scene->vertex_m[corner[i]], sizeof *leaf->corner_m) == 0;
+        for (int k = 0; k < 3; k++) {
+            double v[3];
+            corner_of(bvh, leaf, of[which][k], v);
+            found += vec3_distance(v, bvh->scene->vertex_m[corner[i]]) <= 2.0 * most_m;
+        }
         assert_int_equal(found, 1);
     }
+    bvh_set_plane(bvh, bvh_leaf_triangle(leaf, which), &plane);
+    assert_memory_equal(&plane, &leaf->plane[which], sizeof plane);
 }
 
-/* They are at least the true lengths, and larger by at most 1/64 and the rounding to float. */
-static void check_lengths(const struct bvh *bvh, const struct bvh_leaf *leaf)
+/* The size is at least each edge and each distance from the base. It is larger by at most 1/64, by the rounding to
+ * float, and by 2^-16 of the distance from the origin. */
+static void check_size(const struct bvh *bvh, const struct bvh_leaf *leaf)
 {
-    double far_m = 0.0, edge_m = 0.0;
-    for (int i = 0; i < 4; i++) {
-        far_m = fmax(far_m, vec3_distance(leaf->corner_m[i], bvh->origin_m));
-        for (int k = 0; k < i; k++)
-            if (i != 3 || k != 0) edge_m = fmax(edge_m, vec3_distance(leaf->corner_m[i], leaf->corner_m[k]));
-    }
-    assert_true(bvh_leaf_far_m(leaf) >= far_m && bvh_leaf_far_m(leaf) <= far_m * (1.0 + 1.0 / 64.0 + 0x1p-20));
-    assert_true(bvh_leaf_edge_m(leaf) >= edge_m && bvh_leaf_edge_m(leaf) <= edge_m * (1.0 + 1.0 / 64.0 + 0x1p-20));
+    double v[5][3], far_m, edge_m = 0.0, least_m = 0.0;
+    for (int i = 0; i < 4; i++)
+        corner_of(bvh, leaf, i, v[i]);
+    for (int j = 0; j < 3; j++)
+        v[4][j] = bvh->origin_m[j] + (double)leaf->base_m[j];
+    far_m = vec3_distance(v[4], bvh->origin_m);
+    for (int i = 0; i < 5; i++)
+        for (int k = 0; k < i; k++) {
+            least_m = fmax(least_m, vec3_distance(v[i], v[k]));
+            if (i < 4) edge_m = fmax(edge_m, vec3_distance(v[i], v[k]));
+        }
+    const double size_m = (double)bvh_leaf_size_m(bvh_leaf_rest(leaf));
+    assert_true(size_m >= least_m * (1.0 - 0x1p-20));
+    assert_true(size_m <= (edge_m + 0x1p-15 * far_m) * (1.0 + 1.0 / 64.0 + 0x1p-20));
 }
 
 static uint32_t check_leaves(const struct scene *scene)
@@ -79,7 +101,7 @@ static uint32_t check_leaves(const struct scene *scene)
         for (int which = 0; which <= bvh_leaf_has_two(&bvh.leaf[i]); which++) {
             assert_int_equal(seen[bvh_leaf_triangle(&bvh.leaf[i], which)]++, 0);
             check_corners(&bvh, &bvh.leaf[i], which);
-            check_lengths(&bvh, &bvh.leaf[i]);
+            check_size(&bvh, &bvh.leaf[i]);
         }
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         assert_int_equal(seen[i], 1);
@@ -130,7 +152,7 @@ static void cast(const struct bvh *bvh, const double d[3][RAYS], double *range_m
     bvh_work_free(work);
 }
 
-/* A large connected surface takes less memory, and has the same hits to the bit. In bytes a triangle: half a leaf, 52;
+/* A large connected surface takes less memory, and has the same hits to the bit. In bytes a triangle: half a leaf, 64;
  * a plane, 32; and Embree's nodes: 20 of four leaves, 52 of one (measured at a million). */
 static void test_memory_of_a_large_surface(void **state)
 {

@@ -131,8 +131,8 @@ static void test_sight_pays(void **state)
     assert_true(plan_sight_may_pay(&need));
     choose_sight(&need, &PLAIN, "map", "2000 million pulses of a scan pay for a map");
     choose_sight(&need, &MIXED, "none", "a map saves nothing: only 0 % of the pulses");
-    need.pulses = 3e5;
-    choose_sight(&need, &PLAIN, "none", "0.3 million pulses of a scan do not pay");
+    need.pulses = 5e4;
+    choose_sight(&need, &PLAIN, "none", "0.05 million pulses of a scan do not pay");
     need.pulses = 1e4;
     assert_false(plan_sight_may_pay(&need));
     choose_sight(&need, NULL, "none", "0.01 million pulses of a scan are too few");

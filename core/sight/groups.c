@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: MIT */
+/* Groups of triangles: where each is seen, and which of them are too small to be examined one by one. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/sight/build_inside.h"
+#include "core/vec3.h"
+
+static uint32_t triangles_of(const struct build_shared *b, uint32_t group)
+{
+    const uint32_t left = bvh_scene(b->sight->bvh)->n_triangles - group * BUILD_GROUP;
+    return left < BUILD_GROUP ? left : BUILD_GROUP;
+}
+
+static void find_box(const struct build_shared *b, uint32_t group, uint32_t n, struct build_group *g)
+{
+    for (int k = 0; k < 3; k++) {
+        g->lo_m[k] = INFINITY;
+        g->hi_m[k] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < n; i++) {
+        double v[3][3];
+        sight_corners(b->sight, group * BUILD_GROUP + i, v);
+        for (int j = 0; j < 9; j++) {
+            const double x = v[j / 3][j % 3];
+            double *lo_m = &g->lo_m[j % 3], *hi_m = &g->hi_m[j % 3];
+            *lo_m = x < *lo_m ? x : *lo_m;
+            *hi_m = x > *hi_m ? x : *hi_m;
+        }
+    }
+    g->far_m = 0.0;
+    for (int k = 0; k < 3; k++)
+        g->far_m = fmax(g->far_m, fmax(-g->lo_m[k], g->hi_m[k]));
+}
+
+/* What a box reaches along an axis of a face. */
+struct reach {
+    double lo_m, hi_m;
+};
+
+static void to_face(const struct build_group *g, uint32_t face, struct reach at[3])
+{
+    const uint32_t axis = face / 2;
+    for (uint32_t i = 0; i < 3; i++)
+        at[i] = (struct reach){g->lo_m[(axis + i) % 3], g->hi_m[(axis + i) % 3]};
+    if (face & 1) at[0] = (struct reach){-at[0].hi_m, -at[0].lo_m};
+}
+
+/* As for a triangle (bins.c): the whole box lies beyond one side of the face's pyramid, or behind the station. */
+static int is_beside(const struct build_group *g, uint32_t face)
+{
+    struct reach at[3];
+    to_face(g, face, at);
+    const double edge_m = BUILD_BESIDE * g->far_m, side_m = BUILD_WIDER * at[0].hi_m + edge_m;
+    return at[0].hi_m < -edge_m || at[1].lo_m > side_m || -at[1].hi_m > side_m || at[2].lo_m > side_m ||
+           -at[2].hi_m > side_m;
+}
+
+int build_group_rect(const struct build_group *g, uint32_t face, double rect[2][2])
+{
+    struct reach at[3];
+    to_face(g, face, at);
+    const double near_m = at[0].lo_m, far_m = at[0].hi_m;
+    if (!(near_m > 1e-5 * far_m)) return 0;
+    const double pad = 4.0 * SIGHT_PAD + BUILD_BESIDE * g->far_m / near_m;
+    for (int i = 0; i < 2; i++) {
+        const double lo_m = at[1 + i].lo_m, hi_m = at[1 + i].hi_m;
+        rect[i][0] = lo_m / (lo_m > 0.0 ? far_m : near_m) - pad;
+        rect[i][1] = hi_m / (hi_m > 0.0 ? near_m : far_m) + pad;
+    }
+    return 1;
+}
+
+/* The share of the group's rectangle on a face. */
+static double area_on(const double rect[2][2])
+{
+    double area = 1.0;
+    for (int i = 0; i < 2; i++)
+        area *= fmax(0.0, fmin(rect[i][1], 1.0) - fmax(rect[i][0], -1.0));
+    return area;
+}
+
+/* Whether so few rays come to the group that it is a candidate as a whole. */
+static int is_whole(const struct build_shared *b, const struct build_group *g, uint32_t n)
+{
+    const double faces_area = 4.0 * SIGHT_FACES;
+    double area = 0.0, rect[2][2];
+    for (uint32_t face = 0; face < SIGHT_FACES; face++) {
+        if (g->beside >> face & 1) continue;
+        if (!build_group_rect(g, face, rect)) return 0;
+        area += area_on((const double(*)[2])rect);
+    }
+    return area * b->spec->rays < n * SIGHT_GROUP_RAYS * faces_area;
+}
+
+int build_groups(struct build_shared *b, struct sh_err *err)
+{
+    const uint32_t n = (bvh_scene(b->sight->bvh)->n_triangles + BUILD_GROUP - 1) / BUILD_GROUP;
+    const uint64_t bytes = n * sizeof *b->group;
+    b->group = malloc(bytes + 1);
+    if (b->group == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u groups", n);
+    b->n_groups = n;
+    b->bytes += bytes;
+    b->given_back += bytes;
+    for (uint32_t i = 0; i < n; i++) {
+        struct build_group *g = &b->group[i];
+        if ((i & 0xfff) == 0 && sh_check_stop(b->report, err) != SH_OK) return SH_ESTOPPED;
+        find_box(b, i, triangles_of(b, i), g);
+        g->beside = 0;
+        for (uint32_t face = 0; face < SIGHT_FACES; face++)
+            g->beside |= (uint8_t)(is_beside(g, face) << face);
+        g->whole = (int8_t)is_whole(b, g, triangles_of(b, i));
+    }
+    return SH_OK;
+}
+
+/* Its nearest point is that of the box: sums of squares lose less than 1e-12. */
+void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c)
+{
+    double rect[2][2], near2 = 0.0;
+    build_group_rect(g, face, rect);
+    *c = (struct build_candidate){.graze = 1e300, .triangle = BVH_NO_TRIANGLE, .record = BUILD_NO_RECORD};
+    for (int i = 0; i < 2; i++) {
+        c->rect[i][0] = 0.5 * (rect[i][0] + rect[i][1]);
+        c->rect[i][1] = 0.5 * (rect[i][1] - rect[i][0]);
+    }
+    for (int k = 0; k < 3; k++) {
+        const double beyond_m = fmax(0.0, fmax(g->lo_m[k], -g->hi_m[k]));
+        near2 += beyond_m * beyond_m;
+    }
+    c->near_m = sqrt(near2) * (1.0 - 1e-12);
+}
