@@ -175,6 +175,7 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
     else
         set_floats(in, nested, query->width);
     in->dir_float = query->width == BVH_PACKET ? bvh_field(&nested->rays, BVH_PACKET, dir_x) : NULL;
+    if (in->has_own && in->dir_float != NULL) bvh_turn_origins(in, BVH_PACKET);
     return 1;
 }
 

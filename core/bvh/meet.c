@@ -23,8 +23,9 @@ static const uint8_t corner_of[2][3] = {{0, 1, 2}, {1, 3, 2}};
  * difference, 3 for the cross product, 5 for the dot product of three terms. The bound counts it twice, for here
  * and for edges.h, and adds the 8 units within which edges.h takes an edge for hit. */
 #define SIDE_DOUBT (32.0 * 0x1p-53)
-/* The same in single precision, which is tried first where all rays begin at one point: the cross product is made
- * in double and rounded, 1; the direction 1; the dot product 5. */
+/* The same in single precision, which is tried first: the cross product is made in double and rounded, 1; the direction
+ * 1; the dot product 5. Where rays begin at points o of their own, p counts from one of these, c, and the side is
+ * (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with |o - c| for |p|; the sum 1. */
 #define FLOAT_DOUBT (12.0 * 0x1p-24)
 /* Where a plane is seen at a smaller sine, the range comes from the edges. */
 #define FLAT 1e-6
@@ -89,6 +90,36 @@ VEC_INLINE int judge_fast(const double moment[EDGES][3], const float *dir, float
         const float s0 = m[0][0] * x + m[0][1] * y + m[0][2] * z, s1 = m[1][0] * x + m[1][1] * y + m[1][2] * z,
                     s2 = m[2][0] * x + m[2][1] * y + m[2][2] * z, s3 = m[3][0] * x + m[3][1] * y + m[3][2] * z,
                     s4 = m[4][0] * x + m[4][1] * y + m[4][2] * z;
+        wide[i] = judge_floats(s0, s1, s2, doubt) | judge_floats(s3, s4, -s1, doubt) << SECOND;
+    }
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
+        found->of[i] &= (uint8_t)wide[i];
+    return any(found, DOUBT | DOUBT << SECOND);
+}
+
+/* The same where rays begin at points of their own. */
+VEC_INLINE int judge_fast_own(const struct bvh_query *query, const struct bvh_leaf *leaf, float doubt,
+                              struct lanes *found)
+{
+    const float *dx = query->dir_float, *dy = dx + BVH_PACKET, *dz = dy + BVH_PACKET;
+    const float *ux = query->turned[0], *uy = query->turned[1], *uz = query->turned[2];
+    double moment[EDGES][3];
+    float m[EDGES][3], e[EDGES][3];
+    int32_t wide[BVH_PACKET];
+    find_moments(query, leaf, moment);
+    for (int k = 0; k < EDGES; k++)
+        for (int j = 0; j < 3; j++) {
+            m[k][j] = (float)moment[k][j];
+            e[k][j] = (float)(leaf->corner_m[edge_to[k]][j] - leaf->corner_m[edge_from[k]][j]);
+        }
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const float x = dx[i], y = dy[i], z = dz[i], u = ux[i], v = uy[i], w = uz[i];
+        const float s0 = (m[0][0] * x + m[0][1] * y + m[0][2] * z) + (e[0][0] * u + e[0][1] * v + e[0][2] * w),
+                    s1 = (m[1][0] * x + m[1][1] * y + m[1][2] * z) + (e[1][0] * u + e[1][1] * v + e[1][2] * w),
+                    s2 = (m[2][0] * x + m[2][1] * y + m[2][2] * z) + (e[2][0] * u + e[2][1] * v + e[2][2] * w),
+                    s3 = (m[3][0] * x + m[3][1] * y + m[3][2] * z) + (e[3][0] * u + e[3][1] * v + e[3][2] * w),
+                    s4 = (m[4][0] * x + m[4][1] * y + m[4][2] * z) + (e[4][0] * u + e[4][1] * v + e[4][2] * w);
         wide[i] = judge_floats(s0, s1, s2, doubt) | judge_floats(s3, s4, -s1, doubt) << SECOND;
     }
     for (uint32_t i = 0; i < BVH_PACKET; i++)
@@ -307,6 +338,10 @@ VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *
     const struct lanes valid = *found;
     int64_t wide[BVH_PACKET];
     if (query->has_own) {
+        const double apart = query->apart_m * bvh_leaf_edge_m(leaf);
+        if (query->dir_float != NULL &&
+            !judge_fast_own(query, leaf, (float)(FLOAT_DOUBT * (size + apart)), found))
+            return;
         judge_from_own(query, leaf, SIDE_DOUBT * size, wide);
     } else {
         double moment[EDGES][3];

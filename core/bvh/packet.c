@@ -144,6 +144,7 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
+    if (query->has_own && width == BVH_PACKET) bvh_turn_origins(query, n);
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
     if (query->unsure != 0) packet_settle(query, packet, width);
     if (query->decided != decided) take_near(query, n);

@@ -8,6 +8,7 @@
 
 #include "core/bvh.h"
 #include "core/embree.h"
+#include "core/vecmath.h"
 
 /* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This is
  * half of the wire's finest count, and far more than rounding makes of zero. */
@@ -32,12 +33,15 @@ struct bvh_query {
     double at_origin_m;        /* no hit is nearer than this */
     uint32_t width;            /* rays of the call */
     int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
-    double at[3], at_local[3]; /* prcs; from the BVH's origin */
+    double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points `at` is the first of them */
     double far_m;              /* no ray begins further from the BVH's origin */
     double most_m;             /* of a float ray, as in struct bvh_batch */
     double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
     const float *dir_float;    /* [3][BVH_PACKET] the same for Embree; NULL: the packet is smaller */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
+    /* Of own points, where dir_float is there: (org - at) x dir, and a length that no org - at exceeds. */
+    float turned[3][BVH_PACKET];
+    double apart_m;
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
@@ -72,6 +76,30 @@ static inline void bvh_forget_near(struct bvh_query *query)
         query->near_m[i] = INFINITY;
         query->near[i] = BVH_NO_TRIANGLE;
     }
+}
+
+/* Sets `at`, turned and apart_m of a packet whose first n lanes have rays with points of their own. */
+VEC_INLINE void bvh_turn_origins(struct bvh_query *query, uint32_t n)
+{
+    const double *px = query->org[0], *py = query->org[1], *pz = query->org[2];
+    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
+    const double ax = px[0], ay = py[0], az = pz[0];
+    double apart2[BVH_PACKET];
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+        const double x = px[i] - ax, y = py[i] - ay, z = pz[i] - az, here2 = x * x + y * y + z * z;
+        query->turned[0][i] = (float)(y * dz[i] - z * dy[i]);
+        query->turned[1][i] = (float)(z * dx[i] - x * dz[i]);
+        query->turned[2][i] = (float)(x * dy[i] - y * dx[i]);
+        apart2[i] = i < n ? here2 : 0.0;
+    }
+    for (uint32_t half = BVH_PACKET / 2; half > 0; half /= 2)
+        for (uint32_t i = 0; i < half; i++)
+            apart2[i] = apart2[i] > apart2[i + half] ? apart2[i] : apart2[i + half];
+    query->apart_m = sqrt(apart2[0]);
+    query->at[0] = ax;
+    query->at[1] = ay;
+    query->at[2] = az;
 }
 
 /* Casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
