@@ -109,6 +109,17 @@ static void find_origins(const struct bvh_query *query, const struct bvh_copy *c
     in->far_m = sqrt(most2);
 }
 
+VEC_INLINE void turn_origins(struct bvh_nested *nested)
+{
+    struct bvh_query *in = &nested->query;
+    const struct vec3_in org = {in->org[0], in->org[1], in->org[2]}, dir = {in->dir[0], in->dir[1], in->dir[2]};
+    for (int j = 0; j < 3; j++)
+        in->at[j] = in->org[j][0];
+    bvh_turn_origins(in->at, &org, &dir, BVH_PACKET, nested->turned[0], nested->turned[1], nested->turned[2]);
+    in->turned = (struct vec3_floats){nested->turned[0], nested->turned[1], nested->turned[2]};
+    in->apart_m = 2.0 * in->far_m;
+}
+
 /* The float rays begin at start_m. Fields are those of `width` rays. */
 VEC_INLINE void set_floats(const struct bvh_query *in, struct bvh_nested *nested, uint32_t width)
 {
@@ -175,7 +186,7 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
     else
         set_floats(in, nested, query->width);
     in->dir_float = query->width == BVH_PACKET ? bvh_field(&nested->rays, BVH_PACKET, dir_x) : NULL;
-    if (in->has_own && in->dir_float != NULL) bvh_turn_origins(in, BVH_PACKET);
+    if (in->has_own && in->dir_float != NULL) turn_origins(nested);
     return 1;
 }
 

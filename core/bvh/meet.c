@@ -102,7 +102,7 @@ VEC_INLINE int judge_fast_own(const struct bvh_query *query, const struct bvh_le
                               struct lanes *found)
 {
     const float *dx = query->dir_float, *dy = dx + BVH_PACKET, *dz = dy + BVH_PACKET;
-    const float *ux = query->turned[0], *uy = query->turned[1], *uz = query->turned[2];
+    const float *ux = query->turned.x, *uy = query->turned.y, *uz = query->turned.z;
     double moment[EDGES][3];
     float m[EDGES][3], e[EDGES][3];
     int32_t wide[BVH_PACKET];
@@ -339,8 +339,7 @@ VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *
     int64_t wide[BVH_PACKET];
     if (query->has_own) {
         const double apart = query->apart_m * bvh_leaf_edge_m(leaf);
-        if (query->dir_float != NULL &&
-            !judge_fast_own(query, leaf, (float)(FLOAT_DOUBT * (size + apart)), found))
+        if (query->dir_float != NULL && !judge_fast_own(query, leaf, (float)(FLOAT_DOUBT * (size + apart)), found))
             return;
         judge_from_own(query, leaf, SIDE_DOUBT * size, wide);
     } else {

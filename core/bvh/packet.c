@@ -73,10 +73,12 @@ VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch,
     float *to_org = bvh_field(&packet->at, width, org_x), *to_dir = bvh_field(&packet->at, width, dir_x),
           *tfar = bvh_field(&packet->at, width, tfar);
     for (uint32_t j = 0; j < 3; j++) {
-        for (uint32_t i = 0; i < width; i++)
-            to_dir[j * width + i] = dir[j][first + (i < n ? i : 0)];
-        for (uint32_t i = 0; org[j] != NULL && i < width; i++)
-            to_org[j * width + i] = org[j][first + (i < n ? i : 0)];
+        memcpy(to_dir + j * width, dir[j] + first, n * sizeof(float));
+        if (org[j] != NULL) memcpy(to_org + j * width, org[j] + first, n * sizeof(float));
+        for (uint32_t i = n; i < width; i++)
+            to_dir[j * width + i] = to_dir[j * width];
+        for (uint32_t i = n; i < width; i++)
+            to_org[j * width + i] = to_org[j * width];
     }
     for (uint32_t i = 0; i < width; i++)
         tfar[i] = batch->t_max;
@@ -144,7 +146,8 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
-    if (query->has_own && width == BVH_PACKET) bvh_turn_origins(query, n);
+    if (query->has_own)
+        query->turned = (struct vec3_floats){batch->turned.x + first, batch->turned.y + first, batch->turned.z + first};
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
     if (query->unsure != 0) packet_settle(query, packet, width);
     if (query->decided != decided) take_near(query, n);
@@ -176,7 +179,8 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     query->far_m = batch->far_m;
     query->most_m = batch->most_m;
     query->decided = query->leaves = 0;
-    memcpy(query->at, rays->from.at_m, sizeof query->at);
+    query->apart_m = batch->apart_m;
+    memcpy(query->at, batch->at, sizeof query->at);
     memcpy(query->at_local, batch->at_local, sizeof query->at_local);
     memset(query->start_m, 0, sizeof query->start_m);
     bvh_forget_near(query);

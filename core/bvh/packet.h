@@ -33,14 +33,14 @@ struct bvh_query {
     double at_origin_m;        /* no hit is nearer than this */
     uint32_t width;            /* rays of the call */
     int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
-    double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points `at` is the first of them */
+    double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points, `at` is near to them */
     double far_m;              /* no ray begins further from the BVH's origin */
     double most_m;             /* of a float ray, as in struct bvh_batch */
     double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
     const float *dir_float;    /* [3][BVH_PACKET] the same for Embree; NULL: the packet is smaller */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
     /* Of own points, where dir_float is there: (org - at) x dir, and a length that no org - at exceeds. */
-    float turned[3][BVH_PACKET];
+    struct vec3_floats turned;
     double apart_m;
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
@@ -55,6 +55,7 @@ struct bvh_query {
 /* A packet within a copy. */
 struct bvh_nested {
     struct bvh_query query;
+    float turned[3][BVH_PACKET];
     struct RTCRayHit16 rays; /* or fewer */
     int valid[BVH_PACKET];
 } __attribute__((aligned(64)));
@@ -78,28 +79,19 @@ static inline void bvh_forget_near(struct bvh_query *query)
     }
 }
 
-/* Sets `at`, turned and apart_m of a packet whose first n lanes have rays with points of their own. */
-VEC_INLINE void bvh_turn_origins(struct bvh_query *query, uint32_t n)
+/* (org - at) x dir, as struct bvh_query has it. */
+VEC_INLINE void bvh_turn_origins(const double at[3], const struct vec3_in *org, const struct vec3_in *dir, uint32_t n,
+                                 float *restrict x, float *restrict y, float *restrict z)
 {
-    const double *px = query->org[0], *py = query->org[1], *pz = query->org[2];
-    const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
-    const double ax = px[0], ay = py[0], az = pz[0];
-    double apart2[BVH_PACKET];
+    const double ax = at[0], ay = at[1], az = at[2];
+    const struct vec3_in o = *org, d = *dir;
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        const double x = px[i] - ax, y = py[i] - ay, z = pz[i] - az, here2 = x * x + y * y + z * z;
-        query->turned[0][i] = (float)(y * dz[i] - z * dy[i]);
-        query->turned[1][i] = (float)(z * dx[i] - x * dz[i]);
-        query->turned[2][i] = (float)(x * dy[i] - y * dx[i]);
-        apart2[i] = i < n ? here2 : 0.0;
+    for (uint32_t i = 0; i < n; i++) {
+        const double u = o.x[i] - ax, v = o.y[i] - ay, w = o.z[i] - az;
+        x[i] = (float)(v * d.z[i] - w * d.y[i]);
+        y[i] = (float)(w * d.x[i] - u * d.z[i]);
+        z[i] = (float)(u * d.y[i] - v * d.x[i]);
     }
-    for (uint32_t half = BVH_PACKET / 2; half > 0; half /= 2)
-        for (uint32_t i = 0; i < half; i++)
-            apart2[i] = apart2[i] > apart2[i + half] ? apart2[i] : apart2[i + half];
-    query->apart_m = sqrt(apart2[0]);
-    query->at[0] = ax;
-    query->at[1] = ay;
-    query->at[2] = az;
 }
 
 /* Casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
@@ -109,6 +101,8 @@ struct bvh_batch {
     const double *start_m;       /* NULL: 0 */
     struct vec3_in local;        /* origins from the BVH's origin; x NULL: all at at_local */
     double at_local[3], far_m;
+    struct vec3_floats turned; /* own points: as in struct bvh_query */
+    double at[3], apart_m;
     float t_max;
     double most_m;                 /* of a float ray; INFINITY: what is further than t_max may or may not be met */
     struct bvh_counters *counters; /* counted up */
