@@ -97,11 +97,11 @@ VEC_INLINE int judge_fast(const double moment[EDGES][3], const float *dir, float
     return any(found, DOUBT | DOUBT << SECOND);
 }
 
-/* The same where rays begin at points of their own. */
+/* The same where rays begin at points of their own, for packets of `width`. */
 VEC_INLINE int judge_fast_own(const struct bvh_query *query, const struct bvh_leaf *leaf, float doubt,
-                              struct lanes *found)
+                              struct lanes *found, uint32_t width)
 {
-    const float *dx = query->dir_float, *dy = dx + BVH_PACKET, *dz = dy + BVH_PACKET;
+    const float *dx = query->dir_float, *dy = dx + width, *dz = dy + width;
     const float *ux = query->turned.x, *uy = query->turned.y, *uz = query->turned.z;
     double moment[EDGES][3];
     float m[EDGES][3], e[EDGES][3];
@@ -113,7 +113,7 @@ VEC_INLINE int judge_fast_own(const struct bvh_query *query, const struct bvh_le
             e[k][j] = (float)(leaf->corner_m[edge_to[k]][j] - leaf->corner_m[edge_from[k]][j]);
         }
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    for (uint32_t i = 0; i < width; i++) {
         const float x = dx[i], y = dy[i], z = dz[i], u = ux[i], v = uy[i], w = uz[i];
         const float s0 = (m[0][0] * x + m[0][1] * y + m[0][2] * z) + (e[0][0] * u + e[0][1] * v + e[0][2] * w),
                     s1 = (m[1][0] * x + m[1][1] * y + m[1][2] * z) + (e[1][0] * u + e[1][1] * v + e[1][2] * w),
@@ -122,7 +122,7 @@ VEC_INLINE int judge_fast_own(const struct bvh_query *query, const struct bvh_le
                     s4 = (m[4][0] * x + m[4][1] * y + m[4][2] * z) + (e[4][0] * u + e[4][1] * v + e[4][2] * w);
         wide[i] = judge_floats(s0, s1, s2, doubt) | judge_floats(s3, s4, -s1, doubt) << SECOND;
     }
-    for (uint32_t i = 0; i < BVH_PACKET; i++)
+    for (uint32_t i = 0; i < width; i++)
         found->of[i] &= (uint8_t)wide[i];
     return any(found, DOUBT | DOUBT << SECOND);
 }
@@ -156,13 +156,14 @@ VEC_INLINE double side_of(struct place p, struct place q, struct place dir)
     return (p.y * ez - p.z * ey) * dir.x + (p.z * ex - p.x * ez) * dir.y + (p.x * ey - p.y * ex) * dir.z;
 }
 
-VEC_INLINE void judge_from_own(const struct bvh_query *query, const struct bvh_leaf *leaf, double doubt, int64_t *found)
+VEC_INLINE void judge_from_own(const struct bvh_query *query, const struct bvh_leaf *leaf, double doubt, int64_t *found,
+                               uint32_t width)
 {
     const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
     const double *px = query->org[0], *py = query->org[1], *pz = query->org[2];
     const double(*c)[3] = leaf->corner_m;
     VEC_LOOP
-    for (uint32_t i = 0; i < BVH_PACKET; i++) {
+    for (uint32_t i = 0; i < width; i++) {
         const double ox = px[i], oy = py[i], oz = pz[i];
         const struct place d = {dx[i], dy[i], dz[i]};
         const struct place p0 = place_of(c[0], ox, oy, oz), p1 = place_of(c[1], ox, oy, oz),
@@ -331,25 +332,33 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
     }
 }
 
+/* Where rays with points of their own are, in packets of up to `width`. */
+VEC_INLINE void judge_own(const struct bvh_query *query, const struct bvh_leaf *leaf, struct lanes *found,
+                          uint32_t width)
+{
+    const double edge_m = bvh_leaf_edge_m(leaf), far_m = bvh_leaf_far_m(leaf) + query->far_m;
+    const struct lanes valid = *found;
+    int64_t wide[BVH_PACKET];
+    if (query->dir_float != NULL &&
+        !judge_fast_own(query, leaf, (float)(FLOAT_DOUBT * (far_m + query->apart_m) * edge_m), found, width))
+        return;
+    judge_from_own(query, leaf, SIDE_DOUBT * far_m * edge_m, wide, width);
+    for (uint32_t i = 0; i < width; i++)
+        found->of[i] = valid.of[i] & (uint8_t)wide[i];
+}
+
 /* Where all rays are beside the two triangles. found: all bits of the rays that Embree asks for. */
 VEC_INLINE void judge_all(const struct bvh_query *query, const struct bvh_leaf *leaf, struct lanes *found)
 {
     const double size = (bvh_leaf_far_m(leaf) + query->far_m) * bvh_leaf_edge_m(leaf);
     const struct lanes valid = *found;
+    double moment[EDGES][3];
     int64_t wide[BVH_PACKET];
-    if (query->has_own) {
-        const double apart = query->apart_m * bvh_leaf_edge_m(leaf);
-        if (query->dir_float != NULL && !judge_fast_own(query, leaf, (float)(FLOAT_DOUBT * (size + apart)), found))
-            return;
-        judge_from_own(query, leaf, SIDE_DOUBT * size, wide);
-    } else {
-        double moment[EDGES][3];
-        find_moments(query, leaf, moment);
-        if (query->dir_float != NULL &&
-            !judge_fast((const double(*)[3])moment, query->dir_float, (float)(FLOAT_DOUBT * size), found))
-            return;
-        judge_from_one(query, (const double(*)[3])moment, SIDE_DOUBT * size, wide);
-    }
+    find_moments(query, leaf, moment);
+    if (query->width == BVH_PACKET && query->dir_float != NULL &&
+        !judge_fast((const double(*)[3])moment, query->dir_float, (float)(FLOAT_DOUBT * size), found))
+        return;
+    judge_from_one(query, (const double(*)[3])moment, SIDE_DOUBT * size, wide);
     for (uint32_t i = 0; i < BVH_PACKET; i++)
         found->of[i] = valid.of[i] & (uint8_t)wide[i];
 }
@@ -361,7 +370,12 @@ static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *le
     __builtin_prefetch(&query->bvh->plane[leaf->triangle]);
     if (two) __builtin_prefetch(&query->bvh->plane[bvh_leaf_triangle(leaf, 1)]);
     query->leaves++;
-    judge_all(query, leaf, found);
+    if (!query->has_own)
+        judge_all(query, leaf, found);
+    else if (query->width == BVH_PACKET)
+        judge_own(query, leaf, found, BVH_PACKET);
+    else
+        judge_own(query, leaf, found, BVH_PACKET / 2);
     if (any(found, EITHER)) meet_triangle(query, tfar, leaf, 0, found);
     if (two && any(found, EITHER << SECOND)) meet_triangle(query, tfar, leaf, 1, found);
 }

@@ -145,7 +145,7 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     set_floats(packet, batch, first, n, width);
     set_doubles(query, batch, first, n);
     query->width = width;
-    query->dir_float = width == BVH_PACKET ? bvh_field(&packet->at, width, dir_x) : NULL;
+    query->dir_float = width >= BVH_PACKET / 2 ? bvh_field(&packet->at, width, dir_x) : NULL;
     if (query->has_own)
         query->turned = (struct vec3_floats){batch->turned.x + first, batch->turned.y + first, batch->turned.z + first};
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);

@@ -37,7 +37,7 @@ struct bvh_query {
     double far_m;              /* no ray begins further from the BVH's origin */
     double most_m;             /* of a float ray, as in struct bvh_batch */
     double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
-    const float *dir_float;    /* [3][BVH_PACKET] the same for Embree; NULL: the packet is smaller */
+    const float *dir_float;    /* [3][width] the same for Embree; NULL: the packet is smaller */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
     /* Of own points, where dir_float is there: (org - at) x dir, and a length that no org - at exceeds. */
     struct vec3_floats turned;

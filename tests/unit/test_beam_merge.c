@@ -197,7 +197,7 @@ static void make_row(uint64_t key, double *range_m, double *rho, uint32_t *label
         const double part = (double)(rng_u64(2, key * EACH + j) >> 11) * 0x1p-53;
         range_m[j] = 20.0 + spread_m * (kind == 1 ? (double)(part > 0.5) : part);
         rho[j] = kind == 2 ? 0.0 : 0.1 + (double)(rng_u64(3, key * EACH + j) >> 11) * 0x1p-53;
-        label[j] = 7 + (kind == 3 && part > 0.9);
+        label[j] = kind == 3 && part > 0.9 ? 8 : 7;
         if (kind == 4 && part > 0.9) range_m[j] = (double)NAN;
         if (kind == 5 && part > 0.5) range_m[j] = 19.9;
         if (kind == 6) range_m[j] = (double)NAN;
