@@ -9,21 +9,27 @@
 #include "core/cast/chunk.h"
 #include "core/vecmath.h"
 
-/* The sub-ray at (x, y) of a pulse's disc. origin: of the pulse, becomes that of the sub-ray. */
-VEC_INLINE void sub_ray(const struct beam *beam, const struct beam_sight *restrict sight, const struct beam_part *part,
-                        double origin[restrict 3], double out[restrict 3])
+enum { LANES = 8 }; /* the pool has room for that many beyond the last sub-ray */
+
+/* A sub-ray: where it begins, and its unit direction. */
+struct sub_ray {
+    double from_m[3], dir[3];
+};
+
+/* The sub-ray at (x, y) of the disc of a pulse that begins at from_m. */
+VEC_INLINE struct sub_ray sub_ray(const struct beam *beam, const struct beam_sight *sight, const double from_m[3],
+                                  double x, double y)
 {
-    const double x = part->x, y = part->y;
-    for (int i = 0; i < 3; i++) {
-        origin[i] += beam->exit_radius_m * (x * sight->e1[i] + y * sight->e2[i]);
-        out[i] = sight->dir[i] + beam->slope * (x * sight->e2[i] - y * sight->e1[i]);
-    }
+    const double exit_m = beam->exit_radius_m, slope = beam->slope;
+    const double *dir = sight->dir, *e1 = sight->e1, *e2 = sight->e2;
     /* 1 / sqrt(1 + t) as a series, which is faster than root and division. Its error is below t^4, with t
      * < 2.5e-5. */
-    double t = beam->slope * beam->slope * (x * x + y * y);
-    double over = 1.0 - t * (0.5 - t * (0.375 - 0.3125 * t));
-    for (int i = 0; i < 3; i++)
-        out[i] *= over;
+    const double t = slope * slope * (x * x + y * y), over = 1.0 - t * (0.5 - t * (0.375 - 0.3125 * t));
+    return (struct sub_ray){{from_m[0] + exit_m * (x * e1[0] + y * e2[0]), from_m[1] + exit_m * (x * e1[1] + y * e2[1]),
+                             from_m[2] + exit_m * (x * e1[2] + y * e2[2])},
+                            {(dir[0] + slope * (x * e2[0] - y * e1[0])) * over,
+                             (dir[1] + slope * (x * e2[1] - y * e1[1])) * over,
+                             (dir[2] + slope * (x * e2[2] - y * e1[2])) * over}};
 }
 
 /* A ray for a part. */
@@ -31,11 +37,11 @@ static void add_ray(struct caster *c, const struct chunk *k, struct job *job, co
 {
     struct pool *pool = &c->sub_rays->pool;
     uint32_t i = pool->n++;
-    double origin[3], out[3];
-    bvh_origin_of(&k->from, job->pulse, origin);
-    sub_ray(&k->s->beam->beam, &job->sight, part, origin, out);
-    VEC3_SET(pool->p, i, origin);
-    VEC3_SET(pool->d, i, out);
+    double from_m[3];
+    bvh_origin_of(&k->from, job->pulse, from_m);
+    const struct sub_ray ray = sub_ray(&k->s->beam->beam, &job->sight, from_m, part->x, part->y);
+    VEC3_SET(pool->p, i, ray.from_m);
+    VEC3_SET(pool->d, i, ray.dir);
     pool->energy[i] = part->energy;
     job->n++;
     if (!k->spreads) return;
@@ -51,20 +57,45 @@ static void look_along(const struct caster *c, struct job *job)
     beam_axes(dir, job->sight.e1, job->sight.e2);
 }
 
+/* The rays of a pattern, for whole vectors of places. */
+VEC_CLONES
+static void add_pattern(const struct beam *beam, const struct beam_sight *sight, const double from_m[3],
+                        const struct beam_pattern *pattern, const struct vec3_out *to_p, const struct vec3_out *to_d)
+{
+    const struct beam_sight s = *sight;
+    const struct vec3_out p = *to_p, d = *to_d;
+    const double at_m[3] = {from_m[0], from_m[1], from_m[2]};
+    const uint32_t n = (pattern->n + LANES - 1) / LANES * LANES;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        const struct sub_ray ray = sub_ray(beam, &s, at_m, (double)pattern->x[i], (double)pattern->y[i]);
+        VEC3_SET(p, i, ray.from_m);
+        VEC3_SET(d, i, ray.dir);
+    }
+}
+
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job)
 {
     const struct beam_pattern *pattern = &k->s->beam->pattern;
-    struct beam_part part = {.energy = 1.0 / pattern->n, .xx = pattern->rest, .yy = pattern->rest};
-    job->first = c->sub_rays->pool.n;
-    job->n = 0;
+    struct pool *pool = &c->sub_rays->pool;
+    const uint32_t first = pool->n, end = first + pattern->n;
+    const double energy = 1.0 / pattern->n;
+    double from_m[3];
+    job->first = first;
+    job->n = pattern->n;
     job->centre.energy = 0.0;
     job->next_m = INFINITY;
     job->whole = 1;
     look_along(c, job);
-    for (uint32_t i = 0; i < pattern->n; i++) {
-        part.x = (double)pattern->x[i];
-        part.y = (double)pattern->y[i];
-        add_ray(c, k, job, &part);
+    bvh_origin_of(&k->from, job->pulse, from_m);
+    add_pattern(&k->s->beam->beam, &job->sight, from_m, pattern, &VEC3_OUT(pool->p, first), &VEC3_OUT(pool->d, first));
+    for (uint32_t i = first; i < end; i++)
+        pool->energy[i] = energy;
+    pool->n = end;
+    if (!k->spreads) return;
+    for (uint32_t i = first; i < end; i++) {
+        pool->xx[i] = pool->yy[i] = (float)pattern->rest;
+        pool->xy[i] = 0.0f;
     }
 }
 
@@ -79,12 +110,12 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     if (isnan(c->list.range_m[p])) return 1; /* nothing there */
     if (steep > 2500.0f) return 0;
     const struct bvh_plane *tri = bvh_plane(bvh, c->hit[p]);
-    double origin[3], local[3], out[3];
-    bvh_origin_of(&k->from, p, origin);
-    sub_ray(&k->s->beam->beam, &job->sight, part, origin, out);
+    double from_m[3], local[3];
+    bvh_origin_of(&k->from, p, from_m);
+    const struct sub_ray ray = sub_ray(&k->s->beam->beam, &job->sight, from_m, part->x, part->y);
     bvh_origin(bvh, local);
-    vec3_sub(origin, local, origin);
-    r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
+    vec3_sub(ray.from_m, local, from_m);
+    r->range_m = (tri->d - vec3_dot(tri->n, from_m)) / vec3_dot(tri->n, ray.dir);
     r->energy = part->energy;
     r->sigma_m = k->spreads ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;
     r->label = c->list.label[p];

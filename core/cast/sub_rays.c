@@ -185,13 +185,52 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     w->n_echoes += n;
 }
 
+/* Whether the returns of whole footprints are just ranges, labels, and what comes back. */
+static int are_alike(const struct chunk *k)
+{
+    const struct cast_setup *s = k->s;
+    return s->beam->mode != BEAM_ADAPTIVE && s->silent == NULL && (s->detect == NULL || s->detect->depth == 0) &&
+           k->waves == NULL && !k->texels && !k->spreads;
+}
+
+/* Jobs first .. first + BEAM_ALIKE, over whole footprints. */
+static void finish_alike(struct caster *c, const struct chunk *k, uint32_t first)
+{
+    struct sub_ray_work *w = c->sub_rays;
+    const struct pool *p = &w->pool;
+    const struct cast_detect *d = k->s->detect;
+    const uint32_t n = w->job[first].n, at = w->job[first].first;
+    const struct beam_alike alike = {.n = n,
+                                     .energy = p->energy[at],
+                                     .range_m = p->range_m + at,
+                                     .label = p->label + at,
+                                     .rho = d != NULL && d->surfaces != NULL ? p->rho + at : NULL};
+    struct beam_merging how;
+    struct beam_echo echo[BEAM_ALIKE];
+    beam_merging(&k->s->beam->beam, 1, &how);
+    const uint32_t merged = beam_merge_alike(&how, &alike, echo);
+    for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
+        const struct job *job = &w->job[first + i];
+        if ((merged >> i & 1) == 0) {
+            finish_job(c, k, job);
+            continue;
+        }
+        w->echoes_of[job->pulse].first = w->n_echoes;
+        w->echoes_of[job->pulse].n = 1;
+        w->echo[w->n_echoes++] = echo[i];
+    }
+}
+
 static void run_jobs(struct caster *c, const struct chunk *k)
 {
     struct sub_ray_work *w = c->sub_rays;
     cast_pool(c, k, 0);
     for (int pass = 0; pass < MAX_PASSES && k->s->beam->mode == BEAM_ADAPTIVE; pass++)
         look_secondary(c, k);
-    for (uint32_t j = 0; j < w->n_jobs; j++)
+    uint32_t j = 0;
+    for (; j + BEAM_ALIKE <= w->n_jobs && are_alike(k); j += BEAM_ALIKE)
+        finish_alike(c, k, j);
+    for (; j < w->n_jobs; j++)
         finish_job(c, k, &w->job[j]);
     w->n_jobs = w->pool.n = 0;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/footprint.h"
+#include "core/vecmath.h"
 
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how)
 {
@@ -151,4 +152,134 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *r, uint3
         ++*left_out;
     }
     return found;
+}
+
+/* ---- several pulses at a time, one in each lane */
+
+/* Of each pulse: its nearest return and that one's place, its farthest return; is_whole: all returns are there. */
+struct reaches {
+    double near_m[BEAM_ALIKE], far_m[BEAM_ALIKE];
+    int64_t nearest[BEAM_ALIKE], is_whole[BEAM_ALIKE];
+};
+
+VEC_CLONES
+static void find_reaches(const struct beam_alike *alike, struct reaches *of)
+{
+    const double *range_m = alike->range_m;
+    const int64_t n = alike->n;
+    struct reaches r;
+    for (int64_t i = 0; i < BEAM_ALIKE; i++) {
+        r.near_m[i] = r.far_m[i] = range_m[i * n];
+        r.nearest[i] = 0;
+        r.is_whole[i] = range_m[i * n] == range_m[i * n];
+    }
+    for (int64_t j = 1; j < n; j++) {
+        VEC_LOOP
+        for (int64_t i = 0; i < BEAM_ALIKE; i++) {
+            const double here_m = range_m[i * n + j];
+            r.nearest[i] = here_m < r.near_m[i] ? j : r.nearest[i];
+            r.near_m[i] = here_m < r.near_m[i] ? here_m : r.near_m[i];
+            r.far_m[i] = here_m > r.far_m[i] ? here_m : r.far_m[i];
+            r.is_whole[i] = here_m == here_m ? r.is_whole[i] : 0;
+        }
+    }
+    *of = r;
+}
+
+/* Sums of each pulse: of what comes back, and of that times the range beyond the nearest. */
+struct lane_sums {
+    double back[BEAM_ALIKE], first[BEAM_ALIKE];
+};
+
+/* The order of summing is that of beam_merge, whose first return has changed places with the nearest one. */
+VEC_CLONES
+static void sum_ranges(const struct beam_alike *alike, const struct reaches *of, struct lane_sums *sums)
+{
+    const double *range_m = alike->range_m, energy = alike->energy;
+    const int64_t n = alike->n;
+    const struct reaches r = *of;
+    double beyond_m[BEAM_ALIKE], first[BEAM_ALIKE];
+    for (int64_t i = 0; i < BEAM_ALIKE; i++) {
+        beyond_m[i] = range_m[i * n] - r.near_m[i];
+        first[i] = 0.0;
+    }
+    for (int64_t j = 1; j < n; j++) {
+        VEC_LOOP
+        for (int64_t i = 0; i < BEAM_ALIKE; i++) {
+            const double here_m = range_m[i * n + j] - r.near_m[i];
+            first[i] += energy * (j == r.nearest[i] ? beyond_m[i] : here_m);
+        }
+    }
+    memcpy(sums->first, first, sizeof first);
+}
+
+/* The same where surfaces are modelled. */
+VEC_CLONES
+static void sum_returns(const struct beam_alike *alike, const struct reaches *of, struct lane_sums *sums)
+{
+    const double *range_m = alike->range_m, *rho = alike->rho, energy = alike->energy;
+    const int64_t n = alike->n;
+    const struct reaches r = *of;
+    double beyond_m[BEAM_ALIKE], back0[BEAM_ALIKE];
+    struct lane_sums s;
+    for (int64_t i = 0; i < BEAM_ALIKE; i++) {
+        beyond_m[i] = range_m[i * n] - r.near_m[i];
+        back0[i] = energy * rho[i * n];
+        s.back[i] = energy * rho[i * n + r.nearest[i]];
+        s.first[i] = 0.0;
+    }
+    for (int64_t j = 1; j < n; j++) {
+        VEC_LOOP
+        for (int64_t i = 0; i < BEAM_ALIKE; i++) {
+            const int64_t is_first = j == r.nearest[i];
+            const double here_m = range_m[i * n + j] - r.near_m[i], back = energy * rho[i * n + j];
+            const double weight = is_first ? back0[i] : back;
+            s.back[i] += weight;
+            s.first[i] += weight * (is_first ? beyond_m[i] : here_m);
+        }
+    }
+    *sums = s;
+}
+
+/* A bit for each pulse whose returns have one label. */
+VEC_CLONES
+static uint32_t have_one_label(const struct beam_alike *alike)
+{
+    const uint32_t *label = alike->label, n = alike->n, all = BEAM_ALIKE * n;
+    uint32_t differ = 0, bits = 0;
+    for (uint32_t i = 0; i < all; i++)
+        differ |= label[i] ^ label[0];
+    if (differ == 0) return (1U << BEAM_ALIKE) - 1;
+    for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
+        differ = 0;
+        for (uint32_t j = 0; j < n; j++)
+            differ |= label[i * n + j] ^ label[i * n];
+        bits |= (uint32_t)(differ == 0) << i;
+    }
+    return bits;
+}
+
+uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alike *alike, struct beam_echo *echo)
+{
+    struct reaches r;
+    struct lane_sums sums;
+    double energy = 0.0;
+    if (alike->n < MANY) return 0; /* beam_merge sorts these */
+    for (uint32_t j = 0; j < alike->n; j++)
+        energy += alike->energy;
+    find_reaches(alike, &r);
+    if (alike->rho != NULL)
+        sum_returns(alike, &r, &sums);
+    else
+        sum_ranges(alike, &r, &sums);
+    uint32_t done = have_one_label(alike);
+    for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
+        const double back = alike->rho != NULL ? sums.back[i] : energy;
+        if (!r.is_whole[i] || !(r.far_m[i] - r.near_m[i] <= how->gap_m) || !(back > 0.0)) done &= ~(1U << i);
+        echo[i] = (struct beam_echo){.range_m = r.near_m[i] + sums.first[i] / back,
+                                     .energy = energy,
+                                     .back = back,
+                                     .label = alike->label[i * alike->n]};
+    }
+    return done;
 }

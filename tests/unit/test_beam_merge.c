@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/footprint.h"
+#include "core/rng.h"
 #include "core/vec3.h"
 
 enum { MOST = 16 };
@@ -182,6 +183,85 @@ static void test_crowd(void **state)
     }
 }
 
+/* ---- several pulses at a time */
+
+enum { EACH = 19, ROWS = 400 };
+
+/* A pulse of EACH returns. Most are on one surface; others have a gap, a miss, ranges at the resolution, equal nearest
+ * ones, two labels, or no light that comes back. */
+static void make_row(uint64_t key, double *range_m, double *rho, uint32_t *label)
+{
+    const uint64_t kind = rng_u64(1, key) % 10;
+    const double spread_m = kind == 0 ? 3.0 : kind == 1 ? beam.resolution_m : 0.3;
+    for (uint32_t j = 0; j < EACH; j++) {
+        const double part = (double)(rng_u64(2, key * EACH + j) >> 11) * 0x1p-53;
+        range_m[j] = 20.0 + spread_m * (kind == 1 ? (double)(part > 0.5) : part);
+        rho[j] = kind == 2 ? 0.0 : 0.1 + (double)(rng_u64(3, key * EACH + j) >> 11) * 0x1p-53;
+        label[j] = kind == 3 && part > 0.9 ? 8 : 7;
+        if (kind == 4 && part > 0.9) range_m[j] = (double)NAN;
+        if (kind == 5 && part > 0.5) range_m[j] = 19.9;
+        if (kind == 6) range_m[j] = (double)NAN;
+    }
+}
+
+/* Merges one pulse by beam_merge. Returns whether it is one echo of all returns. */
+static int merge_row(const double *range_m, const double *rho, const uint32_t *label, struct beam_echo *one)
+{
+    struct beam_return r[EACH];
+    uint64_t left_out = 0;
+    uint32_t n = 0, labels = 0;
+    for (uint32_t j = 0; j < EACH; j++) {
+        const double energy = 1.0 / EACH;
+        if (isnan(range_m[j])) continue;
+        labels |= label[j] ^ label[0];
+        r[n++] = (struct beam_return){.range_m = range_m[j],
+                                      .energy = energy,
+                                      .back = rho != NULL ? energy * 1.0 * rho[j] : energy,
+                                      .label = label[j]};
+    }
+    if (n < EACH || beam_merge(&how, r, EACH, echo, &left_out) != 1) return 0;
+    *one = echo[0];
+    return labels == 0;
+}
+
+/* Every pulse that is merged with others is the same, bit by bit, as by itself. Pulses that beam_merge makes one echo
+ * of, without a gap anywhere, are all merged so, unless nothing comes back of them. */
+static void test_alike(void **state)
+{
+    (void)state;
+    static double range_m[BEAM_ALIKE * EACH], rho[BEAM_ALIKE * EACH];
+    static uint32_t label[BEAM_ALIKE * EACH];
+    uint32_t merged = 0, others = 0;
+    for (uint32_t row = 0; row < 2 * ROWS; row++) {
+        const double *weights = row % 2 == 0 ? rho : NULL;
+        struct beam_echo alike[BEAM_ALIKE], one;
+        for (uint32_t i = 0; i < BEAM_ALIKE; i++)
+            make_row((uint64_t)row * BEAM_ALIKE + i, range_m + i * EACH, rho + i * EACH, label + i * EACH);
+        const struct beam_alike all = {EACH, 1.0 / EACH, range_m, label, weights};
+        const uint32_t bits = beam_merge_alike(&how, &all, alike);
+        for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
+            const double *r = range_m + i * EACH, *w = weights != NULL ? rho + i * EACH : NULL;
+            const int is_one = merge_row(r, w, label + i * EACH, &one);
+            double least_m = r[0], most_m = r[0];
+            for (uint32_t j = 1; j < EACH; j++) {
+                least_m = fmin(least_m, r[j]);
+                most_m = fmax(most_m, r[j]);
+            }
+            const int is_apart = !is_one || most_m - least_m > how.gap_m || !(one.back > 0.0);
+            assert_int_equal(bits >> i & 1, !is_apart);
+            others += (uint32_t)is_apart;
+            if (is_apart) continue;
+            merged++;
+            assert_memory_equal(&alike[i].range_m, &one.range_m, sizeof one.range_m);
+            assert_memory_equal(&alike[i].energy, &one.energy, sizeof one.energy);
+            assert_memory_equal(&alike[i].back, &one.back, sizeof one.back);
+            assert_int_equal(alike[i].label, one.label);
+            assert_int_equal(alike[i].number, one.number);
+        }
+    }
+    assert_true(merged > ROWS && others > ROWS);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -192,6 +272,7 @@ int main(void)
         cmocka_unit_test(test_at_the_resolution),
         cmocka_unit_test(test_definitions),
         cmocka_unit_test(test_axes),
+        cmocka_unit_test(test_alike),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
 }
