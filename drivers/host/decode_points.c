@@ -193,3 +193,30 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
         points_polar(sh, frame, first, points, n);
     return (int)n;
 }
+
+/* Stand-in until the library decodes into columns itself. */
+int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                     const struct scanhead_columns *to, uint32_t max)
+{
+    struct scanhead_point p[BLOCK];
+    uint32_t at = 0;
+    while (at < max) {
+        const int n = scanhead_points(sh, frame, first + at, p, max - at < BLOCK ? max - at : BLOCK);
+        if (n < 0) return n;
+        if (n == 0) break;
+        for (int i = 0; i < n; i++, at++) {
+            if (to->x != NULL) to->x[at] = p[i].x;
+            if (to->y != NULL) to->y[at] = p[i].y;
+            if (to->z != NULL) to->z[at] = p[i].z;
+            if (to->range_m != NULL) to->range_m[at] = p[i].range_m;
+            if (to->mirror_rad != NULL) to->mirror_rad[at] = p[i].mirror_rad;
+            if (to->pan_rad != NULL) to->pan_rad[at] = p[i].pan_rad;
+            if (to->reflectance_db != NULL) to->reflectance_db[at] = p[i].reflectance_db;
+            if (to->t_ns != NULL) to->t_ns[at] = p[i].t_ns;
+            if (to->label != NULL) to->label[at] = p[i].label;
+            if (to->echo != NULL) to->echo[at] = p[i].echo;
+            if (to->echo_count != NULL) to->echo_count[at] = p[i].echo_count;
+        }
+    }
+    return (int)at;
+}

@@ -241,6 +241,18 @@ struct scanhead_point {
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
+/* Where scanhead_columns() writes. A column that is NULL is not computed. */
+struct scanhead_columns {
+    double *x, *y, *z, *range_m, *mirror_rad, *pan_rad, *reflectance_db;
+    int64_t *t_ns;
+    uint16_t *label;
+    uint8_t *echo, *echo_count;
+};
+/* scanhead_points() as columns: the same figures, bit for bit. Returns the number of points written, or a negative
+ * error. */
+int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                     const struct scanhead_columns *to, uint32_t max);
+
 struct scanhead_attribute {
     double amplitude_db; /* above the head's detection threshold; NaN: not modelled, or an empty shot */
     double width_ns;     /* of the echo, full at half maximum; 655.35: that or more; NaN: an empty shot */

@@ -46,9 +46,9 @@ static void from_anchor(const struct track *t, const double p[3], double d[3])
         d[2] -= (d[0] * d[0] + d[1] * d[1]) / (2 * EARTH_M); /* the surface falls away below the level */
 }
 
-static double height_of(const struct track *t, const struct scanhead_point *point)
+static double height_of(const struct track *t, int i)
 {
-    double p[3] = {point->x, point->y, point->z}, d[3], scene[3];
+    double p[3] = {t->points.x[i], t->points.y[i], t->points.z[i]}, d[3], scene[3];
     if (!t->info.geo) {
         station_pose_forward(&t->pose, p);
         return p[2];
@@ -61,13 +61,12 @@ static double height_of(const struct track *t, const struct scanhead_point *poin
 
 double colour_figure(enum colour_mode mode, const struct track *t, int i)
 {
-    const struct scanhead_point *point = &t->point[i];
-    if (point->echo_count == 0) return (double)NAN;
+    if (t->points.echo_count[i] == 0) return (double)NAN;
     switch (mode) {
     case COLOUR_RANGE:
-        return point->range_m;
+        return t->points.range_m[i];
     case COLOUR_HEIGHT:
-        return height_of(t, point);
+        return height_of(t, i);
     case COLOUR_FRAME:
         return t->info.moving ? t->frame[i] : t->info.frame;
     default:
@@ -77,11 +76,11 @@ double colour_figure(enum colour_mode mode, const struct track *t, int i)
 
 void colour_of_point(const struct colour_scale *scale, const struct track *t, int i, uint8_t rgb[3])
 {
-    const struct scanhead_point *point = &t->point[i];
+    const struct track_points *p = &t->points;
     memcpy(rgb, colour_grey, 3);
-    if (point->echo_count == 0) return;
+    if (p->echo_count[i] == 0) return;
     if (scale->mode == COLOUR_SOLID) memcpy(rgb, scale->rgb, 3);
-    if (scale->mode == COLOUR_REFLECTANCE) colour_reflectance(point->reflectance_db, rgb);
-    if (scale->mode == COLOUR_LABEL && point->label != SCANHEAD_NO_LABEL) colour_number(point->label, rgb);
+    if (scale->mode == COLOUR_REFLECTANCE) colour_reflectance(p->reflectance_db[i], rgb);
+    if (scale->mode == COLOUR_LABEL && p->label[i] != SCANHEAD_NO_LABEL) colour_number(p->label[i], rgb);
     if (colour_has_limits(scale->mode)) colour_between(scale->low, scale->high, colour_figure(scale->mode, t, i), rgb);
 }

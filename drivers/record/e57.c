@@ -137,11 +137,12 @@ static int put_xyz(struct e57 *e, const double p[3], struct sh_err *err)
     return 0;
 }
 
-static int put_place(struct e57 *e, const struct scanhead_point *point, struct sh_err *err)
+static int put_place(struct e57 *e, int at, struct sh_err *err)
 {
     struct e57_packet *g = &e->gathered;
-    double p[3] = {point->x, point->y, point->z};
-    int empty = point->echo_count == 0;
+    const struct track_points *points = &e->base.track.points;
+    double p[3] = {points->x[at], points->y[at], points->z[at]};
+    int empty = points->echo_count[at] == 0;
     e57_put_bits(g->stream[E57_INVALID], 2, g->n, empty ? 2 : 0);
     if (empty) {
         for (int i = 0; i < 3; i++)
@@ -152,25 +153,25 @@ static int put_place(struct e57 *e, const struct scanhead_point *point, struct s
     return put_xyz(e, p, err);
 }
 
-static void put_figures(struct e57_packet *g, const struct scanhead_point *p)
+static void put_figures(struct e57_packet *g, const struct track_points *p, int i)
 {
-    const int none = isnan(p->reflectance_db);
-    const int16_t cdb = none ? 0 : (int16_t)lrint(p->reflectance_db * 100);
+    const int none = isnan(p->reflectance_db[i]);
+    const int16_t cdb = none ? 0 : (int16_t)lrint(p->reflectance_db[i] * 100);
     le_put16(g->stream[E57_INTENSITY] + 2 * (size_t)g->n, (uint16_t)(cdb + 32768));
     e57_put_bits(g->stream[E57_NO_INTENSITY], 1, g->n, none ? 1 : 0);
-    le_put_double(g->stream[E57_TIME] + 8 * (size_t)g->n, (double)p->t_ns / 1e9);
-    e57_put_bits(g->stream[E57_RETURN], 4, g->n, p->echo > 0 ? p->echo - 1u : 0);
-    e57_put_bits(g->stream[E57_RETURNS], 4, g->n, p->echo_count);
-    le_put16(g->stream[E57_LABEL] + 2 * (size_t)g->n, p->label);
+    le_put_double(g->stream[E57_TIME] + 8 * (size_t)g->n, (double)p->t_ns[i] / 1e9);
+    e57_put_bits(g->stream[E57_RETURN], 4, g->n, p->echo[i] > 0 ? p->echo[i] - 1u : 0);
+    e57_put_bits(g->stream[E57_RETURNS], 4, g->n, p->echo_count[i]);
+    le_put16(g->stream[E57_LABEL] + 2 * (size_t)g->n, p->label[i]);
 }
 
 static int put_record(struct e57 *e, int i, struct sh_err *err)
 {
     const struct track *t = &e->base.track;
     struct e57_packet *g = &e->gathered;
-    int rc = put_place(e, &t->point[i], err);
+    int rc = put_place(e, i, err);
     if (rc != 0) return rc;
-    put_figures(g, &t->point[i]);
+    put_figures(g, &t->points, i);
     for (int c = 0; c < 3 && t->has_colours; c++)
         g->stream[E57_RED + c][g->n] = t->rgb[i][c];
     le_put32(g->stream[E57_ROW] + 4 * (size_t)g->n, t->row[i]);
@@ -185,11 +186,11 @@ static int e57_points(void *rec, int n, struct sh_err *err)
     const unsigned most = e->facts.has_colours ? E57_PACKET_COLOURED : E57_PACKET_RECORDS;
     int rc = find_start(e, err);
     for (int i = 0; rc == 0 && i < n; i++) {
-        const struct scanhead_point *p = &e->base.track.point[i];
+        const struct track_points *p = &e->base.track.points;
         const unsigned whole = e->gathered.n & ~7u; /* what a packet may hold that is not the last one */
-        if (p->echo_count == 0 && !e->facts.empty_shots) continue;
-        if (whole > 0 && p->t_ns - e->t0_ns >= PACKET_NS) rc = put_packet(e, whole, err);
-        if (e->gathered.n == 0) e->t0_ns = p->t_ns;
+        if (p->echo_count[i] == 0 && !e->facts.empty_shots) continue;
+        if (whole > 0 && p->t_ns[i] - e->t0_ns >= PACKET_NS) rc = put_packet(e, whole, err);
+        if (e->gathered.n == 0) e->t0_ns = p->t_ns[i];
         if (rc == 0) rc = put_record(e, i, err);
         if (rc == 0 && e->gathered.n == most) rc = put_packet(e, most, err);
     }

@@ -176,12 +176,12 @@ static int set_xyz(struct las *las, int32_t n[3], const double p[3], struct sh_e
 static int has_time(const struct track *t, int i, double *gps_s)
 {
     *gps_s = t->gps_s[i];
-    return t->waited ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
+    return t->waited ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->points.t_ns[i], gps_s) == 0;
 }
 
 static int set_time(const struct las *las, double *time_s, int i, struct sh_err *err)
 {
-    *time_s = (double)las->base.track.point[i].t_ns / 1e9;
+    *time_s = (double)las->base.track.points.t_ns[i] / 1e9;
     if (las->facts.gps_time && !has_time(&las->base.track, i, time_s))
         return sh_fail(err, SH_EFORMAT, "%s: the head no longer reports the time; a LAS file holds one kind of time",
                        las->base.file.path);
@@ -211,10 +211,10 @@ static void set_attribute(struct las_point *to, const struct scanhead_attribute 
 }
 
 /* LAS 1.2 counts to five. */
-static void set_returns(struct las *las, struct las_point *to, const struct scanhead_point *point)
+static void set_returns(struct las *las, struct las_point *to, int i)
 {
-    to->echo = point->echo;
-    to->echo_count = point->echo_count;
+    to->echo = las->base.track.points.echo[i];
+    to->echo_count = las->base.track.points.echo_count[i];
     if (las->facts.minor != 2 || to->echo_count <= LAS_12_RETURNS) return;
     to->echo_count = LAS_12_RETURNS;
     las->n_returns_cut++;
@@ -271,10 +271,10 @@ static int end_waves(struct las *las, struct sh_err *err)
 static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
 {
     struct track *t = &las->base.track;
-    const struct scanhead_point *point = &t->point[i];
+    const struct track_points *p = &t->points;
     struct las_point las_point = {
-        .intensity = intensity(point->reflectance_db), .station = (uint16_t)t->info.station, .label = point->label};
-    double p_crs[3] = {point->x, point->y, point->z}, p_socs[3] = {point->x, point->y, point->z};
+        .intensity = intensity(p->reflectance_db[i]), .station = (uint16_t)t->info.station, .label = p->label[i]};
+    double p_crs[3] = {p->x[i], p->y[i], p->z[i]}, p_socs[3] = {p->x[i], p->y[i], p->z[i]};
     if (!t->info.geo)
         station_pose_forward(&t->pose, p_crs);
     else
@@ -283,7 +283,7 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
     int rc = set_time(las, &las_point.time_s, i, err);
     if (rc == 0) rc = set_xyz(las, las_point.xyz, p_crs, err);
     if (rc != 0) return rc;
-    set_returns(las, &las_point, point);
+    set_returns(las, &las_point, i);
     if (!t->info.moving && las->facts.minor != 2) las_point.scan_angle = scan_angle(las, p_socs);
     if (t->has_attributes) set_attribute(&las_point, &t->attribute[i], t->deviation[i]);
     if (t->has_colours) memcpy(las_point.rgb, t->rgb[i], sizeof las_point.rgb);
@@ -293,12 +293,13 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
 }
 
 /* Has the version no room for it? Counts why. */
-static int is_left_out(struct las *las, const struct scanhead_point *p)
+static int is_left_out(struct las *las, int i)
 {
-    const int beyond = las->facts.minor == 2 && p->echo > LAS_12_RETURNS;
-    las->n_empty += p->echo_count == 0;
-    las->n_beyond_returns += p->echo_count != 0 && beyond;
-    return p->echo_count == 0 || beyond;
+    const struct track_points *p = &las->base.track.points;
+    const int is_empty = p->echo_count[i] == 0, beyond = las->facts.minor == 2 && p->echo[i] > LAS_12_RETURNS;
+    las->n_empty += (uint64_t)is_empty;
+    las->n_beyond_returns += (uint64_t)(!is_empty && beyond);
+    return is_empty || beyond;
 }
 
 static int check_count(const struct las *las, struct sh_err *err)
@@ -321,8 +322,7 @@ static int las_points(void *rec, int n, struct sh_err *err)
     if (!las->facts.gps_time && !las->time_came_late)
         las->time_came_late = scanhead_gps_time(las->base.track.sh, 0, &s) == 0;
     for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &las->base.track.point[i];
-        if (is_left_out(las, p)) continue;
+        if (is_left_out(las, i)) continue;
         las->n_waves_left_out += las->base.track.has_waves && !las->facts.has_waves && las->base.track.wave[i] != NULL;
         rc = check_count(las, err);
         if (rc == 0) rc = put_point(las, at, i, err);

@@ -247,12 +247,12 @@ static void set_colour(const struct mesh_recorder *m, int i, uint8_t rgb[3])
 static int take_point(struct mesh_recorder *m, int i, struct sh_err *err)
 {
     struct track *t = &m->base.track;
-    const struct scanhead_point *p = &t->point[i];
+    const struct track_points *p = &t->points;
     struct sh_err why = {0};
-    struct mesh_point point = {.xyz_m = {p->x, p->y, p->z},
-                               .range_m = p->range_m,
-                               .reflectance_db = (float)p->reflectance_db,
-                               .label = p->label,
+    struct mesh_point point = {.xyz_m = {p->x[i], p->y[i], p->z[i]},
+                               .range_m = p->range_m[i],
+                               .reflectance_db = (float)p->reflectance_db[i],
+                               .label = p->label[i],
                                .station = (uint16_t)t->info.station,
                                .frame = t->info.moving ? t->frame[i] : t->info.frame};
     if (!t->info.geo) station_pose_forward(&t->pose, point.xyz_m);
@@ -270,8 +270,8 @@ static int mesh_take_points(void *rec, int n, struct sh_err *err)
     const struct track *t = &m->base.track;
     int rc = SH_OK;
     for (int i = 0; rc == SH_OK && i < n; i++) {
-        if (t->point[i].echo > 1) m->n_later++;
-        if (t->point[i].echo > 1 || t->point[i].echo_count == 0) continue;
+        if (t->points.echo[i] > 1) m->n_later++;
+        if (t->points.echo[i] > 1 || t->points.echo_count[i] == 0) continue;
         if (!mesh_grid_takes(&m->grid, t, i)) {
             m->n_split += t->sweep == m->grid.sweep;
             rc = end_grid(m, err);

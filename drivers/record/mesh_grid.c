@@ -99,7 +99,7 @@ int mesh_grid_add(struct mesh_grid *g, struct track *t, int i, const double xyz_
         (is_new && !grow(&g->column, &g->room_column, g->n_columns + 1, sizeof *g->column)))
         return fail_memory(t, n, err);
     if (g->moving) {
-        if (scanhead_pose(t->sh, t->point[i].t_ns, &pose) != SCANHEAD_OK) return 0;
+        if (scanhead_pose(t->sh, t->points.t_ns[i], &pose) != SCANHEAD_OK) return 0;
         for (int k = 0; k < 3; k++)
             g->to_head_m[n][k] = (float)(pose.position_m[k] - xyz_m[k]);
     }

@@ -84,7 +84,8 @@ static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
 /* A row of the file; the recorder's `columns` say which members are written. */
 struct vertex {
     double xyz[3];
-    const struct scanhead_point *point;
+    const struct track_points *points;
+    int i; /* in them */
     unsigned station;
     double frame;
     const struct scanhead_attribute *attribute;
@@ -104,23 +105,24 @@ static inline uint8_t *put_length(uint8_t *to, double v, int as_float)
 /* Returns the end of the row. Inlined with known columns, it has no branches. */
 static inline __attribute__((always_inline)) uint8_t *put_columns(uint8_t *to, const struct vertex *v, unsigned columns)
 {
-    const struct scanhead_point *p = v->point;
+    const struct track_points *p = v->points;
+    const int i = v->i;
     const int as_float = (columns & PLY_FLOAT) != 0;
-    for (int i = 0; i < 3; i++)
-        to = put_length(to, v->xyz[i], as_float);
-    if ((columns & PLY_RANGE) != 0) to = put_length(to, p->range_m, as_float);
+    for (int k = 0; k < 3; k++)
+        to = put_length(to, v->xyz[k], as_float);
+    if ((columns & PLY_RANGE) != 0) to = put_length(to, p->range_m[i], as_float);
     if ((columns & PLY_REFLECTANCE) != 0) {
-        le_put_float(to, (float)p->reflectance_db);
+        le_put_float(to, (float)p->reflectance_db[i]);
         to += 4;
     }
-    if ((columns & PLY_TIME) != 0) to = put_length(to, (double)p->t_ns / 1e9, 0);
+    if ((columns & PLY_TIME) != 0) to = put_length(to, (double)p->t_ns[i] / 1e9, 0);
     if ((columns & PLY_ECHO) != 0) {
-        to[0] = p->echo;
-        to[1] = p->echo_count;
+        to[0] = p->echo[i];
+        to[1] = p->echo_count[i];
         to += 2;
     }
     if ((columns & PLY_LABEL) != 0) {
-        le_put16(to, p->label);
+        le_put16(to, p->label[i]);
         to += 2;
     }
     if ((columns & PLY_STATION) != 0) {
@@ -159,7 +161,7 @@ static size_t put_number(char *to, size_t room, int digits, double v)
 /* Returns the end of the row, or NULL if numbers are too long for it. */
 static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns, int degrees)
 {
-    const struct scanhead_point *p = v->point;
+    const struct track_points *p = v->points;
     const int flat = degrees ? 12 : 6;
     char *to = (char *)row;
     size_t n = 0;
@@ -170,14 +172,14 @@ static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns
     size_t k = 3;
 #define TAKE(part, value, places) \
     if ((columns & (part)) != 0) number[k].v = (value), number[k++].digits = (places)
-    TAKE(PLY_RANGE, p->range_m, 6);
-    TAKE(PLY_REFLECTANCE, p->reflectance_db, 2);
-    TAKE(PLY_TIME, (double)p->t_ns / 1e9, 9);
+    TAKE(PLY_RANGE, p->range_m[v->i], 6);
+    TAKE(PLY_REFLECTANCE, p->reflectance_db[v->i], 2);
+    TAKE(PLY_TIME, (double)p->t_ns[v->i] / 1e9, 9);
     for (size_t i = 0; i < k && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
     if (n >= TEXT_LEN) return NULL;
-    if ((columns & PLY_ECHO) != 0) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u ", p->echo, p->echo_count);
-    if ((columns & PLY_LABEL) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", p->label);
+    if ((columns & PLY_ECHO) != 0) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u ", p->echo[v->i], p->echo_count[v->i]);
+    if ((columns & PLY_LABEL) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", p->label[v->i]);
     if ((columns & PLY_STATION) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", v->station);
     if ((columns & PLY_FRAME) != 0 && n < TEXT_LEN)
         n += (size_t)(isnan(v->frame) ? snprintf(to + n, TEXT_LEN - n, "nan ")
@@ -246,7 +248,7 @@ static int check_floats_on_the_way(const struct ply *ply, int n, struct sh_err *
     double most = 0;
     if ((ply->facts.columns & PLY_FLOAT) == 0 || !t->info.moving) return 0;
     for (int i = 0; i < n; i++)
-        most = fmax(most, largest((const double[3]){t->point[i].x, t->point[i].y, t->point[i].z}));
+        most = fmax(most, largest((const double[3]){t->points.x[i], t->points.y[i], t->points.z[i]}));
     return most <= FLOAT_MOST_M + t->info.range_max_m ? 0 : fail_float(ply->base.file.path, most, err);
 }
 
@@ -275,15 +277,16 @@ static int ply_scan(void *rec, struct sh_err *err)
 static inline int take_vertex(struct ply *ply, int i, struct vertex *v)
 {
     struct track *t = &ply->base.track;
-    const struct scanhead_point *p = &t->point[i];
-    if (p->echo_count == 0 && !ply->facts.empty_shots) return 0;
-    v->point = p;
-    v->xyz[0] = p->x;
-    v->xyz[1] = p->y;
-    v->xyz[2] = p->z;
+    const struct track_points *p = &t->points;
+    if (p->echo_count[i] == 0 && !ply->facts.empty_shots) return 0;
+    v->points = p;
+    v->i = i;
+    v->xyz[0] = p->x[i];
+    v->xyz[1] = p->y[i];
+    v->xyz[2] = p->z[i];
     if (t->info.geo) return 1;
     station_pose_forward(&t->pose, v->xyz);
-    return p->echo_count == 0 || !track_is_nowhere(t, v->xyz[0], v->xyz[1], v->xyz[2]);
+    return p->echo_count[i] == 0 || !track_is_nowhere(t, v->xyz[0], v->xyz[1], v->xyz[2]);
 }
 
 /* Binary rows with the columns that every head's points have, which most recordings are made of. */

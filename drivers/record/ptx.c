@@ -73,7 +73,7 @@ static int has_room(const struct ptx *ptx, uint32_t n)
     const struct track *t = &ptx->base.track;
     const uint32_t first = t->row[0], last = t->row[n - 1];
     if (g->n_shots == 0) return 1;
-    const uint32_t after = ptx->last_row + (t->point[0].echo <= 1); /* further echoes belong to the last shot */
+    const uint32_t after = ptx->last_row + (t->points.echo[0] <= 1); /* further echoes belong to the last shot */
     if (t->line < ptx->last_line || (t->line == ptx->last_line && first < after)) return 0;
     const uint64_t columns = (uint64_t)t->line - g->column_min + 1;
     const uint64_t rows =
@@ -108,13 +108,13 @@ static float intensity(struct ptx *ptx, double reflectance_db)
 static int make_cell(struct ptx *ptx, int i, struct ptx_cell *cell)
 {
     struct track *t = &ptx->base.track;
-    const struct scanhead_point *p = &t->point[i];
+    const struct track_points *p = &t->points;
     *cell = (struct ptx_cell){.column = t->line, .row = t->row[i], .intensity = -1};
-    if (p->echo_count == 0) return 0;
-    double p_socs[3] = {p->x, p->y, p->z};
+    if (p->echo_count[i] == 0) return 0;
+    double p_socs[3] = {p->x[i], p->y[i], p->z[i]};
     if (t->info.geo) station_pose_reverse(&t->pose, p_socs);
     if (track_is_nowhere(t, p_socs[0], p_socs[1], p_socs[2])) return 0;
-    cell->intensity = intensity(ptx, p->reflectance_db);
+    cell->intensity = intensity(ptx, p->reflectance_db[i]);
     memcpy(cell->p_socs, p_socs, sizeof p_socs);
     if (t->has_colours) memcpy(cell->rgb, t->rgb[i], sizeof cell->rgb);
     return 1;
@@ -136,7 +136,7 @@ static int take_shot(struct ptx *ptx, int i, struct sh_err *err)
     const struct track *t = &ptx->base.track;
     struct ptx_grid *g = &ptx->grid;
     struct ptx_cell cell;
-    if (t->point[i].echo > 1) {
+    if (t->points.echo[i] > 1) {
         ptx->n_left_out++;
         return 0;
     }

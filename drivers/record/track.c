@@ -162,7 +162,7 @@ static uint64_t first_row(const struct track *t, const struct scanhead_frame *fr
 static uint64_t number_rows(struct track *t, uint64_t row, int n)
 {
     for (int i = 0; i < n; i++) {
-        if (t->point[i].echo <= 1) row++;
+        if (t->points.echo[i] <= 1) row++;
         t->row[i] = (uint32_t)(row > 0 ? row - 1 : 0);
     }
     return row;
@@ -170,7 +170,8 @@ static uint64_t number_rows(struct track *t, uint64_t row, int n)
 
 static void keep_point(struct track *t, int from, int to)
 {
-    t->point[to] = t->point[from];
+    const struct scanhead_point point = track_get_point(t, from);
+    track_set_point(t, to, &point);
     t->row[to] = t->row[from];
     t->index[to] = t->index[from];
     t->frame[to] = t->frame[from];
@@ -181,8 +182,8 @@ static int leave_out_nowhere(struct track *t, int n)
 {
     int kept = 0;
     for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &t->point[i];
-        if (p->echo_count != 0 && track_is_nowhere(t, p->x, p->y, p->z)) continue;
+        const struct track_points *p = &t->points;
+        if (p->echo_count[i] != 0 && track_is_nowhere(t, p->x[i], p->y[i], p->z[i])) continue;
         if (kept != i) keep_point(t, i, kept);
         kept++;
     }
@@ -194,7 +195,20 @@ static void set_geo_frames(struct track *t, int n)
 {
     struct scanhead_pose pose;
     for (int i = 0; i < n; i++)
-        t->frame[i] = scanhead_pose(t->sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
+        t->frame[i] = scanhead_pose(t->sh, t->points.t_ns[i], &pose) == SCANHEAD_OK ? pose.frame : NAN;
+}
+
+/* As scanhead_to_scene. */
+static int to_scene(struct track *t, int n)
+{
+    struct scanhead_point point[TRACK_BATCH];
+    struct track_points *p = &t->points;
+    for (int i = 0; i < n; i++)
+        point[i] = track_get_point(t, i);
+    const int lost = scanhead_to_scene(t->sh, point, (uint32_t)n, t->frame);
+    for (int i = 0; i < n; i++)
+        p->x[i] = point[i].x, p->y[i] = point[i].y, p->z[i] = point[i].z;
+    return lost;
 }
 
 /* Returns how many points are left, or a negative error. */
@@ -205,10 +219,10 @@ static int place_moving(struct track *t, int n, struct sh_err *err)
         set_geo_frames(t, n);
         return n;
     }
-    int lost = scanhead_to_scene(t->sh, t->point, (uint32_t)n, t->frame);
+    const int lost = to_scene(t, n);
     if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(t->sh));
     for (int i = 0; i < n; i++) {
-        if (t->point[i].echo_count != 0 && isnan(t->point[i].x)) {
+        if (t->points.echo_count[i] != 0 && isnan(t->points.x[i])) {
             t->missing.n_without_pose++;
             continue;
         }
@@ -221,7 +235,7 @@ static void count_unheld(struct track *t, int n)
 {
     if (t->ops->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
     for (int i = 0; i < n; i++)
-        t->missing.n_attributes_unheld += t->point[i].echo_count != 0;
+        t->missing.n_attributes_unheld += t->points.echo_count[i] != 0;
 }
 
 /* Takes the present batch: n points of the frame, from `first` on. */
@@ -254,12 +268,32 @@ static int begin_scan(struct track *t, struct sh_err *err)
     return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;
 }
 
+/* Columns that neither the recorder nor its colours and waveforms need are not computed. */
+static struct scanhead_columns columns_to(struct track *t)
+{
+    struct track_points *p = &t->points;
+    const int made = t->has_colours && t->colour.given; /* colours, from any figure of the point */
+    const unsigned spared = made || track_waits(t) || t->info.moving ? 0 : t->spared;
+    return (struct scanhead_columns){
+        .x = p->x,
+        .y = p->y,
+        .z = p->z,
+        .range_m = (spared & TRACK_RANGE) != 0 ? NULL : p->range_m,
+        .reflectance_db = (spared & TRACK_REFLECTANCE) != 0 ? NULL : p->reflectance_db,
+        .t_ns = (spared & TRACK_TIME) != 0 ? NULL : p->t_ns,
+        .label = (spared & TRACK_LABEL) != 0 ? NULL : p->label,
+        .echo = p->echo,
+        .echo_count = p->echo_count,
+    };
+}
+
 /* Takes all points of the frame. row: that of the first one. */
 static int take_batches(struct track *t, const struct scanhead_frame *frame, uint64_t row, struct sh_err *err)
 {
+    const struct scanhead_columns to = columns_to(t);
     int rc = 0;
     for (uint32_t first = 0; rc == 0 && first < frame->n_points;) {
-        int n = scanhead_points(t->sh, frame, first, t->point, TRACK_BATCH);
+        int n = scanhead_columns(t->sh, frame, first, &to, TRACK_BATCH);
         if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(t->sh));
         row = number_rows(t, row, n);
         rc = take_batch(t, first, n, err);

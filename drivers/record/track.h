@@ -25,13 +25,24 @@
 
 enum { TRACK_BATCH = 256 };
 
+/* Points in columns, as scanhead_columns() writes them. */
+struct track_points {
+    double x[TRACK_BATCH], y[TRACK_BATCH], z[TRACK_BATCH], range_m[TRACK_BATCH], reflectance_db[TRACK_BATCH];
+    int64_t t_ns[TRACK_BATCH];
+    uint16_t label[TRACK_BATCH];
+    uint8_t echo[TRACK_BATCH], echo_count[TRACK_BATCH];
+};
+
+/* Columns that a recorder may do without. */
+enum track_column { TRACK_RANGE = 1 << 0, TRACK_REFLECTANCE = 1 << 1, TRACK_TIME = 1 << 2, TRACK_LABEL = 1 << 3 };
+
 struct track_waiting;
 struct track_waves;
 
 struct track_ops {
     /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
     int (*scan)(void *rec, struct sh_err *err);
-    /* n points of track->point. In the geo layout they are in the CRS; in the polar layout in the head's
+    /* n points of track->points. In the geo layout they are in the CRS; in the polar layout in the head's
      * frame, or in the scene frame where the head moves. NULL: no points wanted. */
     int (*points)(void *rec, int n, struct sh_err *err);
     int metres;           /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
@@ -71,6 +82,7 @@ struct track {
     const struct track_ops *ops;
     void *rec; /* what ops are called with */
     struct colour_choice colour;
+    unsigned spared; /* enum track_column: the recorder reads none of these; may change when a scan begins */
     /* of the frame that the points at hand are in */
     struct scanhead *sh;    /* of the last frame of any kind */
     struct scanhead *named; /* heads in a scene have the same labels: the head that names most of them */
@@ -92,7 +104,7 @@ struct track {
     double cast_share;               /* of a line's pulses, 0..1: those in the blind part are not cast */
     struct scanhead_emitter emitter; /* of the last descriptor */
     double scale_m; /* of coordinates in the recording: the stream's; coarser where the head moves far */
-    struct scanhead_point point[TRACK_BATCH];
+    struct track_points points;
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     int has_attributes;        /* wanted, and sent: */

@@ -5,6 +5,35 @@
 
 #include "drivers/record/track.h"
 
+/* Point i of the batch as a struct, without encoder angles; and the way back. */
+static inline struct scanhead_point track_get_point(const struct track *track, int i)
+{
+    const struct track_points *p = &track->points;
+    return (struct scanhead_point){.x = p->x[i],
+                                   .y = p->y[i],
+                                   .z = p->z[i],
+                                   .range_m = p->range_m[i],
+                                   .reflectance_db = p->reflectance_db[i],
+                                   .t_ns = p->t_ns[i],
+                                   .label = p->label[i],
+                                   .echo = p->echo[i],
+                                   .echo_count = p->echo_count[i]};
+}
+
+static inline void track_set_point(struct track *track, int i, const struct scanhead_point *from)
+{
+    struct track_points *p = &track->points;
+    p->x[i] = from->x;
+    p->y[i] = from->y;
+    p->z[i] = from->z;
+    p->range_m[i] = from->range_m;
+    p->reflectance_db[i] = from->reflectance_db;
+    p->t_ns[i] = from->t_ns;
+    p->label[i] = from->label;
+    p->echo[i] = from->echo;
+    p->echo_count[i] = from->echo_count;
+}
+
 /* Whether frames that follow the points are wanted, and sent. */
 int track_waits(const struct track *track);
 /* The caller calls this before the points of a frame, when no points wait any more. first_row: the row of its first

@@ -49,7 +49,7 @@ void track_keep(struct track *t, int n)
     struct track_waiting *w = t->waiting;
     for (int i = 0; i < n && w->n < NATIVE_MAX_POINTS; i++) { /* no frame holds more */
         struct waiting_point *p = &w->point[w->n++];
-        *p = (struct waiting_point){.point = t->point[i], .row = t->row[i], .index = t->index[i]};
+        *p = (struct waiting_point){.point = track_get_point(t, i), .row = t->row[i], .index = t->index[i]};
         if (t->info.moving) p->frame = t->frame[i];
         if (scanhead_gps_time(t->sh, p->point.t_ns, &p->gps_s) != 0) p->gps_s = (double)NAN;
     }
@@ -97,7 +97,7 @@ static int hand_out(struct track *t, struct sh_err *err)
     int rc = 0, n = 0;
     for (uint32_t k = 0; w != NULL && k < w->n && rc == 0; k++) {
         const struct waiting_point *p = &w->point[k];
-        t->point[n] = p->point;
+        track_set_point(t, n, &p->point);
         t->row[n] = p->row;
         t->frame[n] = p->frame;
         t->gps_s[n] = p->gps_s;

@@ -131,23 +131,23 @@ const struct scanhead_wave *track_find_wave(struct track *t, const struct scanhe
 
 int track_beam(const struct track *t, int i, double beam[3])
 {
-    const struct scanhead_point *p = &t->point[i];
-    const double xyz[3] = {p->x, p->y, p->z};
+    const struct track_points *p = &t->points;
+    const double xyz[3] = {p->x[i], p->y[i], p->z[i]}, range_m = p->range_m[i];
     struct scanhead_pose pose;
     if (t->info.geo) {
         memcpy(beam, t->wave[i]->direction, sizeof t->wave[i]->direction);
         return 1;
     }
-    if (!(p->range_m > 0)) return 0;
+    if (!(range_m > 0)) return 0;
     if (!t->info.moving) {
         mat3_apply(t->pose.rotation, xyz, beam);
         for (int k = 0; k < 3; k++)
-            beam[k] /= p->range_m;
+            beam[k] /= range_m;
         return 1;
     }
-    if (scanhead_pose(t->sh, p->t_ns, &pose) != SCANHEAD_OK) return 0;
+    if (scanhead_pose(t->sh, p->t_ns[i], &pose) != SCANHEAD_OK) return 0;
     for (int k = 0; k < 3; k++)
-        beam[k] = (xyz[k] - pose.position_m[k]) / p->range_m;
+        beam[k] = (xyz[k] - pose.position_m[k]) / range_m;
     return 1;
 }
 

@@ -33,9 +33,11 @@ static double height_seen(enum georef_crs crs, uint32_t native_crs, double lon_d
     georef_axes(georef, t.info.axes);
     georef_forward(georef, 1, (struct vec3_in){&d_scene[0], &d_scene[1], &d_scene[2]},
                    (struct vec3_out){&d[0], &d[1], &d[2]});
-    t.point[0] = (struct scanhead_point){
-        .x = t.info.anchor[0] + d[0], .y = t.info.anchor[1] + d[1], .z = t.info.anchor[2] + d[2], .echo_count = 1};
-    if (crs == GEOREF_GEODETIC) t.point[0].y = remainder(t.point[0].y, 360);
+    t.points.x[0] = t.info.anchor[0] + d[0];
+    t.points.y[0] = t.info.anchor[1] + d[1];
+    t.points.z[0] = t.info.anchor[2] + d[2];
+    t.points.echo_count[0] = 1;
+    if (crs == GEOREF_GEODETIC) t.points.y[0] = remainder(t.points.y[0], 360);
     georef_free(georef);
     return colour_figure(COLOUR_HEIGHT, &t, 0);
 }

@@ -86,17 +86,17 @@ static int stream_make_room(struct viewed_stream *s, struct sh_err *err)
 static void put_point(struct viewed_stream *s, int i, const double xyz_m[3])
 {
     const struct track *t = &s->track;
-    const struct scanhead_point *from = &t->point[i];
+    const struct track_points *from = &t->points;
     struct viewed_points *p = &s->v->points;
     const uint32_t n = p->n++;
     memcpy(p->xyz_m[n], xyz_m, sizeof p->xyz_m[n]);
-    p->range_m[n] = (float)from->range_m;
-    p->reflectance_db[n] = (float)from->reflectance_db;
-    p->t_s[n] = 1e-9 * (double)from->t_ns;
-    p->label[n] = from->label;
+    p->range_m[n] = (float)from->range_m[i];
+    p->reflectance_db[n] = (float)from->reflectance_db[i];
+    p->t_s[n] = 1e-9 * (double)from->t_ns[i];
+    p->label[n] = from->label[i];
     p->station[n] = (uint16_t)t->info.station;
-    p->echo[n] = from->echo;
-    p->echoes[n] = from->echo_count;
+    p->echo[n] = from->echo[i];
+    p->echoes[n] = from->echo_count[i];
     if (p->amplitude_db != NULL) p->amplitude_db[n] = (float)t->attribute[i].amplitude_db;
     if (p->rgb != NULL) memcpy(p->rgb[n], t->rgb[i], sizeof p->rgb[n]);
 }
@@ -105,7 +105,7 @@ static void put_point(struct viewed_stream *s, int i, const double xyz_m[3])
 static int put_into_grid(struct viewed_stream *s, int i, const double xyz_m[3], struct sh_err *err)
 {
     struct track *t = &s->track;
-    if (s->no_mesh || t->point[i].echo > 1) return SH_OK;
+    if (s->no_mesh || t->points.echo[i] > 1) return SH_OK;
     if (!mesh_grid_takes(&s->grid, t, i)) {
         int rc = viewed_end_grid(s, err);
         if (rc != SH_OK) return rc;
@@ -124,9 +124,9 @@ static int stream_take_points(void *ctx, int n, struct sh_err *err)
     struct track *t = &s->track;
     int rc = SH_OK;
     for (int i = 0; rc == SH_OK && i < n; i++) {
-        const struct scanhead_point *p = &t->point[i];
-        double xyz_m[3] = {p->x, p->y, p->z};
-        if (p->echo_count == 0) {
+        const struct track_points *p = &t->points;
+        double xyz_m[3] = {p->x[i], p->y[i], p->z[i]};
+        if (p->echo_count[i] == 0) {
             s->v->n_empty++;
             continue;
         }
