@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/mat3.h"
+#include "core/vecmath.h"
 
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose)
 {
@@ -17,6 +18,24 @@ void station_pose_reverse(const struct station_pose *pose, double p[3])
 {
     const double *s = pose->shift_m, from_station[3] = {p[0] - s[0], p[1] - s[1], p[2] - s[2]};
     mat3_apply_transposed(pose->rotation, from_station, p);
+}
+
+VEC_CLONES static void reverse_all(const double *restrict s, const double *restrict r, int n, double *restrict x,
+                                   double *restrict y, double *restrict z)
+{
+    for (int i = 0; i < n; i++) {
+        const double from_station[3] = {x[i] - s[0], y[i] - s[1], z[i] - s[2]};
+        double p[3];
+        mat3_apply_transposed(r, from_station, p);
+        x[i] = p[0];
+        y[i] = p[1];
+        z[i] = p[2];
+    }
+}
+
+void station_pose_reverse_all(const struct station_pose *pose, int n, double *x, double *y, double *z)
+{
+    reverse_all(pose->shift_m, pose->rotation, n, x, y, z);
 }
 
 /* By the largest of the four components, so that none is the difference of near numbers (Shepperd 1978). */

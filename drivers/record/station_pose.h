@@ -32,6 +32,8 @@ static inline void station_pose_forward(const struct station_pose *pose, double 
         p[i] = pose->shift_m[i] + turned[i];
 }
 void station_pose_reverse(const struct station_pose *pose, double p[3]);
+/* Takes n points back, in columns: the same figures, bit for bit. */
+void station_pose_reverse_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
 
 /* The unit quaternion w, x, y, z of the rotation; w is not negative. */
 void station_pose_quaternion(const struct station_pose *pose, double q[4]);

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/decimal.h"
 #include "core/grow.h"
 #include "core/studio/mesh/inside.h"
 #include "core/newfile.h"
@@ -208,26 +209,12 @@ int mesh_work_step(struct mesh_work *work, struct sh_err *err)
 
 /* Up to 9e6 a double times 1e9 is a whole number of at most 53 bits and a part, so that it is rounded once, and rightly but
  * for ties. Beyond, double itself steps by more than a nanometre. */
-size_t mesh_put_number(char *to, double v)
+char *mesh_put_number(char *to, double v)
 {
-    char digit[20], *p = to;
-    int n = 0, skip = 0;
-    if (fabs(v) > 9e6) return (size_t)snprintf(to, MESH_NUMBER_LEN, "%.17g", v);
-    uint64_t left = (uint64_t)llrint(fabs(v) * 1e9);
-    if (v < 0 && left != 0) *p++ = '-';
-    while (left > 0 || n < 10) {
-        digit[n++] = (char)('0' + left % 10);
-        left /= 10;
-    }
-    while (skip < 9 && digit[skip] == '0')
-        skip++;
-    for (int i = n - 1; i >= 9; i--)
-        *p++ = digit[i];
-    if (skip < 9) *p++ = '.';
-    for (int i = 8; i >= skip; i--)
-        *p++ = digit[i];
-    *p = '\0';
-    return (size_t)(p - to);
+    if (fabs(v) > 9e6) return decimal_put_general(to, v, 17);
+    const uint64_t nm = (uint64_t)llrint(fabs(v) * 1e9);
+    *to = '-';
+    return decimal_put_short(to + (v < 0 && nm != 0), nm, 9);
 }
 
 const char *mesh_stem(const char *path, size_t *len)

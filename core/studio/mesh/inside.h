@@ -51,9 +51,9 @@ struct mesh_work {
 };
 int mesh_work_step(struct mesh_work *work, struct sh_err *err);
 
-/* A coordinate in metres as decimals to the nanometre, without zeros at its end. At least MESH_NUMBER_LEN bytes. */
-enum { MESH_NUMBER_LEN = 336 };
-size_t mesh_put_number(char *to, double v);
+/* A coordinate in metres as decimals to the nanometre, without zeros at its end, in DECIMAL_GENERAL_ROOM (core/decimal.h).
+ * Returns the end. */
+char *mesh_put_number(char *to, double v);
 
 /* The path's name without folders; its length without the ending. */
 const char *mesh_stem(const char *path, size_t *len);
