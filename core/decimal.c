@@ -4,10 +4,12 @@
  * What is left is the digits of a whole number. All other doubles go to printf. */
 #include "core/decimal.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "core/bytes.h"
+#include "core/vecmath.h"
 
 __extension__ typedef unsigned __int128 u128;
 
@@ -87,19 +89,40 @@ static inline char *put_parts(char *to, uint64_t v, unsigned decimals)
     return put_padded(to, decimals < 20 ? v - whole * power_of_10[decimals] : v, decimals);
 }
 
+/* v > 0 as a whole number of n digits, without the zeros at its end. */
+static char *put_stripped(char *to, uint64_t v, unsigned n)
+{
+    if (n > 8) {
+        const uint64_t last = v % EIGHT_DIGITS;
+        if (last == 0) return put_stripped(to, v / EIGHT_DIGITS, n - 8);
+        to = put_padded(to, v / EIGHT_DIGITS, n - 8);
+        v = last;
+        n = 8;
+    }
+    const uint64_t digits = eight_digits((uint32_t)v);
+    le_put64(to, (digits + ASCII_ZEROS) >> 8 * (8 - n));
+    return to + n - __builtin_clzll(digits) / 8;
+}
+
+static inline __attribute__((always_inline)) char *put_short(char *to, uint64_t v, unsigned decimals)
+{
+    const uint64_t whole = decimals < 20 ? v / power_of_10[decimals] : 0;
+    const uint64_t rest = decimals < 20 ? v - whole * power_of_10[decimals] : v;
+    to = put_whole(to, whole);
+    *to = '.';
+    return rest > 0 ? put_stripped(to + 1, rest, decimals) : to;
+}
+
 char *decimal_put_short(char *to, uint64_t v, unsigned decimals)
 {
-    to = put_parts(to, v, decimals);
-    while (to[-1] == '0')
-        to--;
-    return to - (to[-1] == '.');
+    return decimals == 9 ? put_short(to, v, 9) : put_short(to, v, decimals); /* a known number divides fast */
 }
 
 /* ---- doubles */
 
 struct parts {
     uint64_t m; /* |v| = m / 2^s */
-    int s, is_negative;
+    int s;
 };
 
 static inline struct parts take_apart(double v)
@@ -108,7 +131,7 @@ static inline struct parts take_apart(double v)
     memcpy(&bits, &v, sizeof bits);
     const int exponent = (int)(bits >> MANTISSA_BITS & EXPONENTS);
     const uint64_t part = bits & (((uint64_t)1 << MANTISSA_BITS) - 1);
-    return (struct parts){part | (uint64_t)(exponent != 0) << MANTISSA_BITS, 1075 - exponent, bits >> 63 != 0};
+    return (struct parts){part | (uint64_t)(exponent != 0) << MANTISSA_BITS, 1075 - exponent};
 }
 
 /* |v| 10^decimals, rounded. 0: it may have more than 64 bits. */
@@ -123,19 +146,34 @@ static inline int scale(struct parts v, u128 power, uint64_t *whole)
     return rounded >> 64 == 0;
 }
 
+/* The same where doubles are sure of it. The power is exact, so the product is wrong by a part of 2^-53 at most, and the
+ * number is not so near to the middle of two. */
+static inline int scale_surely(double v, double power, uint64_t *whole)
+{
+    uint64_t bits;
+    const double product = fabs(v) * power, rounded = vec_round(product, &bits);
+    *whole = (uint64_t)(int64_t)rounded;
+    return product < 0x1p43 && fabs(product - rounded) < 0.5 - 0x1p-9;
+}
+
+/* All of them are exact. */
+static const double double_of_10[MOST_DECIMALS + 1] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                       1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                                       1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+
 static inline __attribute__((always_inline)) char *put_fixed(char *to, double v, unsigned decimals)
 {
-    const struct parts parts = take_apart(v);
-    const u128 power = decimals < 20 ? power_of_10[decimals] : (u128)10 * power_of_10[19];
     uint64_t whole;
-    if (!scale(parts, power, &whole)) return to + sprintf(to, "%.*f", (int)decimals, v);
+    const u128 power = decimals < 20 ? power_of_10[decimals] : (u128)10 * power_of_10[19];
+    if (!scale_surely(v, double_of_10[decimals], &whole) && !scale(take_apart(v), power, &whole))
+        return to + sprintf(to, "%.*f", (int)decimals, v);
     *to = '-';
-    return put_parts(to + parts.is_negative, whole, decimals);
+    return put_parts(to + (signbit(v) != 0), whole, decimals);
 }
 
 char *decimal_put_fixed(char *to, double v, unsigned decimals)
 {
-    if (decimals == 6) return put_fixed(to, v, 6); /* a division by a known number is a product */
+    if (decimals == 6) return put_fixed(to, v, 6); /* a known number divides fast */
     if (decimals == 9) return put_fixed(to, v, 9);
     return put_fixed(to, v, decimals);
 }
@@ -148,32 +186,32 @@ static char *put_power(char *to, uint64_t whole, unsigned digits, int power)
     return put_padded(to + 2, (uint64_t)-power, 2);
 }
 
-/* The decimals depend on the power of ten of the first digit. That of the power of two below |v| is the same, or one less. */
+static int scale_any(double v, int decimals, uint64_t *whole)
+{
+    if (decimals < 0 || decimals > MOST_DECIMALS) return 0;
+    if (scale_surely(v, double_of_10[decimals], whole)) return 1;
+    const u128 low = power_of_10[decimals % 20], high = decimals < 20 ? 1 : (u128)10 * power_of_10[19];
+    return scale(take_apart(v), low * high, whole);
+}
+
+/* The decimals depend on the power of ten of the first digit. That of the power of two below |v| is the same, or one less:
+ * then there is a digit too many. */
 char *decimal_put_general(char *to, double v, unsigned digits)
 {
-    const struct parts parts = take_apart(v);
-    const int exponent = MANTISSA_BITS - parts.s; /* of two: 2^exponent <= |v| < 2^(exponent + 1) */
-    int power = exponent * 78913 >> 18;           /* log10(2) is 78913 / 2^18 */
+    const int exponent = MANTISSA_BITS - take_apart(v).s; /* of two: 2^exponent <= |v| < 2^(exponent + 1) */
+    int power = exponent * 78913 >> 18;                   /* log10(2) is 78913 / 2^18 */
     int decimals = (int)digits - 1 - power;
     uint64_t whole = 0;
     *to = '-';
-    if (v == 0) return put_whole(to + parts.is_negative, 0);
-    if (decimals < 0 || decimals > MOST_DECIMALS || parts.s < 1 || parts.s > 127)
-        return to + sprintf(to, "%.*g", (int)digits, v);
-    u128 ten = decimals < 20 ? power_of_10[decimals] : (u128)power_of_10[decimals - 19] * power_of_10[19];
-    if (ten * parts.m >> parts.s >= power_of_10[digits]) {
+    if (v == 0) return put_whole(to + (signbit(v) != 0), 0);
+    int can = scale_any(v, decimals, &whole);
+    if (can && whole >= power_of_10[digits]) {
         power++;
         decimals--;
-        ten /= 10;
+        can = scale_any(v, decimals, &whole);
     }
-    if (decimals < 0 || !scale(parts, ten, &whole)) return to + sprintf(to, "%.*g", (int)digits, v);
-    if (whole == power_of_10[digits]) { /* rounded up to the next power of ten */
-        power++;
-        decimals--;
-        whole /= 10;
-    }
-    if (decimals < 0) return to + sprintf(to, "%.*g", (int)digits, v);
-    to += parts.is_negative;
+    if (!can) return to + sprintf(to, "%.*g", (int)digits, v);
+    to += signbit(v) != 0;
     if (power < -4) return put_power(to, whole, digits, power);
     return decimals > 0 ? decimal_put_short(to, whole, (unsigned)decimals) : put_whole(to, whole);
 }
