@@ -1,11 +1,25 @@
 /* SPDX-License-Identifier: MIT */
-/* Points of a frame as doubles. The hot path of every recorder. */
+/* Points of a frame as doubles. The hot path of every recorder.
+ *
+ * A frame is taken in blocks of rows. The rows of a block become columns of words, and loops that compilers turn into
+ * vectors make each column of figures from these. */
 #include <math.h>
 
 #include "core/vecmath.h"
 #include "drivers/host/host.h"
 
 #define TWO_PI 6.283185307179586476925
+
+enum { BLOCK = 128 };
+
+/* Rows of the wire as columns, and room for columns that nobody wants but others are computed from. */
+struct block {
+    uint32_t a[BLOCK], b[BLOCK], c[BLOCK], middle[BLOCK], tail[BLOCK];
+    double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];
+    double mirror[BLOCK], pan[BLOCK]; /* turns */
+    double x[BLOCK], y[BLOCK], z[BLOCK], range_m[BLOCK];
+    uint8_t echo[BLOCK], echo_count[BLOCK];
+};
 
 void host_turn_table(struct scanhead *sh)
 {
@@ -16,18 +30,99 @@ void host_turn_table(struct scanhead *sh)
     }
 }
 
-/* Point i as on the wire; members that all layouts share are set in p. */
-static inline struct native_point decode_points_take(const uint8_t *payload, uint32_t i, int64_t t0_ns,
-                                                     struct scanhead_point *p)
+/* ---- what all layouts share */
+
+VEC_CLONES static void take_words(const uint8_t *restrict row, int n, struct block *restrict b)
 {
-    struct native_point w;
-    native_decode_point(payload, i, &w);
-    p->label = w.label;
-    p->t_ns = (int64_t)((uint64_t)t0_ns + w.dt_ns); /* wraps where a broken stream's t0_ns is the largest */
-    p->echo = w.echo;
-    p->echo_count = w.echo_count;
-    p->reflectance_db = w.refl_cdb == INT16_MIN ? NAN : w.refl_cdb / 100.0;
-    return w;
+    for (int i = 0; i < n; i++) {
+        b->a[i] = le_get32(row + NATIVE_POINT_LEN * i);
+        b->b[i] = le_get32(row + NATIVE_POINT_LEN * i + 4);
+        b->c[i] = le_get32(row + NATIVE_POINT_LEN * i + 8);
+        b->middle[i] = le_get32(row + NATIVE_POINT_LEN * i + 12);
+        b->tail[i] = le_get32(row + NATIVE_POINT_LEN * i + 16);
+    }
+}
+
+VEC_INLINE struct native_point point_of_middle(uint32_t middle)
+{
+    const uint32_t word[5] = {[3] = middle};
+    return native_point_of(word);
+}
+
+VEC_INLINE struct native_point point_of_tail(uint32_t tail)
+{
+    const uint32_t word[5] = {[4] = tail};
+    return native_point_of(word);
+}
+
+VEC_CLONES static void set_times(const uint32_t *restrict tail, int n, int64_t t0_ns, int64_t *restrict t_ns)
+{
+    for (int i = 0; i < n; i++) /* wraps where a broken stream's t0_ns is the largest */
+        t_ns[i] = (int64_t)((uint64_t)t0_ns + point_of_tail(tail[i]).dt_ns);
+}
+
+VEC_CLONES static void set_reflectances(const uint32_t *restrict middle, int n, double *restrict reflectance_db)
+{
+    for (int i = 0; i < n; i++) {
+        const int cdb = point_of_middle(middle[i]).refl_cdb;
+        reflectance_db[i] = cdb == INT16_MIN ? (double)NAN : cdb / 100.0;
+    }
+}
+
+VEC_CLONES static void set_labels(const uint32_t *restrict middle, int n, uint16_t *restrict label)
+{
+    for (int i = 0; i < n; i++)
+        label[i] = point_of_middle(middle[i]).label;
+}
+
+VEC_CLONES static void set_echoes(const uint32_t *restrict tail, int n, uint8_t *restrict echo,
+                                  uint8_t *restrict echo_count)
+{
+    for (int i = 0; i < n; i++) {
+        const struct native_point w = point_of_tail(tail[i]);
+        echo[i] = w.echo;
+        echo_count[i] = w.echo_count;
+    }
+}
+
+VEC_INLINE int is_empty(uint32_t tail)
+{
+    return point_of_tail(tail).echo_count == 0;
+}
+
+static void set_all(double *to, int n, double value)
+{
+    for (int i = 0; i < n; i++)
+        to[i] = value;
+}
+
+/* ---- geo */
+
+/* One coordinate. */
+VEC_CLONES static void set_places(const uint32_t *restrict count, const uint32_t *restrict tail, int n, double anchor,
+                                  double scale, double *restrict at)
+{
+    for (int i = 0; i < n; i++)
+        at[i] = is_empty(tail[i]) ? (double)NAN : anchor + scale * (int32_t)count[i];
+}
+
+VEC_CLONES static void set_distances(const struct block *restrict b, int n, const double scale[3],
+                                     double *restrict range_m)
+{
+    const double sx = scale[0], sy = scale[1], sz = scale[2];
+    for (int i = 0; i < n; i++) {
+        const double dx = sx * (int32_t)b->a[i], dy = sy * (int32_t)b->b[i], dz = sz * (int32_t)b->c[i];
+        range_m[i] = is_empty(b->tail[i]) ? (double)NAN : sqrt(dx * dx + dy * dy + dz * dz);
+    }
+}
+
+/* Longitudes stay within 180 degrees. */
+VEC_CLONES static void fold_longitudes(double *y, int n)
+{
+    for (int i = 0; i < n; i++) {
+        const double below = y[i] > 180 ? y[i] - 360 : y[i];
+        y[i] = below < -180 ? below + 360 : below;
+    }
 }
 
 /* WGS 84, NIMA TR8350.2: geodetic to geocentric. */
@@ -40,57 +135,45 @@ static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
     p[2] = (n * (1 - e2) + h) * s;
 }
 
-/* Sets the other members of a geo point, once x, y, z and range_m are set. */
-static inline void end_geo(struct scanhead_point *p)
+/* From the anchor, straight through space. */
+static void set_geodetic_ranges(const double anchor[3], const struct block *b, int n, const struct scanhead_columns *to)
 {
-    p->mirror_rad = p->pan_rad = NAN;
-    if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
-}
-
-static void points_geodetic(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
-                            struct scanhead_point *p, uint32_t n)
-{
-    const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
-    double from[3], to[3];
+    double from[3], at[3];
     geocentric(anchor[0], anchor[1], anchor[2], from);
-    for (uint32_t i = first; i < first + n; i++, p++) {
-        const struct native_point w = decode_points_take(frame->payload, i, frame->scan_t0_ns, p);
-        p->x = anchor[0] + scale[0] * (int32_t)w.a;
-        p->y = anchor[1] + scale[1] * (int32_t)w.b;
-        p->z = anchor[2] + scale[2] * (int32_t)w.c;
-        if (p->y > 180) p->y -= 360;
-        if (p->y < -180) p->y += 360;
-        geocentric(p->x, p->y, p->z, to);
-        double dx = to[0] - from[0], dy = to[1] - from[1], dz = to[2] - from[2];
-        p->range_m = sqrt(dx * dx + dy * dy + dz * dz);
-        end_geo(p);
+    for (int i = 0; i < n; i++) {
+        to->range_m[i] = NAN;
+        if (is_empty(b->tail[i])) continue;
+        geocentric(to->x[i], to->y[i], to->z[i], at);
+        const double dx = at[0] - from[0], dy = at[1] - from[1], dz = at[2] - from[2];
+        to->range_m[i] = sqrt(dx * dx + dy * dy + dz * dz);
     }
 }
 
-static void points_geo(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
-                       struct scanhead_point *p, uint32_t n)
+static void columns_geo(const struct scanhead *sh, struct block *b, int n, const struct scanhead_columns *wanted)
 {
     const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
-    for (uint32_t i = first; i < first + n; i++, p++) {
-        const struct native_point w = decode_points_take(frame->payload, i, frame->scan_t0_ns, p);
-        double dx = scale[0] * (int32_t)w.a, dy = scale[1] * (int32_t)w.b, dz = scale[2] * (int32_t)w.c;
-        p->x = anchor[0] + dx;
-        p->y = anchor[1] + dy;
-        p->z = anchor[2] + dz;
-        p->range_m = sh->anchor.moving & NATIVE_MOVING ? NAN : sqrt(dx * dx + dy * dy + dz * dz);
-        end_geo(p);
+    const int geodetic = sh->anchor.crs == NATIVE_CRS_GEODETIC;
+    struct scanhead_columns to = *wanted;
+    if (geodetic && to.range_m != NULL) { /* ranges are computed from all three */
+        if (to.x == NULL) to.x = b->x;
+        if (to.y == NULL) to.y = b->y;
+        if (to.z == NULL) to.z = b->z;
     }
+    if (to.x != NULL) set_places(b->a, b->tail, n, anchor[0], scale[0], to.x);
+    if (to.y != NULL) set_places(b->b, b->tail, n, anchor[1], scale[1], to.y);
+    if (to.z != NULL) set_places(b->c, b->tail, n, anchor[2], scale[2], to.z);
+    if (geodetic && to.y != NULL) fold_longitudes(to.y, n);
+    if (to.range_m != NULL && geodetic)
+        set_geodetic_ranges(anchor, b, n, &to);
+    else if (to.range_m != NULL && sh->anchor.moving & NATIVE_MOVING)
+        set_all(to.range_m, n, NAN);
+    else if (to.range_m != NULL)
+        set_distances(b, n, scale, to.range_m);
+    if (to.mirror_rad != NULL) set_all(to.mirror_rad, n, NAN);
+    if (to.pan_rad != NULL) set_all(to.pan_rad, n, NAN);
 }
 
-/* ---- polar points, in blocks of arrays: the loops that compute are vectors */
-
-enum { BLOCK = 64 };
-struct polar_block {
-    double mirror[BLOCK], pan[BLOCK]; /* turns */
-    int one_mirror;                   /* all mirror angles are equal, as along a ring: only index 0 is computed */
-    double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];
-    double mirror_rad[BLOCK], pan_rad[BLOCK];
-};
+/* ---- polar */
 
 /* The largest whole number that is not above |x| < 2^51. */
 VEC_INLINE double floor_of(double x, uint64_t *bits)
@@ -99,6 +182,12 @@ VEC_INLINE double floor_of(double x, uint64_t *bits)
     const uint64_t above = near > x;
     *bits -= above;
     return near - (double)(int)above;
+}
+
+VEC_CLONES static void set_turns(const uint32_t *restrict count, int n, double per_count, double *restrict turn)
+{
+    for (int i = 0; i < n; i++)
+        turn[i] = count[i] * per_count;
 }
 
 /* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
@@ -129,94 +218,155 @@ VEC_CLONES static void fold(const double *restrict u, int n, double lo, double *
     }
 }
 
-static void points_of_block(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
-                            const struct polar_block *b, struct scanhead_point *p, uint32_t n)
+VEC_CLONES static void set_ranges(const struct block *restrict b, int n, double scale, double *restrict range_m)
 {
-    const double scale = sh->descriptor.range_scale_m;
-    for (uint32_t i = 0; i < n; i++, p++) {
-        const struct native_point w = decode_points_take(frame->payload, first + i, frame->scan_t0_ns, p);
-        p->range_m = p->echo_count == 0 ? NAN : scale * w.a;
-        const uint32_t m = b->one_mirror ? 0 : i;
-        const double flat = p->range_m * b->cos_m[m];
-        p->x = flat * b->sin_pan[i];
-        p->y = flat * b->cos_pan[i];
-        p->z = p->range_m * b->sin_m[m];
-        p->mirror_rad = b->mirror_rad[m];
-        p->pan_rad = b->pan_rad[i];
+    for (int i = 0; i < n; i++)
+        range_m[i] = is_empty(b->tail[i]) ? (double)NAN : scale * b->a[i];
+}
+
+VEC_CLONES static void set_xyz(const struct block *restrict b, int n, const double *restrict range_m,
+                               double *restrict x, double *restrict y, double *restrict z)
+{
+    for (int i = 0; i < n; i++) {
+        const double flat = range_m[i] * b->cos_m[i];
+        x[i] = flat * b->sin_pan[i];
+        y[i] = flat * b->cos_pan[i];
+        z[i] = range_m[i] * b->sin_m[i];
     }
 }
 
-static void points_polar(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
-                         struct scanhead_point *p, uint32_t n)
+/* Along a ring all mirror angles are equal. */
+static int is_one_mirror(const struct block *b, int n)
+{
+    uint32_t differ = 0;
+    for (int i = 0; i < n; i++)
+        differ |= b->b[i] ^ b->b[0];
+    return differ == 0;
+}
+
+static void set_positions(const struct scanhead *sh, struct block *b, int n, int one_mirror,
+                          const struct scanhead_columns *to)
+{
+    const int m = one_mirror ? 1 : n;
+    const double *range_m = to->range_m;
+    if (range_m == NULL) {
+        set_ranges(b, n, sh->descriptor.range_scale_m, b->range_m);
+        range_m = b->range_m;
+    }
+    sincos_turns(sh->sin_part, sh->cos_part, b->mirror, m, b->sin_m, b->cos_m);
+    sincos_turns(sh->sin_part, sh->cos_part, b->pan, n, b->sin_pan, b->cos_pan);
+    if (one_mirror) {
+        set_all(b->sin_m, n, b->sin_m[0]);
+        set_all(b->cos_m, n, b->cos_m[0]);
+    }
+    set_xyz(b, n, range_m, to->x != NULL ? to->x : b->x, to->y != NULL ? to->y : b->y, to->z != NULL ? to->z : b->z);
+}
+
+static void columns_polar(const struct scanhead *sh, struct block *b, int n, const struct scanhead_columns *to)
 {
     const struct native_descriptor *d = &sh->descriptor;
+    const int one_mirror = is_one_mirror(b, n), m = one_mirror ? 1 : n;
     /* The mirror angle lies within half a turn of the line's middle, so that it has no jump along the line. With other
      * heads it is an elevation. */
     const double middle = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6;
     const double lo = (sh->emitter.kind == NATIVE_EMIT_LINE ? middle : 0) - 0.5;
-    const double mirror_turns = 1 / d->mirror_counts_per_turn, pan_turns = 1 / d->pan_counts_per_turn;
-    struct polar_block b = {.mirror = {0}, .pan = {0}};
-    for (uint32_t at = 0; at < n; at += BLOCK) {
-        const int m = (int)(n - at < BLOCK ? n - at : BLOCK);
-        b.one_mirror = 1;
-        for (int i = 0; i < m; i++) {
-            struct native_point w;
-            native_decode_point(frame->payload, first + at + (uint32_t)i, &w);
-            b.mirror[i] = w.b * mirror_turns;
-            b.pan[i] = w.c * pan_turns;
-            b.one_mirror &= b.mirror[i] == b.mirror[0];
-        }
-        sincos_turns(sh->sin_part, sh->cos_part, b.mirror, b.one_mirror ? 1 : m, b.sin_m, b.cos_m);
-        sincos_turns(sh->sin_part, sh->cos_part, b.pan, m, b.sin_pan, b.cos_pan);
-        fold(b.mirror, b.one_mirror ? 1 : m, lo, b.mirror_rad);
-        fold(b.pan, m, 0, b.pan_rad);
-        points_of_block(sh, frame, first + at, &b, p + at, (uint32_t)m);
+    set_turns(b->b, m, 1 / d->mirror_counts_per_turn, b->mirror);
+    set_turns(b->c, n, 1 / d->pan_counts_per_turn, b->pan);
+    if (to->range_m != NULL) set_ranges(b, n, d->range_scale_m, to->range_m);
+    if (to->x != NULL || to->y != NULL || to->z != NULL) set_positions(sh, b, n, one_mirror, to);
+    if (to->mirror_rad != NULL) {
+        fold(b->mirror, m, lo, to->mirror_rad);
+        if (one_mirror) set_all(to->mirror_rad, n, to->mirror_rad[0]);
     }
+    if (to->pan_rad != NULL) fold(b->pan, n, 0, to->pan_rad);
 }
 
-int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
-                    struct scanhead_point *points, uint32_t max)
+/* ---- blocks */
+
+/* n <= BLOCK points from `first` on. */
+static void columns_of_block(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, int n,
+                             struct block *b, const struct scanhead_columns *to)
+{
+    take_words(frame->payload + NATIVE_POINTS_HEAD_LEN + (size_t)first * NATIVE_POINT_LEN, n, b);
+    if (sh->descriptor.layout == NATIVE_GEO)
+        columns_geo(sh, b, n, to);
+    else
+        columns_polar(sh, b, n, to);
+    if (to->reflectance_db != NULL) set_reflectances(b->middle, n, to->reflectance_db);
+    if (to->label != NULL) set_labels(b->middle, n, to->label);
+    if (to->t_ns != NULL) set_times(b->tail, n, frame->scan_t0_ns, to->t_ns);
+    if (to->echo != NULL || to->echo_count != NULL)
+        set_echoes(b->tail, n, to->echo != NULL ? to->echo : b->echo,
+                   to->echo_count != NULL ? to->echo_count : b->echo_count);
+}
+
+/* How many points there are from `first` on, at most max; or an error. */
+static int points_from(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, uint32_t max)
 {
     int rc = host_check_last(sh, frame, SCANHEAD_POINTS);
     if (rc != 0) return rc;
     if (!sh->have_descriptor || !sh->have_anchor)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: points came before the descriptor and the anchor of their scan",
                        sh->source.name);
-    if (first >= frame->n_points) return 0;
-    uint32_t n = frame->n_points - first;
-    if (n > max) n = max;
-    if (sh->descriptor.layout == NATIVE_GEO && sh->anchor.crs == NATIVE_CRS_GEODETIC)
-        points_geodetic(sh, frame, first, points, n);
-    else if (sh->descriptor.layout == NATIVE_GEO)
-        points_geo(sh, frame, first, points, n);
-    else
-        points_polar(sh, frame, first, points, n);
-    return (int)n;
+    const uint32_t n = first < frame->n_points ? frame->n_points - first : 0;
+    return (int)(n < max ? n : max);
 }
 
-/* Stand-in until the library decodes into columns itself. */
+#define COLUMN_FROM(column) .column = to->column != NULL ? to->column + at : NULL
+static struct scanhead_columns columns_from(const struct scanhead_columns *to, int at)
+{
+    return (struct scanhead_columns){
+        COLUMN_FROM(x),
+        COLUMN_FROM(y),
+        COLUMN_FROM(z),
+        COLUMN_FROM(range_m),
+        COLUMN_FROM(mirror_rad),
+        COLUMN_FROM(pan_rad),
+        COLUMN_FROM(reflectance_db),
+        COLUMN_FROM(t_ns),
+        COLUMN_FROM(label),
+        COLUMN_FROM(echo),
+        COLUMN_FROM(echo_count),
+    };
+}
+
 int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      const struct scanhead_columns *to, uint32_t max)
 {
-    struct scanhead_point p[BLOCK];
-    uint32_t at = 0;
-    while (at < max) {
-        const int n = scanhead_points(sh, frame, first + at, p, max - at < BLOCK ? max - at : BLOCK);
-        if (n < 0) return n;
-        if (n == 0) break;
-        for (int i = 0; i < n; i++, at++) {
-            if (to->x != NULL) to->x[at] = p[i].x;
-            if (to->y != NULL) to->y[at] = p[i].y;
-            if (to->z != NULL) to->z[at] = p[i].z;
-            if (to->range_m != NULL) to->range_m[at] = p[i].range_m;
-            if (to->mirror_rad != NULL) to->mirror_rad[at] = p[i].mirror_rad;
-            if (to->pan_rad != NULL) to->pan_rad[at] = p[i].pan_rad;
-            if (to->reflectance_db != NULL) to->reflectance_db[at] = p[i].reflectance_db;
-            if (to->t_ns != NULL) to->t_ns[at] = p[i].t_ns;
-            if (to->label != NULL) to->label[at] = p[i].label;
-            if (to->echo != NULL) to->echo[at] = p[i].echo;
-            if (to->echo_count != NULL) to->echo_count[at] = p[i].echo_count;
-        }
+    struct block b;
+    const int n = points_from(sh, frame, first, max);
+    for (int at = 0; at < n; at += BLOCK) {
+        const struct scanhead_columns columns = columns_from(to, at);
+        columns_of_block(sh, frame, first + (uint32_t)at, n - at < BLOCK ? n - at : BLOCK, &b, &columns);
     }
-    return (int)at;
+    return n;
+}
+
+int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                    struct scanhead_point *points, uint32_t max)
+{
+    struct block b;
+    double mirror_rad[BLOCK], pan_rad[BLOCK], reflectance_db[BLOCK];
+    int64_t t_ns[BLOCK];
+    uint16_t label[BLOCK];
+    const struct scanhead_columns columns = {b.x,  b.y,   b.z,    b.range_m,   mirror_rad, pan_rad, reflectance_db,
+                                             t_ns, label, b.echo, b.echo_count};
+    const int n = points_from(sh, frame, first, max);
+    for (int at = 0; at < n; at += BLOCK, points += BLOCK) {
+        const int m = n - at < BLOCK ? n - at : BLOCK;
+        columns_of_block(sh, frame, first + (uint32_t)at, m, &b, &columns);
+        for (int i = 0; i < m; i++)
+            points[i] = (struct scanhead_point){.x = b.x[i],
+                                                .y = b.y[i],
+                                                .z = b.z[i],
+                                                .range_m = b.range_m[i],
+                                                .mirror_rad = mirror_rad[i],
+                                                .pan_rad = pan_rad[i],
+                                                .reflectance_db = reflectance_db[i],
+                                                .t_ns = t_ns[i],
+                                                .echo = b.echo[i],
+                                                .echo_count = b.echo_count[i],
+                                                .label = label[i]};
+    }
+    return n;
 }

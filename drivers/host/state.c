@@ -7,6 +7,7 @@
 
 #include "core/bytes.h"
 #include "core/grow.h"
+#include "core/vecmath.h"
 #include "drivers/host/host.h"
 #include "drivers/protocol/native_waves.h"
 
@@ -290,6 +291,32 @@ int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_
         (uint64_t)sh->times.gps_ns + ((uint64_t)sh->times.scan_t0_ns + (uint64_t)t_ns - (uint64_t)sh->times.gps_at_ns);
     int64_t s = (int64_t)gps_ns / 1000000000, ns = (int64_t)gps_ns % 1000000000;
     *adjusted_standard_gps_time_s = (double)(s - 1000000000) + (double)ns / 1e9;
+    return SCANHEAD_OK;
+}
+
+/* t_ns + shift_ns lie within the second that begins whole_s after 1980-01-06 and 1e9 s; else the result is 0. */
+VEC_CLONES static int times_of_second(const int64_t *restrict t_ns, uint32_t n, uint64_t shift_ns, double whole_s,
+                                      double *restrict to)
+{
+    uint64_t any_other = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint64_t ns = (uint64_t)t_ns[i] + shift_ns;
+        any_other |= ns | (999999999 - ns);
+        to[i] = whole_s + vec_from_u64(ns) / 1e9;
+    }
+    return any_other >> 63 == 0;
+}
+
+int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n, double *to)
+{
+    const struct host_times *times = &sh->times;
+    if (!times->have_gps || !times->have_scan_t0) return SCANHEAD_ESTATE;
+    const uint64_t shift_ns = (uint64_t)times->gps_ns + (uint64_t)times->scan_t0_ns - (uint64_t)times->gps_at_ns;
+    const int64_t first_ns = n > 0 ? (int64_t)((uint64_t)t_ns[0] + shift_ns) : 0, first_s = first_ns / 1000000000;
+    const uint64_t within_ns = shift_ns - (uint64_t)first_s * 1000000000;
+    if (first_ns >= 0 && times_of_second(t_ns, n, within_ns, (double)(first_s - 1000000000), to)) return SCANHEAD_OK;
+    for (uint32_t i = 0; i < n; i++)
+        scanhead_gps_time(sh, t_ns[i], &to[i]);
     return SCANHEAD_OK;
 }
 

@@ -198,19 +198,25 @@ struct native_point {
     uint8_t echo, echo_count; /* both 0: shot without echo */
 };
 
+/* Takes the five words of a point apart. */
+static inline struct native_point native_point_of(const uint32_t word[5])
+{
+    return (struct native_point){.a = word[0],
+                                 .b = word[1],
+                                 .c = word[2],
+                                 .refl_cdb = (int16_t)(uint16_t)word[3],
+                                 .label = (uint16_t)(word[3] >> 16),
+                                 .dt_ns = word[4] & 0xffffffu,
+                                 .echo = (uint8_t)(word[4] >> 24 & 15u),
+                                 .echo_count = (uint8_t)(word[4] >> 28)};
+}
+
 /* Point i < n_points of a checked points payload. Inline, for readers of millions a second. */
 static inline void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out)
 {
     const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + (size_t)i * NATIVE_POINT_LEN;
-    uint32_t tail = le_get32(p + 16);
-    out->a = le_get32(p);
-    out->b = le_get32(p + 4);
-    out->c = le_get32(p + 8);
-    out->refl_cdb = (int16_t)le_get16(p + 12);
-    out->label = le_get16(p + 14);
-    out->dt_ns = tail & 0xffffffu;
-    out->echo = (uint8_t)(tail >> 24 & 15u);
-    out->echo_count = (uint8_t)(tail >> 28);
+    const uint32_t word[5] = {le_get32(p), le_get32(p + 4), le_get32(p + 8), le_get32(p + 12), le_get32(p + 16)};
+    *out = native_point_of(word);
 }
 
 struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4. Begin of a colours

@@ -37,6 +37,7 @@ static int e57_begin(void *rec, struct sh_err *err)
     e->facts.empty_shots = e->base.options.empty_shots;
     e->pages.file = &e->base.file;
     e->base.track.spared = TRACK_RANGE;
+    e->base.track.no_empty = !e->facts.empty_shots;
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
@@ -136,20 +137,15 @@ static int is_due(const struct e57 *e, unsigned n, int64_t t_ns)
     return n >= 8 && t_ns - e->t0_ns >= PACKET_NS;
 }
 
-static int is_kept(const struct e57 *e, int i)
-{
-    return e->base.track.points.echo_count[i] != 0 || e->facts.empty_shots;
-}
-
 /* How many points from i on, of at most n, go into one packet one after the other: 1 at least. */
 static int count_run(const struct e57 *e, int i, int n)
 {
-    const struct track_points *p = &e->base.track.points;
     const struct e57_packet *g = &e->gathered;
+    const int64_t *t_ns = e->base.track.points.t_ns + i;
     const int room = (int)(g->most - g->n);
     int k = 1;
     if (n > room) n = room;
-    while (k < n && is_kept(e, i + k) && !is_due(e, g->n + (unsigned)k, p->t_ns[i + k]))
+    while (k < n && !is_due(e, g->n + (unsigned)k, t_ns[k]))
         k++;
     return k;
 }
@@ -165,17 +161,12 @@ static int e57_points(void *rec, int n, struct sh_err *err)
 {
     struct e57 *e = rec;
     int rc = find_start(e, err);
-    for (int i = 0; rc == 0 && i < n;) {
-        if (!is_kept(e, i)) {
-            i++;
-            continue;
-        }
-        if (is_due(e, e->gathered.n, e->base.track.points.t_ns[i])) rc = put_packet(e, e->gathered.n & ~7u, err);
-        if (rc != 0) break;
-        if (e->gathered.n == 0) e->t0_ns = e->base.track.points.t_ns[i];
-        const int k = count_run(e, i, n - i);
-        rc = put_run(e, i, k, err);
-        i += k;
+    for (int i = 0, run; rc == 0 && i < n; i += run) {
+        const int64_t t_ns = e->base.track.points.t_ns[i];
+        if (is_due(e, e->gathered.n, t_ns)) rc = put_packet(e, e->gathered.n & ~7u, err);
+        if (e->gathered.n == 0) e->t0_ns = t_ns;
+        run = count_run(e, i, n - i);
+        if (rc == 0) rc = put_run(e, i, run, err);
     }
     return rc;
 }

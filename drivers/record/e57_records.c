@@ -66,10 +66,12 @@ VEC_CLONES static void put_intensities(const double *restrict reflectance_db, in
     }
 }
 
-VEC_CLONES static void put_times(const int64_t *restrict t_ns, int n, uint8_t *restrict to)
+static void put_times(const struct track *t, int first, int n, uint8_t *to)
 {
-    for (size_t i = 0; i < (size_t)n; i++)
-        le_put_double(to + 8 * i, (double)t_ns[i] / 1e9);
+    double t_s[TRACK_BATCH];
+    track_seconds(t, first + n, t_s);
+    for (int i = 0; i < n; i++)
+        le_put_double(to + 8 * (size_t)i, t_s[first + i]);
 }
 
 VEC_CLONES static void put_returns(const uint8_t *restrict echo, int n, uint8_t *restrict to)
@@ -94,7 +96,7 @@ static void put_figures(struct e57_packet *packet, const struct e57_facts *facts
     uint8_t *const *s = packet->stream;
     const size_t at = packet->n;
     put_intensities(p->reflectance_db + first, n, s[E57_INTENSITY] + 2 * at, s[E57_NO_INTENSITY] + at);
-    put_times(p->t_ns + first, n, s[E57_TIME] + 8 * at);
+    put_times(t, first, n, s[E57_TIME] + 8 * at);
     put_returns(p->echo + first, n, s[E57_RETURN] + at);
     memcpy(s[E57_RETURNS] + at, p->echo_count + first, (size_t)n);
     put_rows(t->row + first, t->line, n, s[E57_ROW] + 4 * at, s[E57_COLUMN] + 4 * at);

@@ -251,8 +251,7 @@ size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
     return (size_t)(end - to);
 }
 
-/* The length of a point's record, without extra bytes. */
-static size_t own_len(const struct las_facts *f)
+size_t las_own_len(const struct las_facts *f)
 {
     static const uint8_t own[11] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67}; /* by format */
     return own[format_of(f)];
@@ -263,59 +262,10 @@ size_t las_point_len(const struct las_facts *f)
     const struct track *t = f->track;
     size_t extra = LAS_LABEL_LEN + (t->has_attributes ? LAS_ATTRIBUTES_LEN : 0u);
     if (t->has_deviations) extra += LAS_DEVIATION_LEN;
-    return own_len(f) + (f->minor == 2 ? 0 : extra);
+    return las_own_len(f) + (f->minor == 2 ? 0 : extra);
 }
 
-static void put_colour(uint8_t *to, const uint8_t rgb[3])
+size_t las_time_at(const struct las_facts *f)
 {
-    for (int i = 0; i < 3; i++)
-        le_put16(to + 2 * i, (uint16_t)(257 * rgb[i])); /* 255 is 65535 */
-}
-
-/* Format 1 or 3. Classification 0: never classified. */
-static void put_point_12(const struct las_facts *f, const struct las_point *p, uint8_t *to)
-{
-    to[14] = (uint8_t)(p->echo | p->echo_count << 3);
-    le_put16(to + 18, p->station);
-    le_put_double(to + 20, p->time_s);
-    if (f->has_colour) put_colour(to + 28, p->rgb);
-}
-
-static void put_wave(uint8_t *to, const struct las_point *p)
-{
-    to[0] = p->packet.kind;
-    le_put64(to + 1, p->packet.at);
-    le_put32(to + 9, p->packet.len);
-    le_put_float(to + 13, p->location_ps);
-    for (int i = 0; i < 3; i++)
-        le_put_float(to + 17 + 4 * i, p->back_ps[i]);
-}
-
-/* Writes a point of format 6, 7, 9 or 10, and the extra bytes. The near infrared of format 10 stays 0. */
-static void put_point_14(const struct las_facts *f, const struct las_point *p, uint8_t *to)
-{
-    to[14] = (uint8_t)(p->echo | p->echo_count << 4);
-    le_put16(to + 18, p->scan_angle);
-    le_put16(to + 20, p->station);
-    le_put_double(to + 22, p->time_s);
-    if (f->has_colour) put_colour(to + 30, p->rgb);
-    uint8_t *extra = to + own_len(f);
-    if (f->has_waves) put_wave(extra - LAS_WAVE_LEN, p);
-    le_put16(extra, p->label);
-    if (!f->track->has_attributes) return;
-    le_put16(extra + 2, p->amplitude);
-    le_put16(extra + 4, p->width);
-    if (f->track->has_deviations) le_put16(extra + 6, p->deviation);
-}
-
-void las_put_point(const struct las_facts *f, const struct las_point *p, uint8_t *to)
-{
-    memset(to, 0, las_point_len(f));
-    for (int i = 0; i < 3; i++)
-        le_put32(to + 4 * i, (uint32_t)p->xyz[i]);
-    le_put16(to + 12, p->intensity);
-    if (f->minor == 2)
-        put_point_12(f, p, to);
-    else
-        put_point_14(f, p, to);
+    return f->minor == 2 ? 20 : 22;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The header and the variable length records of a LAS file, and one point's record. LAS 1.4 (ASPRS LAS 1.4 R15)
+/* The header and the variable length records of a LAS file. LAS 1.4 (ASPRS LAS 1.4 R15)
  * with point data record format 6, or 7 with colour; with waveforms 9, or 10. LAS 1.2 with format 1, or 3. Facts go in
  * (las.c gathers them), bytes come out. Pure. */
 #ifndef DRIVERS_RECORD_LAS_HEADER_H
@@ -58,22 +58,11 @@ struct las_facts {
     uint64_t waves_at;             /* where the record of packets begins in the file; 0: it is in the .wdp */
 };
 
-struct las_point {
-    int32_t xyz[3]; /* counts */
-    uint16_t intensity, scan_angle, station, label;
-    uint8_t echo, echo_count; /* within the version's returns */
-    double time_s;
-    uint16_t amplitude, width, deviation; /* with attributes */
-    uint8_t rgb[3];
-    /* With waveforms: the packet, the return's time after the packet's first sample, and how coordinates change along a
-     * picosecond back to the head. */
-    struct las_packet packet;
-    float location_ps, back_ps[3];
-};
-
 /* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
 size_t las_point_len(const struct las_facts *facts);
-void las_put_point(const struct las_facts *facts, const struct las_point *point, uint8_t *to);
+/* Of these, how many are the format's own; extra bytes follow. And where the time stands, after which a colour may. */
+size_t las_own_len(const struct las_facts *facts);
+size_t las_time_at(const struct las_facts *facts);
 
 /* Counts a point's record as it is in the file: its place and its return. Of the facts it needs `minor`. */
 void las_count_record(struct las_facts *facts, const uint8_t *record);

@@ -18,15 +18,14 @@
 #include "drivers/record/ply_repair.h"
 #include "drivers/record/recorder.h"
 
-enum { ROW_MOST = 128, TEXT_LEN = 512 };
-
-_Static_assert(3 * 8 + 8 + 4 + 8 + 2 + 2 + 2 + 8 + 8 + 3 <= ROW_MOST && ROW_MOST <= TEXT_LEN, "room for a row");
+enum { TEXT_LEN = 512 };
 
 struct ply {
     struct recorder base;
     struct ply_facts facts;
-    int begun;         /* room for the header is made */
-    size_t header_len; /* bytes of that room */
+    int begun;                                      /* room for the header is made */
+    size_t header_len;                              /* bytes of that room */
+    double time_s[TRACK_BATCH], frame[TRACK_BATCH]; /* of the batch, where they are columns */
 };
 
 static int ply_begin(void *rec, struct sh_err *err)
@@ -38,6 +37,7 @@ static int ply_begin(void *rec, struct sh_err *err)
     ply->facts.empty_shots = ply->base.options.empty_shots;
     ply->facts.scalar_names = ply->base.options.scalar_names;
     ply->facts.columns = ply_columns_there(&ply->base.track, ply->base.options.columns); /* until points have come */
+    ply->base.track.no_empty = !ply->base.options.empty_shots;
     if (ply->base.options.n_heads > 1) ply->facts.more_heads = ply->base.options.n_heads - 1;
     return 0;
 }
@@ -81,74 +81,89 @@ static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
     return rc;
 }
 
-/* A row of the file; the recorder's `columns` say which members are written. */
-struct vertex {
-    double xyz[3];
-    const struct track_points *points;
-    int i; /* in them */
-    unsigned station;
-    double frame;
-    const struct scanhead_attribute *attribute;
-    double deviation;
-    const uint8_t *rgb;
+/* ---- binary rows, a column at a time */
+
+struct ply_rows {
+    uint8_t *to; /* the column's place in the first row */
+    size_t len;  /* of a row */
+    int n;
 };
 
-static inline uint8_t *put_length(uint8_t *to, double v, int as_float)
+static inline void put_doubles(struct ply_rows *rows, const double *v)
 {
-    if (as_float)
-        le_put_float(to, (float)v);
+    for (int i = 0; i < rows->n; i++)
+        le_put_double(rows->to + (size_t)i * rows->len, v[i]);
+    rows->to += 8;
+}
+
+static inline void put_floats(struct ply_rows *rows, const double *v)
+{
+    for (int i = 0; i < rows->n; i++)
+        le_put_float(rows->to + (size_t)i * rows->len, (float)v[i]);
+    rows->to += 4;
+}
+
+static void put_lengths(struct ply_rows *rows, const double *v, unsigned columns)
+{
+    if ((columns & PLY_FLOAT) != 0)
+        put_floats(rows, v);
     else
-        le_put_double(to, v);
-    return to + (as_float ? 4 : 8);
+        put_doubles(rows, v);
 }
 
-/* Returns the end of the row. Inlined with known columns, it has no branches. */
-static inline __attribute__((always_inline)) uint8_t *put_columns(uint8_t *to, const struct vertex *v, unsigned columns)
+static void put_echoes(struct ply_rows *rows, const struct track_points *p)
 {
-    const struct track_points *p = v->points;
-    const int i = v->i;
-    const int as_float = (columns & PLY_FLOAT) != 0;
-    for (int k = 0; k < 3; k++)
-        to = put_length(to, v->xyz[k], as_float);
-    if ((columns & PLY_RANGE) != 0) to = put_length(to, p->range_m[i], as_float);
-    if ((columns & PLY_REFLECTANCE) != 0) {
-        le_put_float(to, (float)p->reflectance_db[i]);
-        to += 4;
-    }
-    if ((columns & PLY_TIME) != 0) to = put_length(to, (double)p->t_ns[i] / 1e9, 0);
-    if ((columns & PLY_ECHO) != 0) {
-        to[0] = p->echo[i];
-        to[1] = p->echo_count[i];
-        to += 2;
-    }
-    if ((columns & PLY_LABEL) != 0) {
-        le_put16(to, p->label[i]);
-        to += 2;
-    }
-    if ((columns & PLY_STATION) != 0) {
-        le_put16(to, (uint16_t)v->station);
-        to += 2;
-    }
-    return to;
+    for (int i = 0; i < rows->n; i++)
+        le_put16(rows->to + (size_t)i * rows->len, (uint16_t)(p->echo[i] | p->echo_count[i] << 8));
+    rows->to += 2;
 }
 
-static uint8_t *put_binary(uint8_t *to, const struct vertex *v, unsigned columns)
+/* NULL: the same number in all rows. */
+static void put_shorts(struct ply_rows *rows, const uint16_t *v, uint16_t same)
 {
-    to = put_columns(to, v, columns);
-    if ((columns & PLY_FRAME) != 0) to = put_length(to, v->frame, 0);
-    if ((columns & PLY_ATTRIBUTES) != 0) {
-        le_put_float(to, (float)v->attribute->amplitude_db);
-        le_put_float(to + 4, (float)v->attribute->width_ns);
-        to += 8;
-    }
-    if ((columns & PLY_DEVIATION) != 0) {
-        le_put_float(to, (float)v->deviation);
-        to += 4;
-    }
-    if ((columns & PLY_COLOUR) == 0) return to;
-    memcpy(to, v->rgb, 3);
-    return to + 3;
+    for (int i = 0; i < rows->n; i++)
+        le_put16(rows->to + (size_t)i * rows->len, v != NULL ? v[i] : same);
+    rows->to += 2;
 }
+
+static void put_attributes(struct ply_rows *rows, const struct scanhead_attribute *a)
+{
+    for (int i = 0; i < rows->n; i++) {
+        uint8_t *to = rows->to + (size_t)i * rows->len;
+        le_put_float(to, (float)a[i].amplitude_db);
+        le_put_float(to + 4, (float)a[i].width_ns);
+    }
+    rows->to += 8;
+}
+
+static void put_colours(struct ply_rows *rows, const uint8_t (*rgb)[3])
+{
+    for (int i = 0; i < rows->n; i++)
+        memcpy(rows->to + (size_t)i * rows->len, rgb[i], 3);
+    rows->to += 3;
+}
+
+static void put_binary(struct ply *ply, struct ply_rows rows)
+{
+    const struct track *t = &ply->base.track;
+    const struct track_points *p = &t->points;
+    const unsigned columns = ply->facts.columns;
+    put_lengths(&rows, p->x, columns);
+    put_lengths(&rows, p->y, columns);
+    put_lengths(&rows, p->z, columns);
+    if ((columns & PLY_RANGE) != 0) put_lengths(&rows, p->range_m, columns);
+    if ((columns & PLY_REFLECTANCE) != 0) put_floats(&rows, p->reflectance_db);
+    if ((columns & PLY_TIME) != 0) put_doubles(&rows, ply->time_s);
+    if ((columns & PLY_ECHO) != 0) put_echoes(&rows, p);
+    if ((columns & PLY_LABEL) != 0) put_shorts(&rows, p->label, 0);
+    if ((columns & PLY_STATION) != 0) put_shorts(&rows, NULL, (uint16_t)t->info.station);
+    if ((columns & PLY_FRAME) != 0) put_doubles(&rows, ply->frame);
+    if ((columns & PLY_ATTRIBUTES) != 0) put_attributes(&rows, t->attribute);
+    if ((columns & PLY_DEVIATION) != 0) put_floats(&rows, t->deviation);
+    if ((columns & PLY_COLOUR) != 0) put_colours(&rows, t->rgb);
+}
+
+/* ---- rows of text */
 
 /* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
  * digits would say nothing. "nan" without a sign, as some readers know no other. */
@@ -158,44 +173,60 @@ static size_t put_number(char *to, size_t room, int digits, double v)
     return n > 0 && (size_t)n < room ? (size_t)n : room;
 }
 
-/* Returns the end of the row, or NULL if numbers are too long for it. */
-static uint8_t *put_ascii(uint8_t *row, const struct vertex *v, unsigned columns, int degrees)
+/* Writes point i. Returns the end of the row, or NULL if numbers are too long for it. */
+static uint8_t *put_ascii(uint8_t *row, const struct ply *ply, int i)
 {
-    const struct track_points *p = v->points;
-    const int flat = degrees ? 12 : 6;
+    const struct track *t = &ply->base.track;
+    const struct track_points *p = &t->points;
+    const unsigned columns = ply->facts.columns;
+    const int flat = t->crs == NATIVE_CRS_GEODETIC ? 12 : 6;
     char *to = (char *)row;
     size_t n = 0;
     struct {
         double v;
         int digits;
-    } number[8] = {{v->xyz[0], flat}, {v->xyz[1], flat}, {v->xyz[2], 6}};
+    } number[8] = {{p->x[i], flat}, {p->y[i], flat}, {p->z[i], 6}};
     size_t k = 3;
 #define TAKE(part, value, places) \
     if ((columns & (part)) != 0) number[k].v = (value), number[k++].digits = (places)
-    TAKE(PLY_RANGE, p->range_m[v->i], 6);
-    TAKE(PLY_REFLECTANCE, p->reflectance_db[v->i], 2);
-    TAKE(PLY_TIME, (double)p->t_ns[v->i] / 1e9, 9);
-    for (size_t i = 0; i < k && n < TEXT_LEN; i++)
-        n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
+    TAKE(PLY_RANGE, p->range_m[i], 6);
+    TAKE(PLY_REFLECTANCE, p->reflectance_db[i], 2);
+    TAKE(PLY_TIME, ply->time_s[i], 9);
+    for (size_t j = 0; j < k && n < TEXT_LEN; j++)
+        n += put_number(to + n, TEXT_LEN - n, number[j].digits, number[j].v);
     if (n >= TEXT_LEN) return NULL;
-    if ((columns & PLY_ECHO) != 0) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u ", p->echo[v->i], p->echo_count[v->i]);
-    if ((columns & PLY_LABEL) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", p->label[v->i]);
-    if ((columns & PLY_STATION) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", v->station);
+    if ((columns & PLY_ECHO) != 0) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u ", p->echo[i], p->echo_count[i]);
+    if ((columns & PLY_LABEL) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", p->label[i]);
+    if ((columns & PLY_STATION) != 0 && n < TEXT_LEN)
+        n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", t->info.station);
     if ((columns & PLY_FRAME) != 0 && n < TEXT_LEN)
-        n += (size_t)(isnan(v->frame) ? snprintf(to + n, TEXT_LEN - n, "nan ")
-                                      : snprintf(to + n, TEXT_LEN - n, "%.9g ", v->frame));
+        n += (size_t)(isnan(ply->frame[i]) ? snprintf(to + n, TEXT_LEN - n, "nan ")
+                                           : snprintf(to + n, TEXT_LEN - n, "%.9g ", ply->frame[i]));
     k = 0;
-    TAKE(PLY_ATTRIBUTES, v->attribute->amplitude_db, 2);
-    TAKE(PLY_ATTRIBUTES, v->attribute->width_ns, 2);
-    TAKE(PLY_DEVIATION, v->deviation, 3);
+    TAKE(PLY_ATTRIBUTES, t->attribute[i].amplitude_db, 2);
+    TAKE(PLY_ATTRIBUTES, t->attribute[i].width_ns, 2);
+    TAKE(PLY_DEVIATION, t->deviation[i], 3);
 #undef TAKE
-    for (size_t i = 0; i < k && n < TEXT_LEN; i++)
-        n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
+    for (size_t j = 0; j < k && n < TEXT_LEN; j++)
+        n += put_number(to + n, TEXT_LEN - n, number[j].digits, number[j].v);
     if ((columns & PLY_COLOUR) != 0 && n < TEXT_LEN)
-        n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u ", v->rgb[0], v->rgb[1], v->rgb[2]);
+        n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u ", t->rgb[i][0], t->rgb[i][1], t->rgb[i][2]);
     if (n >= TEXT_LEN) return NULL;
     to[n - 1] = '\n'; /* the blank after the last number */
     return row + n;
+}
+
+/* *to is moved on. SH_EFORMAT: a coordinate is too long; what was put before that counts. */
+static int put_text_rows(struct ply *ply, int n, uint8_t **to, struct sh_err *err)
+{
+    const struct track_points *p = &ply->base.track.points;
+    for (int i = 0; i < n; i++) {
+        uint8_t *end = put_ascii(*to, ply, i);
+        if (end == NULL) return recorder_fail_huge(&ply->base, (const double[3]){p->x[i], p->y[i], p->z[i]}, err);
+        *to = end;
+        ply->facts.n_vertices++;
+    }
+    return SH_OK;
 }
 
 /* The time may come late. 1: now. */
@@ -252,6 +283,12 @@ static int check_floats_on_the_way(const struct ply *ply, int n, struct sh_err *
     return most <= FLOAT_MOST_M + t->info.range_max_m ? 0 : fail_float(ply->base.file.path, most, err);
 }
 
+static unsigned columns_spared(unsigned columns)
+{
+    return ((columns & PLY_RANGE) != 0 ? 0 : TRACK_RANGE) | ((columns & PLY_REFLECTANCE) != 0 ? 0 : TRACK_REFLECTANCE) |
+           ((columns & PLY_TIME) != 0 ? 0 : TRACK_TIME) | ((columns & PLY_LABEL) != 0 ? 0 : TRACK_LABEL);
+}
+
 /* Room for the header is made when the number of surfaces is known. */
 static int ply_scan(void *rec, struct sh_err *err)
 {
@@ -259,6 +296,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     const struct scanhead_info *info = &ply->base.track.info;
     struct ply_facts *facts = &ply->facts;
     facts->columns = ply_columns_there(&ply->base.track, ply->base.options.columns);
+    ply->base.track.spared = columns_spared(facts->columns);
     struct ply_head head = {.station = info->station};
     snprintf(head.idn, sizeof head.idn, "%s", info->idn);
     snprintf(head.profile, sizeof head.profile, "%s", info->profile);
@@ -273,73 +311,42 @@ static int ply_scan(void *rec, struct sh_err *err)
     return rc == 0 && is_new ? write_header(ply, 1, err) : rc;
 }
 
-/* Point i of the batch, placed; 0: it is left out. */
-static inline int take_vertex(struct ply *ply, int i, struct vertex *v)
+/* Moves the batch to its place in the scene. Returns how many points are left. */
+static int place_points(struct ply *ply, int n)
 {
     struct track *t = &ply->base.track;
-    const struct track_points *p = &t->points;
-    if (p->echo_count[i] == 0 && !ply->facts.empty_shots) return 0;
-    v->points = p;
-    v->i = i;
-    v->xyz[0] = p->x[i];
-    v->xyz[1] = p->y[i];
-    v->xyz[2] = p->z[i];
-    if (t->info.geo) return 1;
-    station_pose_forward(&t->pose, v->xyz);
-    return p->echo_count[i] == 0 || !track_is_nowhere(t, v->xyz[0], v->xyz[1], v->xyz[2]);
+    struct track_points *p = &t->points;
+    if (t->info.geo) return n;
+    station_pose_forward_all(&t->pose, n, p->x, p->y, p->z);
+    return track_leave_out(t, n);
 }
 
-/* Binary rows with the columns that every head's points have, which most recordings are made of. */
-static inline __attribute__((always_inline)) uint8_t *put_rows(struct ply *ply, int n, uint8_t *to, unsigned columns)
-{
-    struct vertex v = {.station = ply->base.track.info.station};
-    for (int i = 0; i < n; i++) {
-        if (!take_vertex(ply, i, &v)) continue;
-        to = put_columns(to, &v, columns);
-        ply->facts.n_vertices++;
-    }
-    return to;
-}
-
-/* NULL: a coordinate is too long. What was put before that counts. */
-static uint8_t *put_any_rows(struct ply *ply, int n, uint8_t **to, struct sh_err *err)
+static void set_columns(struct ply *ply, int n)
 {
     const struct track *t = &ply->base.track;
-    const unsigned columns = ply->facts.columns;
-    const int degrees = t->crs == NATIVE_CRS_GEODETIC;
-    struct vertex v = {.station = t->info.station};
-    for (int i = 0; i < n; i++) {
-        if (!take_vertex(ply, i, &v)) continue;
-        v.frame = t->info.moving ? t->frame[i] : t->info.frame;
-        v.attribute = &t->attribute[i];
-        v.deviation = t->deviation[i];
-        v.rgb = t->rgb[i];
-        uint8_t *end = ply->facts.ascii ? put_ascii(*to, &v, columns, degrees) : put_binary(*to, &v, columns);
-        if (end == NULL) {
-            recorder_fail_huge(&ply->base, v.xyz, err);
-            return NULL;
-        }
-        *to = end;
-        ply->facts.n_vertices++;
-    }
-    return *to;
+    if ((ply->facts.columns & PLY_TIME) != 0) track_seconds(t, n, ply->time_s);
+    for (int i = 0; i < n && (ply->facts.columns & PLY_FRAME) != 0; i++)
+        ply->frame[i] = t->info.moving ? t->frame[i] : t->info.frame;
 }
 
 static int ply_points(void *rec, int n, struct sh_err *err)
 {
-    enum { USUAL = PLY_RANGE | PLY_REFLECTANCE | PLY_TIME | PLY_ECHO | PLY_LABEL | PLY_STATION };
     struct ply *ply = rec;
+    const size_t len = ply->facts.ascii ? TEXT_LEN : ply_row_len(ply->facts.columns);
     int rc = set_gps(ply) ? write_header(ply, 1, err) : 0;
-    uint8_t *from = rc == 0 ? outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err) : NULL, *to = from;
+    uint8_t *from = rc == 0 ? outfile_room(&ply->base.file, (size_t)n * len, err) : NULL, *to = from;
     if (from == NULL) return rc != 0 ? rc : SH_EIO;
     rc = check_floats_on_the_way(ply, n, err);
     if (rc != 0) return rc;
-    if (!ply->facts.ascii && ply->facts.columns == USUAL)
-        to = put_rows(ply, n, to, USUAL);
-    else if (!ply->facts.ascii && (ply->facts.columns & ~(unsigned)(USUAL | PLY_FLOAT)) == 0)
-        to = put_rows(ply, n, to, ply->facts.columns);
-    else if (put_any_rows(ply, n, &to, err) == NULL)
-        rc = SH_EFORMAT;
+    n = place_points(ply, n);
+    set_columns(ply, n);
+    if (ply->facts.ascii) {
+        rc = put_text_rows(ply, n, &to, err);
+    } else {
+        put_binary(ply, (struct ply_rows){.to = to, .len = len, .n = n});
+        to += (size_t)n * len;
+        ply->facts.n_vertices += (uint64_t)n;
+    }
     outfile_used(&ply->base.file, (size_t)(to - from)); /* also before a failure: the file may be kept */
     return rc;
 }

@@ -202,12 +202,28 @@ unsigned ply_columns_there(const struct track *track, unsigned asked)
     return asked;
 }
 
+static int is_as_float(unsigned asked, const struct column *c)
+{
+    return (asked & PLY_FLOAT) != 0 && (c->part == 0 || c->part == PLY_RANGE);
+}
+
+size_t ply_row_len(unsigned asked)
+{
+    size_t len = 0;
+    for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++) {
+        const struct column *c = &columns[i];
+        if (c->part != 0 && (asked & c->part) == 0) continue;
+        const char *type = is_as_float(asked, c) ? "float" : c->type;
+        len += strcmp(type, "double") == 0 ? 8 : strcmp(type, "float") == 0 ? 4 : strcmp(type, "ushort") == 0 ? 2 : 1;
+    }
+    return len;
+}
+
 /* CloudCompare shows columns of other names than these only where it is told to. */
 static void put_column(FILE *out, const struct ply_facts *facts, const struct column *c)
 {
-    const int as_float = (facts->columns & PLY_FLOAT) != 0 && (c->part == 0 || c->part == PLY_RANGE);
-    fprintf(out, "property %s %s%s\n", as_float ? "float" : c->type, facts->scalar_names && !c->plain ? "scalar_" : "",
-            c->name);
+    const char *type = is_as_float(facts->columns, c) ? "float" : c->type;
+    fprintf(out, "property %s %s%s\n", type, facts->scalar_names && !c->plain ? "scalar_" : "", c->name);
 }
 
 /* How much of the names and of the padding goes into the header. */

@@ -38,6 +38,8 @@ struct ply_facts {
 
 /* The columns that points of the track have. To be called once the track has begun. */
 unsigned ply_columns_there(const struct track *track, unsigned columns);
+/* Bytes of a binary row of these columns. */
+size_t ply_row_len(unsigned columns);
 /* The meaning of the track's coordinates, in words. */
 const char *ply_crs_text(const struct track *track);
 /* "label N OBJECT | MATERIAL", a line each with `before` in front, of all surfaces that the stream has named so far. */

@@ -38,6 +38,24 @@ void station_pose_reverse_all(const struct station_pose *pose, int n, double *x,
     reverse_all(pose->shift_m, pose->rotation, n, x, y, z);
 }
 
+VEC_CLONES static void forward_all(const double *restrict s, const double *restrict r, int n, double *restrict x,
+                                   double *restrict y, double *restrict z)
+{
+    for (int i = 0; i < n; i++) {
+        const double p[3] = {x[i], y[i], z[i]};
+        double turned[3];
+        mat3_apply(r, p, turned);
+        x[i] = s[0] + turned[0];
+        y[i] = s[1] + turned[1];
+        z[i] = s[2] + turned[2];
+    }
+}
+
+void station_pose_forward_all(const struct station_pose *pose, int n, double *x, double *y, double *z)
+{
+    forward_all(pose->shift_m, pose->rotation, n, x, y, z);
+}
+
 /* By the largest of the four components, so that none is the difference of near numbers (Shepperd 1978). */
 void station_pose_quaternion(const struct station_pose *pose, double q[4])
 {

@@ -34,6 +34,8 @@ static inline void station_pose_forward(const struct station_pose *pose, double 
 void station_pose_reverse(const struct station_pose *pose, double p[3]);
 /* Takes n points back, in columns: the same figures, bit for bit. */
 void station_pose_reverse_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
+/* Takes them forward, likewise. */
+void station_pose_forward_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
 
 /* The unit quaternion w, x, y, z of the rotation; w is not negative. */
 void station_pose_quaternion(const struct station_pose *pose, double q[4]);

@@ -157,39 +157,6 @@ static uint64_t first_row(const struct track *t, const struct scanhead_frame *fr
     return whole_u32(since_s * t->info.prr_hz);
 }
 
-/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. No head sends a frame that
- * begins with a later echo; such an echo goes to the row before. */
-static uint64_t number_rows(struct track *t, uint64_t row, int n)
-{
-    for (int i = 0; i < n; i++) {
-        if (t->points.echo[i] <= 1) row++;
-        t->row[i] = (uint32_t)(row > 0 ? row - 1 : 0);
-    }
-    return row;
-}
-
-static void keep_point(struct track *t, int from, int to)
-{
-    const struct scanhead_point point = track_get_point(t, from);
-    track_set_point(t, to, &point);
-    t->row[to] = t->row[from];
-    t->index[to] = t->index[from];
-    t->frame[to] = t->frame[from];
-}
-
-/* Returns how many points are left. */
-static int leave_out_nowhere(struct track *t, int n)
-{
-    int kept = 0;
-    for (int i = 0; i < n; i++) {
-        const struct track_points *p = &t->points;
-        if (p->echo_count[i] != 0 && track_is_nowhere(t, p->x[i], p->y[i], p->z[i])) continue;
-        if (kept != i) keep_point(t, i, kept);
-        kept++;
-    }
-    return kept;
-}
-
 /* Positions of the geo layout need no pose. The frame scalar does; it is NaN where the pose was lost. */
 static void set_geo_frames(struct track *t, int n)
 {
@@ -198,36 +165,25 @@ static void set_geo_frames(struct track *t, int n)
         t->frame[i] = scanhead_pose(t->sh, t->points.t_ns[i], &pose) == SCANHEAD_OK ? pose.frame : NAN;
 }
 
-/* As scanhead_to_scene. */
-static int to_scene(struct track *t, int n)
-{
-    struct scanhead_point point[TRACK_BATCH];
-    struct track_points *p = &t->points;
-    for (int i = 0; i < n; i++)
-        point[i] = track_get_point(t, i);
-    const int lost = scanhead_to_scene(t->sh, point, (uint32_t)n, t->frame);
-    for (int i = 0; i < n; i++)
-        p->x[i] = point[i].x, p->y[i] = point[i].y, p->z[i] = point[i].z;
-    return lost;
-}
-
 /* Returns how many points are left, or a negative error. */
 static int place_moving(struct track *t, int n, struct sh_err *err)
 {
+    uint16_t index[TRACK_BATCH];
     int kept = 0;
     if (t->info.geo) {
         set_geo_frames(t, n);
         return n;
     }
-    const int lost = to_scene(t, n);
+    const int lost = track_to_scene(t, n);
     if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(t->sh));
     for (int i = 0; i < n; i++) {
         if (t->points.echo_count[i] != 0 && isnan(t->points.x[i])) {
             t->missing.n_without_pose++;
             continue;
         }
-        keep_point(t, i, kept++);
+        index[kept++] = (uint16_t)i;
     }
+    if (kept < n) track_pick(t, index, kept);
     return kept;
 }
 
@@ -245,7 +201,7 @@ static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err
         t->index[i] = first + (uint32_t)i;
     int kept = t->info.moving ? place_moving(t, n, err) : n;
     if (kept < 0) return kept;
-    kept = leave_out_nowhere(t, kept);
+    kept = track_leave_out(t, kept);
     count_unheld(t, kept);
     t->waited = 0;
     if (!track_waits(t)) return track_give(t, kept, err);
@@ -268,34 +224,15 @@ static int begin_scan(struct track *t, struct sh_err *err)
     return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;
 }
 
-/* Columns that neither the recorder nor its colours and waveforms need are not computed. */
-static struct scanhead_columns columns_to(struct track *t)
-{
-    struct track_points *p = &t->points;
-    const int made = t->has_colours && t->colour.given; /* colours, from any figure of the point */
-    const unsigned spared = made || track_waits(t) || t->info.moving ? 0 : t->spared;
-    return (struct scanhead_columns){
-        .x = p->x,
-        .y = p->y,
-        .z = p->z,
-        .range_m = (spared & TRACK_RANGE) != 0 ? NULL : p->range_m,
-        .reflectance_db = (spared & TRACK_REFLECTANCE) != 0 ? NULL : p->reflectance_db,
-        .t_ns = (spared & TRACK_TIME) != 0 ? NULL : p->t_ns,
-        .label = (spared & TRACK_LABEL) != 0 ? NULL : p->label,
-        .echo = p->echo,
-        .echo_count = p->echo_count,
-    };
-}
-
 /* Takes all points of the frame. row: that of the first one. */
 static int take_batches(struct track *t, const struct scanhead_frame *frame, uint64_t row, struct sh_err *err)
 {
-    const struct scanhead_columns to = columns_to(t);
+    const struct scanhead_columns to = track_columns_to(t);
     int rc = 0;
     for (uint32_t first = 0; rc == 0 && first < frame->n_points;) {
         int n = scanhead_columns(t->sh, frame, first, &to, TRACK_BATCH);
         if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(t->sh));
-        row = number_rows(t, row, n);
+        row = track_number_rows(t, row, n);
         rc = take_batch(t, first, n, err);
         first += (uint32_t)n;
     }

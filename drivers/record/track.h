@@ -33,7 +33,7 @@ struct track_points {
     uint8_t echo[TRACK_BATCH], echo_count[TRACK_BATCH];
 };
 
-/* Columns that a recorder may do without. */
+/* Columns that a recorder may do without. They are not computed unless the track needs them itself. */
 enum track_column { TRACK_RANGE = 1 << 0, TRACK_REFLECTANCE = 1 << 1, TRACK_TIME = 1 << 2, TRACK_LABEL = 1 << 3 };
 
 struct track_waiting;
@@ -56,6 +56,7 @@ struct track_ops {
 struct track_missing {
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
+    uint64_t n_empty;              /* shots without echo, with no_empty */
     uint64_t n_nowhere;            /* echoes whose coordinates are infinite or NaN, of a broken stream */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
@@ -82,6 +83,7 @@ struct track {
     const struct track_ops *ops;
     void *rec; /* what ops are called with */
     struct colour_choice colour;
+    int no_empty;    /* 1: shots without echo are left out and counted */
     unsigned spared; /* enum track_column: the recorder reads none of these; may change when a scan begins */
     /* of the frame that the points at hand are in */
     struct scanhead *sh;    /* of the last frame of any kind */
@@ -131,8 +133,16 @@ struct track {
  * station number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
-/* 1 where an echo's position is infinite or NaN, as in a broken stream. It is counted, and the caller leaves it out.
- * Points come out of the track with finite coordinates; a recorder that transforms them asks again. */
+/* For recorders: leaves only points index[0..n-1] of the batch in it; the indices rise. */
+void track_pick(struct track *track, const uint16_t *index, int n);
+/* Leaves echoes out whose positions are infinite or NaN, as in a broken stream, and with no_empty shots without echo.
+ * Both are counted. Returns how many of the n points of the batch are left. The track has done this before it gives
+ * points out; a recorder that has moved them asks again. */
+int track_leave_out(struct track *track, int n);
+/* Writes the times of the n points in seconds, as t_ns / 1e9. */
+void track_seconds(const struct track *track, int n, double *to);
+
+/* The same question for one point. 1: it is counted, and the caller leaves it out. */
 static inline int track_is_nowhere(struct track *track, double x, double y, double z)
 {
     if ((x - x) + (y - y) + (z - z) == 0) return 0; /* a difference is NaN where one of them is not finite */

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to drivers/record/track*.c: points that wait for attributes, colours and waveforms. */
+/* Private to drivers/record/track*.c: columns of a batch, and points that wait for attributes, colours and waveforms.
+ */
 #ifndef DRIVERS_RECORD_TRACK_INSIDE_H
 #define DRIVERS_RECORD_TRACK_INSIDE_H
 
 #include "drivers/record/track.h"
+
+/* ---- the batch's columns (track_columns.c) */
 
 /* Point i of the batch as a struct, without encoder angles; and the way back. */
 static inline struct scanhead_point track_get_point(const struct track *track, int i)
@@ -33,6 +36,15 @@ static inline void track_set_point(struct track *track, int i, const struct scan
     p->echo[i] = from->echo;
     p->echo_count[i] = from->echo_count;
 }
+
+/* Where the library writes points. */
+struct scanhead_columns track_columns_to(struct track *track);
+/* Numbers the rows of n points. `row` is the number of pulses of the line before them; returns that after them. */
+uint64_t track_number_rows(struct track *track, uint64_t row, int n);
+/* As scanhead_to_scene. */
+int track_to_scene(struct track *track, int n);
+
+/* ---- points that wait (track_waiting.c) */
 
 /* Whether frames that follow the points are wanted, and sent. */
 int track_waits(const struct track *track);

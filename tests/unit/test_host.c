@@ -220,6 +220,27 @@ static void test_file(void **state)
     unlink(path);
 }
 
+/* Times within a second, across its end, back and forth, and of a broken stream. */
+static void expect_same_times(const struct scanhead *sh)
+{
+    static const int64_t from_step_ns[][2] = {
+        {0, 1},           {123456789, 3333333}, {999999990, 1},           {-5, 1},
+        {7000000000, -7}, {INT64_MIN, 1},       {INT64_MAX - 99, 1},      {1250000000, 0},
+        {0, 1 << 30},     {-1000000050, 1},     {-1315964790000000001, 1}};
+    for (size_t k = 0; k < sizeof from_step_ns / sizeof *from_step_ns; k++) {
+        int64_t t_ns[100];
+        double seen_s[100], want_s;
+        for (int i = 0; i < 100; i++)
+            t_ns[i] = from_step_ns[k][0] + i * from_step_ns[k][1];
+        assert_int_equal(scanhead_gps_times(sh, t_ns, 100, seen_s), 0);
+        for (int i = 0; i < 100; i++) {
+            assert_int_equal(scanhead_gps_time(sh, t_ns[i], &want_s), 0);
+            assert_memory_equal(&seen_s[i], &want_s, sizeof want_s);
+        }
+    }
+    assert_int_equal(scanhead_gps_times(sh, NULL, 0, NULL), 0);
+}
+
 /* 2011-09-14T01:46:25Z is GPS 1e9 s (published by LIGO's tconvert), so its adjusted standard time is 0. */
 static void test_gps_time(void **state)
 {
@@ -237,6 +258,7 @@ static void test_gps_time(void **state)
     assert_true(fabs(t_s - 1.23456789) < 1e-15); /* seconds and fraction are rounded apart */
     assert_int_equal(scanhead_gps_time(sh, -2500000000, &t_s), 0);
     assert_true(t_s == -2.5);
+    expect_same_times(sh);
     /* The head's clock was set ahead by 3.75 s between: the second of GPS 1e9 + 5 began 1.25 s after the scan. */
     put_event(head, NATIVE_EV_PPS, 1315964790, 6250000000, 1000000005, 0);
     expect_frame(sh, SCANHEAD_EVENT, &f);
@@ -248,10 +270,12 @@ static void test_gps_time(void **state)
     expect_frame(sh, SCANHEAD_POINTS, &f);
     assert_int_equal(scanhead_gps_time(sh, 7000000000 - 500, &t_s), 0);
     assert_true(t_s == 5.75);
+    expect_same_times(sh);
     /* This head doesn't know the time. */
     put_event(head, NATIVE_EV_SCAN_START, 2, 9000000000, 0, 0);
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(scanhead_gps_time(sh, 0, &t_s), SCANHEAD_ESTATE);
+    assert_int_equal(scanhead_gps_times(sh, &(const int64_t){0}, 1, &t_s), SCANHEAD_ESTATE);
     close(head);
     scanhead_close(sh);
 }

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* Points of a batch as a LAS file has them: figures in columns, and the rows that are written of them. The loops are
+ * vectors; the figures are those of the formulas beside them, to the last count. Pure. */
+#ifndef DRIVERS_RECORD_LAS_COLUMNS_H
+#define DRIVERS_RECORD_LAS_COLUMNS_H
+
+#include "drivers/record/las_header.h"
+
+struct las_columns {
+    int32_t xyz[3][TRACK_BATCH]; /* counts */
+    uint16_t intensity[TRACK_BATCH], scan_angle[TRACK_BATCH];
+    uint8_t returns[TRACK_BATCH]; /* number and count, as a record has them */
+    double time_s[TRACK_BATCH];
+    uint16_t amplitude[TRACK_BATCH], width[TRACK_BATCH], deviation[TRACK_BATCH]; /* with attributes */
+    /* With waveforms: the packet, the return's time after the packet's first sample, and how coordinates change along a
+     * picosecond back to the head. Zeros: the point has none. */
+    struct las_packet packet[TRACK_BATCH];
+    float location_ps[TRACK_BATCH], back_ps[TRACK_BATCH][3];
+};
+
+/* One coordinate in counts of `scale` from `offset`, rounded. Returns the number of points before the first one that is
+ * too far for 32 bits, or NaN. */
+int las_set_counts(const double *at, int n, double offset, double scale, int32_t *to);
+/* 32768 + 100 times the reflectance; 0 where it is not modelled. */
+void las_set_intensities(const double *reflectance_db, int n, uint16_t *to);
+/* The angle from straight down, of points in the head's frame, in steps of 0.006 degrees: las_scan_angle of each.
+ * Returns how many have none; theirs is 0. */
+uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, int n, uint16_t *to);
+/* The formula. SCAN_ANGLE_NONE: the position is NaN. */
+enum { SCAN_ANGLE_NONE = UINT16_MAX };
+uint16_t las_scan_angle(double x, double y, double z);
+
+/* Writes n rows of las_point_len(). The track's labels, station and colours are those of the points. */
+void las_put_rows(const struct las_facts *facts, const struct las_columns *columns, int n, uint8_t *to);
+/* Counts n rows, as las_count_record does one. */
+void las_count_rows(struct las_facts *facts, const struct las_columns *columns, int n);
+
+#endif
