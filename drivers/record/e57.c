@@ -14,6 +14,7 @@
 
 #include "core/bytes.h"
 #include "core/grow.h"
+#include "core/vecmath.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_records.h"
@@ -137,6 +138,14 @@ static int is_due(const struct e57 *e, unsigned n, int64_t t_ns)
     return n >= 8 && t_ns - e->t0_ns >= PACKET_NS;
 }
 
+VEC_CLONES static int64_t find_latest(const int64_t *restrict t_ns, int n)
+{
+    int64_t latest = t_ns[0];
+    for (int i = 1; i < n; i++)
+        latest = t_ns[i] > latest ? t_ns[i] : latest;
+    return latest;
+}
+
 /* How many points from i on, of at most n, go into one packet one after the other: 1 at least. */
 static int count_run(const struct e57 *e, int i, int n)
 {
@@ -145,6 +154,7 @@ static int count_run(const struct e57 *e, int i, int n)
     const int room = (int)(g->most - g->n);
     int k = 1;
     if (n > room) n = room;
+    if (find_latest(t_ns, n) - e->t0_ns < PACKET_NS) return n;
     while (k < n && !is_due(e, g->n + (unsigned)k, t_ns[k]))
         k++;
     return k;

@@ -158,19 +158,33 @@ VEC_CLONES static void find_limits16(const uint8_t *restrict v, unsigned n, uint
     limit[1] = high;
 }
 
+/* Two records a byte; the last byte may have a 0 besides. */
+VEC_CLONES static unsigned find_most4(const uint8_t *restrict v, size_t n_bytes)
+{
+    uint8_t most = 0;
+    for (size_t i = 0; i < n_bytes; i++) {
+        const uint8_t low = v[i] & 15, high = v[i] >> 4, x = low > high ? low : high;
+        most = x > most ? x : most;
+    }
+    return most;
+}
+
 typedef void count_run(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n);
 
-/* Counts the records whose field in stream s is 0, run by run. Where a byte has none but such records, it is one step. */
+/* Counts the records whose field in stream s is 0, run by run. Bytes with nothing but such records are one step, and so
+ * are bytes with none. */
 static void count_zeros(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], int s, unsigned n,
                         count_run *count)
 {
     const unsigned bits = stream_bits[s], a_byte = 8 / bits;
-    for (unsigned i = 0; i < n; i++) {
+    const uint8_t none = bits == 1 ? 0xff : 0xaa; /* a field of two bits is 2 or 0 */
+    for (unsigned i = 0; i < n;) {
         const unsigned first = i;
         while (i < n && get_bits(stream[s], bits, i) == 0)
             i += i % a_byte == 0 && stream[s][i / a_byte] == 0 ? a_byte : 1;
-        if (i > n) i = n;
-        if (i > first) count(scan, stream, first, i - first);
+        if (i > first) count(scan, stream, first, (i < n ? i : n) - first);
+        while (i < n && get_bits(stream[s], bits, i) != 0)
+            i += i % a_byte == 0 && stream[s][i / a_byte] == none ? a_byte : 1;
     }
 }
 
@@ -213,11 +227,8 @@ static void count_indices(struct e57_scan *scan, const uint8_t *const stream[E57
     scan->row_max = row[1];
     scan->column_min = column[0];
     scan->column_max = column[1];
-    for (size_t i = 0; i < stream_len(E57_RETURN, n); i++) { /* two a byte; the last byte may have a 0 besides */
-        const unsigned one = stream[E57_RETURN][i] & 15u, other = stream[E57_RETURN][i] >> 4;
-        if (one > scan->return_max) scan->return_max = one;
-        if (other > scan->return_max) scan->return_max = other;
-    }
+    const unsigned most = find_most4(stream[E57_RETURN], stream_len(E57_RETURN, n));
+    if (most > scan->return_max) scan->return_max = most;
     scan->n_records += n;
 }
 
