@@ -11,7 +11,7 @@
 
 enum {
     OUTFILE_BUFFER = 1 << 20,
-    OUTFILE_BLOCK = 4096,           /* of direct writing: places and lengths are multiples of it */
+    OUTFILE_BLOCK = 4096,          /* of direct writing: places and lengths are multiples of it */
     OUTFILE_DIRECT_FROM = 8 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
