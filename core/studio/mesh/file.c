@@ -6,11 +6,12 @@
 #include <unistd.h>
 
 #include "core/decimal.h"
+#include "core/direct.h"
 #include "core/grow.h"
 #include "core/studio/mesh/inside.h"
 #include "core/newfile.h"
 
-enum { BUFFER = 1 << 18, STEPS_BETWEEN_STOPS = 1 << 16 };
+enum { BUFFER = 1 << 20, STEPS_BETWEEN_STOPS = 1 << 16 };
 
 static int fail_write(const struct mesh_file *file, struct sh_err *err)
 {
@@ -23,12 +24,32 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
 /* ---- a stream that remembers why it failed. It seems to take all that follows: Assimp's exporter of FBX ends the program
  * where a write does not move its place on. */
 
+/* Whether the writes that follow go past the system's cache. */
+static void pass_cache(struct mesh_file *file, int on)
+{
+    if (file->is_direct < 0 || file->is_direct == on) return;
+    file->is_direct = direct_set(file->fd, on) == 0 ? on : -1;
+}
+
+/* A full buffer, as the stream writes them one after the other. */
+static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
+{
+    return file->at >= DIRECT_FROM && (uintptr_t)data % DIRECT_BLOCK == 0 && n % DIRECT_BLOCK == 0 &&
+           file->at % DIRECT_BLOCK == 0;
+}
+
 static ssize_t on_write(void *cookie, const char *data, size_t n)
 {
     struct mesh_file *file = cookie;
+    pass_cache(file, is_full_buffer(file, data, n));
     for (size_t done = 0; done < n && file->error == 0;) {
         const ssize_t wrote = pwrite(file->fd, data + done, n - done, file->at + (off_t)done);
         if (wrote < 0 && errno == EINTR) continue;
+        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't after all, or wrote a part before */
+            pass_cache(file, 0);
+            file->is_direct = -1;
+            continue;
+        }
         if (wrote <= 0) file->error = wrote < 0 ? errno : ENOSPC;
         if (wrote > 0) done += (size_t)wrote;
     }
@@ -40,6 +61,7 @@ static ssize_t on_write(void *cookie, const char *data, size_t n)
 static ssize_t on_read(void *cookie, char *data, size_t n)
 {
     struct mesh_file *file = cookie;
+    pass_cache(file, 0);
     const ssize_t got = pread(file->fd, data, n, file->at);
     if (got > 0) file->at += got;
     return got;
@@ -57,8 +79,10 @@ static int on_seek(void *cookie, off64_t *at, int whence)
 static int open_stream(struct mesh_file *file, struct sh_err *err)
 {
     file->file = fopencookie(file, "w+b", (cookie_io_functions_t){on_read, on_write, on_seek, NULL});
-    if (file->file == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", file->path);
-    setvbuf(file->file, NULL, _IOFBF, BUFFER);
+    file->buffer = aligned_alloc(DIRECT_BLOCK, BUFFER);
+    if (file->file == NULL || file->buffer == NULL)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", file->path);
+    setvbuf(file->file, file->buffer, _IOFBF, BUFFER);
     return SH_OK;
 }
 
@@ -68,6 +92,7 @@ static void release(struct mesh_file *file)
 {
     if (file->file != NULL) fclose(file->file);
     if (file->fd >= 0) close(file->fd);
+    free(file->buffer);
     free(file->path);
     free(file->part);
     free(file);

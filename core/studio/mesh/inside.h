@@ -14,9 +14,11 @@ struct mesh_file {
     char *path, *part;
     int fd;        /* -1: it is whole, and on the disk */
     FILE *file;    /* reads, too */
+    char *buffer;  /* of file, in whole blocks */
     int is_named;  /* it has its name by now */
     off_t at, end; /* of the stream, also after a write has failed */
     int error;     /* errno of the first write that failed; 0: none */
+    int is_direct; /* the descriptor writes past the system's cache, just now; -1: the file system can't do it */
 };
 
 /* The files of one output, which come and go together (file.c). Begins as zeros but for path. */
