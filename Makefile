@@ -193,7 +193,7 @@ $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.o $(BUILD)/head.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   head and studio, no main                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves waveform waveform_detect loop_cost loading kernels panorama copies)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves waveform waveform_detect loop_cost loading kernels panorama copies decode live)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 # LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
 LIMIT = tests/common/limit.c
@@ -212,7 +212,10 @@ $(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o
 $(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
 $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  LD    $@"
-	$(Q)$(CC) $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS)
+	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS)
+# Its bus is the unit tests' stand-in for libusb, which checks its user with cmocka.
+$(BUILD)/tests/bench/live: $(BUILD)/tests/unit/fake_libusb.c.o
+$(BUILD)/tests/bench/live: private override LDLIBS := -Wl,--as-needed -lcmocka $(LDLIBS)
 # stb_image_write shifts into the sign bit.
 $(BUILD)/tests/common/chart.c.o: private override SAN =
 # What computes, with sanitizers: a sixth of the code, which takes most of the time.
@@ -382,10 +385,11 @@ test-usb-million: deps
 
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
-#? bench             speed, and leaks of 10^8 rays; also bench-beam, -plain, -copies, -loading, -loop, -kernels, -page, -panorama, -velodyne, -waves
+#? bench             speed, and leaks of 10^8 rays; also bench-beam, -plain, -copies, -live, -loading, -loop, -kernels, -page, -panorama, -velodyne, -waves
 bench: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
 	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house,garden --reach --leaks 1e8 -o $(BUILD)/bench.json
+	@$(MAKE) --no-print-directory bench-speed
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam waveform waveform_detect)
@@ -398,13 +402,12 @@ bench-plain: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
 	@$(BUILD)/tests/bench/plain
 # The encoder of VLP-16 data packets, ns a firing.
-# A panorama of 0.1 degrees to binary PLY on one processor, beside Embree alone: every column, and coordinates as float.
+# A panorama of 0.1 degrees to files on one processor, beside Embree alone; last, PLY with coordinates as float alone.
 PANORAMA = taskset -c $(shell expr $(JOBS) - 1) $(BUILD)/tests/bench/panorama --set loop.threads=1
 bench-panorama: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/panorama
-	@$(PANORAMA)
+	@$(PANORAMA) --ending none,.ply,.las,.e57
 	@$(PANORAMA) --columns xyz,float
-	@$(PANORAMA) --ending none
 # A browser beside a head at its limit, and how fast the page is; some minutes.
 bench-page: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
@@ -430,8 +433,8 @@ bench-waves: deps-build
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
 	@$(BUILD)/tests/bench/kernels
-	@$(if $(filter x86_64-%,$(TARGET)),$(MAKE) --no-print-directory -j2 BUILD=$(BUILD)/avx2 CPPFLAGS='$(CPPFLAGS) -DVEC_ONE' \
-		CFLAGS='$(CFLAGS) -march=x86-64-v3 -w' $(BUILD)/avx2/tests/bench/kernels && echo "AVX2:" && $(BUILD)/avx2/tests/bench/kernels)
+	@$(call make_avx2,tests/bench/kernels)
+	@$(if $(AVX2),echo "AVX2:" && $(AVX2)/tests/bench/kernels)
 # The real loop, processor time a pulse, with and without stream_sha256. In turns with others: make bench-loop
 # WITH="'/path/scanhead' '/other --option'".
 WITH ?=

@@ -2,7 +2,9 @@
 /* These stream frames follow the points: attributes and colour of each point, sums of each line. waves.c has
  * waveforms. */
 #include <math.h>
+#include <string.h>
 
+#include "core/vecmath.h"
 #include "drivers/host/host.h"
 #include "drivers/protocol/native_waves.h"
 
@@ -45,14 +47,33 @@ static int attributes_from(struct scanhead *sh, const struct scanhead_frame *fra
     return (int)(n < max ? n : max);
 }
 
+/* Indices begin at 0, and `from` is the payload as many records on: a sum that may wrap makes no vectors. */
+VEC_CLONES static void set_deviations(const uint8_t *restrict from, uint32_t n_points, uint32_t n,
+                                      double *restrict deviation)
+{
+    for (uint32_t i = 0; i < n; i++)
+        deviation[i] = native_decode_deviation(from, n_points, i) / 1000.0;
+}
+
+VEC_CLONES static void set_attributes(const uint8_t *restrict from, uint32_t n,
+                                      struct scanhead_attribute *restrict attributes)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        struct native_attribute a;
+        native_decode_attribute(from, i, &a);
+        attributes[i].amplitude_db = a.amplitude_cdb == NATIVE_AMPLITUDE_NONE ? (double)NAN : a.amplitude_cdb / 100.0;
+        attributes[i].width_ns = a.width_cns == NATIVE_WIDTH_NONE ? (double)NAN : a.width_cns / 100.0;
+    }
+}
+
 int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, double *deviation,
                         uint32_t max)
 {
     if (scanhead_has_deviations(sh) != 1)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the head's attributes have no deviations", sh->source.name);
     const int n = attributes_from(sh, frame, first, max);
-    for (int i = 0; i < n; i++)
-        deviation[i] = native_decode_deviation(frame->payload, frame->n_points, first + (uint32_t)i) / 1000.0;
+    if (n > 0)
+        set_deviations(frame->payload + (size_t)first * NATIVE_DEVIATION_LEN, frame->n_points, (uint32_t)n, deviation);
     return n;
 }
 
@@ -60,12 +81,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
                         struct scanhead_attribute *attributes, uint32_t max)
 {
     const int n = attributes_from(sh, frame, first, max);
-    for (int i = 0; i < n; i++) {
-        struct native_attribute a;
-        native_decode_attribute(frame->payload, first + (uint32_t)i, &a);
-        attributes[i].amplitude_db = a.amplitude_cdb == NATIVE_AMPLITUDE_NONE ? (double)NAN : a.amplitude_cdb / 100.0;
-        attributes[i].width_ns = a.width_cns == NATIVE_WIDTH_NONE ? (double)NAN : a.width_cns / 100.0;
-    }
+    if (n > 0) set_attributes(frame->payload + (size_t)first * NATIVE_ATTRIBUTE_LEN, (uint32_t)n, attributes);
     return n;
 }
 
@@ -79,11 +95,8 @@ int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, ui
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;
     if (n > max) n = max;
-    for (uint32_t i = 0; i < n; i++) {
-        uint8_t rgb[3];
-        native_decode_colour(frame->payload, first + i, rgb);
-        colours[i] = (struct scanhead_colour){rgb[0], rgb[1], rgb[2]};
-    }
+    _Static_assert(sizeof *colours == NATIVE_COLOUR_LEN, "a colour is as on the wire");
+    memcpy(colours, frame->payload + NATIVE_COLOURS_HEAD_LEN + (size_t)first * NATIVE_COLOUR_LEN, n * sizeof *colours);
     return (int)n;
 }
 

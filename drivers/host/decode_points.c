@@ -25,22 +25,32 @@ void host_turn_table(struct scanhead *sh)
 {
     for (int i = 0; i < HOST_TURN_PARTS; i++) {
         double a = TWO_PI * i / HOST_TURN_PARTS;
-        sh->sin_part[i] = sin(a);
-        sh->cos_part[i] = cos(a);
+        sh->turn_part[i] = (struct host_turn_part){sin(a), cos(a)};
     }
 }
 
 /* ---- what all layouts share */
 
-VEC_CLONES static void take_words(const uint8_t *restrict row, int n, struct block *restrict b)
+VEC_CLONES static void split_fours(const uint32_t (*restrict four)[4], int n, struct block *restrict b)
 {
     for (int i = 0; i < n; i++) {
-        b->a[i] = le_get32(row + NATIVE_POINT_LEN * i);
-        b->b[i] = le_get32(row + NATIVE_POINT_LEN * i + 4);
-        b->c[i] = le_get32(row + NATIVE_POINT_LEN * i + 8);
-        b->middle[i] = le_get32(row + NATIVE_POINT_LEN * i + 12);
-        b->tail[i] = le_get32(row + NATIVE_POINT_LEN * i + 16);
+        b->a[i] = le32toh(four[i][0]);
+        b->b[i] = le32toh(four[i][1]);
+        b->c[i] = le32toh(four[i][2]);
+        b->middle[i] = le32toh(four[i][3]);
     }
+}
+
+/* Words that are four apart come into columns by shuffles; those that are five apart don't. */
+static void take_words(const uint8_t *row, int n, struct block *b)
+{
+    uint32_t four[BLOCK][4];
+    _Static_assert(NATIVE_POINT_LEN == sizeof four[0] + sizeof b->tail[0], "five words a row");
+    for (int i = 0; i < n; i++, row += NATIVE_POINT_LEN) {
+        memcpy(four[i], row, sizeof four[i]);
+        b->tail[i] = le_get32(row + sizeof four[i]);
+    }
+    split_fours((const uint32_t(*)[4])four, n, b);
 }
 
 VEC_INLINE struct native_point point_of_middle(uint32_t middle)
@@ -190,23 +200,45 @@ VEC_CLONES static void set_turns(const uint32_t *restrict count, int n, double p
         turn[i] = count[i] * per_count;
 }
 
-/* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
- * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of u itself. Angles in
- * turns need no reduction by an inexact pi. */
-VEC_CLONES static void sincos_turns(const double *restrict sin_part, const double *restrict cos_part,
-                                    const double *restrict u, int n, double *restrict s, double *restrict c)
+/* The table's part that is nearest to u[n] >= 0 turns, and the rest beside it in radians. */
+VEC_CLONES static void split_turns(const double *restrict u, int n, uint32_t *restrict part, double *restrict rest_rad)
 {
     for (int i = 0; i < n; i++) {
-        const double part = u[i] * HOST_TURN_PARTS;
+        const double parts = u[i] * HOST_TURN_PARTS;
         uint64_t k;
-        const double whole = floor_of(part + 0.5, &k);
-        const double r = (part - whole) * (TWO_PI / HOST_TURN_PARTS), r2 = r * r;
+        const double whole = floor_of(parts + 0.5, &k);
+        part[i] = (uint32_t)k & (HOST_TURN_PARTS - 1);
+        rest_rad[i] = (parts - whole) * (TWO_PI / HOST_TURN_PARTS);
+    }
+}
+
+/* |r| <= pi/256, so the first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of
+ * the angle itself. */
+VEC_CLONES static void add_rests(const struct host_turn_part *restrict part, const double *restrict rest_rad, int n,
+                                 double *restrict s, double *restrict c)
+{
+    for (int i = 0; i < n; i++) {
+        const double r = rest_rad[i], r2 = r * r;
         const double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120));
         const double cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)));
-        const double sk = sin_part[k & (HOST_TURN_PARTS - 1)], ck = cos_part[k & (HOST_TURN_PARTS - 1)];
+        const double sk = part[i].sine, ck = part[i].cosine;
         s[i] = sk + (ck * sin_r + sk * cos_r_1);
         c[i] = ck + (ck * cos_r_1 - sk * sin_r);
     }
+}
+
+/* sin and cos of u[n] >= 0 turns: the table gives whole 1/256 turns, a series the rest. Angles in turns need no
+ * reduction by an inexact pi. The table is read between the vectors: a part as a whole, which costs less than picking
+ * its figures into them. */
+static void sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c)
+{
+    uint32_t k[BLOCK];
+    double rest_rad[BLOCK];
+    struct host_turn_part part[BLOCK];
+    split_turns(u, n, k, rest_rad);
+    for (int i = 0; i < n; i++)
+        part[i] = table[k[i]];
+    add_rests(part, rest_rad, n, s, c);
 }
 
 /* u[n] turns, folded into [lo, lo + 1), as radians. */
@@ -253,8 +285,8 @@ static void set_positions(const struct scanhead *sh, struct block *b, int n, int
         set_ranges(b, n, sh->descriptor.range_scale_m, b->range_m);
         range_m = b->range_m;
     }
-    sincos_turns(sh->sin_part, sh->cos_part, b->mirror, m, b->sin_m, b->cos_m);
-    sincos_turns(sh->sin_part, sh->cos_part, b->pan, n, b->sin_pan, b->cos_pan);
+    sincos_turns(sh->turn_part, b->mirror, m, b->sin_m, b->cos_m);
+    sincos_turns(sh->turn_part, b->pan, n, b->sin_pan, b->cos_pan);
     if (one_mirror) {
         set_all(b->sin_m, n, b->sin_m[0]);
         set_all(b->cos_m, n, b->cos_m[0]);
@@ -342,6 +374,28 @@ int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, ui
     return n;
 }
 
+/* The loops are apart because one size of figures a loop makes the better vectors. */
+static void put_points(const struct scanhead_columns *from, int n, struct scanhead_point *points)
+{
+    VEC_LOOP
+    for (int i = 0; i < n; i++) {
+        points[i].x = from->x[i];
+        points[i].y = from->y[i];
+        points[i].z = from->z[i];
+        points[i].range_m = from->range_m[i];
+        points[i].mirror_rad = from->mirror_rad[i];
+        points[i].pan_rad = from->pan_rad[i];
+        points[i].reflectance_db = from->reflectance_db[i];
+        points[i].t_ns = from->t_ns[i];
+    }
+    VEC_LOOP
+    for (int i = 0; i < n; i++) {
+        points[i].echo = from->echo[i];
+        points[i].echo_count = from->echo_count[i];
+        points[i].label = from->label[i];
+    }
+}
+
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max)
 {
@@ -355,18 +409,7 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
     for (int at = 0; at < n; at += BLOCK, points += BLOCK) {
         const int m = n - at < BLOCK ? n - at : BLOCK;
         columns_of_block(sh, frame, first + (uint32_t)at, m, &b, &columns);
-        for (int i = 0; i < m; i++)
-            points[i] = (struct scanhead_point){.x = b.x[i],
-                                                .y = b.y[i],
-                                                .z = b.z[i],
-                                                .range_m = b.range_m[i],
-                                                .mirror_rad = mirror_rad[i],
-                                                .pan_rad = pan_rad[i],
-                                                .reflectance_db = reflectance_db[i],
-                                                .t_ns = t_ns[i],
-                                                .echo = b.echo[i],
-                                                .echo_count = b.echo_count[i],
-                                                .label = label[i]};
+        put_points(&columns, m, points);
     }
     return n;
 }

@@ -18,6 +18,10 @@ struct host_node {
     uint8_t raw[];
 };
 
+struct host_turn_part {
+    double sine, cosine;
+};
+
 struct host_surface {
     char *object, *material; /* NULL: not seen */
 };
@@ -78,7 +82,7 @@ struct scanhead {
     int hashing;
     struct sha256_ctx sha256;
     struct sh_err err;
-    double sin_part[HOST_TURN_PARTS], cos_part[HOST_TURN_PARTS]; /* of whole parts of a turn */
+    struct host_turn_part turn_part[HOST_TURN_PARTS]; /* of whole parts of a turn */
 };
 
 /* notices.c: hands on what the parser notices. Called once, after native_parser_init. */

@@ -312,9 +312,9 @@ int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t 
     const struct host_times *times = &sh->times;
     if (!times->have_gps || !times->have_scan_t0) return SCANHEAD_ESTATE;
     const uint64_t shift_ns = (uint64_t)times->gps_ns + (uint64_t)times->scan_t0_ns - (uint64_t)times->gps_at_ns;
-    const int64_t first_ns = n > 0 ? (int64_t)((uint64_t)t_ns[0] + shift_ns) : 0, first_s = first_ns / 1000000000;
+    const int64_t first_s = n > 0 ? (int64_t)((uint64_t)t_ns[0] + shift_ns) / 1000000000 : 0;
     const uint64_t within_ns = shift_ns - (uint64_t)first_s * 1000000000;
-    if (first_ns >= 0 && times_of_second(t_ns, n, within_ns, (double)(first_s - 1000000000), to)) return SCANHEAD_OK;
+    if (times_of_second(t_ns, n, within_ns, (double)(first_s - 1000000000), to)) return SCANHEAD_OK;
     for (uint32_t i = 0; i < n; i++)
         scanhead_gps_time(sh, t_ns[i], &to[i]);
     return SCANHEAD_OK;

@@ -232,6 +232,14 @@ struct native_attribute {
     uint16_t width_cns;    /* 0.01 ns, full at half maximum */
 };
 
+/* Attribute i < n_points of a checked attributes payload. */
+static inline void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out)
+{
+    const uint8_t *p = payload + NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)i * NATIVE_ATTRIBUTE_LEN;
+    out->amplitude_cdb = (int16_t)le_get16(p);
+    out->width_cns = le_get16(p + 2);
+}
+
 enum native_pose_flags { /* the values of core/pose.h */
                          NATIVE_POSE_EXTRAPOLATED = 1,
                          NATIVE_POSE_LATE = 2,
@@ -309,7 +317,6 @@ int native_decode_emitter(const uint8_t *payload, size_t len, struct native_emit
 void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *out); /* i < n_beams */
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
-void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3]); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out);

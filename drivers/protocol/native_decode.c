@@ -62,13 +62,6 @@ int native_decode_attributes(const uint8_t *payload, size_t len, struct native_a
     return rc;
 }
 
-void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out)
-{
-    const uint8_t *p = payload + NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)i * NATIVE_ATTRIBUTE_LEN;
-    out->amplitude_cdb = (int16_t)le_get16(p);
-    out->width_cns = le_get16(p + 2);
-}
-
 /* A colours payload begins as an attributes payload does. */
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out)
 {

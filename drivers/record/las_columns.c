@@ -71,9 +71,9 @@ VEC_INLINE float near_atan(float r)
     return r + r * (z * s);
 }
 
-/* The same up to a hundredth of a count: 1e-6 rad. Both angles are off by less than 4e-7 rad (the series, atan2f, and
- * two sums below pi, with half a last bit of 1.2e-7 rad each), and the products by half a last bit, 1e-3 counts. Where
- * this close to a half, the formula decides: SCAN_ANGLE_NONE, as where an angle is NaN. */
+/* The same to a hundredth of a count. The series and its rounding, two sums below pi and atan2f are off by less than
+ * 8e-7 rad together, which is 0.008 counts; either product, by half a last bit, is off by 0.001. The formula decides
+ * where this is within 0.015 of a half: SCAN_ANGLE_NONE, as where an angle is NaN. */
 VEC_CLONES static void near_scan_angles(const double *restrict x, const double *restrict y, const double *restrict z,
                                         int n, uint16_t *restrict to)
 {

@@ -90,47 +90,64 @@ struct ply_rows {
     int n;
 };
 
-static inline void put_doubles(struct ply_rows *rows, const double *v)
+/* Columns side by side. They take one pass where their number is known. */
+static inline __attribute__((always_inline)) void put_doubles(struct ply_rows *rows, const double *const *v,
+                                                              int columns)
 {
-    for (int i = 0; i < rows->n; i++)
-        le_put_double(rows->to + (size_t)i * rows->len, v[i]);
-    rows->to += 8;
+    const size_t len = rows->len;
+    uint8_t *to = rows->to;
+    for (int i = 0; i < rows->n; i++, to += len)
+        for (int k = 0; k < columns; k++)
+            le_put_double(to + 8 * k, v[k][i]);
+    rows->to += 8 * columns;
 }
 
-static inline void put_floats(struct ply_rows *rows, const double *v)
+static void put_floats(struct ply_rows *rows, const double *v)
 {
-    for (int i = 0; i < rows->n; i++)
-        le_put_float(rows->to + (size_t)i * rows->len, (float)v[i]);
+    const size_t len = rows->len;
+    uint8_t *to = rows->to;
+    for (int i = 0; i < rows->n; i++, to += len)
+        le_put_float(to, (float)v[i]);
     rows->to += 4;
 }
 
-static void put_lengths(struct ply_rows *rows, const double *v, unsigned columns)
+/* x, y, z and, with its column, range. */
+static void put_lengths(struct ply_rows *rows, const struct track_points *p, unsigned columns)
 {
-    if ((columns & PLY_FLOAT) != 0)
-        put_floats(rows, v);
+    const double *const v[4] = {p->x, p->y, p->z, p->range_m};
+    const int has_range = (columns & PLY_RANGE) != 0;
+    for (int k = 0; k < 3 + has_range && (columns & PLY_FLOAT) != 0; k++)
+        put_floats(rows, v[k]);
+    if ((columns & PLY_FLOAT) != 0) return;
+    if (has_range)
+        put_doubles(rows, v, 4);
     else
-        put_doubles(rows, v);
+        put_doubles(rows, v, 3);
 }
 
 static void put_echoes(struct ply_rows *rows, const struct track_points *p)
 {
-    for (int i = 0; i < rows->n; i++)
-        le_put16(rows->to + (size_t)i * rows->len, (uint16_t)(p->echo[i] | p->echo_count[i] << 8));
+    const size_t len = rows->len;
+    uint8_t *to = rows->to;
+    for (int i = 0; i < rows->n; i++, to += len)
+        le_put16(to, (uint16_t)(p->echo[i] | p->echo_count[i] << 8));
     rows->to += 2;
 }
 
 /* NULL: the same number in all rows. */
 static void put_shorts(struct ply_rows *rows, const uint16_t *v, uint16_t same)
 {
-    for (int i = 0; i < rows->n; i++)
-        le_put16(rows->to + (size_t)i * rows->len, v != NULL ? v[i] : same);
+    const size_t len = rows->len;
+    uint8_t *to = rows->to;
+    for (int i = 0; i < rows->n; i++, to += len)
+        le_put16(to, v != NULL ? v[i] : same);
     rows->to += 2;
 }
 
 static void put_attributes(struct ply_rows *rows, const struct scanhead_attribute *a)
 {
-    for (int i = 0; i < rows->n; i++) {
-        uint8_t *to = rows->to + (size_t)i * rows->len;
+    uint8_t *to = rows->to;
+    for (int i = 0; i < rows->n; i++, to += rows->len) {
         le_put_float(to, (float)a[i].amplitude_db);
         le_put_float(to + 4, (float)a[i].width_ns);
     }
@@ -139,8 +156,9 @@ static void put_attributes(struct ply_rows *rows, const struct scanhead_attribut
 
 static void put_colours(struct ply_rows *rows, const uint8_t (*rgb)[3])
 {
-    for (int i = 0; i < rows->n; i++)
-        memcpy(rows->to + (size_t)i * rows->len, rgb[i], 3);
+    uint8_t *to = rows->to;
+    for (int i = 0; i < rows->n; i++, to += rows->len)
+        memcpy(to, rgb[i], 3);
     rows->to += 3;
 }
 
@@ -149,16 +167,13 @@ static void put_binary(struct ply *ply, struct ply_rows rows)
     const struct track *t = &ply->base.track;
     const struct track_points *p = &t->points;
     const unsigned columns = ply->facts.columns;
-    put_lengths(&rows, p->x, columns);
-    put_lengths(&rows, p->y, columns);
-    put_lengths(&rows, p->z, columns);
-    if ((columns & PLY_RANGE) != 0) put_lengths(&rows, p->range_m, columns);
+    put_lengths(&rows, p, columns);
     if ((columns & PLY_REFLECTANCE) != 0) put_floats(&rows, p->reflectance_db);
-    if ((columns & PLY_TIME) != 0) put_doubles(&rows, ply->time_s);
+    if ((columns & PLY_TIME) != 0) put_doubles(&rows, (const double *const[]){ply->time_s}, 1);
     if ((columns & PLY_ECHO) != 0) put_echoes(&rows, p);
     if ((columns & PLY_LABEL) != 0) put_shorts(&rows, p->label, 0);
     if ((columns & PLY_STATION) != 0) put_shorts(&rows, NULL, (uint16_t)t->info.station);
-    if ((columns & PLY_FRAME) != 0) put_doubles(&rows, ply->frame);
+    if ((columns & PLY_FRAME) != 0) put_doubles(&rows, (const double *const[]){ply->frame}, 1);
     if ((columns & PLY_ATTRIBUTES) != 0) put_attributes(&rows, t->attribute);
     if ((columns & PLY_DEVIATION) != 0) put_floats(&rows, t->deviation);
     if ((columns & PLY_COLOUR) != 0) put_colours(&rows, t->rgb);

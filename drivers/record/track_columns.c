@@ -110,6 +110,7 @@ int track_leave_out(struct track *t, int n)
     const struct track_points *p = &t->points;
     uint16_t index[TRACK_BATCH];
     int kept = 0;
+    if (n <= 0) return 0;
     if (all_are_finite(p->x, p->y, p->z, n) && memchr(p->echo_count, 0, (size_t)n) == NULL) return n;
     for (int i = 0; i < n; i++) {
         const int is_empty = p->echo_count[i] == 0;

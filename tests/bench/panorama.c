@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* This measures a whole panorama of 0.1 degrees to a binary PLY file, beside Embree alone on the same rays.
+/* This measures a whole panorama of 0.1 degrees to files, beside Embree alone on the same rays.
  *
  *   build/tests/bench/panorama [options]
  *
- * Each round runs both in turns. Embree alone casts all rays, robust, with ready packets at its best width, on one
+ * Each round runs all in turns. Embree alone casts all rays, robust, with ready packets at its best width, on one
  * thread. The head scans the same panorama off line, as `scanhead record` does, into files. Loading and building the
  * BVH come before. Figures are processor time of all threads, kernel included, so they are those of one core. */
 #include <errno.h>
@@ -23,21 +23,23 @@
 #include "tests/bench/options.h"
 #include "tests/bench/sight.h"
 
-enum { MAX_ROUNDS = 99, PATH_ROOM = 96, STEPS = 3600, RINGS = 1801, RAYS = STEPS * (RINGS - 2) + 2 };
+enum { MAX_ROUNDS = 99, MAX_ENDINGS = 8, PATH_ROOM = 96, STEPS = 3600, RINGS = 1801, RAYS = STEPS * (RINGS - 2) + 2 };
 
 static const char HELP[] =
-    "panorama [options]: a panorama of 0.1 degrees to binary PLY, beside Embree alone on the same rays\n\n"
+    "panorama [options]: a panorama of 0.1 degrees to files, beside Embree alone on the same rays\n\n"
     "  --scene NAME    1M (default), another number of triangles, house or garden\n"
     "  --rounds N      default 7, at most 99\n"
     "  --folder DIR    where the files go, default /tmp\n"
-    "  --ending END    .ply (default) or another that `scanhead record` knows; none: no file\n"
+    "  --ending LIST   .ply (default) or others that `scanhead record` knows, with commas; none: no file\n"
     "  --columns LIST  of .ply, as --ply-columns of `scanhead record`\n"
-    "  --set KEY=VALUE another value of a configuration key; may be repeated\n";
+    "  --set KEY=VALUE another value of a configuration key; may be repeated\n"
+    "  --raw           each round's figures, a line each, in place of medians\n";
 
 struct options {
-    const char *scene, *folder, *ending;
-    uint32_t rounds;
+    const char *scene, *folder, *ending[MAX_ENDINGS];
+    uint32_t rounds, n_endings;
     unsigned columns;
+    int raw;
     const char *set[16];
     int n_sets;
 };
@@ -142,7 +144,6 @@ static int prepare_files(const struct options *o, const struct bench_target *t, 
     snprintf(config_path, sizeof config_path, "%s/scan.yaml", folder);
     snprintf(head_path, sizeof head_path, "%s/head.yaml", folder);
     snprintf(mesh_path, sizeof mesh_path, "%s/mesh.ply", folder);
-    snprintf(cloud_path, sizeof cloud_path, "%s/scan%s", folder, o->ending);
     int rc = write_head(err);
     if (rc == SH_OK && !bench_is_house(t->name)) rc = write_mesh(t->scene, err);
     return rc == SH_OK ? write_config(t, err) : rc;
@@ -153,7 +154,6 @@ static void remove_files(void)
     unlink(config_path);
     unlink(head_path);
     unlink(mesh_path);
-    unlink(cloud_path);
     if (folder[0] != '\0') rmdir(folder);
 }
 
@@ -254,49 +254,70 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return record_files_frame(ctx, sh, frame, err);
 }
 
-/* Returns the seconds for a scan, files included. */
-static int scan_once(const struct options *o, struct offline *off, double *spent_s, uint64_t *pulses,
+/* Sets the seconds for a scan, a file of that ending included. */
+static int scan_once(const struct options *o, const char *ending, struct offline *off, double *spent_s,
                      struct sh_err *err)
 {
     struct record_files files = {.recorder = {.may_wait = 1, .columns = o->columns}};
     struct recording_result result;
     const struct recording_options options = {
         .frames = -1, .first_station = 1, .last_station = 1, .head_ends = 1, .frame = write_frame, .ctx = &files};
+    snprintf(cloud_path, sizeof cloud_path, "%s/scan%s", folder, ending);
     const double start_s = bench_process_s();
-    int rc = o->ending[0] == '.' ? record_files_add(&files, cloud_path, err) : SH_OK;
+    int rc = ending[0] == '.' ? record_files_add(&files, cloud_path, err) : SH_OK;
     if (rc == SH_OK) rc = record_files_open(&files, err);
     if (rc == SH_OK) rc = recording_run(off->sh, &options, &result, err);
     if (rc == SH_OK) rc = record_files_close(&files, 1, err);
     *spent_s = bench_process_s() - start_s;
-    *pulses = rc == SH_OK ? result.counts.pulses : 0;
-    if (rc == SH_OK && *pulses != RAYS)
-        return sh_fail(err, SH_ESTATE, "%llu pulses came; %d were to", (unsigned long long)*pulses, RAYS);
+    unlink(cloud_path);
+    if (rc == SH_OK && result.counts.pulses != RAYS)
+        return sh_fail(err, SH_ESTATE, "%llu pulses came; %d were to", (unsigned long long)result.counts.pulses, RAYS);
     return rc;
 }
 
 struct figures {
-    double alone_ns[MAX_ROUNDS], ours_ns[MAX_ROUNDS], ratio[MAX_ROUNDS];
+    double alone_ns[MAX_ROUNDS];
+    /* of each ending: */
+    double ns[MAX_ENDINGS][MAX_ROUNDS], by_alone[MAX_ENDINGS][MAX_ROUNDS], by_first[MAX_ENDINGS][MAX_ROUNDS];
 };
 
-static int measure(const struct options *o, struct alone *a, struct offline *off, struct sh_err *err)
+static int measure(const struct options *o, struct alone *a, struct offline *off, struct figures *f, struct sh_err *err)
 {
-    static struct figures f;
-    uint64_t pulses = 0;
-    int rc = SH_OK;
-    for (uint32_t round = 0; round < o->rounds && rc == SH_OK; round++) {
-        double spent_s;
-        f.alone_ns[round] = 1e9 * alone_pass(a, a->n) / a->n;
-        rc = scan_once(o, off, &spent_s, &pulses, err);
-        f.ours_ns[round] = 1e9 * spent_s / RAYS;
-        f.ratio[round] = f.alone_ns[round] / f.ours_ns[round];
+    for (uint32_t round = 0; round < o->rounds; round++) {
+        f->alone_ns[round] = 1e9 * alone_pass(a, a->n) / a->n;
+        for (uint32_t i = 0; i < o->n_endings; i++) {
+            double spent_s;
+            const int rc = scan_once(o, o->ending[i], off, &spent_s, err);
+            if (rc != SH_OK) return rc;
+            f->ns[i][round] = 1e9 * spent_s / RAYS;
+            f->by_alone[i][round] = f->ns[i][round] / f->alone_ns[round];
+            f->by_first[i][round] = f->ns[i][round] / f->ns[0][round];
+        }
     }
-    if (rc != SH_OK) return rc;
-    printf("%s, %d rays, %u rounds, file %s\n", o->scene, RAYS, o->rounds, o->ending);
-    printf("Embree alone  %7.2f ns a ray (packets of %u, %s)\n", bench_median(f.alone_ns, o->rounds), a->width,
-           a->feed == EMBREE_PREPARED ? "ready" : "filled from arrays");
-    printf("panorama      %7.2f ns a ray\n", bench_median(f.ours_ns, o->rounds));
-    printf("ratio         %7.3f\n", bench_median(f.ratio, o->rounds));
     return SH_OK;
+}
+
+static void print_raw(const struct options *o, const struct figures *f)
+{
+    for (uint32_t round = 0; round < o->rounds; round++) {
+        printf("embree_ns %.3f\n", f->alone_ns[round]);
+        for (uint32_t i = 0; i < o->n_endings; i++)
+            printf("%s_ns %.3f\n%s:embree %.4f\n%s:%s %.4f\n", o->ending[i], f->ns[i][round], o->ending[i],
+                   f->by_alone[i][round], o->ending[i], o->ending[0], f->by_first[i][round]);
+    }
+}
+
+static void print_medians(const struct options *o, const struct alone *a, struct figures *f)
+{
+    char first[32];
+    snprintf(first, sizeof first, "x %.16s", o->ending[0]);
+    printf("%s, %d rays, %u rounds; Embree alone: packets of %u, %s\n", o->scene, RAYS, o->rounds, a->width,
+           a->feed == EMBREE_PREPARED ? "ready" : "filled from arrays");
+    printf("%-14s %9s %9s %9s\n", "file", "ns a ray", "x Embree", first);
+    printf("%-14s %9.2f %9.3f\n", "Embree alone", bench_median(f->alone_ns, o->rounds), 1.0);
+    for (uint32_t i = 0; i < o->n_endings; i++)
+        printf("%-14s %9.2f %9.3f %9.3f\n", o->ending[i], bench_median(f->ns[i], o->rounds),
+               bench_median(f->by_alone[i], o->rounds), bench_median(f->by_first[i], o->rounds));
 }
 
 static int run(const struct options *o, struct bench_target *t, struct alone *a, struct offline *off,
@@ -307,28 +328,46 @@ static int run(const struct options *o, struct bench_target *t, struct alone *a,
     if (rc == SH_OK) rc = alone_create(t, a, err);
     if (rc == SH_OK) rc = config_load(config_path, o->set, o->n_sets, cfg, err);
     if (rc == SH_OK) rc = offline_open(cfg, 0.0, NULL, off, err);
+    static struct figures figures;
     if (rc == SH_OK) rc = offline_prepare(off, 1, NULL, err);
-    return rc == SH_OK ? measure(o, a, off, err) : rc;
+    if (rc == SH_OK) rc = measure(o, a, off, &figures, err);
+    if (rc == SH_OK && o->raw) print_raw(o, &figures);
+    if (rc == SH_OK && !o->raw) print_medians(o, a, &figures);
+    return rc;
+}
+
+/* Splits the list where it lies. */
+static void split_endings(struct options *o, char *list)
+{
+    for (char *save = NULL, *name; o->n_endings < MAX_ENDINGS && (name = strtok_r(list, ",", &save)) != NULL;
+         list = NULL)
+        o->ending[o->n_endings++] = name;
 }
 
 static int parse(struct options *o, int argc, char **argv)
 {
-    static const struct option table[] = {
-        {"scene", required_argument, NULL, 's'},   {"rounds", required_argument, NULL, 'r'},
-        {"folder", required_argument, NULL, 'f'},  {"ending", required_argument, NULL, 'e'},
-        {"columns", required_argument, NULL, 'c'}, {"set", required_argument, NULL, 'k'},
-        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0}};
-    *o = (struct options){.scene = "1M", .folder = "/tmp", .ending = ".ply", .rounds = 7};
+    static const struct option table[] = {{"scene", required_argument, NULL, 's'},
+                                          {"rounds", required_argument, NULL, 'r'},
+                                          {"folder", required_argument, NULL, 'f'},
+                                          {"ending", required_argument, NULL, 'e'},
+                                          {"columns", required_argument, NULL, 'c'},
+                                          {"set", required_argument, NULL, 'k'},
+                                          {"raw", no_argument, NULL, 'w'},
+                                          {"help", no_argument, NULL, 'h'},
+                                          {NULL, 0, NULL, 0}};
+    *o = (struct options){.scene = "1M", .folder = "/tmp", .rounds = 7};
     for (int c; (c = getopt_long(argc, argv, "", table, NULL)) >= 0;) {
         if (c == 's') o->scene = optarg;
         if (c == 'f') o->folder = optarg;
-        if (c == 'e') o->ending = optarg;
+        if (c == 'e') split_endings(o, optarg);
+        if (c == 'w') o->raw = 1;
         if (c == 'r') o->rounds = (uint32_t)strtoul(optarg, NULL, 10);
         if (c == 'k' && o->n_sets < 16) o->set[o->n_sets++] = optarg;
         if (c == 'c' && !ply_columns_read(optarg, &o->columns)) c = '?';
         if (c == 'h') fputs(HELP, stdout);
         if (c == 'h' || c == '?') return c == 'h' ? BENCH_OK : BENCH_USAGE;
     }
+    if (o->n_endings == 0) o->ending[o->n_endings++] = ".ply";
     if (optind == argc && o->rounds >= 1 && o->rounds <= MAX_ROUNDS &&
         (bench_is_house(o->scene) || bench_count(o->scene) != 0))
         return -1;

@@ -301,6 +301,13 @@ static int fake_happen(void)
         fake_complete(i, LIBUSB_TRANSFER_COMPLETED, NULL, 0);
         return 1;
     }
+    for (int i = 0; i < bus.n_flying && bus.feed != NULL; i++) {
+        if (bus.flying[i]->endpoint != FAKE_IN) continue;
+        size_t len = (size_t)bus.flying[i]->length;
+        const uint8_t *data = bus.feed(&len);
+        fake_complete(i, LIBUSB_TRANSFER_COMPLETED, data, (int)len);
+        return 1;
+    }
     return 0;
 }
 

@@ -61,6 +61,8 @@ struct fake_bus {
     int was_reset, no_question; /* sessions are over; the head stalls the question whether they are */
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
+    const uint8_t *(*feed)(
+        size_t *len);   /* the bytes of a read that nothing is scripted for, at most len of them; NULL: none come */
     char written[4096]; /* the commands so far */
     const char *answer; /* to each of them; NULL: none */
 };

@@ -146,7 +146,13 @@ static struct scanhead *open_rows(const struct kind *k, struct scanhead_frame *f
     struct scanhead *sh = open_pair(&head);
     struct native_descriptor d = make_descriptor(k->geo, 1);
     struct native_anchor anchor = make_anchor();
-    const struct native_emitter e = {.kind = k->emitter, .steps = 3600, .turn = 1, .rings = 3, .gaps = 2};
+    const struct native_emitter e = {.kind = k->emitter,
+                                     .steps = 3600,
+                                     .turn = 1,
+                                     .rings = 3,
+                                     .gaps = 2,
+                                     .sequence_ns_num = 1,
+                                     .sequence_ns_den = 1};
     d.mirror_counts_per_turn = k->mirror_counts;
     d.pan_counts_per_turn = k->pan_counts;
     anchor.crs = k->crs;
@@ -164,7 +170,7 @@ static struct scanhead *open_rows(const struct kind *k, struct scanhead_frame *f
     }
     put_points(head, N, 0);
     do
-        assert_int_equal(scanhead_next(sh, frame, WAIT_MS), 0);
+        if (scanhead_next(sh, frame, WAIT_MS) != 0) fail_msg("%s: %s", k->name, scanhead_error(sh));
     while (frame->type != SCANHEAD_POINTS);
     assert_int_equal(frame->n_points, N);
     close(head);

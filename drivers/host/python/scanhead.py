@@ -1538,6 +1538,11 @@ class Head:
         n = frame.fields["n_points"]
         if not self._is_of_points(frame, 1):
             return None
+        if np is not None:
+            amplitude_cdb = np.frombuffer(frame.payload, "<i2", 2 * n, 16)[::2]
+            width_cns = np.frombuffer(frame.payload, "<u2", 2 * n, 16)[1::2]
+            return (np.where(amplitude_cdb == -32768, _NAN, amplitude_cdb / 100.0),
+                    np.where(width_cns == 0, _NAN, width_cns / 100.0))
         raw = list(struct.iter_unpack("<hH", frame.payload[16:16 + 4 * n]))
         return (_column((_NAN if a == -32768 else a / 100.0 for a, _ in raw), n),
                 _column((w / 100.0 if w else _NAN for _, w in raw), n))
