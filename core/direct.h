@@ -11,7 +11,7 @@ enum {
     DIRECT_FROM = 8 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
-/* For the writes that follow. -1: the file system or an older kernel can't do it, and the descriptor stays as it was. */
+/* It holds for the writes that follow. -1: the file system or an older kernel can't do it, and the descriptor stays as it was. */
 static inline int direct_set(int fd, int on)
 {
     const int flags = fcntl(fd, F_GETFL);

@@ -42,7 +42,7 @@ VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n
     return n_bad == 0;
 }
 
-/* By the plain formula. */
+/* The message needs the first of them; the plain formula finds it. */
 static void find_far(const struct run *run, double scale_m, int n, double far_m[3])
 {
     int i = 0;
