@@ -14,9 +14,10 @@
 
 #include "core/bytes.h"
 #include "core/grow.h"
+#include "core/vecmath.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
-#include "drivers/record/e57_packet.h"
+#include "drivers/record/e57_records.h"
 #include "drivers/record/recorder.h"
 
 static const int64_t PACKET_NS = 100000000;
@@ -28,7 +29,6 @@ struct e57 {
     struct e57_scan *scan; /* the present one */
     struct e57_packet gathered;
     int64_t t0_ns; /* of the first record in `gathered` */
-    uint8_t packet[E57_PACKET_MAX];
 };
 
 static int e57_begin(void *rec, struct sh_err *err)
@@ -37,15 +37,18 @@ static int e57_begin(void *rec, struct sh_err *err)
     struct e57 *e = rec;
     e->facts.empty_shots = e->base.options.empty_shots;
     e->pages.file = &e->base.file;
+    e->base.track.spared = TRACK_RANGE;
+    e->base.track.no_empty = !e->facts.empty_shots;
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
 /* The first n of the records gathered so far. */
 static int put_packet(struct e57 *e, unsigned n, struct sh_err *err)
 {
-    const size_t len = e57_packet_make(&e->gathered, &e->facts, n, e->packet);
-    e57_packet_count(e->packet, len, &e->facts, e->scan);
-    return e57_put(&e->pages, e->packet, len, err);
+    size_t len;
+    const uint8_t *packet = e57_packet_make(&e->gathered, &e->facts, n, &len);
+    e57_packet_count(packet, len, &e->facts, e->scan);
+    return e57_put(&e->pages, packet, len, err);
 }
 
 static int end_scan(struct e57 *e, struct sh_err *err)
@@ -104,6 +107,7 @@ static int begin_scan(void *rec, struct sh_err *err)
     e->facts.epsg = e->base.track.epsg;
     e->facts.geoid_heights = e->base.track.geoid_heights;
     e->facts.has_colours = e->base.track.has_colours;
+    e57_packet_begin(&e->gathered, &e->facts);
     return put_begin(e, err);
 }
 
@@ -118,81 +122,61 @@ static int find_start(struct e57 *e, struct sh_err *err)
     return e57_patch(&e->pages, e->scan->note, note, sizeof note, err);
 }
 
-static int put_xyz(struct e57 *e, const double p[3], struct sh_err *err)
+static int fail_far(const struct e57 *e, const double p[3], struct sh_err *err)
 {
-    struct e57_scan *s = e->scan;
-    int32_t n[3];
-    for (int i = 0; i < 3; i++) {
-        double counts = rint(p[i] / s->scale_m);
-        if (!(fabs(counts) <= INT32_MAX))
-            return sh_fail(
-                err, SH_EFORMAT,
-                "%s: a point at (%.3f %.3f %.3f) from the head is beyond the %.0f m that 32 bits hold in steps of %g "
-                "m; give the head a coarser output.scale_m",
-                e->base.file.path, p[0], p[1], p[2], 2147483647 * s->scale_m, s->scale_m);
-        n[i] = (int32_t)counts;
-    }
-    for (int i = 0; i < 3; i++)
-        le_put32(e->gathered.stream[E57_X + i] + 4 * (size_t)e->gathered.n, (uint32_t)n[i] ^ 0x80000000u);
-    return 0;
+    return sh_fail(
+        err, SH_EFORMAT,
+        "%s: a point at (%.3f %.3f %.3f) from the head is beyond the %.0f m that 32 bits hold in steps of %g "
+        "m; give the head a coarser output.scale_m",
+        e->base.file.path, p[0], p[1], p[2], 2147483647 * e->scan->scale_m, e->scan->scale_m);
 }
 
-static int put_place(struct e57 *e, int at, struct sh_err *err)
+/* Whether the packet has to end before a point of this time. Only whole bytes of all streams may end a packet that is not
+ * the last one. */
+static int is_due(const struct e57 *e, unsigned n, int64_t t_ns)
 {
-    struct e57_packet *g = &e->gathered;
-    const struct track_points *points = &e->base.track.points;
-    double p[3] = {points->x[at], points->y[at], points->z[at]};
-    int empty = points->echo_count[at] == 0;
-    e57_put_bits(g->stream[E57_INVALID], 2, g->n, empty ? 2 : 0);
-    if (empty) {
-        for (int i = 0; i < 3; i++)
-            le_put32(g->stream[E57_X + i] + 4 * (size_t)g->n, 0x80000000u);
-        return 0;
-    }
-    if (e->base.track.info.geo) station_pose_reverse(&e->base.track.pose, p);
-    return put_xyz(e, p, err);
+    return n >= 8 && t_ns - e->t0_ns >= PACKET_NS;
 }
 
-static void put_figures(struct e57_packet *g, const struct track_points *p, int i)
+VEC_CLONES static int64_t find_latest(const int64_t *restrict t_ns, int n)
 {
-    const int none = isnan(p->reflectance_db[i]);
-    const int16_t cdb = none ? 0 : (int16_t)lrint(p->reflectance_db[i] * 100);
-    le_put16(g->stream[E57_INTENSITY] + 2 * (size_t)g->n, (uint16_t)(cdb + 32768));
-    e57_put_bits(g->stream[E57_NO_INTENSITY], 1, g->n, none ? 1 : 0);
-    le_put_double(g->stream[E57_TIME] + 8 * (size_t)g->n, (double)p->t_ns[i] / 1e9);
-    e57_put_bits(g->stream[E57_RETURN], 4, g->n, p->echo[i] > 0 ? p->echo[i] - 1u : 0);
-    e57_put_bits(g->stream[E57_RETURNS], 4, g->n, p->echo_count[i]);
-    le_put16(g->stream[E57_LABEL] + 2 * (size_t)g->n, p->label[i]);
+    int64_t latest = t_ns[0];
+    for (int i = 1; i < n; i++)
+        latest = t_ns[i] > latest ? t_ns[i] : latest;
+    return latest;
 }
 
-static int put_record(struct e57 *e, int i, struct sh_err *err)
+/* How many points from i on, of at most n, go into one packet one after the other: 1 at least. */
+static int count_run(const struct e57 *e, int i, int n)
 {
-    const struct track *t = &e->base.track;
-    struct e57_packet *g = &e->gathered;
-    int rc = put_place(e, i, err);
-    if (rc != 0) return rc;
-    put_figures(g, &t->points, i);
-    for (int c = 0; c < 3 && t->has_colours; c++)
-        g->stream[E57_RED + c][g->n] = t->rgb[i][c];
-    le_put32(g->stream[E57_ROW] + 4 * (size_t)g->n, t->row[i]);
-    le_put32(g->stream[E57_COLUMN] + 4 * (size_t)g->n, t->line);
-    g->n++;
-    return 0;
+    const struct e57_packet *g = &e->gathered;
+    const int64_t *t_ns = e->base.track.points.t_ns + i;
+    const int room = (int)(g->most - g->n);
+    int k = 1;
+    if (n > room) n = room;
+    if (find_latest(t_ns, n) - e->t0_ns < PACKET_NS) return n;
+    while (k < n && !is_due(e, g->n + (unsigned)k, t_ns[k]))
+        k++;
+    return k;
+}
+
+static int put_run(struct e57 *e, int i, int n, struct sh_err *err)
+{
+    double far_m[3];
+    if (e57_records_put(&e->gathered, &e->facts, &e->base.track, i, n, far_m) != 0) return fail_far(e, far_m, err);
+    return e->gathered.n == e->gathered.most ? put_packet(e, e->gathered.n, err) : 0;
 }
 
 static int e57_points(void *rec, int n, struct sh_err *err)
 {
     struct e57 *e = rec;
-    const unsigned most = e->facts.has_colours ? E57_PACKET_COLOURED : E57_PACKET_RECORDS;
     int rc = find_start(e, err);
-    for (int i = 0; rc == 0 && i < n; i++) {
-        const struct track_points *p = &e->base.track.points;
-        const unsigned whole = e->gathered.n & ~7u; /* what a packet may hold that is not the last one */
-        if (p->echo_count[i] == 0 && !e->facts.empty_shots) continue;
-        if (whole > 0 && p->t_ns[i] - e->t0_ns >= PACKET_NS) rc = put_packet(e, whole, err);
-        if (e->gathered.n == 0) e->t0_ns = p->t_ns[i];
-        if (rc == 0) rc = put_record(e, i, err);
-        if (rc == 0 && e->gathered.n == most) rc = put_packet(e, most, err);
+    for (int i = 0, run; rc == 0 && i < n; i += run) {
+        const int64_t t_ns = e->base.track.points.t_ns[i];
+        if (is_due(e, e->gathered.n, t_ns)) rc = put_packet(e, e->gathered.n & ~7u, err);
+        if (e->gathered.n == 0) e->t0_ns = t_ns;
+        run = count_run(e, i, n - i);
+        if (rc == 0) rc = put_run(e, i, run, err);
     }
     return rc;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/bytes.h"
+#include "core/vecmath.h"
 #include "drivers/protocol/crc32c.h"
 
 static const unsigned stream_bits[E57_N_STREAMS] = {32, 32, 32, 2, 16, 1, 8, 8, 8, 64, 4, 4, 32, 32, 16};
@@ -27,42 +28,88 @@ static size_t stream_len(int s, unsigned n)
     return ((size_t)n * stream_bits[s] + 7) / 8;
 }
 
-void e57_put_bits(uint8_t *stream, unsigned bits, unsigned i, unsigned v)
-{
-    unsigned at = i * bits;
-    if (at % 8 == 0) stream[at / 8] = 0;
-    stream[at / 8] |= (uint8_t)(v << at % 8);
-}
-
 static unsigned get_bits(const uint8_t *stream, unsigned bits, unsigned i)
 {
     const unsigned at = i * bits;
     return (unsigned)stream[at / 8] >> at % 8 & ((1u << bits) - 1);
 }
 
-size_t e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n,
-                       uint8_t out[E57_PACKET_MAX])
+void e57_packet_begin(struct e57_packet *packet, const struct e57_facts *facts)
+{
+    uint8_t *at = packet->full + E57_PACKET_HEADER_LEN + 2 * count_streams(facts);
+    int n_bits = 0;
+    packet->n = 0;
+    packet->most = facts->has_colours ? E57_PACKET_COLOURED : E57_PACKET_RECORDS;
+    for (int s = 0; s < E57_N_STREAMS; s++) {
+        packet->stream[s] = stream_bits[s] < 8 ? packet->bits[n_bits++] : at;
+        if (has_stream(facts, s)) at += stream_len(s, packet->most);
+    }
+}
+
+/* Eight records of `bits` each, a byte a record, side by side from the low end on: fields of 8 bits become fields of 16 with
+ * two records each, then of 32 with four. */
+VEC_INLINE uint64_t pack_eight(uint64_t v, unsigned bits)
+{
+    const uint64_t two = ((uint64_t)1 << 2 * bits) - 1, four = ((uint64_t)1 << 4 * bits) - 1;
+    v = (v | v >> (8 - bits)) & (two | two << 16 | two << 32 | two << 48);
+    v = (v | v >> (16 - 2 * bits)) & (four | four << 32);
+    return v | v >> (32 - 4 * bits);
+}
+
+/* Groups of eight records; those beyond the last record are 0. */
+VEC_CLONES static void pack(const uint8_t *restrict v, unsigned bits, size_t n_eights, uint8_t *restrict out)
+{
+    if (bits == 1)
+        for (size_t i = 0; i < n_eights; i++)
+            out[i] = (uint8_t)pack_eight(le_get64(v + 8 * i), 1);
+    else if (bits == 2)
+        for (size_t i = 0; i < n_eights; i++)
+            le_put16(out + 2 * i, (uint16_t)pack_eight(le_get64(v + 8 * i), 2));
+    else
+        for (size_t i = 0; i < n_eights; i++)
+            le_put32(out + 4 * i, (uint32_t)pack_eight(le_get64(v + 8 * i), 4));
+}
+
+/* The first n records of a stream, in the packet at `at`. */
+static void put_stream(struct e57_packet *packet, int s, unsigned n, uint8_t *at)
+{
+    uint8_t *stream = packet->stream[s];
+    if (stream_bits[s] >= 8) {
+        if (at != stream) memcpy(at, stream, stream_len(s, n));
+        return;
+    }
+    if (n == packet->n) memset(stream + n, 0, 8); /* else n is a multiple of 8 */
+    pack(stream, stream_bits[s], (n + 7) / 8, at);
+}
+
+static void keep_rest(struct e57_packet *packet, int s, unsigned n)
+{
+    const size_t width = stream_bits[s] < 8 ? 1 : stream_bits[s] / 8;
+    memmove(packet->stream[s], packet->stream[s] + n * width, (packet->n - n) * width);
+}
+
+const uint8_t *e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n, size_t *len)
 {
     const uint16_t n_streams = count_streams(facts);
+    uint8_t *out = n == packet->most ? packet->full : packet->part;
     uint8_t *len_at = out + E57_PACKET_HEADER_LEN, *at = len_at + 2 * n_streams;
     for (int s = 0; s < E57_N_STREAMS; s++) {
         if (!has_stream(facts, s)) continue;
-        const size_t len = stream_len(s, n);
-        le_put16(len_at, (uint16_t)len);
+        put_stream(packet, s, n, at);
+        le_put16(len_at, (uint16_t)stream_len(s, n));
         len_at += 2;
-        memcpy(at, packet->stream[s], len);
-        at += len;
-        if (n < packet->n) memmove(packet->stream[s], packet->stream[s] + len, stream_len(s, packet->n - n));
+        at += stream_len(s, n);
+        if (n < packet->n) keep_rest(packet, s, n);
     }
     while ((at - out) % 4 != 0)
         *at++ = 0;
-    const size_t len = (size_t)(at - out);
+    *len = (size_t)(at - out);
     out[0] = 1; /* a data packet */
     out[1] = 0;
-    le_put16(out + 2, (uint16_t)(len - 1));
+    le_put16(out + 2, (uint16_t)(*len - 1));
     le_put16(out + 4, n_streams);
     packet->n -= n;
-    return len;
+    return out;
 }
 
 /* ---- what is in a packet */
@@ -87,48 +134,117 @@ static int find_streams(const uint8_t *packet, size_t len, const struct e57_fact
     return len - at < 4 ? (int)n : -1;
 }
 
-static void count_point(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned i)
+VEC_CLONES static void find_limits32(const uint8_t *restrict v, unsigned n, uint32_t limit[2])
 {
-    for (int k = 0; k < 3; k++) {
-        const int32_t v = (int32_t)(le_get32(stream[E57_X + k] + 4 * (size_t)i) ^ 0x80000000u);
-        if (scan->n_points == 0 || v < scan->min[k]) scan->min[k] = v;
-        if (scan->n_points == 0 || v > scan->max[k]) scan->max[k] = v;
+    uint32_t low = limit[0], high = limit[1];
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t x = le_get32(v + 4 * i);
+        low = x < low ? x : low;
+        high = x > high ? x : high;
     }
-    scan->n_points++;
+    limit[0] = low;
+    limit[1] = high;
 }
 
-static void count_intensity(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned i)
+VEC_CLONES static void find_limits16(const uint8_t *restrict v, unsigned n, uint16_t limit[2])
 {
-    if (get_bits(stream[E57_NO_INTENSITY], 1, i) != 0) return;
-    const int16_t cdb = (int16_t)(le_get16(stream[E57_INTENSITY] + 2 * (size_t)i) - 32768);
-    if (!scan->have_intensity || cdb < scan->intensity_min_cdb) scan->intensity_min_cdb = cdb;
-    if (!scan->have_intensity || cdb > scan->intensity_max_cdb) scan->intensity_max_cdb = cdb;
+    uint16_t low = limit[0], high = limit[1];
+    for (size_t i = 0; i < n; i++) {
+        const uint16_t x = le_get16(v + 2 * i);
+        low = x < low ? x : low;
+        high = x > high ? x : high;
+    }
+    limit[0] = low;
+    limit[1] = high;
+}
+
+/* Two records a byte; the last byte may have a 0 besides. */
+VEC_CLONES static unsigned find_most4(const uint8_t *restrict v, size_t n_bytes)
+{
+    uint8_t most = 0;
+    for (size_t i = 0; i < n_bytes; i++) {
+        const uint8_t low = v[i] & 15, high = v[i] >> 4, x = low > high ? low : high;
+        most = x > most ? x : most;
+    }
+    return most;
+}
+
+typedef void count_run(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n);
+
+/* Counts the records whose field in stream s is 0, run by run. Bytes with nothing but such records are one step, and so
+ * are bytes with none. */
+static void count_zeros(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], int s, unsigned n,
+                        count_run *count)
+{
+    const unsigned bits = stream_bits[s], a_byte = 8 / bits;
+    const uint8_t none = bits == 1 ? 0xff : 0xaa; /* a field of two bits is 2 or 0 */
+    for (unsigned i = 0; i < n;) {
+        const unsigned first = i;
+        while (i < n && get_bits(stream[s], bits, i) == 0)
+            i += i % a_byte == 0 && stream[s][i / a_byte] == 0 ? a_byte : 1;
+        if (i > first) count(scan, stream, first, (i < n ? i : n) - first);
+        while (i < n && get_bits(stream[s], bits, i) != 0)
+            i += i % a_byte == 0 && stream[s][i / a_byte] == none ? a_byte : 1;
+    }
+}
+
+/* Points of the records from `first` on. Coordinates are counted from the least int32: their order is that of these counts. */
+static void count_points(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n)
+{
+    const uint32_t least = 0x80000000u;
+    for (int k = 0; k < 3; k++) {
+        uint32_t limit[2] = {UINT32_MAX, 0};
+        if (scan->n_points > 0) limit[0] = (uint32_t)scan->min[k] ^ least;
+        if (scan->n_points > 0) limit[1] = (uint32_t)scan->max[k] ^ least;
+        find_limits32(stream[E57_X + k] + 4 * (size_t)first, n, limit);
+        scan->min[k] = (int32_t)(limit[0] ^ least);
+        scan->max[k] = (int32_t)(limit[1] ^ least);
+    }
+    scan->n_points += n;
+}
+
+/* Intensities of the records from `first` on, all modelled. */
+static void count_intensities(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first,
+                              unsigned n)
+{
+    uint16_t limit[2] = {UINT16_MAX, 0};
+    if (scan->have_intensity) limit[0] = (uint16_t)(scan->intensity_min_cdb + 32768);
+    if (scan->have_intensity) limit[1] = (uint16_t)(scan->intensity_max_cdb + 32768);
+    find_limits16(stream[E57_INTENSITY] + 2 * (size_t)first, n, limit);
+    scan->intensity_min_cdb = (int16_t)(limit[0] - 32768);
+    scan->intensity_max_cdb = (int16_t)(limit[1] - 32768);
     scan->have_intensity = 1;
 }
 
-static void count_index(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned i)
+static void count_indices(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned n)
 {
-    const uint32_t row = le_get32(stream[E57_ROW] + 4 * (size_t)i),
-                   column = le_get32(stream[E57_COLUMN] + 4 * (size_t)i);
-    const unsigned number = get_bits(stream[E57_RETURN], 4, i);
     const int first = scan->n_records == 0;
-    if (first || row < scan->row_min) scan->row_min = row;
-    if (first || row > scan->row_max) scan->row_max = row;
-    if (first || column < scan->column_min) scan->column_min = column;
-    if (first || column > scan->column_max) scan->column_max = column;
-    if (number > scan->return_max) scan->return_max = number;
-    scan->n_records++;
+    uint32_t row[2] = {first ? UINT32_MAX : scan->row_min, first ? 0 : scan->row_max},
+             column[2] = {first ? UINT32_MAX : scan->column_min, first ? 0 : scan->column_max};
+    find_limits32(stream[E57_ROW], n, row);
+    find_limits32(stream[E57_COLUMN], n, column);
+    scan->row_min = row[0];
+    scan->row_max = row[1];
+    scan->column_min = column[0];
+    scan->column_max = column[1];
+    const unsigned most = find_most4(stream[E57_RETURN], stream_len(E57_RETURN, n));
+    if (most > scan->return_max) scan->return_max = most;
+    scan->n_records += n;
 }
 
 int e57_packet_count(const uint8_t *packet, size_t len, const struct e57_facts *facts, struct e57_scan *scan)
 {
     const uint8_t *stream[E57_N_STREAMS] = {0};
-    const int n = find_streams(packet, len, facts, stream);
-    if (n < 0) return -1;
-    for (unsigned i = 0; i < (unsigned)n; i++) {
-        if (!facts->empty_shots || get_bits(stream[E57_INVALID], 2, i) == 0) count_point(scan, stream, i);
-        count_intensity(scan, stream, i);
-        count_index(scan, stream, i);
+    const int found = find_streams(packet, len, facts, stream);
+    const unsigned n = found > 0 ? (unsigned)found : 0;
+    if (found < 0) return -1;
+    if (n > 0) {
+        if (facts->empty_shots)
+            count_zeros(scan, stream, E57_INVALID, n, count_points);
+        else
+            count_points(scan, stream, 0, n);
+        count_zeros(scan, stream, E57_NO_INTENSITY, n, count_intensities);
+        count_indices(scan, stream, n);
     }
     scan->crc = crc32c(scan->crc, packet, len);
     return 0;

@@ -39,17 +39,20 @@ enum e57_stream {
     E57_N_STREAMS
 };
 
+/* Records that are gathered for a packet. Streams of whole bytes lie where they will be in a full packet, so that it is not
+ * copied. Streams of bits have a byte a record until the packet is made. */
 struct e57_packet {
-    unsigned n; /* records in the streams */
-    uint8_t stream[E57_N_STREAMS][E57_PACKET_RECORDS * 8];
+    unsigned n, most;               /* records in the streams, and in a full packet */
+    uint8_t *stream[E57_N_STREAMS]; /* of a field that the file lacks: nothing may be put there */
+    uint8_t bits[4][E57_PACKET_RECORDS + 8];
+    uint8_t full[E57_PACKET_MAX], part[E57_PACKET_MAX];
 };
 
-/* The low `bits` of v as record i of a stream; a byte holds several, from its low end. */
-void e57_put_bits(uint8_t *stream, unsigned bits, unsigned i, unsigned v);
-/* Makes the packet of the first n <= packet->n records, and returns its length. The records after them (fewer than 8)
- * become the first ones of the next packet. */
-size_t e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n,
-                       uint8_t out[E57_PACKET_MAX]);
+/* Without records, for a file with these fields. The packet must stay where it is. */
+void e57_packet_begin(struct e57_packet *packet, const struct e57_facts *facts);
+/* Makes the packet of the first n <= packet->n records. Its bytes are good until the next records are put. The records
+ * after them (fewer than 8) become the first ones of the next packet. */
+const uint8_t *e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n, size_t *len);
 /* Adds the packet to the figures of its scan. -1: it is not a packet of this file. */
 int e57_packet_count(const uint8_t *packet, size_t len, const struct e57_facts *facts, struct e57_scan *scan);
 

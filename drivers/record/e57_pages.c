@@ -43,20 +43,35 @@ static int put_page(struct e57_pages *pages, struct sh_err *err)
     return outfile_write(pages->file, pages->page, E57_PAGE, err);
 }
 
+/* A page of content goes straight into the file's buffer. */
+static int put_whole_page(struct e57_pages *pages, const uint8_t *content, struct sh_err *err)
+{
+    uint8_t *to = outfile_room(pages->file, E57_PAGE, err);
+    if (to == NULL) return SH_EIO;
+    memcpy(to, content, E57_PAGE_CONTENT);
+    seal(to);
+    outfile_used(pages->file, E57_PAGE);
+    pages->n_full++;
+    return 0;
+}
+
 int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err *err)
 {
     const uint8_t *p = data;
-    while (len > 0) {
-        size_t n = E57_PAGE_CONTENT - pages->used;
-        if (n > len) n = len;
-        memcpy(pages->page + pages->used, p, n);
-        pages->used += n;
+    int rc = 0;
+    while (rc == 0 && len > 0) {
+        const size_t room = E57_PAGE_CONTENT - pages->used, n = room < len ? room : len;
+        if (n == E57_PAGE_CONTENT) {
+            rc = put_whole_page(pages, p, err);
+        } else {
+            memcpy(pages->page + pages->used, p, n);
+            pages->used += n;
+            rc = n == room ? put_page(pages, err) : 0;
+        }
         p += n;
         len -= n;
-        int rc = pages->used == E57_PAGE_CONTENT ? put_page(pages, err) : 0;
-        if (rc != 0) return rc;
     }
-    return 0;
+    return rc;
 }
 
 int e57_finish(struct e57_pages *pages, struct sh_err *err)

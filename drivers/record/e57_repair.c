@@ -186,10 +186,12 @@ static int put_empty_packet(struct left *l, struct e57_pages *pages, struct sh_e
     if (last->section_len > E57_SECTION_HEADER_LEN) return SH_OK;
     struct e57_packet *none = calloc(1, sizeof *none);
     if (none == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", l->repair->path);
-    const size_t len = e57_packet_make(none, &l->facts, 0, l->packet);
+    size_t len;
+    e57_packet_begin(none, &l->facts);
+    const uint8_t *packet = e57_packet_make(none, &l->facts, 0, &len);
+    e57_packet_count(packet, len, &l->facts, last);
+    int rc = e57_put(pages, packet, len, err);
     free(none);
-    e57_packet_count(l->packet, len, &l->facts, last);
-    int rc = e57_put(pages, l->packet, len, err);
     last->section_len = e57_logical(pages) - last->section;
     return rc;
 }

@@ -47,8 +47,7 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
 static void set_direct(struct outfile *file, int on)
 {
     if (file->is_direct == on) return;
-    const int flags = fcntl(file->fd, F_GETFL);
-    if (flags >= 0 && fcntl(file->fd, F_SETFL, on ? flags | O_DIRECT : flags & ~O_DIRECT) == 0)
+    if (direct_set(file->fd, on) == 0)
         file->is_direct = on;
     else
         file->may_be_direct = 0;

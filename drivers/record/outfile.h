@@ -7,12 +7,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/direct.h"
 #include "core/err.h"
 
 enum {
     OUTFILE_BUFFER = 1 << 20,
-    OUTFILE_BLOCK = 4096,           /* of direct writing: places and lengths are multiples of it */
-    OUTFILE_DIRECT_FROM = 32 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
+    OUTFILE_BLOCK = DIRECT_BLOCK, /* of direct writing (core/direct.h) */
+    OUTFILE_DIRECT_FROM = DIRECT_FROM,
 };
 
 struct outfile {

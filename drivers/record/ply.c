@@ -13,12 +13,13 @@
 #include <string.h>
 
 #include "core/bytes.h"
+#include "core/decimal.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/ply_columns.h"
 #include "drivers/record/ply_repair.h"
 #include "drivers/record/recorder.h"
 
-enum { TEXT_LEN = 512 };
+enum { TEXT_LEN = 512, TEXT_ROOM = 9 * DECIMAL_FIXED_ROOM + 9 * DECIMAL_GENERAL_ROOM };
 
 struct ply {
     struct recorder base;
@@ -182,53 +183,54 @@ static void put_binary(struct ply *ply, struct ply_rows rows)
 
 /* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
  * digits would say nothing. "nan" without a sign, as some readers know no other. */
-static size_t put_number(char *to, size_t room, int digits, double v)
+static char *put_number(char *to, unsigned decimals, double v)
 {
-    int n = isnan(v) ? snprintf(to, room, "nan ") : snprintf(to, room, "%.*f ", digits, v);
-    return n > 0 && (size_t)n < room ? (size_t)n : room;
+    to = isnan(v) ? stpcpy(to, "nan") : decimal_put_fixed(to, v, decimals);
+    *to++ = ' ';
+    return to;
 }
 
-/* Writes point i. Returns the end of the row, or NULL if numbers are too long for it. */
+static char *put_whole(char *to, unsigned v)
+{
+    to = decimal_put_whole(to, v);
+    *to++ = ' ';
+    return to;
+}
+
+static char *put_frame(char *to, double v)
+{
+    to = isnan(v) ? stpcpy(to, "nan") : decimal_put_general(to, v, 9);
+    *to++ = ' ';
+    return to;
+}
+
+/* Writes point i, in TEXT_ROOM. Returns the end of the row, or NULL if numbers are too long for it. */
 static uint8_t *put_ascii(uint8_t *row, const struct ply *ply, int i)
 {
     const struct track *t = &ply->base.track;
     const struct track_points *p = &t->points;
-    const unsigned columns = ply->facts.columns;
-    const int flat = t->crs == NATIVE_CRS_GEODETIC ? 12 : 6;
+    const unsigned columns = ply->facts.columns, flat = t->crs == NATIVE_CRS_GEODETIC ? 12 : 6;
     char *to = (char *)row;
-    size_t n = 0;
-    struct {
-        double v;
-        int digits;
-    } number[8] = {{p->x[i], flat}, {p->y[i], flat}, {p->z[i], 6}};
-    size_t k = 3;
-#define TAKE(part, value, places) \
-    if ((columns & (part)) != 0) number[k].v = (value), number[k++].digits = (places)
-    TAKE(PLY_RANGE, p->range_m[i], 6);
-    TAKE(PLY_REFLECTANCE, p->reflectance_db[i], 2);
-    TAKE(PLY_TIME, ply->time_s[i], 9);
-    for (size_t j = 0; j < k && n < TEXT_LEN; j++)
-        n += put_number(to + n, TEXT_LEN - n, number[j].digits, number[j].v);
-    if (n >= TEXT_LEN) return NULL;
-    if ((columns & PLY_ECHO) != 0) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u ", p->echo[i], p->echo_count[i]);
-    if ((columns & PLY_LABEL) != 0 && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", p->label[i]);
-    if ((columns & PLY_STATION) != 0 && n < TEXT_LEN)
-        n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u ", t->info.station);
-    if ((columns & PLY_FRAME) != 0 && n < TEXT_LEN)
-        n += (size_t)(isnan(ply->frame[i]) ? snprintf(to + n, TEXT_LEN - n, "nan ")
-                                           : snprintf(to + n, TEXT_LEN - n, "%.9g ", ply->frame[i]));
-    k = 0;
-    TAKE(PLY_ATTRIBUTES, t->attribute[i].amplitude_db, 2);
-    TAKE(PLY_ATTRIBUTES, t->attribute[i].width_ns, 2);
-    TAKE(PLY_DEVIATION, t->deviation[i], 3);
-#undef TAKE
-    for (size_t j = 0; j < k && n < TEXT_LEN; j++)
-        n += put_number(to + n, TEXT_LEN - n, number[j].digits, number[j].v);
-    if ((columns & PLY_COLOUR) != 0 && n < TEXT_LEN)
-        n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u ", t->rgb[i][0], t->rgb[i][1], t->rgb[i][2]);
-    if (n >= TEXT_LEN) return NULL;
-    to[n - 1] = '\n'; /* the blank after the last number */
-    return row + n;
+    to = put_number(to, flat, p->x[i]);
+    to = put_number(to, flat, p->y[i]);
+    to = put_number(to, 6, p->z[i]);
+    if ((columns & PLY_RANGE) != 0) to = put_number(to, 6, p->range_m[i]);
+    if ((columns & PLY_REFLECTANCE) != 0) to = put_number(to, 2, p->reflectance_db[i]);
+    if ((columns & PLY_TIME) != 0) to = put_number(to, 9, ply->time_s[i]);
+    if ((columns & PLY_ECHO) != 0) to = put_whole(put_whole(to, p->echo[i]), p->echo_count[i]);
+    if ((columns & PLY_LABEL) != 0) to = put_whole(to, p->label[i]);
+    if ((columns & PLY_STATION) != 0) to = put_whole(to, t->info.station);
+    if ((columns & PLY_FRAME) != 0) to = put_frame(to, ply->frame[i]);
+    if ((columns & PLY_ATTRIBUTES) != 0) {
+        to = put_number(to, 2, t->attribute[i].amplitude_db);
+        to = put_number(to, 2, t->attribute[i].width_ns);
+    }
+    if ((columns & PLY_DEVIATION) != 0) to = put_number(to, 3, t->deviation[i]);
+    for (int c = 0; c < 3 && (columns & PLY_COLOUR) != 0; c++)
+        to = put_whole(to, t->rgb[i][c]);
+    if (to - (char *)row >= TEXT_LEN) return NULL;
+    to[-1] = '\n'; /* the blank after the last number */
+    return (uint8_t *)to;
 }
 
 /* *to is moved on. SH_EFORMAT: a coordinate is too long; what was put before that counts. */
@@ -349,7 +351,7 @@ static int ply_points(void *rec, int n, struct sh_err *err)
     struct ply *ply = rec;
     const size_t len = ply->facts.ascii ? TEXT_LEN : ply_row_len(ply->facts.columns);
     int rc = set_gps(ply) ? write_header(ply, 1, err) : 0;
-    uint8_t *from = rc == 0 ? outfile_room(&ply->base.file, (size_t)n * len, err) : NULL, *to = from;
+    uint8_t *from = rc == 0 ? outfile_room(&ply->base.file, (size_t)n * len + TEXT_ROOM, err) : NULL, *to = from;
     if (from == NULL) return rc != 0 ? rc : SH_EIO;
     rc = check_floats_on_the_way(ply, n, err);
     if (rc != 0) return rc;

@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/decimal.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/csv_repair.h"
 #include "drivers/record/recorder.h"
@@ -64,11 +65,15 @@ static int put_station(void *rec, struct sh_err *err)
 
 static int pose_file_put(struct pose_file *file, const struct scanhead_pose *p, struct sh_err *err)
 {
-    char line[LINE];
-    int n = snprintf(line, sizeof line, "%u,%.9f,%.15g,%.15g,%.15g,%.17g,%.17g,%.17g,%.17g,%.9g,%d\n", file->scan,
-                     1e-9 * (double)p->t_ns, p->position_m[0], p->position_m[1], p->position_m[2], p->quat[0],
-                     p->quat[1], p->quat[2], p->quat[3], p->frame, p->flags);
-    return outfile_write(&file->base.file, line, (size_t)n, err);
+    char line[2 * LINE], *at = decimal_put_whole(line, file->scan);
+    *at++ = ',';
+    at = decimal_put_fixed(at, 1e-9 * (double)p->t_ns, 9);
+    *at++ = ',';
+    at = decimal_put_cells(at, p->position_m, 3, 15);
+    at = decimal_put_cells(at, p->quat, 4, 17);
+    at = decimal_put_cells(at, &p->frame, 1, 9);
+    at += sprintf(at, "%d\n", p->flags);
+    return outfile_write(&file->base.file, line, (size_t)(at - line), err);
 }
 
 /* Poses are in the scene frame. If the points are in a CRS, comments say how the scene frame lies in it. */

@@ -28,11 +28,19 @@
 enum {
     PADDING_FREE = 1 << 24, /* 160 MiB of text: enough for 4,500 lines of 3,700 pulses if only one line came */
     PADDING_PER_SHOT = 8,
+    N_KNOWN = 1024, /* of the stream's steps of 0.01 dB */
+};
+
+/* An intensity that was needed before: scans have few different reflectances, and a power takes long. */
+struct known {
+    double reflectance_db;
+    float intensity;
 };
 
 struct ptx {
     struct recorder base;
     struct ptx_grid grid;
+    struct known known[N_KNOWN];
     struct station_pose pose;     /* of the scan in the grid */
     uint32_t last_line, last_row; /* of the grid's last shot */
     uint64_t n_left_out, n_too_bright;
@@ -45,6 +53,8 @@ static int ptx_begin(void *rec, struct sh_err *err)
 {
     struct ptx *ptx = rec;
     ptx->padding = ptx->base.options.padding != NULL ? ptx->base.options.padding : &ptx->own;
+    ptx->known[0].intensity = 1; /* of 0 dB */
+    ptx->base.track.spared = TRACK_RANGE | TRACK_TIME | TRACK_LABEL;
     return ptx_grid_open(&ptx->grid, ptx->base.file.path, err);
 }
 
@@ -100,8 +110,14 @@ static int ptx_scan(void *rec, struct sh_err *err)
 static float intensity(struct ptx *ptx, double reflectance_db)
 {
     if (isnan(reflectance_db)) return 0.5f;
-    if (reflectance_db > 0) ptx->n_too_bright++;
-    return reflectance_db > 0 ? 1.0f : (float)pow(10, reflectance_db / 10);
+    if (reflectance_db > 0) {
+        ptx->n_too_bright++;
+        return 1.0f;
+    }
+    struct known *known = &ptx->known[(unsigned long)lrint(-100 * reflectance_db) % N_KNOWN];
+    if (known->reflectance_db != reflectance_db)
+        *known = (struct known){reflectance_db, (float)pow(10, reflectance_db / 10)};
+    return known->intensity;
 }
 
 /* The cell of the batch's point i. 1, or 0: a shot without echo. */
@@ -131,35 +147,43 @@ static int begin_grid(struct ptx *ptx, struct sh_err *err)
     return rc == 0 ? outfile_patch(file, file->written, text, sizeof text - 1, err) : rc;
 }
 
-static int take_shot(struct ptx *ptx, int i, struct sh_err *err)
+/* Makes the cell of the batch's point i. 1, or 0: it has none. */
+static int take_shot(struct ptx *ptx, int i, struct ptx_cell *cell)
 {
     const struct track *t = &ptx->base.track;
-    struct ptx_grid *g = &ptx->grid;
-    struct ptx_cell cell;
     if (t->points.echo[i] > 1) {
         ptx->n_left_out++;
         return 0;
     }
-    int rc = g->n_shots == 0 ? begin_grid(ptx, err) : 0;
     ptx->last_line = t->line;
     ptx->last_row = t->row[i];
-    const int is_larger = ptx_grid_shot(g, t->line, t->row[i]);
-    const int is_kept = make_cell(ptx, i, &cell) || is_larger; /* so that the file alone says how large the grid is */
-    return rc == 0 && is_kept ? ptx_grid_cell(g, &cell, err) : rc;
+    const int is_larger = ptx_grid_shot(&ptx->grid, t->line, t->row[i]);
+    return make_cell(ptx, i, cell) || is_larger; /* so that the file alone says how large the grid is */
+}
+
+static int take_shots(struct ptx *ptx, int first, int n, struct sh_err *err)
+{
+    struct ptx_cell cell[TRACK_BATCH];
+    int n_cells = 0;
+    for (int i = first; i < n; i++)
+        n_cells += take_shot(ptx, i, &cell[n_cells]);
+    return ptx_grid_cells(&ptx->grid, cell, n_cells, err);
 }
 
 static int ptx_points(void *rec, int n, struct sh_err *err)
 {
     struct ptx *ptx = rec;
+    int rc = 0, first = 0;
     if (n > 0 && !has_room(ptx, (uint32_t)n)) {
-        int rc = end_scan(ptx, err);
+        rc = end_scan(ptx, err);
         if (rc != 0) return rc;
         ptx->n_split++;
     }
-    int rc = 0;
-    for (int i = 0; rc == 0 && i < n; i++)
-        rc = take_shot(ptx, i, err);
-    return rc;
+    for (; ptx->grid.n_shots == 0 && first < n && ptx->base.track.points.echo[first] > 1; first++)
+        ptx->n_left_out++;
+    if (first == n) return 0;
+    if (ptx->grid.n_shots == 0) rc = begin_grid(ptx, err);
+    return rc == 0 ? take_shots(ptx, first, n, err) : rc;
 }
 
 static int ptx_finish(void *rec, struct sh_err *err)

@@ -10,6 +10,8 @@
 #include "core/newfile.h"
 #include "drivers/protocol/crc32c.h"
 
+enum { CELLS_AT_ONCE = 256, SPOOL_BUFFER = 1 << 18 };
+
 static const char MAGIC[8] = "ptxgrid1";
 
 static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
@@ -39,6 +41,7 @@ int ptx_grid_open(struct ptx_grid *grid, const char *path, struct sh_err *err)
         grid->spool = fdopen(fd, "w+b");
         if (grid->spool == NULL) newfile_drop(grid->path, fd);
         if (grid->spool == NULL) rc = fail_spool(grid, err);
+        if (rc == SH_OK) setvbuf(grid->spool, NULL, _IOFBF, SPOOL_BUFFER);
     }
     if (rc != SH_OK) ptx_grid_close(grid);
     return rc;
@@ -93,12 +96,12 @@ int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row)
     return widen(grid, column, row, grid->n_shots++ == 0);
 }
 
-int ptx_grid_cell(struct ptx_grid *grid, const struct ptx_cell *cell, struct sh_err *err)
+int ptx_grid_cells(struct ptx_grid *grid, struct ptx_cell *cell, int n, struct sh_err *err)
 {
-    struct ptx_cell c = *cell;
-    c.check = check_of_cell(&c);
-    grid->n_cells++;
-    return ptx_grid_put(grid, &c, sizeof c, err);
+    for (int i = 0; i < n; i++)
+        cell[i].check = check_of_cell(&cell[i]);
+    grid->n_cells += (uint64_t)n;
+    return n > 0 ? ptx_grid_put(grid, cell, (size_t)n * sizeof *cell, err) : 0;
 }
 
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err)
@@ -106,21 +109,39 @@ int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err)
     return !ferror(grid->spool) && fflush(grid->spool) == 0 ? 0 : fail_spool(grid, err);
 }
 
-static void blank(struct ptx_cell *column, uint32_t n_rows)
+/* Cells on their way back from the file. */
+struct drain {
+    uint64_t left; /* in the file, with those in `cell` from `at` on */
+    size_t at, n;
+    struct ptx_cell cell[CELLS_AT_ONCE];
+};
+
+/* The next cell; NULL: there is none, or it could not be read, which rc then says. */
+static const struct ptx_cell *look_at_cell(struct ptx_grid *grid, struct drain *d, int *rc, struct sh_err *err)
 {
-    for (uint32_t i = 0; i < n_rows; i++)
-        column[i] = (struct ptx_cell){.intensity = -1};
+    if (d->left == 0) return NULL;
+    if (d->at < d->n) return &d->cell[d->at];
+    d->at = 0;
+    d->n = fread(d->cell, sizeof *d->cell, d->left < CELLS_AT_ONCE ? (size_t)d->left : CELLS_AT_ONCE, grid->spool);
+    if (d->n > 0) return d->cell;
+    *rc = fail_spool(grid, err);
+    return NULL;
 }
 
-/* The cells of one column; the first one of the next stays in `cell`. */
-static int ptx_grid_fill(struct ptx_grid *grid, uint32_t at, struct ptx_cell *column, struct ptx_cell *cell,
-                         uint64_t *left, struct sh_err *err)
+/* The cells of column `at`. */
+static int ptx_grid_fill(struct ptx_grid *grid, uint32_t at, struct ptx_cell *column, struct drain *d,
+                         struct sh_err *err)
 {
-    while (*left > 0 && cell->column == at) {
+    const struct ptx_cell *cell;
+    int rc = 0;
+    for (uint32_t i = 0; i <= grid->row_max - grid->row_min; i++)
+        column[i] = (struct ptx_cell){.intensity = -1};
+    while ((cell = look_at_cell(grid, d, &rc, err)) != NULL && cell->column == at) {
         column[cell->row - grid->row_min] = *cell;
-        if (--*left > 0 && fread(cell, sizeof *cell, 1, grid->spool) != 1) return fail_spool(grid, err);
+        d->at++;
+        d->left--;
     }
-    return 0;
+    return rc;
 }
 
 int ptx_grid_drain(struct ptx_grid *grid,
@@ -129,20 +150,18 @@ int ptx_grid_drain(struct ptx_grid *grid,
 {
     if (grid->n_shots == 0) return 0;
     uint32_t n_rows = grid->row_max - grid->row_min + 1;
-    uint64_t left = grid->n_cells;
-    struct ptx_cell cell, *column = malloc(n_rows * sizeof *column);
+    struct drain d = {.left = grid->n_cells};
+    struct ptx_cell *column = malloc(n_rows * sizeof *column);
     if (column == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a column of %u shots", grid->path, n_rows);
     int rc = ptx_grid_save(grid, err);
     if (rc == 0 && fseeko(grid->spool, sizeof(struct ptx_head), SEEK_SET) != 0) rc = fail_spool(grid, err);
-    if (rc == 0 && left > 0 && fread(&cell, sizeof cell, 1, grid->spool) != 1) rc = fail_spool(grid, err);
     for (uint64_t at = grid->column_min; rc == 0 && at <= grid->column_max; at++) {
-        blank(column, n_rows);
-        rc = ptx_grid_fill(grid, (uint32_t)at, column, &cell, &left, err);
+        rc = ptx_grid_fill(grid, (uint32_t)at, column, &d, err);
         if (rc == 0) rc = fn(ctx, column, n_rows, err);
     }
-    if (rc == 0 && left > 0)
+    if (rc == 0 && d.left > 0)
         rc = sh_fail(err, SH_EFORMAT, "%s: line numbers went back within a scan; %llu echoes are left out", grid->path,
-                     (unsigned long long)left);
+                     (unsigned long long)d.left);
     free(column);
     grid->n_shots = grid->n_cells = 0;
     return rc;

@@ -10,10 +10,11 @@
 #include <string.h>
 
 #include "core/bytes.h"
+#include "core/decimal.h"
 #include "drivers/record/csv_repair.h"
 #include "drivers/record/recorder.h"
 
-enum { WAVES_AT_ONCE = 64, FRONT_MOST = 512, COUNT_MOST = 6, LINE_MOST = FRONT_MOST + 4096 * COUNT_MOST };
+enum { WAVES_AT_ONCE = 64, FRONT_MOST = 1024, COUNT_MOST = 6, LINE_MOST = FRONT_MOST + 4096 * COUNT_MOST };
 
 struct waves_file {
     struct recorder base;
@@ -31,16 +32,23 @@ static int put_title(struct waves_file *file, struct sh_err *err)
     return outfile_write(&file->base.file, title[0], strlen(title[0]), err);
 }
 
-static char *put_count(char *at, unsigned count)
+/* The columns before the samples. */
+static char *put_front(char *at, const struct track *t, const struct scanhead_wave *w)
 {
-    char digit[COUNT_MOST];
-    int n = 0;
-    do
-        digit[n++] = (char)('0' + count % 10);
-    while ((count /= 10) != 0);
-    while (n > 0)
-        *at++ = digit[--n];
-    return at;
+    const uint64_t whole[] = {t->n_scans, t->info.station, w->pulse};
+    for (int i = 0; i < 3; i++) {
+        at = decimal_put_whole(at, whole[i]);
+        *at++ = ',';
+    }
+    at = decimal_put_fixed(at, 1e-9 * (double)w->t_ns, 9);
+    *at++ = ',';
+    at = decimal_put_cells(at, &w->range_m, 1, 9);
+    at = decimal_put_cells(at, &w->step_m, 1, 12);
+    at = decimal_put_whole(at, w->n);
+    *at++ = ',';
+    at = decimal_put_cells(at, &w->baseline, 1, 9);
+    at = decimal_put_cells(at, &w->count_signal, 1, 9);
+    return decimal_put_cells(at, w->direction, 3, 9);
 }
 
 static int put_wave(struct waves_file *file, const struct scanhead_wave *w, struct sh_err *err)
@@ -48,12 +56,10 @@ static int put_wave(struct waves_file *file, const struct scanhead_wave *w, stru
     const struct track *t = &file->base.track;
     char *row = (char *)outfile_room(&file->base.file, LINE_MOST, err), *at = row;
     if (row == NULL) return SH_EIO;
-    at += snprintf(row, FRONT_MOST, "%u,%u,%llu,%.9f,%.9g,%.12g,%u,%.9g,%.9g,%.9g,%.9g,%.9g,", t->n_scans,
-                   t->info.station, (unsigned long long)w->pulse, 1e-9 * (double)w->t_ns, w->range_m, w->step_m, w->n,
-                   w->baseline, w->count_signal, w->direction[0], w->direction[1], w->direction[2]);
+    at = put_front(at, t, w);
     for (uint32_t i = 0; i < w->n; i++) {
         if (i > 0) *at++ = ' ';
-        at = put_count(at, le_get16(w->sample + 2 * (size_t)i));
+        at = decimal_put_whole(at, le_get16(w->sample + 2 * (size_t)i));
     }
     *at++ = '\n';
     outfile_used(&file->base.file, (size_t)(at - row));

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Meshes are written, and read back by readers that share nothing with the writers: our own of .obj and .ply, Assimp's
  * of .gltf, .glb and .fbx. */
+#include <fcntl.h>
 #include <math.h>
+#include <sys/stat.h>
 
 #include "core/studio/mesh.h"
 #include "core/studio/picture.h"
@@ -218,6 +220,32 @@ static void points_alone(void **state)
     assert_true(mesh_takes_points("x.ply") && mesh_takes_points("x.obj") && !mesh_takes_points("x.fbx"));
 }
 
+/* A long file is written past the system's cache, in whole buffers. Its end holds the vertices as they were given. */
+static void long_file(void **state)
+{
+    enum { MANY = 700000, ROW = 24, AT_ONCE = 1000 };
+    struct stat st;
+    uint8_t row[AT_ONCE * ROW];
+    (void)state;
+    double(*many)[3] = calloc(MANY, sizeof *many);
+    assert_non_null(many);
+    for (int i = 0; i < MANY; i++)
+        for (int k = 0; k < 3; k++)
+            many[i][k] = i + 0.25 * k;
+    const struct mesh mesh = {.n_vertices = MANY, .xyz_m = (const double(*)[3])many};
+    write_ok("long.ply", &mesh);
+    const int fd = open(at("long.ply"), O_RDONLY);
+    assert_int_equal(fstat(fd, &st), 0);
+    assert_true(st.st_size > (off_t)MANY * ROW && st.st_size < (off_t)MANY * ROW + 1000);
+    for (int i = 0; i < MANY; i += AT_ONCE) {
+        assert_int_equal(pread(fd, row, sizeof row, st.st_size - (off_t)(MANY - i) * ROW), sizeof row);
+        assert_memory_equal(row, many[i], sizeof row);
+    }
+    close(fd);
+    free(many);
+    drop("long.ply");
+}
+
 static void what_is_refused(void **state)
 {
     (void)state;
@@ -383,6 +411,7 @@ int main(void)
         cmocka_unit_test(each_format_is_read_back),
         cmocka_unit_test(ply_as_text),
         cmocka_unit_test(points_alone),
+        cmocka_unit_test(long_file),
         cmocka_unit_test(what_is_refused),
         cmocka_unit_test(floats_that_are_too_coarse),
         cmocka_unit_test(whole_or_not_at_all),

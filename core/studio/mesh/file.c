@@ -5,11 +5,13 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/decimal.h"
+#include "core/direct.h"
 #include "core/grow.h"
 #include "core/studio/mesh/inside.h"
 #include "core/newfile.h"
 
-enum { BUFFER = 1 << 18, STEPS_BETWEEN_STOPS = 1 << 16 };
+enum { BUFFER = 1 << 20, STEPS_BETWEEN_STOPS = 1 << 16 };
 
 static int fail_write(const struct mesh_file *file, struct sh_err *err)
 {
@@ -22,12 +24,32 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
 /* ---- a stream that remembers why it failed. It seems to take all that follows: Assimp's exporter of FBX ends the program
  * where a write does not move its place on. */
 
+/* Whether the writes that follow go past the system's cache. */
+static void pass_cache(struct mesh_file *file, int on)
+{
+    if (file->is_direct < 0 || file->is_direct == on) return;
+    file->is_direct = direct_set(file->fd, on) == 0 ? on : -1;
+}
+
+/* A full buffer, as the stream writes them one after the other. */
+static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
+{
+    return file->at >= DIRECT_FROM && (uintptr_t)data % DIRECT_BLOCK == 0 && n % DIRECT_BLOCK == 0 &&
+           file->at % DIRECT_BLOCK == 0;
+}
+
 static ssize_t on_write(void *cookie, const char *data, size_t n)
 {
     struct mesh_file *file = cookie;
+    pass_cache(file, is_full_buffer(file, data, n));
     for (size_t done = 0; done < n && file->error == 0;) {
         const ssize_t wrote = pwrite(file->fd, data + done, n - done, file->at + (off_t)done);
         if (wrote < 0 && errno == EINTR) continue;
+        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't after all, or wrote a part before */
+            pass_cache(file, 0);
+            file->is_direct = -1;
+            continue;
+        }
         if (wrote <= 0) file->error = wrote < 0 ? errno : ENOSPC;
         if (wrote > 0) done += (size_t)wrote;
     }
@@ -39,6 +61,7 @@ static ssize_t on_write(void *cookie, const char *data, size_t n)
 static ssize_t on_read(void *cookie, char *data, size_t n)
 {
     struct mesh_file *file = cookie;
+    pass_cache(file, 0);
     const ssize_t got = pread(file->fd, data, n, file->at);
     if (got > 0) file->at += got;
     return got;
@@ -56,8 +79,10 @@ static int on_seek(void *cookie, off64_t *at, int whence)
 static int open_stream(struct mesh_file *file, struct sh_err *err)
 {
     file->file = fopencookie(file, "w+b", (cookie_io_functions_t){on_read, on_write, on_seek, NULL});
-    if (file->file == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", file->path);
-    setvbuf(file->file, NULL, _IOFBF, BUFFER);
+    file->buffer = aligned_alloc(DIRECT_BLOCK, BUFFER);
+    if (file->file == NULL || file->buffer == NULL)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", file->path);
+    setvbuf(file->file, file->buffer, _IOFBF, BUFFER);
     return SH_OK;
 }
 
@@ -67,6 +92,7 @@ static void release(struct mesh_file *file)
 {
     if (file->file != NULL) fclose(file->file);
     if (file->fd >= 0) close(file->fd);
+    free(file->buffer);
     free(file->path);
     free(file->part);
     free(file);
@@ -208,26 +234,12 @@ int mesh_work_step(struct mesh_work *work, struct sh_err *err)
 
 /* Up to 9e6 a double times 1e9 is a whole number of at most 53 bits and a part, so that it is rounded once, and rightly but
  * for ties. Beyond, double itself steps by more than a nanometre. */
-size_t mesh_put_number(char *to, double v)
+char *mesh_put_number(char *to, double v)
 {
-    char digit[20], *p = to;
-    int n = 0, skip = 0;
-    if (fabs(v) > 9e6) return (size_t)snprintf(to, MESH_NUMBER_LEN, "%.17g", v);
-    uint64_t left = (uint64_t)llrint(fabs(v) * 1e9);
-    if (v < 0 && left != 0) *p++ = '-';
-    while (left > 0 || n < 10) {
-        digit[n++] = (char)('0' + left % 10);
-        left /= 10;
-    }
-    while (skip < 9 && digit[skip] == '0')
-        skip++;
-    for (int i = n - 1; i >= 9; i--)
-        *p++ = digit[i];
-    if (skip < 9) *p++ = '.';
-    for (int i = 8; i >= skip; i--)
-        *p++ = digit[i];
-    *p = '\0';
-    return (size_t)(p - to);
+    if (fabs(v) > 9e6) return decimal_put_general(to, v, 17);
+    const uint64_t nm = (uint64_t)llrint(fabs(v) * 1e9);
+    *to = '-';
+    return decimal_put_short(to + (v < 0 && nm != 0), nm, 9);
 }
 
 const char *mesh_stem(const char *path, size_t *len)

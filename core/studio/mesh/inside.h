@@ -14,9 +14,11 @@ struct mesh_file {
     char *path, *part;
     int fd;        /* -1: it is whole, and on the disk */
     FILE *file;    /* reads, too */
+    char *buffer;  /* of file, in whole blocks */
     int is_named;  /* it has its name by now */
     off_t at, end; /* of the stream, also after a write has failed */
     int error;     /* errno of the first write that failed; 0: none */
+    int is_direct; /* the descriptor writes past the system's cache, just now; -1: the file system can't do it */
 };
 
 /* The files of one output, which come and go together (file.c). Begins as zeros but for path. */
@@ -51,9 +53,9 @@ struct mesh_work {
 };
 int mesh_work_step(struct mesh_work *work, struct sh_err *err);
 
-/* A coordinate in metres as decimals to the nanometre, without zeros at its end. At least MESH_NUMBER_LEN bytes. */
-enum { MESH_NUMBER_LEN = 336 };
-size_t mesh_put_number(char *to, double v);
+/* A coordinate in metres as decimals to the nanometre, without zeros at its end, in DECIMAL_GENERAL_ROOM (core/decimal.h).
+ * Returns the end. */
+char *mesh_put_number(char *to, double v);
 
 /* The path's name without folders; its length without the ending. */
 const char *mesh_stem(const char *path, size_t *len);

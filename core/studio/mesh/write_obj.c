@@ -2,8 +2,12 @@
 /* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates, as
  * fractions: many readers take that, though the format does not name it. */
 #include <stdlib.h>
+#include <string.h>
 
+#include "core/decimal.h"
 #include "core/studio/mesh/inside.h"
+
+enum { ROWS_AT_ONCE = 64, ROW_ROOM = 11 * (DECIMAL_GENERAL_ROOM + 1) + 16 /* a vertex; a face has less */ };
 
 struct obj {
     const struct mesh *mesh;
@@ -53,60 +57,70 @@ static int write_materials(const struct obj *o, struct mesh_output *out, const c
     return mesh_file_finish(file, err);
 }
 
-static int put_vertices(const struct obj *o, uint32_t first, uint32_t n, struct sh_err *err)
+static char *put_vertex(char *p, const struct mesh *m, uint32_t i)
 {
-    const struct mesh *m = o->mesh;
-    int rc = SH_OK;
-    for (uint32_t i = first; rc == SH_OK && i < first + n; i++) {
-        char text[3 * MESH_NUMBER_LEN + 256], *p = text;
-        *p++ = 'v';
-        for (int k = 0; k < 3; k++) {
-            *p++ = ' ';
-            p += mesh_put_number(p, m->xyz_m[i][k]);
-        }
-        for (int k = 0; k < 3 && m->rgb != NULL; k++)
-            p += sprintf(p, " %.4g", m->rgb[i][k] / 255.0);
-        if (m->uv != NULL) p += sprintf(p, "\nvt %.9g %.9g", (double)m->uv[i][0], (double)m->uv[i][1]);
-        if (m->normal != NULL) {
-            const float *v = m->normal[i];
-            p += sprintf(p, "\nvn %.6g %.6g %.6g", (double)v[0], (double)v[1], (double)v[2]);
-        }
-        *p++ = '\n';
-        rc = mesh_file_write(o->file, text, (size_t)(p - text), err);
-        if (rc == SH_OK) rc = mesh_work_step(o->work, err);
+    *p++ = 'v';
+    for (int k = 0; k < 3; k++) {
+        *p++ = ' ';
+        p = mesh_put_number(p, m->xyz_m[i][k]);
     }
-    return rc;
+    for (int k = 0; k < 3 && m->rgb != NULL; k++) {
+        *p++ = ' ';
+        p = decimal_put_general(p, m->rgb[i][k] / 255.0, 4);
+    }
+    for (int k = 0; k < 2 && m->uv != NULL; k++) {
+        p = k == 0 ? stpcpy(p, "\nvt ") : stpcpy(p, " ");
+        p = decimal_put_general(p, (double)m->uv[i][k], 9);
+    }
+    for (int k = 0; k < 3 && m->normal != NULL; k++) {
+        p = k == 0 ? stpcpy(p, "\nvn ") : stpcpy(p, " ");
+        p = decimal_put_general(p, (double)m->normal[i][k], 6);
+    }
+    *p++ = '\n';
+    return p;
 }
 
 /* Vertex, texture coordinate and normal have one number. */
-static int put_faces(const struct obj *o, uint32_t first, uint32_t n, struct sh_err *err)
+static char *put_face(char *p, const struct mesh *m, uint32_t i)
 {
-    const struct mesh *m = o->mesh;
-    int rc = SH_OK;
-    for (uint32_t i = first; rc == SH_OK && i < first + n; i++) {
-        char text[160];
-        int len = 1;
-        text[0] = 'f';
-        for (int k = 0; k < 3; k++) {
-            const uint32_t v = m->face[i][k] + 1;
-            len += sprintf(text + len, " %u", v);
-            if (m->uv != NULL) len += sprintf(text + len, "/%u", v);
-            if (m->normal != NULL) len += sprintf(text + len, m->uv != NULL ? "/%u" : "//%u", v);
-        }
-        text[len++] = '\n';
-        rc = mesh_file_write(o->file, text, (size_t)len, err);
-        if (rc == SH_OK) rc = mesh_work_step(o->work, err);
+    *p++ = 'f';
+    for (int k = 0; k < 3; k++) {
+        const uint32_t v = m->face[i][k] + 1;
+        *p++ = ' ';
+        p = decimal_put_whole(p, v);
+        if (m->uv == NULL && m->normal == NULL) continue;
+        *p++ = '/';
+        if (m->uv != NULL) p = decimal_put_whole(p, v);
+        if (m->normal == NULL) continue;
+        *p++ = '/';
+        p = decimal_put_whole(p, v);
     }
-    return rc;
+    *p++ = '\n';
+    return p;
 }
 
-/* Points that no face uses. */
-static int put_points(const struct obj *o, uint32_t first, uint32_t n, struct sh_err *err)
+/* A point that no face uses. */
+static char *put_point(char *p, const struct mesh *m, uint32_t i)
 {
+    (void)m;
+    p = decimal_put_whole(stpcpy(p, "p "), i + 1);
+    *p++ = '\n';
+    return p;
+}
+
+/* work: NULL where the rows are none of it. */
+static int put_rows(const struct obj *o, char *(*put)(char *p, const struct mesh *m, uint32_t i), uint32_t first,
+                    uint32_t n, struct mesh_work *work, struct sh_err *err)
+{
+    char text[ROWS_AT_ONCE * ROW_ROOM], *p = text;
     int rc = SH_OK;
-    for (uint32_t i = first; rc == SH_OK && i < first + n; i++) {
-        char text[32];
-        rc = mesh_file_write(o->file, text, (size_t)sprintf(text, "p %u\n", i + 1), err);
+    for (uint32_t i = 0; rc == SH_OK && i < n; i++) {
+        p = put(p, o->mesh, first + i);
+        if (i % ROWS_AT_ONCE == ROWS_AT_ONCE - 1 || i == n - 1) {
+            rc = mesh_file_write(o->file, text, (size_t)(p - text), err);
+            p = text;
+        }
+        if (rc == SH_OK && work != NULL) rc = mesh_work_step(work, err);
     }
     return rc;
 }
@@ -118,10 +132,10 @@ static int put_parts(const struct obj *o, int materials, struct sh_err *err)
     for (uint32_t i = 0; rc == SH_OK && i < n_parts(o); i++) {
         const struct mesh_part *p = part(o, i);
         put_name(o->file->file, "o", p->name);
-        rc = put_vertices(o, vertex, p->n_vertices, err);
+        rc = put_rows(o, put_vertex, vertex, p->n_vertices, o->work, err);
         if (materials) put_name(o->file->file, "usemtl", p->name);
-        if (rc == SH_OK && o->mesh->face != NULL) rc = put_faces(o, face, p->n_faces, err);
-        if (rc == SH_OK && o->mesh->face == NULL) rc = put_points(o, vertex, p->n_vertices, err);
+        if (rc == SH_OK && o->mesh->face != NULL) rc = put_rows(o, put_face, face, p->n_faces, o->work, err);
+        if (rc == SH_OK && o->mesh->face == NULL) rc = put_rows(o, put_point, vertex, p->n_vertices, NULL, err);
         vertex += p->n_vertices;
         face += p->n_faces;
     }

@@ -3,9 +3,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/decimal.h"
 #include "core/studio/mesh/inside.h"
 
-enum { MAX_SCALARS = 8, ROW = 4096 }; /* ROW: bytes of a vertex or a face; a figure as text is below MESH_NUMBER_LEN */
+enum {
+    MAX_SCALARS = 8,
+    ROW = (3 + 3 + 3 + 2 + MAX_SCALARS) * (DECIMAL_GENERAL_ROOM + 1)
+}; /* a vertex; a face has less */
 
 static const char *const type_name[] = {"double", "float", "ushort", "uchar"};
 
@@ -49,40 +53,43 @@ static void put_bytes(struct row *r, const void *data, size_t n)
     r->n += n;
 }
 
-static void put_text(struct row *r, const char *text, size_t n)
+/* The place of the next figure in a text, and its end. */
+static char *begin_text(struct row *r)
 {
     if (r->n > 0) r->byte[r->n++] = ' ';
-    put_bytes(r, text, n);
+    return (char *)r->byte + r->n;
+}
+
+static void end_text(struct row *r, const char *end)
+{
+    r->n = (size_t)(end - (const char *)r->byte);
 }
 
 static void put_double(struct row *r, double v)
 {
-    char text[MESH_NUMBER_LEN];
     if (!r->ascii)
         put_bytes(r, &v, sizeof v);
     else if (isfinite(v))
-        put_text(r, text, mesh_put_number(text, v));
+        end_text(r, mesh_put_number(begin_text(r), v));
     else
-        put_text(r, isnan(v) ? "nan" : v < 0 ? "-inf" : "inf", isnan(v) ? 3 : v < 0 ? 4 : 3);
+        end_text(r, stpcpy(begin_text(r), isnan(v) ? "nan" : v < 0 ? "-inf" : "inf"));
 }
 
 static void put_float(struct row *r, float v)
 {
-    char text[32];
     if (!r->ascii)
         put_bytes(r, &v, sizeof v);
     else if (isnan(v))
-        put_text(r, "nan", 3);
+        end_text(r, stpcpy(begin_text(r), "nan"));
     else
-        put_text(r, text, (size_t)snprintf(text, sizeof text, "%.9g", (double)v));
+        end_text(r, decimal_put_general(begin_text(r), (double)v, 9));
 }
 
 /* size: of its type, 1, 2 or 4 bytes. */
 static void put_whole(struct row *r, uint32_t v, size_t size)
 {
-    char text[16];
     if (r->ascii)
-        put_text(r, text, (size_t)snprintf(text, sizeof text, "%u", v));
+        end_text(r, decimal_put_whole(begin_text(r), v));
     else
         put_bytes(r, &v, size);
 }

@@ -364,7 +364,7 @@ int record_job_stream(struct record_job *r, struct sh_err *err)
     int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
     struct stat st;
-    if (app_is_recording(r->source)) r->recording.listen = 1;
+    if (app_is_recording(r->source)) r->recording.listen = r->files.recorder.may_wait = 1;
     if (r->recording.listen && stat(r->source, &st) == 0 && S_ISREG(st.st_mode))
         r->recording.source_bytes = (uint64_t)st.st_size;
     if (r->station == APP_WORD && !r->recording.listen) {
