@@ -16,7 +16,7 @@ struct bvh_work {
     struct bvh_nested nested; /* touched only where there are copies */
     struct {
         float x[ROOM], y[ROOM], z[ROOM];
-    } dir, org, turned; /* as Embree gets them; as in struct bvh_query */
+    } dir, org; /* as Embree gets them */
     struct {
         double x[ROOM], y[ROOM], z[ROOM];
     } own; /* origins, local frame */
@@ -66,57 +66,47 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
 
 enum { LANES = 16 };
 
-/* Squares of distances from `at`, of as many points as there are lanes: each lane keeps its largest one. */
+/* Squares of lengths of as many vectors as there are lanes: each lane keeps its largest one. */
 VEC_INLINE void keep_most(const double *restrict px, const double *restrict py, const double *restrict pz,
-                          const double at[3], double *restrict most2)
+                          double *restrict most2)
 {
-    const double ax = at[0], ay = at[1], az = at[2];
     for (int k = 0; k < LANES; k++) {
-        const double x = px[k] - ax, y = py[k] - ay, z = pz[k] - az, here2 = x * x + y * y + z * z;
+        const double here2 = px[k] * px[k] + py[k] * py[k] + pz[k] * pz[k];
         most2[k] = here2 > most2[k] ? here2 : most2[k];
     }
 }
 
-/* The largest of them, among n points. */
-VEC_INLINE double most2_of(const struct vec3_out *points, const double at[3], uint32_t n)
+/* The largest length of n vectors. */
+VEC_INLINE double most_of(const double *px, const double *py, const double *pz, uint32_t n)
 {
-    const double *px = points->x, *py = points->y, *pz = points->z;
     double most2[LANES] = {0.0};
     uint32_t i = 0;
     for (; i + LANES <= n; i += LANES)
-        keep_most(px + i, py + i, pz + i, at, most2);
+        keep_most(px + i, py + i, pz + i, most2);
     for (; i < n; i++) {
-        const double x = px[i] - at[0], y = py[i] - at[1], z = pz[i] - at[2];
-        const double here2 = x * x + y * y + z * z;
+        const double here2 = px[i] * px[i] + py[i] * py[i] + pz[i] * pz[i];
         most2[0] = here2 > most2[0] ? here2 : most2[0];
     }
     for (int k = 1; k < LANES; k++)
         most2[0] = most2[k] > most2[0] ? most2[k] : most2[0];
-    return most2[0];
+    return sqrt(most2[0]);
 }
 
-/* Origins of their own: in the local frame, and how far they are from its origin and from the first of them. */
+/* Origins of their own: in the local frame, and how far they are from its origin. */
 VEC_CLONES
 static void take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     const struct vec3_in p = rays->from.own;
     const struct vec3_out o = VEC3_OUT(w->own, 0);
-    const double x = bvh->origin_m[0], y = bvh->origin_m[1], z = bvh->origin_m[2], zero[3] = {0.0, 0.0, 0.0};
-    const double at[3] = VEC3_AT(p, 0);
-    const uint32_t n = rays->n;
+    const double x = bvh->origin_m[0], y = bvh->origin_m[1], z = bvh->origin_m[2];
     VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < rays->n; i++) {
         o.x[i] = p.x[i] - x;
         o.y[i] = p.y[i] - y;
         o.z[i] = p.z[i] - z;
     }
-    const double first[3] = VEC3_AT(o, 0);
     batch->local = VEC3_IN(w->own, 0);
-    batch->far_m = sqrt(most2_of(&o, zero, n));
-    batch->apart_m = sqrt(most2_of(&o, first, n));
-    memcpy(batch->at, at, sizeof at);
-    bvh_turn_origins(at, &p, &rays->dir, n, w->turned.x, w->turned.y, w->turned.z);
-    batch->turned = (struct vec3_floats){w->turned.x, w->turned.y, w->turned.z};
+    batch->far_m = most_of(o.x, o.y, o.z, rays->n);
 }
 
 /* Rays that begin outside of the scene's radius enter it before they hit anything: the float ray begins there. */
@@ -142,7 +132,6 @@ static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct 
 {
     vec3_sub(rays->from.at_m, bvh->origin_m, batch->at_local);
     batch->far_m = vec3_length(batch->at_local);
-    memcpy(batch->at, rays->from.at_m, sizeof batch->at);
     if (rays->from.own.x != NULL) take_own(w, bvh, rays, batch);
     if (batch->far_m > bvh->radius_m) {
         take_along(w, bvh, rays, batch);

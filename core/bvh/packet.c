@@ -73,10 +73,12 @@ VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch,
     float *to_org = bvh_field(&packet->at, width, org_x), *to_dir = bvh_field(&packet->at, width, dir_x),
           *tfar = bvh_field(&packet->at, width, tfar);
     for (uint32_t j = 0; j < 3; j++) {
-        for (uint32_t i = 0; i < width; i++)
-            to_dir[j * width + i] = dir[j][first + (i < n ? i : 0)];
-        for (uint32_t i = 0; org[j] != NULL && i < width; i++)
-            to_org[j * width + i] = org[j][first + (i < n ? i : 0)];
+        memcpy(to_dir + j * width, dir[j] + first, n * sizeof(float));
+        if (org[j] != NULL) memcpy(to_org + j * width, org[j] + first, n * sizeof(float));
+        for (uint32_t i = n; i < width; i++)
+            to_dir[j * width + i] = to_dir[j * width];
+        for (uint32_t i = n; i < width; i++)
+            to_org[j * width + i] = to_org[j * width];
     }
     for (uint32_t i = 0; i < width; i++)
         tfar[i] = batch->t_max;
