@@ -244,6 +244,35 @@ static void a_slot_is_as_long_as_its_tick(void **state)
     assert_int_equal(longer_slots(), 0);
 }
 
+/* A tick that is written in place keeps its bytes and marks while its room grows, from nothing on. */
+static void a_tick_grows_in_its_slot(void **state)
+{
+    (void)state;
+    enum { STEPS = 200 };
+    static struct ring_mark mark[3] = {{.frame_at = 1}, {.frame_at = 2}, {.frame_at = 3}};
+    struct ring_slot own = {0}; /* a slot without a store */
+    struct ring_slot *const slots[] = {ring_claim(&ring, 0), &own};
+    for (int i = 0; i < 2; i++) {
+        struct ring_tick *tick = &slots[i]->tick;
+        ring_begin(slots[i]);
+        tick->mark = mark;
+        tick->n_marks = 3;
+        for (uint32_t step = 1; step <= STEPS; step++) {
+            size_t room;
+            assert_int_equal(ring_grow(slots[i], step, &room), SH_OK);
+            assert_true(room >= step);
+            memset(tick->bytes + tick->len, (int)step, step);
+            tick->len += step;
+        }
+        assert_int_equal(ring_end(slots[i]), SH_OK);
+        assert_true(slots[i]->longer != NULL && slots[i]->longer_room < tick->len + sizeof mark + 2048);
+        assert_memory_equal(tick->mark, mark, sizeof mark);
+        for (uint32_t step = 1, at = 0; step <= STEPS; at += step++)
+            assert_true(tick->bytes[at] == (uint8_t)step && tick->bytes[at + step - 1] == (uint8_t)step);
+    }
+    free(own.longer);
+}
+
 /* The tick is then released without frames, and says that its line has a gap. The next one that fits is whole. */
 static void without_memory_a_tick_is_empty(void **state)
 {
@@ -350,6 +379,7 @@ int main(void)
         WITH_RING(what_does_not_fit_is_not_copied),
         WITH_RING(a_claimed_slot_is_empty),
         WITH_RING(a_slot_is_as_long_as_its_tick),
+        WITH_RING(a_tick_grows_in_its_slot),
         WITH_RING(without_memory_a_tick_is_empty),
         WITH_RING(a_slot_in_use_is_not_claimed),
     };
