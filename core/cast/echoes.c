@@ -116,7 +116,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
         return;
     }
     surface_return(d->surfaces, l->n, l->label, l->cosine, l->rho);
-    if (d->depth == 0) return; /* no echo has lost energy on its way */
+    if (d->depth == 0) return;             /* no echo has lost energy on its way */
     for (uint32_t i = k->n; i < l->n; i++) /* first echoes have all of it */
         l->rho[i] *= l->energy[i];
     for (uint32_t i = 0; i < l->n; i++)
