@@ -87,7 +87,7 @@ __attribute__((target("sse4.2"))) uint32_t crc32c_hw(uint32_t crc, const void *d
 enum { FOLD = 64, FOLDS = 4 * FOLD, FOLD_LEAST = 2 * FOLDS };
 #define FOLD_ONE_LO  0x1c19243b00000000
 #define FOLD_ONE_HI  0x75bba45b00000000
-#define FOLD_FOUR_LO (long long)0xe9a5d8be00000000
+#define FOLD_FOUR_LO ((long long)0xe9a5d8be00000000)
 #define FOLD_FOUR_HI 0x1426a81500000000
 #define TARGET_WIDE  __attribute__((target("avx512f,avx512vl,vpclmulqdq,sse4.2")))
 
