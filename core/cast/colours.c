@@ -21,12 +21,25 @@ static double frame_at(const struct chunk *k, uint32_t pulse)
     return a->frame + fmin(1.0, f) * (b->frame - a->frame);
 }
 
-/* Echoes that get colours, of these pulses. */
+/* Echoes that get colours, of these pulses. Neighbours mostly share their labels: colours of the last ones are kept, at
+ * label % KEPT. */
+enum { KEPT = 16, NO_LABEL = 1 << 16 };
 struct coloured {
     const struct chunk *k;
     const double *d_z;
     struct echo_list *list;
+    uint32_t kept_label[KEPT], kept_colour[KEPT];
 };
+
+static uint32_t colour_of_label(struct coloured *c, uint32_t label)
+{
+    const uint32_t at = label % KEPT;
+    uint8_t rgb[3];
+    if (c->kept_label[at] == label) return c->kept_colour[at];
+    colour_number(label, rgb);
+    c->kept_label[at] = label;
+    return c->kept_colour[at] = colour_packed(rgb);
+}
 
 /* Height of echo i, along the true beam of its pulse. */
 static double height_of(const struct coloured *c, uint32_t i, uint32_t pulse)
@@ -37,7 +50,7 @@ static double height_of(const struct coloured *c, uint32_t i, uint32_t pulse)
 }
 
 /* Colour of echo i, which belongs to this pulse. */
-static uint32_t colour_of(const struct coloured *c, uint32_t i, uint32_t pulse)
+static uint32_t colour_of(struct coloured *c, uint32_t i, uint32_t pulse)
 {
     const struct chunk *k = c->k;
     const struct colour_scale *scale = &k->s->colour->scale;
@@ -58,15 +71,14 @@ static uint32_t colour_of(const struct coloured *c, uint32_t i, uint32_t pulse)
         colour_reflectance(signal && l->refl_cdb[i] != LINE_REFL_NONE ? l->refl_cdb[i] / 100.0 : (double)NAN, rgb);
         break;
     case COLOUR_LABEL:
-        colour_number(l->label[i] & 0xffff, rgb);
-        break;
+        return colour_of_label(c, l->label[i] & 0xffff);
     default:
         break;
     }
     return colour_packed(rgb);
 }
 
-static void set_colour(const struct coloured *c, uint32_t i, uint32_t pulse)
+static void set_colour(struct coloured *c, uint32_t i, uint32_t pulse)
 {
     if (isnan(c->list->range_m[i]))
         c->list->colour[i] = colour_packed(colour_grey);
@@ -76,7 +88,9 @@ static void set_colour(const struct coloured *c, uint32_t i, uint32_t pulse)
 
 void caster_colours(const struct chunk *k, const double *d_z, struct echo_list *l)
 {
-    const struct coloured coloured = {k, d_z, l};
+    struct coloured coloured = {.k = k, .d_z = d_z, .list = l};
+    for (uint32_t i = 0; i < KEPT; i++)
+        coloured.kept_label[i] = NO_LABEL;
     for (uint32_t i = 0; i < k->n; i++)
         set_colour(&coloured, i, i);
     for (uint32_t g = 0; g < l->n_secondary; g++)

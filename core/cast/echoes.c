@@ -110,16 +110,15 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
     const struct cast_detect *d = k->s->detect;
     struct echo_list *l = &c->list;
     const struct beam_merging how = {.gap_m = d->separation_m, .pulse_m = k->s->pulse_m, .most = LINE_MAX_ECHOES};
-    for (uint32_t i = 0; i < k->n; i++)
-        l->energy[i] = 1.0;
     if (d->surfaces == NULL) {
-        memcpy(l->rho, l->energy, k->n * sizeof *l->rho);
+        for (uint32_t i = 0; i < k->n; i++)
+            l->rho[i] = 1.0;
         return;
     }
     surface_return(d->surfaces, l->n, l->label, l->cosine, l->rho);
-    for (uint32_t i = 0; i < l->n; i++)
+    if (d->depth == 0) return;             /* no echo has lost energy on its way */
+    for (uint32_t i = k->n; i < l->n; i++) /* first echoes have all of it */
         l->rho[i] *= l->energy[i];
-    if (d->depth == 0) return;
     for (uint32_t i = 0; i < l->n; i++)
         if (caster_is_bare(k->s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
     for (uint32_t i = k->n; i < l->n; i++)
@@ -127,14 +126,6 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
     if (k->waves != NULL) waves_take_paths(k->waves);
     for (uint32_t g = 0; g < l->n_secondary && d->separation_m > 0.0; g++)
         l->secondary[g].n = merge_pulse(l, &how, &l->secondary[g], k->texels);
-}
-
-static uint32_t count_echoes(const struct echo_list *l)
-{
-    uint32_t n = 0;
-    for (uint32_t i = 0; i < l->n; i++)
-        n += l->range_m[i] == l->range_m[i];
-    return n;
 }
 
 /* Returns whether echoes are found in waveforms: they are detected, and have noise. */
@@ -156,7 +147,7 @@ static void detect(struct caster *c, const struct chunk *k)
                                          .amplitude = l->amplitude,
                                          .refl_cdb = l->refl_cdb,
                                          .scan_key = k->s->scan_key};
-    uint32_t before = count_echoes(l);
+    uint32_t before = kernel_count_echoes(l->range_m, l->n);
     if (d->signal != NULL && !finds_echoes(k)) {
         if (k->s->disturbance != NULL) caster_weaken(k->s->disturbance, l->n, l->rho);
         detect_by_signal(d->signal, &echoes);
@@ -165,7 +156,7 @@ static void detect(struct caster *c, const struct chunk *k)
     if (d->ambiguity != DETECT_AMBIGUITY_NONE)
         detect_zones(d->ambiguity, 1e-9 * ((double)run->ns_quot + (double)run->ns_rem / (double)run->ns_den), d->zones,
                      k->s->range_min_m, l->n, l->range_m);
-    c->counters.faint += before - count_echoes(l);
+    c->counters.faint += before - kernel_count_echoes(l->range_m, l->n);
 }
 
 /* With a signal model, noise that doesn't depend on the signal was asked for: a soiled window leaves it as

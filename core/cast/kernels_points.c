@@ -36,6 +36,25 @@ uint32_t kernel_entries(const double *restrict range_m, const uint32_t *restrict
     return echoes;
 }
 
+VEC_CLONES
+uint32_t kernel_count_echoes(const double *restrict range_m, uint32_t n)
+{
+    uint64_t echoes = 0;
+    for (uint32_t i = 0; i < n; i++)
+        echoes += range_m[i] == range_m[i];
+    return (uint32_t)echoes;
+}
+
+VEC_CLONES
+void kernel_values(const int16_t *restrict value, const uint8_t *restrict echo, uint32_t n, int16_t none,
+                   int16_t *restrict out)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const int16_t its = value[i]; /* read in any case, so that there is no branch */
+        out[i] = echo[i] != 0 ? its : none;
+    }
+}
+
 /* Back and forth, in units of 0.01 ns. Floats hold all that is sent: 16 bits. */
 VEC_CLONES
 void kernel_widths(const float *restrict width_m, const uint8_t *restrict echo, uint32_t n, uint16_t *restrict out)

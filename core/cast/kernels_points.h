@@ -14,6 +14,10 @@ void kernel_keys(uint64_t pulse0, const uint8_t *number, uint32_t n, uint64_t *k
 
 /* Echo bytes and labels of pulses with one echo at most. Returns the number of echoes. */
 uint32_t kernel_entries(const double *range_m, const uint32_t *label, uint32_t n, uint8_t *echo, uint16_t *out);
+/* Returns how many ranges are not NaN. */
+uint32_t kernel_count_echoes(const double *range_m, uint32_t n);
+/* Copies the values of entries that are echoes; the others get `none`. */
+void kernel_values(const int16_t *value, const uint8_t *echo, uint32_t n, int16_t none, int16_t *out);
 /* Widths of echoes in 0.01 ns, LINE_WIDTH_NONE for entries without echo. */
 void kernel_widths(const float *width_m, const uint8_t *echo, uint32_t n, uint16_t *out);
 

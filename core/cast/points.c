@@ -68,14 +68,20 @@ static uint32_t write_firsts(struct caster *c, const struct chunk *k)
     const uint8_t *echo = b->echo + k->at;
     const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
     uint32_t echoes = kernel_entries(l->range_m, l->label, k->n, b->echo + k->at, b->label + k->at);
-    for (uint32_t i = 0; i < k->n; i++)
-        refl_cdb[i] = signal && echo[i] != 0 ? l->refl_cdb[i] : (int16_t)LINE_REFL_NONE;
+    if (signal)
+        kernel_values(l->refl_cdb, echo, k->n, (int16_t)LINE_REFL_NONE, refl_cdb);
+    else
+        for (uint32_t i = 0; i < k->n; i++)
+            refl_cdb[i] = (int16_t)LINE_REFL_NONE;
     for (uint32_t i = 0; i < k->n && k->colours; i++)
         put_colour(b->rgb[k->at + i], l->colour[i]);
     if (!k->attributes) return echoes;
     kernel_widths(l->width_m, echo, k->n, b->width_cns + k->at);
-    for (uint32_t i = 0; i < k->n; i++)
-        b->amplitude_cdb[k->at + i] = signal && echo[i] != 0 ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
+    if (signal)
+        kernel_values(l->amplitude_cdb, echo, k->n, (int16_t)LINE_AMPLITUDE_NONE, b->amplitude_cdb + k->at);
+    else
+        for (uint32_t i = 0; i < k->n; i++)
+            b->amplitude_cdb[k->at + i] = (int16_t)LINE_AMPLITUDE_NONE;
     for (uint32_t i = 0; i < k->n && b->deviation != NULL; i++)
         b->deviation[k->at + i] = echo[i] != 0 ? l->deviation[i] : 0;
     return echoes;

@@ -19,7 +19,7 @@ static void put(struct ring_slot *slot, const char *text)
     char bytes[64];
     snprintf(bytes, sizeof bytes, "%s", text);
     struct ring_tick tick = {.bytes = (uint8_t *)bytes, .len = (uint32_t)strlen(text)};
-    assert_int_equal(ring_put(&ring, slot, &tick), SH_OK);
+    assert_int_equal(ring_put(slot, &tick), SH_OK);
 }
 
 static void publish(uint64_t tick, const char *text)
@@ -198,7 +198,7 @@ static void a_claimed_slot_is_empty(void **state)
         assert_non_null(slot);
         assert_memory_equal(&slot->tick, &none, sizeof none);
         assert_true(slot->n_frames == 0 && slot->first_seq == 0);
-        assert_int_equal(ring_put(&ring, slot, &full), SH_OK);
+        assert_int_equal(ring_put(slot, &full), SH_OK);
         slot->n_frames = slot->first_seq = 1;
         assert_true(ring_ready(slot, tick));
         ring_release(&ring, tick);
@@ -220,7 +220,7 @@ static void a_slot_is_as_long_as_its_tick(void **state)
     enum { LONG = 40 * SLOT_BYTES };
     static uint8_t text[LONG], got[LONG];
     static struct ring_mark mark[2];
-    assert_in_range(ring.room, SLOT_BYTES, SLOT_BYTES + 1024);
+    assert_in_range(ring.slot[0].store_room, SLOT_BYTES, SLOT_BYTES + 1024);
     for (uint32_t i = 0; i < LONG; i++)
         text[i] = (uint8_t)(i * 2654435761U >> 24);
     mark[0].frame_at = 7;
@@ -231,7 +231,7 @@ static void a_slot_is_as_long_as_its_tick(void **state)
         struct ring_tick made = {.bytes = text, .len = is_long ? LONG - 1 : 3, .mark = mark, .n_marks = 2};
         struct ring_slot *slot = ring_claim(&ring, tick);
         const uint64_t before = longer_slots();
-        assert_int_equal(ring_put(&ring, slot, &made), SH_OK);
+        assert_int_equal(ring_put(slot, &made), SH_OK);
         assert_int_equal(longer_slots(), is_long ? before + 1 : tick < ring.n_slots ? 0 : before - 1);
         assert_memory_equal(slot->tick.mark, mark, sizeof mark);
         assert_true(ring_ready(slot, tick));
@@ -242,6 +242,35 @@ static void a_slot_is_as_long_as_its_tick(void **state)
         assert_memory_equal(got, text, copy.len);
     }
     assert_int_equal(longer_slots(), 0);
+}
+
+/* A tick that is written in place keeps its bytes and marks while its room grows, from nothing on. */
+static void a_tick_grows_in_its_slot(void **state)
+{
+    (void)state;
+    enum { STEPS = 200 };
+    static struct ring_mark mark[3] = {{.frame_at = 1}, {.frame_at = 2}, {.frame_at = 3}};
+    struct ring_slot own = {0}; /* a slot without a store */
+    struct ring_slot *const slots[] = {ring_claim(&ring, 0), &own};
+    for (int i = 0; i < 2; i++) {
+        struct ring_tick *tick = &slots[i]->tick;
+        ring_begin(slots[i]);
+        tick->mark = mark;
+        tick->n_marks = 3;
+        for (uint32_t step = 1; step <= STEPS; step++) {
+            size_t room;
+            assert_int_equal(ring_grow(slots[i], step, &room), SH_OK);
+            assert_true(room >= step);
+            memset(tick->bytes + tick->len, (int)step, step);
+            tick->len += step;
+        }
+        assert_int_equal(ring_end(slots[i]), SH_OK);
+        assert_true(slots[i]->longer != NULL && slots[i]->longer_room < tick->len + sizeof mark + 2048);
+        assert_memory_equal(tick->mark, mark, sizeof mark);
+        for (uint32_t step = 1, at = 0; step <= STEPS; at += step++)
+            assert_true(tick->bytes[at] == (uint8_t)step && tick->bytes[at + step - 1] == (uint8_t)step);
+    }
+    free(own.longer);
 }
 
 /* The tick is then released without frames, and says that its line has a gap. The next one that fits is whole. */
@@ -264,7 +293,7 @@ static void without_memory_a_tick_is_empty(void **state)
         free(made.bytes);
         skip();
     }
-    int rc = ring_put(&ring, slot, &made);
+    int rc = ring_put(slot, &made);
     assert_int_equal(setrlimit(RLIMIT_AS, &was), 0);
     free(made.bytes);
     assert_int_equal(rc, SH_ENOMEM);
@@ -350,6 +379,7 @@ int main(void)
         WITH_RING(what_does_not_fit_is_not_copied),
         WITH_RING(a_claimed_slot_is_empty),
         WITH_RING(a_slot_is_as_long_as_its_tick),
+        WITH_RING(a_tick_grows_in_its_slot),
         WITH_RING(without_memory_a_tick_is_empty),
         WITH_RING(a_slot_in_use_is_not_claimed),
     };

@@ -89,6 +89,25 @@ static void test_pace_threads_link(void **state)
     assert_string_equal(first.head, other.head);
 }
 
+/* A tick of 80 kB is more than a pty or a socket takes at once: what is left of it goes out later, and whole. */
+static void test_ticks_longer_than_a_pty(void **state)
+{
+    static const char *const links[] = {"pty", "tcp"};
+    struct wire *wire = *state;
+    struct room_config config = SHORT;
+    struct result first, other;
+    config.more = "loop: {tick_hz: 100, queue_ms: 10000, late_ms: 10000}\n";
+    room_write(wire);
+    char path[352];
+    snprintf(path, sizeof path, "%s", room_config_write(wire, &config));
+    record(wire, path, "1", &first);
+    for (int i = 0; i < 2; i++) {
+        scan(wire, path, "fast", "1", links[i], &other);
+        assert_string_equal(first.head, other.head);
+        assert_int_equal(first.pulses, other.pulses);
+    }
+}
+
 /* Different streams have different hashes: noise and its seed, layout and rate all change it. */
 static void test_hash_tells_streams_apart(void **state)
 {
@@ -261,6 +280,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_pace_threads_link, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_ticks_longer_than_a_pty, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_tells_streams_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_of_an_idle_head, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_hash, wire_setup, wire_teardown),
