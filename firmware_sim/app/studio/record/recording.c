@@ -22,6 +22,7 @@ enum {
 };
 
 struct recording {
+    int64_t now_ns;    /* when the last frame came, or none */
     int64_t pulses_ns; /* when pulses came last */
     int64_t heard_ns;  /* the same, or when the head was last asked why none come */
     struct scanhead *sh;
@@ -105,7 +106,8 @@ static int has_lost_frames(const struct recording *r)
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
 {
-    enum recording_news news = recording_count(&r->result->counts, frame, has_lost_frames(r));
+    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* which alone asks for it */
+    enum recording_news news = recording_count(&r->result->counts, frame, lost);
     if (news == RECORDING_NOTHING) return;
     if (news == RECORDING_END_LOST) sh_warn(r->o->report, "the scan's end was lost; the head goes on without it");
     r->scan_over = r->scan_started = 1;
@@ -167,9 +169,8 @@ static double fraction_done(const struct recording *r)
 
 static int recording_report(struct recording *r, struct sh_err *err)
 {
-    int64_t now_ns = clock_now_ns();
-    if (now_ns < r->next_report_ns) return SH_OK;
-    r->next_report_ns = now_ns + 1000000000;
+    if (r->now_ns < r->next_report_ns) return SH_OK;
+    r->next_report_ns = r->now_ns + 1000000000;
     const int rc = r->o->second != NULL ? r->o->second(r->o->ctx, err) : SH_OK;
     if (rc != SH_OK || !r->o->progress) return rc;
     char text[96];
@@ -220,6 +221,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
     struct scanhead_frame frame;
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
+    r->now_ns = clock_now_ns();
     const int reported = recording_report(r, err);
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
@@ -228,7 +230,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
-        r->heard_ns = r->pulses_ns = clock_now_ns();
+        r->heard_ns = r->pulses_ns = r->now_ns;
         count_points(r, &frame);
     }
     if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)ns_since(frame.t_ns, r->scan_t0_ns);
@@ -300,7 +302,7 @@ static int recording_follow(struct recording *r, struct sh_err *err)
             return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
-        if (clock_now_ns() - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
+        if (r->now_ns - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
         rc = look_for_end(r, err);
         if (rc != SH_OK) return rc;
         r->heard_ns = clock_now_ns();
