@@ -67,8 +67,7 @@ static int memory_poll(void *link, int wake_fd, uint32_t want_write, int timeout
     struct link_memory *m = self->shared;
     struct link_events events = {event, 0, max};
     if (!self->reported_opened) self->reported_opened = link_events_push(&events, LINK_OPENED, 0, "memory");
-    if (m->left && !self->reported_closed)
-        self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, "memory");
+    if (m->left && !self->reported_closed) self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, "memory");
     if (!m->left && m->sent_len != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
     return link_poll_sink(wake_fd, !m->left && (want_write & 1u) != 0 && m->bytes == NULL, timeout_ms, &events);
 }

@@ -213,6 +213,9 @@ static inline void native_decode_point(const uint8_t *payload, uint32_t i, struc
     out->echo_count = (uint8_t)(tail >> 28);
 }
 
+/* Of the first n points: how many are shots without an echo, and how many are echoes whose reflectance is modelled. */
+void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, uint32_t *n_reflectances);
+
 struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4. Begin of a colours
                             * payload, too; then n colours of 3: u8 red, green, blue, sRGB */
     uint64_t pulse0;

@@ -93,8 +93,8 @@ struct pump {
     int is_done;         /* it has ended */
     uint32_t want_write; /* a bit for each session whose link took no more */
     int at_once;         /* there is something to do without waiting for events */
-    int64_t over_ns; /* clock: when it was first seen that the run is over; 0: it is not */
-    int failed;      /* a write failed; the reason is still to come */
+    int64_t over_ns;     /* clock: when it was first seen that the run is over; 0: it is not */
+    int failed;          /* a write failed; the reason is still to come */
 };
 
 /* pump.c: warns the user, with the link's name. */

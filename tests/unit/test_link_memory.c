@@ -73,7 +73,8 @@ static void a_client_sends_until_there_is_no_room(void **state)
     assert_int_equal(bench.ops->read(bench.link, 0, back, 1), 0);
     assert_int_equal(bench_poll(&bench, 0, 0), 0);
     assert_int_equal(memory_send(&memory, "abc", 3), 3);
-    assert_int_equal(bench.ops->read(bench.link, 0, back, 2), 2); /* the rest comes next, and not the first bytes again */
+    assert_int_equal(bench.ops->read(bench.link, 0, back, 2),
+                     2); /* the rest comes next, and not the first bytes again */
     assert_int_equal(memory_send(&memory, "d", 1), 1);
     assert_int_equal(bench.ops->read(bench.link, 0, back + 2, 9), 2);
     assert_memory_equal(back, "abcd", 4);
@@ -262,9 +263,12 @@ static void a_head_may_end_within_a_scan(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_write_is_read_where_it_lies), cmocka_unit_test(a_client_sends_until_there_is_no_room),
-        cmocka_unit_test(each_end_may_go),               cmocka_unit_test(the_stream_is_that_of_a_socket),
-        cmocka_unit_test(a_client_may_go_within_a_scan), cmocka_unit_test(a_head_may_end_within_a_scan),
+        cmocka_unit_test(a_write_is_read_where_it_lies),
+        cmocka_unit_test(a_client_sends_until_there_is_no_room),
+        cmocka_unit_test(each_end_may_go),
+        cmocka_unit_test(the_stream_is_that_of_a_socket),
+        cmocka_unit_test(a_client_may_go_within_a_scan),
+        cmocka_unit_test(a_head_may_end_within_a_scan),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

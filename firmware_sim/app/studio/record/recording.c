@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/line.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
@@ -56,13 +55,8 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
-    uint64_t empty = 0, with_reflectance = 0;
-    for (uint32_t i = 0; i < frame->n_points; i++) {
-        struct native_point point;
-        native_decode_point(frame->payload, i, &point);
-        empty += point.echo_count == 0;
-        with_reflectance += point.echo_count != 0 && point.refl_cdb != LINE_REFL_NONE;
-    }
+    uint32_t empty, with_reflectance;
+    native_count_points(frame->payload, frame->n_points, &empty, &with_reflectance);
     r->result->with_reflectance += with_reflectance;
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
