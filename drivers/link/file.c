@@ -99,6 +99,7 @@ static void file_close(void *link)
 
 const struct link_ops link_file = {
     .name = "file",
+    .stalls = 1,
     .open = file_open,
     .endpoint = file_endpoint,
     .poll = file_poll,

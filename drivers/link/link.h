@@ -95,6 +95,8 @@ struct link_ops {
     int datagrams; /* 1: the system adds a checksum to each write, so a damaged one never arrives */
     int messages;  /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
+    int stalls; /* 1: write() may wait */
+
     uint32_t faults;                               /* what fault() can do: LINK_FAULT_BIT of each */
     uint32_t (*can)(const struct link_spec *spec); /* those that a link of this spec can do; NULL: all */
 

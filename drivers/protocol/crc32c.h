@@ -12,9 +12,12 @@
  * b. */
 uint32_t crc32c(uint32_t crc, const void *data, size_t len);
 
-/* The two ways, for tests and the bench. The hardware one may only be called when crc32c_has_hw(). */
+/* The three ways, for tests and the bench. Those by hardware may only be called when crc32c_has_hw(), or
+ * crc32c_has_wide(). */
 int crc32c_has_hw(void);
 uint32_t crc32c_hw(uint32_t crc, const void *data, size_t len);
+int crc32c_has_wide(void);
+uint32_t crc32c_wide(uint32_t crc, const void *data, size_t len);
 uint32_t crc32c_table(uint32_t crc, const void *data, size_t len);
 
 #endif

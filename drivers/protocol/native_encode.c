@@ -6,6 +6,7 @@
 #include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/fields.h"
+#include "drivers/protocol/native_rows.h"
 #include "drivers/protocol/native_waves.h"
 
 /* Header in front of the payload that already stands at dst + NATIVE_HEADER_LEN. */
@@ -149,28 +150,6 @@ static uint32_t points_that_fit(const struct line_block *block, uint32_t first)
     return n;
 }
 
-/* The hot loop. Its cost is the number of stores, so there are three wide ones. Returns the bits of any time
- * beyond the 24 that have room. */
-static uint32_t put_points(uint8_t *restrict dst, const struct line_block *block, uint32_t first, uint32_t n,
-                           uint32_t dt0_ns)
-{
-    const uint32_t *restrict a = block->a + first, *restrict b = block->b + first, *restrict c = block->c + first;
-    const uint32_t *restrict dt_ns = block->dt_ns + first;
-    const int16_t *restrict refl = block->refl_cdb + first;
-    const uint16_t *restrict label = block->label + first;
-    const uint8_t *restrict echo = block->echo + first;
-    uint32_t bits = 0;
-    for (uint32_t i = 0; i < n; i++, dst += NATIVE_POINT_LEN) {
-        uint32_t dt = dt_ns[i] - dt0_ns;
-        bits |= dt;
-        uint64_t surface = (uint16_t)refl[i] | (uint32_t)label[i] << 16;
-        le_put64(dst, a[i] | (uint64_t)b[i] << 32);
-        le_put64(dst + 8, c[i] | surface << 32);
-        le_put32(dst + 16, dt | (uint32_t)echo[i] << 24);
-    }
-    return bits >> 24;
-}
-
 static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
 {
     uint32_t pulses = 0;
@@ -309,7 +288,7 @@ size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *b
         cut.t_ns = scan_t0_ns + cut.head.t0_ns;
         uint8_t *payload = dst + done + NATIVE_HEADER_LEN;
         fields_encode(&fields_points, &cut.head, payload);
-        if (put_points(payload + NATIVE_POINTS_HEAD_LEN, block, cut.first, n, cut.dt0_ns) != 0) return 0;
+        if (native_put_rows(payload + NATIVE_POINTS_HEAD_LEN, block, cut.first, n, cut.dt0_ns) != 0) return 0;
         done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, cut.t_ns);
         if (cut.is_last && block->waves != NULL) cut.n_lost = block->waves->n_left_out;
         if (put_beside(dst + done, cap - done, &cut, &beside) != SH_OK) return 0;

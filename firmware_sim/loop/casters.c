@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Casters: threads that claim ticks ahead of their time, compute them and put them into the stream. */
-#include <stdio.h>
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
@@ -47,20 +46,16 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     return got;
 }
 
-/* Puts the frames into the slot. 0: it has no room for them, and there is no memory for more. That is reported once per
- * episode. */
-static int casters_put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
+/* Makes the tick in its slot. 0: it has no room, and there is no memory for more. That is reported once per episode. */
+static int casters_fill(struct loop_caster *caster, const struct device_work *work, struct ring_slot *slot)
 {
+    struct loop *loop = caster->loop;
     _Atomic int *no_memory = &loop->casters.no_memory;
-    if (ring_put(&loop->stream.ring, slot, tick) == SH_OK) {
+    if (worker_fill(caster->worker, work, slot) == SH_OK) {
         if (atomic_load(no_memory)) atomic_store(no_memory, 0);
         return 1;
     }
-    if (atomic_exchange(no_memory, 1) == 0) {
-        char text[96];
-        snprintf(text, sizeof text, "no memory for a tick of %u bytes", tick->len);
-        device_report(loop->device, CMD_E_PULSES, text);
-    }
+    if (atomic_exchange(no_memory, 1) == 0) device_report(loop->device, CMD_E_PULSES, "no memory for a tick");
     return 0;
 }
 
@@ -74,7 +69,7 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
         return 0;
     }
     struct casters *casters = &loop->casters;
-    int whole = casters_put(loop, slot, worker_fill(caster->worker, work));
+    int whole = casters_fill(caster, work, slot);
     if (ring_ready(slot, work->tick)) {
         if (atomic_load(&casters->in_vain)) atomic_store(&casters->in_vain, 0);
         return whole;

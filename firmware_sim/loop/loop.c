@@ -37,19 +37,22 @@ static int create_stream(struct loop *loop, struct sh_err *err)
 }
 
 /* A client that joins before the first tick finds the head's description. */
-static void keep_description(struct loop *loop)
+static int keep_description(struct loop *loop, struct sh_err *err)
 {
     struct device_work work;
-    struct ring_tick made;
-    const struct ring_tick *tick = &made;
+    struct ring_slot slot = {0}; /* of its own: the first tick is still to come */
+    struct ring_tick *tick = &slot.tick;
+    int rc = SH_OK;
     if (loop->device == NULL) {
-        loop->source.ops->describe(loop->source.self, &made);
+        loop->source.ops->describe(loop->source.self, tick);
     } else {
         device_describe_now(loop->device, &work);
-        tick = worker_fill(loop->casters.caster[0].worker, &work);
+        rc = worker_fill(loop->casters.caster[0].worker, &work, &slot);
     }
     for (uint32_t at = 0; at < tick->len; at += (uint32_t)native_frame_len(tick->bytes + at))
         latched_put(&loop->stream.latched, tick->bytes + at);
+    free(slot.longer);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "no memory");
 }
 
 /* A new loop, with nothing open. */
@@ -78,7 +81,7 @@ static int open_all(struct loop *loop, struct loop **out, struct sh_err *err)
     int rc = create_stream(loop, err);
     if (rc == SH_OK) rc = casters_create(loop, computes ? config_threads(cfg) : 0, err);
     if (!computes) loop->stream.n_casters = 1; /* the player */
-    if (rc == SH_OK) keep_description(loop);
+    if (rc == SH_OK) rc = keep_description(loop, err);
     if (rc == SH_OK) rc = links_open(&loop->links, cfg, loop->options.extra, err);
     if (rc == SH_OK && computes && cfg->platform.kind == PLATFORM_LIVE && cfg->loop.pace == PACE_REALTIME)
         rc = pose_feed_open(loop->device, cfg, &loop->feed, err);

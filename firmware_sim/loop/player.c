@@ -18,7 +18,7 @@ static int player_put(struct loop *loop, const struct ring_tick *tick, uint64_t 
 {
     struct ring_slot *slot = ring_claim(&loop->stream.ring, number);
     if (slot == NULL) return 0;
-    if (ring_put(&loop->stream.ring, slot, tick) != SH_OK) {
+    if (ring_put(slot, tick) != SH_OK) {
         source_report(&loop->source, CMD_E_PULSES, "no memory for a tick");
         ring_drop(slot);
         return 0;

@@ -37,11 +37,13 @@ int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *
     memset(ring, 0, sizeof *ring);
     ring->queue_ticks = size->queue_ticks;
     ring->n_slots = size->ahead_ticks + size->queue_ticks + size->spare_ticks + 8;
-    ring->room = round_up(size->usual_bytes);
     ring->slot = calloc(ring->n_slots, sizeof *ring->slot);
     int rc = ring->slot != NULL ? SH_OK : SH_ENOMEM;
-    for (uint64_t i = 0; i < ring->n_slots && rc == SH_OK; i++)
-        if ((ring->slot[i].store = malloc(ring->room)) == NULL) rc = SH_ENOMEM;
+    for (uint64_t i = 0; i < ring->n_slots && rc == SH_OK; i++) {
+        struct ring_slot *slot = &ring->slot[i];
+        slot->store_room = round_up(size->usual_bytes);
+        if ((slot->store = malloc(slot->store_room)) == NULL) rc = SH_ENOMEM;
+    }
     if (rc == SH_OK) return SH_OK;
     sh_fail(err, rc, "loop: no memory for %llu slots of %u bytes; lower loop.queue_ms",
             (unsigned long long)ring->n_slots, size->usual_bytes);
@@ -82,24 +84,68 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
     return slot;
 }
 
-int ring_put(const struct ring *ring, struct ring_slot *slot, const struct ring_tick *tick)
+void ring_begin(struct ring_slot *slot)
 {
-    const size_t align = _Alignof(struct ring_mark);
-    const size_t marks_at = (tick->len + align - 1) / align * align, marks_len = tick->n_marks * sizeof *tick->mark;
-    const int is_long = marks_at + marks_len > ring->room;
     free(slot->longer);
-    slot->longer = is_long ? malloc(round_up(marks_at + marks_len)) : NULL;
-    if (is_long && slot->longer == NULL) {
-        slot->tick = (struct ring_tick){.broken = 1};
-        return SH_ENOMEM;
-    }
-    uint8_t *store = is_long ? slot->longer : slot->store;
-    slot->tick = *tick;
-    slot->tick.bytes = store;
-    slot->tick.mark = (struct ring_mark *)(void *)(store + marks_at);
-    if (tick->len != 0) memcpy(slot->tick.bytes, tick->bytes, tick->len);
-    if (marks_len != 0) memcpy(slot->tick.mark, tick->mark, marks_len);
+    slot->longer = NULL;
+    slot->tick = (struct ring_tick){.bytes = slot->store};
+}
+
+static size_t room_of(const struct ring_slot *slot)
+{
+    return slot->longer != NULL ? slot->longer_room : slot->store_room;
+}
+
+/* Gives a tick memory for itself alone, or changes how much that is. */
+static int ring_resize(struct ring_slot *slot, size_t bytes)
+{
+    uint8_t *longer = realloc(slot->longer, bytes);
+    if (longer == NULL) return SH_ENOMEM;
+    if (slot->longer == NULL && slot->tick.len != 0) memcpy(longer, slot->tick.bytes, slot->tick.len);
+    slot->longer = slot->tick.bytes = longer;
+    slot->longer_room = bytes;
     return SH_OK;
+}
+
+/* Room doubles, so that a long tick moves a few times only. */
+int ring_grow(struct ring_slot *slot, size_t more, size_t *room)
+{
+    const size_t had = room_of(slot), need = slot->tick.len + more;
+    if (need > had && ring_resize(slot, round_up(need > 2 * had ? need : 2 * had)) != SH_OK) return SH_ENOMEM;
+    *room = room_of(slot) - slot->tick.len;
+    return SH_OK;
+}
+
+int ring_break(struct ring_slot *slot)
+{
+    slot->tick = (struct ring_tick){.broken = 1};
+    return SH_ENOMEM;
+}
+
+int ring_end(struct ring_slot *slot)
+{
+    struct ring_tick *tick = &slot->tick;
+    const size_t align = _Alignof(struct ring_mark), marks_len = tick->n_marks * sizeof *tick->mark;
+    const size_t marks_at = (tick->len + align - 1) / align * align;
+    size_t room;
+    if (ring_grow(slot, marks_at - tick->len + marks_len, &room) != SH_OK) return ring_break(slot);
+    if (slot->longer != NULL) ring_resize(slot, round_up(marks_at + marks_len)); /* where it can't shrink, it stays */
+    struct ring_mark *mark = (struct ring_mark *)(void *)(tick->bytes + marks_at);
+    if (marks_len != 0) memcpy(mark, tick->mark, marks_len);
+    tick->mark = mark;
+    return SH_OK;
+}
+
+int ring_put(struct ring_slot *slot, const struct ring_tick *tick)
+{
+    size_t room;
+    ring_begin(slot);
+    if (ring_grow(slot, tick->len, &room) != SH_OK) return ring_break(slot);
+    uint8_t *bytes = slot->tick.bytes;
+    if (tick->len != 0) memcpy(bytes, tick->bytes, tick->len);
+    slot->tick = *tick;
+    slot->tick.bytes = bytes;
+    return ring_end(slot);
 }
 
 int ring_ready(struct ring_slot *slot, uint64_t tick)

@@ -2,18 +2,18 @@
 /* The ring of slots between casters, the pacing thread and readers: one slot per tick, with the tick's
  * frames.
  *
- * A caster claims the slot of a tick, puts in what it made, and marks it ready. The pacing thread releases
- * the tick when its time has come. A tick that is not ready in time is marked lost instead. Readers copy
- * released ticks at their own speed. A tick is there for them as long as it is among the last queue_ticks
- * released.
+ * A caster claims the slot of a tick, writes the tick's frames in place, and marks it ready. The pacing thread
+ * releases the tick when its time has come. A tick that is not ready in time is marked lost instead. Readers
+ * look at released ticks, or copy them, at their own speed. A tick is there for them as long as it is among the
+ * last queue_ticks released.
  *
  * Nobody waits for a slow reader here (stream.h does, in the paces fast and step). A reader announces the slot that it
  * copies or looks at (hazard). That slot is not claimed until the reader is done.
  *
- * Memory: each slot has room for a usual tick from the start, and more once a tick needed more. The caster
+ * Memory: each slot has room for a usual tick from the start, and more while its tick needs more. The caster
  * makes that room while the slot is its own, so that the pacing thread never allocates.
  *
- * Threads: one claim at a time, which the caller sees to; put and ready by the claiming caster; release and
+ * Threads: one claim at a time, which the caller sees to; begin to ready by the claiming caster; release and
  * lose by the pacing thread alone; read by any number of readers, each with its own hazard number. There are
  * no locks. A claim may yield to a reader. */
 #ifndef FIRMWARE_SIM_LOOP_RING_H
@@ -59,19 +59,19 @@ struct ring_tick {
 };
 
 struct ring_slot {
-    _Atomic uint64_t state;       /* tick << 2 | phase */
-    _Atomic int busy;             /* a caster uses it, even if its tick is lost already */
-    struct ring_tick tick;        /* its arrays lie in store, or in longer */
-    uint32_t n_frames, first_seq; /* set at release */
-    uint64_t pulses_before;       /* set at release: delivered before this tick, since power-up */
-    uint8_t *store;               /* room for a usual tick */
-    uint8_t *longer;              /* room for a tick that needs more, until the slot's next tick; else NULL */
+    _Atomic uint64_t state;         /* tick << 2 | phase */
+    _Atomic int busy;               /* a caster uses it, even if its tick is lost already */
+    struct ring_tick tick;          /* its arrays lie in store, or in longer */
+    uint32_t n_frames, first_seq;   /* set at release */
+    uint64_t pulses_before;         /* set at release: delivered before this tick, since power-up */
+    uint8_t *store;                 /* room for a usual tick */
+    uint8_t *longer;                /* room for a tick that needs more, until the slot's next tick; else NULL */
+    size_t store_room, longer_room; /* in bytes */
 };
 
 struct ring {
     struct ring_slot *slot;
     uint64_t n_slots, queue_ticks;
-    size_t room;                               /* of a slot's store, in bytes */
     _Atomic uint64_t released;                 /* ticks released or lost so far */
     _Atomic uint64_t hazard[RING_MAX_READERS]; /* tick + 1 being read; 0: none */
 };
@@ -88,10 +88,19 @@ void ring_free(struct ring *ring);
 
 /* The slot for `tick`, empty; or NULL when the tick is lost already. */
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
-/* Copies frames, marks and counts into a claimed slot. A tick longer than usual gets memory for itself alone. If slots
- * kept that memory, all of them would in time be as large as the longest tick. SH_ENOMEM: there is no memory; the slot
+/* Begins a claimed slot's tick, empty: its bytes are written to tick.bytes + tick.len, after ring_grow. */
+void ring_begin(struct ring_slot *slot);
+/* Makes room for tick.len + `more` bytes: *room counts those after tick.len. tick.bytes may move. A tick longer than
+ * usual gets memory for itself alone. If slots kept that memory, all of them would in time be as large as the longest
+ * tick. SH_ENOMEM: there is no memory; nothing has changed. */
+int ring_grow(struct ring_slot *slot, size_t more, size_t *room);
+/* Ends the tick: its marks, which lay anywhere, get their place in the slot. SH_ENOMEM: there is no memory; the slot
  * then holds no frame, and is marked broken. */
-int ring_put(const struct ring *ring, struct ring_slot *slot, const struct ring_tick *tick);
+int ring_end(struct ring_slot *slot);
+/* The tick is broken: its slot holds no frame. Returns SH_ENOMEM. */
+int ring_break(struct ring_slot *slot);
+/* All of these with a copy of frames, marks and counts that lie elsewhere. */
+int ring_put(struct ring_slot *slot, const struct ring_tick *tick);
 /* The caster is done with the slot. 0 when the tick was lost meanwhile. */
 int ring_ready(struct ring_slot *slot, uint64_t tick);
 /* The caster gives the slot up. The pacing thread loses the tick when its time is over. */

@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
  *
- * A session copies each tick before it writes it. So a slow reader holds up nobody. When what it has to read
- * next is too old, it loses whole frames, and goes on with newer ones (lost_frames.c). */
+ * A long tick is written from where it lies in the ring, where the link's write() never waits. Short ticks, and what
+ * the link did not take, are copied first. So a slow reader holds up nobody. When what a session has to read next is
+ * too old, it loses whole frames, and goes on with newer ones (lost_frames.c). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
+
+enum { STRAIGHT_BYTES = 16384 }; /* a tick this long is worth a call of its own */
 
 static void clear(struct session *s)
 {
@@ -153,6 +156,43 @@ static int take_tick(struct pump *pump, struct session *s)
     return 1;
 }
 
+/* Keeps what a link did not take of a tick. It begins with a frame, as count_unwritten expects. */
+static void keep_rest(struct session *s, const struct ring_copy *tick, uint32_t taken)
+{
+    uint32_t at = 0, len;
+    while (at + (len = (uint32_t)native_frame_len(tick->buf + at)) <= taken)
+        at += len;
+    memcpy(s->out, tick->buf + at, tick->len - at);
+    s->out_len = tick->len - at;
+    s->out_pos = taken - at;
+}
+
+static int follows(const struct session *s, const struct ring_copy *tick)
+{
+    return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
+}
+
+/* Writes the next tick without a copy. Returns its bytes, or 0: there is no such tick, or the buffer has bytes that go
+ * before the next one. */
+static uint32_t write_straight(struct pump *pump, struct session *s)
+{
+    struct ring *ring = &pump->stream->ring;
+    struct ring_copy tick;
+    uint32_t taken = 0;
+    if (s->out_len != 0 || pump->ops->stalls || session_waits_for_files(pump)) return 0;
+    if (ring_look(ring, s->reader, s->cursor, &tick) == RING_READ && tick.len >= STRAIGHT_BYTES && follows(s, &tick) &&
+        s->cursor < session_off_tick(pump, s)) {
+        session_check_lost(pump, s, &tick, stream_released(pump->stream));
+        s->cursor++;
+        const ssize_t n = pump->ops->write(pump->link, session_index(pump, s), tick.buf, tick.len);
+        taken = n > 0 ? (uint32_t)n : 0;
+        if (taken < tick.len) keep_rest(s, &tick, taken);
+        taken = taken == tick.len ? taken : 0;
+    }
+    ring_leave(ring, s->reader);
+    return taken;
+}
+
 /* Puts the replies into the buffer; without room for them, they come next time. */
 static void take_replies(struct pump *pump, struct session *s)
 {
@@ -172,14 +212,17 @@ static int has_stepped(const struct pump *pump, const struct session *s)
     return s->cursor >= tick && stream_has_written(pump->stream, pump->listener, s->reader, tick);
 }
 
-/* Puts the next ticks and replies into the buffer, which was written out. */
+/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. */
 static void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
     take_replies(pump, s);
     s->frames_from = s->out_len;
-    while (s->out_len < BATCH_BYTES && take_tick(pump, s))
+    uint32_t straight = 0;
+    for (uint32_t n; straight < BATCH_BYTES && (n = write_straight(pump, s)) != 0; straight += n)
+        stream_move_reader(pump->stream, s->reader, s->cursor);
+    while (straight + s->out_len < BATCH_BYTES && take_tick(pump, s))
         continue;
     s->frames_to = s->out_len;
     while (c->stepping && has_stepped(pump, s)) {
@@ -220,20 +263,25 @@ int session_pass(struct pump *pump, struct session *s, int is_last)
     return faulty_pass(pump->link, session_index(pump, s), t_ns);
 }
 
-/* Takes more once the link has taken all. As session_pass; when there is nothing, the buffer stays empty. */
+/* Takes more once the link has taken all. As session_pass; when there is nothing, the buffer stays empty, and the cursor
+ * where it is. */
 static int fill_if_link_takes(struct pump *pump, struct session *s)
 {
     const int is_over = atomic_load(&pump->stream->over);
+    const uint64_t from = s->cursor;
     const int takes = session_pass(pump, s, 0);
     if (takes > 0) session_fill(pump, s);
-    return takes > 0 && is_over && s->out_pos == s->out_len ? session_pass(pump, s, 1) : takes;
+    const int nothing = s->out_pos == s->out_len && s->cursor == from;
+    return takes > 0 && is_over && nothing ? session_pass(pump, s, 1) : takes;
 }
 
 int session_write(struct pump *pump, struct session *s, int index)
 {
     if (!pump->protocol->passes_native) return session_write_protocol(pump, s, index);
     for (;;) {
+        const uint64_t from = s->cursor;
         ssize_t n = s->out_pos == s->out_len ? fill_if_link_takes(pump, s) : 1;
+        if (n > 0 && s->out_pos == s->out_len && s->cursor != from) continue;
         if (n > 0 && s->out_pos == s->out_len) {
             stream_note_written(pump->stream, s->reader, s->cursor); /* bytes that a fault holds back hold up nobody */
             return 0;

@@ -13,8 +13,8 @@
 
 struct worker {
     const struct site *site; /* as it is for the tick at hand */
-    struct ring_tick tick;   /* the result for the tick at hand */
-    uint32_t cap;            /* of tick.bytes */
+    struct ring_slot *slot;  /* of the tick at hand, which is written there */
+    int no_memory;           /* the slot has no room for the rest of the tick */
     struct ring_mark mark[RING_MAX_MARKS];
     struct caster *caster;
     struct cast_counters counted; /* the caster's counters, as far as slots have them */
@@ -34,6 +34,8 @@ enum {
     MAX_DT_NS = (1 << 24) - 1, /* a point's time within its frame has 24 bits */
     OVERHEAD_BYTES = 24576,    /* upper bound of events, descriptor, anchor, names and telemetry in one tick */
     LINE_END_BYTES = 128,
+    FIXED_BYTES = 512,  /* no frame of a fixed length is longer */
+    NAMES_BYTES = 8192, /* most names in one frame */
 };
 
 int worker_create(const struct site *site, struct worker **out, struct sh_err *err)
@@ -42,10 +44,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     struct worker *worker = calloc(1, sizeof *worker);
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
-    worker->cap = worker_tick_bytes(site);
-    worker->tick.bytes = malloc(worker->cap);
-    int rc = worker->tick.bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
-    if (rc == SH_OK) rc = caster_create(&worker->caster, err);
+    int rc = caster_create(&worker->caster, err);
     if (rc == SH_OK)
         rc = line_block_alloc(&worker->block, device_tick_pulses(site->cfg) * site_most_points_per_pulse(site), err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&worker->block, err);
@@ -66,7 +65,6 @@ void worker_free(struct worker *worker)
     caster_free(worker->caster);
     worker->block.waves = worker->waves;
     line_block_free(&worker->block);
-    free(worker->tick.bytes);
     free(worker);
 }
 
@@ -106,19 +104,23 @@ uint32_t worker_usual_bytes(const struct site *site)
                       site_usual_waves(site, n_points));
 }
 
-static uint8_t *end_of(const struct worker *worker)
-{
-    return worker->tick.bytes + worker->tick.len;
-}
+/* Where the next frame goes. */
+struct place {
+    uint8_t *at;
+    size_t room; /* 0: there is no memory */
+};
 
-static size_t room_of(const struct worker *worker)
+static struct place place_for(struct worker *worker, size_t bytes)
 {
-    return worker->cap - worker->tick.len;
+    struct place place = {NULL, 0};
+    if (!worker->no_memory && ring_grow(worker->slot, bytes, &place.room) != SH_OK) worker->no_memory = 1;
+    if (!worker->no_memory) place.at = worker->slot->tick.bytes + worker->slot->tick.len;
+    return place;
 }
 
 static void added(struct worker *worker, size_t len)
 {
-    worker->tick.len += (uint32_t)len;
+    worker->slot->tick.len += (uint32_t)len;
 }
 
 static void surface_name(void *ctx, uint32_t label, const char **object, const char **material)
@@ -130,18 +132,45 @@ static void surface_name(void *ctx, uint32_t label, const char **object, const c
 
 static void add_telemetry(struct worker *worker, const struct device_work *work)
 {
-    added(worker, native_encode_telemetry(end_of(worker), room_of(worker), &work->telemetry_frame, work->t_ns, 0));
+    const struct place to = place_for(worker, FIXED_BYTES);
+    added(worker, native_encode_telemetry(to.at, to.room, &work->telemetry_frame, work->t_ns, 0));
 }
 
 static void add_event(struct worker *worker, const struct device_work *work, uint32_t i)
 {
     if (work->event[i].code == NATIVE_EV_SCAN_END) add_telemetry(worker, work);
-    added(worker, native_encode_event(end_of(worker), room_of(worker), &work->event[i], work->t_ns, 0));
+    const struct place to = place_for(worker, FIXED_BYTES);
+    added(worker, native_encode_event(to.at, to.room, &work->event[i], work->t_ns, 0));
 }
 
 static void add_anchor(struct worker *worker, const struct native_anchor *anchor, int64_t t_ns, int flags)
 {
-    added(worker, native_encode_anchor(end_of(worker), room_of(worker), anchor, t_ns, flags));
+    const struct place to = place_for(worker, FIXED_BYTES);
+    added(worker, native_encode_anchor(to.at, to.room, anchor, t_ns, flags));
+}
+
+static void add_descriptor(struct worker *worker, const struct device_work *work)
+{
+    const struct place to = place_for(worker, FIXED_BYTES);
+    added(worker, native_encode_descriptor(to.at, to.room, &work->descriptor, work->t_ns, work->describe_flags));
+}
+
+static void add_emitter(struct worker *worker, const struct device_work *work)
+{
+    const struct native_emitter *emitter = &work->emitter;
+    const struct place to = place_for(worker, FIXED_BYTES + (size_t)emitter->n_beams * NATIVE_BEAM_LEN);
+    added(worker, native_encode_emitter(to.at, to.room, emitter, work->beam, work->t_ns, work->describe_flags));
+}
+
+static void add_names(struct worker *worker, const struct device_work *work)
+{
+    struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
+    while (names.n != 0) {
+        const struct place to = place_for(worker, NATIVE_HEADER_LEN + NAMES_BYTES);
+        const size_t len = native_encode_surfaces(to.at, to.room, NAMES_BYTES, &names, work->t_ns);
+        if (len == 0) break;
+        added(worker, len);
+    }
 }
 
 static void fill_heads(struct worker *worker, const struct device_work *work)
@@ -149,19 +178,11 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
     for (uint32_t i = 0; i < work->n_events_before; i++)
         add_event(worker, work, i);
     if (work->describe) {
-        int flags = work->describe_flags;
-        added(worker, native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
-        if (work->emitter.kind != NATIVE_EMIT_LINE)
-            added(worker, native_encode_emitter(end_of(worker), room_of(worker), &work->emitter, work->beam, work->t_ns,
-                                                flags));
-        add_anchor(worker, &work->anchor, work->t_ns, flags);
+        add_descriptor(worker, work);
+        if (work->emitter.kind != NATIVE_EMIT_LINE) add_emitter(worker, work);
+        add_anchor(worker, &work->anchor, work->t_ns, work->describe_flags);
     }
-    struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
-    while (names.n != 0) {
-        size_t len = native_encode_surfaces(end_of(worker), room_of(worker), 8192, &names, work->t_ns);
-        if (len == 0) break;
-        added(worker, len);
-    }
+    add_names(worker, work);
 }
 
 /* All poses from the last one at or before the first pulse to the first one at or after the last pulse. A
@@ -204,7 +225,9 @@ static void take_poses(struct worker *worker, const struct device_work *work)
         memcpy(p->position_m, k->pose.position_m, sizeof p->position_m);
         memcpy(p->quat, k->pose.quat, sizeof p->quat);
     }
-    added(worker, native_encode_poses(end_of(worker), room_of(worker), worker->pose, setup->n_knots, work->t_ns, 0));
+    const struct place to =
+        place_for(worker, NATIVE_HEADER_LEN + NATIVE_POSES_HEAD_LEN + (size_t)setup->n_knots * NATIVE_POSE_LEN);
+    added(worker, native_encode_poses(to.at, to.room, worker->pose, setup->n_knots, work->t_ns, 0));
 }
 
 /* Writes an anchor: the points that follow are relative to another place (site_georef). */
@@ -244,8 +267,8 @@ static void count_hits(struct worker *worker, uint32_t echoes)
                                    .unfit = (uint32_t)(now.unfit - was->unfit),
                                    .lost_samples = (uint32_t)(now.lost_samples - was->lost_samples)};
     *was = now;
-    ring_hits_add(&worker->tick.hits, &hits);
-    ring_hits_add(&worker->tick.tail, &hits);
+    ring_hits_add(&worker->slot->tick.hits, &hits);
+    ring_hits_add(&worker->slot->tick.tail, &hits);
 }
 
 /* Pulses of a tick that belong to one line. */
@@ -264,6 +287,16 @@ static void get_part(const struct device_work *work, uint64_t k, struct part *pa
     part->cast_end = part->end < line->cast_end ? part->end : line->cast_end;
 }
 
+/* Writes the block's points and all that belongs to them. */
+static void add_points(struct worker *worker, const struct device_work *work)
+{
+    const struct line_block *block = &worker->block;
+    struct site_wave_room waves = {0};
+    if (block->waves != NULL) waves = (struct site_wave_room){block->waves->n + 1, block->waves->n_samples};
+    const struct place to = place_for(worker, line_bytes(work->site->cfg, block->n_points, 0, waves));
+    added(worker, native_encode_points(to.at, to.room, block, work->scan_t0_ns));
+}
+
 static void cast_run(struct worker *worker, const struct device_work *work, const struct part *part)
 {
     uint64_t k = part->cast0, end = part->cast_end;
@@ -276,8 +309,8 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
         if (work->disturbance.on && work->disturbance.stuck)
             schedule_hold_run(&work->segment, work->disturbance.stuck_turn, &run);
         count_hits(worker, caster_cast(worker->caster, &worker->setup, &run, &worker->block));
-        added(worker, native_encode_points(end_of(worker), room_of(worker), &worker->block, work->scan_t0_ns));
-        worker->tick.n_cast += n;
+        add_points(worker, work);
+        worker->slot->tick.n_cast += n;
         k += n;
     }
 }
@@ -313,7 +346,7 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
     find_angles(work, last, &mirror_turn, &pan_turn);
     if (setup->detect != NULL && setup->detect->instrument != NULL)
         instrument_read(setup->detect->instrument, 1, &mirror_turn, &pan_turn);
-    struct ring_tick *tick = &worker->tick;
+    struct ring_tick *tick = &worker->slot->tick;
     struct ring_mark *mark = &tick->mark[tick->n_marks++];
     mark->end = (struct line_end){.frame = line->frame,
                                   .line = (uint32_t)line->line,
@@ -332,7 +365,8 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
     mark->scan_t0_ns = work->scan_t0_ns;
     tick->tail = (struct ring_hits){0};
     tick->n_lines++;
-    added(worker, native_encode_line_end(end_of(worker), room_of(worker), &mark->end, work->scan_t0_ns));
+    const struct place to = place_for(worker, LINE_END_BYTES);
+    added(worker, native_encode_line_end(to.at, to.room, &mark->end, work->scan_t0_ns));
 }
 
 static void fill_pulses(struct worker *worker, const struct device_work *work)
@@ -359,7 +393,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     for (uint64_t k = work->pulse0; k < work->pulse_end; k = part.end) {
         get_part(work, k, &part);
         if (part.cast0 < part.cast_end) cast_run(worker, work, &part);
-        worker->tick.n_fired += part.end - k;
+        worker->slot->tick.n_fired += part.end - k;
         if (part.end == part.line.pulse_end) end_line(worker, work, &part.line, part.end);
     }
     if (worker->site->moving && work->pulse_end > work->pulse0) /* also in the blind part of a line */
@@ -371,17 +405,20 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     if (line.begin < work->pulse_end) end_line(worker, work, &line, work->pulse_end);
 }
 
-const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work)
+int worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot)
 {
     if (work->version != NULL) worker->site = device_site_of(work->version);
-    worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark};
+    worker->slot = slot;
+    worker->no_memory = 0;
+    ring_begin(slot);
+    slot->tick.mark = worker->mark;
     fill_heads(worker, work);
     if (work->scanning) {
-        worker->tick.scan = work->scan;
+        slot->tick.scan = work->scan;
         fill_pulses(worker, work);
     }
     for (uint32_t i = work->n_events_before; i < work->n_events; i++)
         add_event(worker, work, i);
     if (work->telemetry) add_telemetry(worker, work);
-    return &worker->tick;
+    return worker->no_memory ? ring_break(slot) : ring_end(slot);
 }

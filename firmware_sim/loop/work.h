@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* One tick's work: casting its pulses and writing its frames.
  *
- * In: what the device says a tick consists of (device_work). Out: the tick's frames as bytes, the line ends
- * that are completed at release, and its counts (ring_tick). */
+ * In: what the device says a tick consists of (device_work). Out: the tick in its slot (ring_tick): its frames as
+ * bytes, the line ends that are completed at release, and its counts. */
 #ifndef FIRMWARE_SIM_LOOP_WORK_H
 #define FIRMWARE_SIM_LOOP_WORK_H
 
@@ -20,7 +20,8 @@ uint32_t worker_tick_bytes(const struct site *site);
 /* Bytes of a usual tick at the settings of power-up: the pulses of a tick with one echo each. */
 uint32_t worker_usual_bytes(const struct site *site);
 
-/* Makes the tick. Allocates nothing. The result is good until the next call. */
-const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work);
+/* Makes the tick in a slot, from ring_begin to ring_end. Allocates nothing but room for a tick longer than usual.
+ * SH_ENOMEM: there was none; the tick is broken. */
+int worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot);
 
 #endif

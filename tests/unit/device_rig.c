@@ -105,6 +105,7 @@ void rig_close(struct rig *rig)
 {
     struct sh_err err;
     worker_free(rig->worker);
+    free(rig->slot.longer);
     need(device_close_journal(rig->device, &err), &err);
     device_free(rig->device);
     site_free(rig->site);
@@ -132,7 +133,8 @@ void rig_go_to(struct rig *rig, uint64_t tick)
 
 const struct ring_tick *rig_fill(struct rig *rig)
 {
-    const struct ring_tick *tick = worker_fill(rig->worker, &rig->work);
+    const struct ring_tick *tick = &rig->slot.tick;
+    assert_int_equal(worker_fill(rig->worker, &rig->work, &rig->slot), SH_OK);
     assert_true(tick->len <= worker_tick_bytes(rig->site) && tick->n_marks <= RING_MAX_MARKS);
     return tick;
 }

@@ -36,6 +36,7 @@ struct rig {
     struct site *site;
     struct device *device;
     struct worker *worker;
+    struct ring_slot slot;   /* of the last tick made */
     uint64_t next;           /* tick to be claimed */
     struct device_work work; /* the last one claimed */
     int over;

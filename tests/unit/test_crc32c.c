@@ -102,6 +102,21 @@ static void test_lengths_hw(void **state)
     check_lengths(crc32c_hw);
 }
 
+static void test_published_wide(void **state)
+{
+    (void)state;
+    if (!crc32c_has_wide()) skip();
+    check_published(crc32c_wide);
+}
+
+/* Its blocks are of 256 and 64 bytes. */
+static void test_lengths_wide(void **state)
+{
+    (void)state;
+    if (!crc32c_has_wide()) skip();
+    check_lengths(crc32c_wide);
+}
+
 static void *table_thread(void *arg)
 {
     *(uint32_t *)arg = crc32c_table(0, "123456789", 9);
@@ -128,6 +143,7 @@ int main(void)
         cmocka_unit_test(test_first_use_from_threads), cmocka_unit_test(test_published_dispatch),
         cmocka_unit_test(test_published_table),        cmocka_unit_test(test_published_hw),
         cmocka_unit_test(test_lengths_table),          cmocka_unit_test(test_lengths_hw),
+        cmocka_unit_test(test_published_wide),         cmocka_unit_test(test_lengths_wide),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

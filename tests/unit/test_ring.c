@@ -19,7 +19,7 @@ static void put(struct ring_slot *slot, const char *text)
     char bytes[64];
     snprintf(bytes, sizeof bytes, "%s", text);
     struct ring_tick tick = {.bytes = (uint8_t *)bytes, .len = (uint32_t)strlen(text)};
-    assert_int_equal(ring_put(&ring, slot, &tick), SH_OK);
+    assert_int_equal(ring_put(slot, &tick), SH_OK);
 }
 
 static void publish(uint64_t tick, const char *text)
@@ -198,7 +198,7 @@ static void a_claimed_slot_is_empty(void **state)
         assert_non_null(slot);
         assert_memory_equal(&slot->tick, &none, sizeof none);
         assert_true(slot->n_frames == 0 && slot->first_seq == 0);
-        assert_int_equal(ring_put(&ring, slot, &full), SH_OK);
+        assert_int_equal(ring_put(slot, &full), SH_OK);
         slot->n_frames = slot->first_seq = 1;
         assert_true(ring_ready(slot, tick));
         ring_release(&ring, tick);
@@ -220,7 +220,7 @@ static void a_slot_is_as_long_as_its_tick(void **state)
     enum { LONG = 40 * SLOT_BYTES };
     static uint8_t text[LONG], got[LONG];
     static struct ring_mark mark[2];
-    assert_in_range(ring.room, SLOT_BYTES, SLOT_BYTES + 1024);
+    assert_in_range(ring.slot[0].store_room, SLOT_BYTES, SLOT_BYTES + 1024);
     for (uint32_t i = 0; i < LONG; i++)
         text[i] = (uint8_t)(i * 2654435761U >> 24);
     mark[0].frame_at = 7;
@@ -231,7 +231,7 @@ static void a_slot_is_as_long_as_its_tick(void **state)
         struct ring_tick made = {.bytes = text, .len = is_long ? LONG - 1 : 3, .mark = mark, .n_marks = 2};
         struct ring_slot *slot = ring_claim(&ring, tick);
         const uint64_t before = longer_slots();
-        assert_int_equal(ring_put(&ring, slot, &made), SH_OK);
+        assert_int_equal(ring_put(slot, &made), SH_OK);
         assert_int_equal(longer_slots(), is_long ? before + 1 : tick < ring.n_slots ? 0 : before - 1);
         assert_memory_equal(slot->tick.mark, mark, sizeof mark);
         assert_true(ring_ready(slot, tick));
@@ -264,7 +264,7 @@ static void without_memory_a_tick_is_empty(void **state)
         free(made.bytes);
         skip();
     }
-    int rc = ring_put(&ring, slot, &made);
+    int rc = ring_put(slot, &made);
     assert_int_equal(setrlimit(RLIMIT_AS, &was), 0);
     free(made.bytes);
     assert_int_equal(rc, SH_ENOMEM);

@@ -73,7 +73,7 @@ static void *caster_main(void *arg)
         struct ring_tick made = {.bytes = bytes, .len = len_of(tick)};
         for (uint32_t i = 0; i < made.len; i++)
             bytes[i] = byte_of(tick, i);
-        if (ring_put(&ring, slot, &made) != SH_OK) atomic_fetch_add(&all.bad, 1);
+        if (ring_put(slot, &made) != SH_OK) atomic_fetch_add(&all.bad, 1);
         ring_ready(slot, tick);
     }
 }

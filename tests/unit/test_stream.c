@@ -47,7 +47,7 @@ static struct ring_slot *make_tick(uint64_t tick, int n_events, int before, uint
     }
     made.hits.echoes = (uint32_t)(before > 0 ? before : 0) + tail;
     made.n_lines = made.n_marks;
-    assert_int_equal(ring_put(&stream.ring, slot, &made), SH_OK);
+    assert_int_equal(ring_put(slot, &made), SH_OK);
     return slot;
 }
 
@@ -128,7 +128,7 @@ static struct ring_slot *make_pulses(uint64_t tick, uint32_t scan, uint64_t n_ca
         made.len = (uint32_t)native_encode_telemetry(bytes, sizeof bytes, &t, 7, 0);
         made.len += (uint32_t)native_encode_event(bytes + made.len, sizeof bytes - made.len, &end, 7, 0);
     }
-    assert_int_equal(ring_put(&stream.ring, slot, &made), SH_OK);
+    assert_int_equal(ring_put(slot, &made), SH_OK);
     return slot;
 }
 
