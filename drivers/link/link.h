@@ -96,6 +96,7 @@ struct link_ops {
     int messages;  /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
     int stalls; /* 1: write() may wait */
+    int is_cheap;  /* 1: write() makes no system call, so that nothing is gained by collecting bytes */
 
     uint32_t faults;                               /* what fault() can do: LINK_FAULT_BIT of each */
     uint32_t (*can)(const struct link_spec *spec); /* those that a link of this spec can do; NULL: all */

@@ -54,6 +54,7 @@ static void null_close(void *link)
 
 const struct link_ops link_null = {
     .name = "null",
+    .is_cheap = 1,
     .open = null_open,
     .endpoint = null_endpoint,
     .poll = null_poll,

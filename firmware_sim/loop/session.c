@@ -11,7 +11,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-enum { STRAIGHT_BYTES = 16384 }; /* a tick this long is worth a call of its own */
+enum { STRAIGHT_BYTES = 16384 }; /* a tick this long is worth a system call of its own */
 
 static void clear(struct session *s)
 {
@@ -179,8 +179,9 @@ static uint32_t write_straight(struct pump *pump, struct session *s)
     struct ring *ring = &pump->stream->ring;
     struct ring_copy tick;
     uint32_t taken = 0;
+    const uint32_t least = pump->ops->is_cheap ? 1 : STRAIGHT_BYTES;
     if (s->out_len != 0 || pump->ops->stalls || session_waits_for_files(pump)) return 0;
-    if (ring_look(ring, s->reader, s->cursor, &tick) == RING_READ && tick.len >= STRAIGHT_BYTES && follows(s, &tick) &&
+    if (ring_look(ring, s->reader, s->cursor, &tick) == RING_READ && tick.len >= least && follows(s, &tick) &&
         s->cursor < session_off_tick(pump, s)) {
         session_check_lost(pump, s, &tick, stream_released(pump->stream));
         s->cursor++;
