@@ -95,8 +95,8 @@ struct link_ops {
     int datagrams; /* 1: the system adds a checksum to each write, so a damaged one never arrives */
     int messages;  /* 1: each write goes out as one message; the owner puts text or frames into it, not both */
 
-    int stalls; /* 1: write() may wait */
-    int is_cheap;  /* 1: write() makes no system call, so that nothing is gained by collecting bytes */
+    int stalls;   /* 1: write() may wait */
+    int is_cheap; /* 1: write() makes no system call, so that nothing is gained by collecting bytes */
 
     uint32_t faults;                               /* what fault() can do: LINK_FAULT_BIT of each */
     uint32_t (*can)(const struct link_spec *spec); /* those that a link of this spec can do; NULL: all */
@@ -121,6 +121,9 @@ struct link_ops {
      * LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
+
+    /* As write, but the bytes are read where they lie, and stay until the next poll. NULL: there is only write. */
+    ssize_t (*lend)(void *link, int session, const void *buf, size_t len);
 
     /* Number of writes that were taken and did not arrive, as far as the system reports it: refused, or without a
      * route. NULL: none. To be called by the link's thread, or after it has ended. */

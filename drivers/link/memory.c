@@ -9,7 +9,7 @@
 
 struct memory_link {
     struct link_memory *shared;
-    size_t lent; /* bytes of the write that the client has, or can take; 0: none */
+    size_t written; /* bytes of the last write, which the client may need yet; 0: none */
     int reported_opened, reported_closed;
 };
 
@@ -17,9 +17,9 @@ struct memory_link {
 
 size_t memory_take(struct link_memory *memory, const uint8_t **bytes)
 {
-    *bytes = memory->bytes;
-    memory->bytes = NULL;
-    return *bytes != NULL ? memory->len : 0;
+    if (memory->n_taken == memory->n_pieces) return 0;
+    *bytes = memory->piece[memory->n_taken].bytes;
+    return memory->piece[memory->n_taken++].len;
 }
 
 size_t memory_send(struct link_memory *memory, const void *bytes, size_t len)
@@ -40,7 +40,7 @@ void memory_leave(struct link_memory *memory)
 {
     if (memory->left) return;
     memory->left = 1;
-    memory->bytes = NULL;
+    memory->n_taken = memory->n_pieces;
     memory_turn(memory, 0);
 }
 
@@ -69,7 +69,8 @@ static int memory_poll(void *link, int wake_fd, uint32_t want_write, int timeout
     if (!self->reported_opened) self->reported_opened = link_events_push(&events, LINK_OPENED, 0, "memory");
     if (m->left && !self->reported_closed) self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, "memory");
     if (!m->left && m->sent_len != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
-    return link_poll_sink(wake_fd, !m->left && (want_write & 1u) != 0 && m->bytes == NULL, timeout_ms, &events);
+    return link_poll_sink(wake_fd, !m->left && (want_write & 1u) != 0 && m->n_taken == m->n_pieces, timeout_ms,
+                          &events);
 }
 
 static ssize_t memory_read(void *link, int session, void *buf, size_t len)
@@ -83,19 +84,31 @@ static ssize_t memory_read(void *link, int session, void *buf, size_t len)
     return (ssize_t)len;
 }
 
+static ssize_t memory_lend(void *link, int session, const void *buf, size_t len)
+{
+    struct link_memory *m = ((struct memory_link *)link)->shared;
+    if (session != 0 || m->left) return SH_ECLOSED;
+    if (m->n_taken == m->n_pieces) m->n_taken = m->n_pieces = 0;
+    if (m->n_pieces == MEMORY_PIECES) return 0;
+    m->piece[m->n_pieces].bytes = buf;
+    m->piece[m->n_pieces++].len = len;
+    return (ssize_t)len;
+}
+
 /* A write counts as taken in the turn after the client took it: only then does the client need the bytes no more. */
 static ssize_t memory_write(void *link, int session, const void *buf, size_t len)
 {
     struct memory_link *self = link;
-    struct link_memory *m = self->shared;
-    if (session != 0 || m->left) return SH_ECLOSED;
-    if (self->lent == 0) {
-        m->bytes = buf;
-        m->len = self->lent = len;
+    const struct link_memory *m = self->shared;
+    if (self->written == 0 || session != 0 || m->left) {
+        const ssize_t n = memory_lend(link, session, buf, len);
+        if (n < 0) return n;
+        self->written = (size_t)n;
+        return 0;
     }
-    if (m->bytes != NULL) return 0;
-    const size_t taken = self->lent;
-    self->lent = 0;
+    if (m->n_taken != m->n_pieces) return 0;
+    const size_t taken = self->written;
+    self->written = 0;
     return (ssize_t)taken;
 }
 
@@ -108,7 +121,7 @@ static void memory_end(void *link, int session)
 static void memory_close(void *link)
 {
     struct memory_link *self = link;
-    self->shared->bytes = NULL;
+    self->shared->n_taken = self->shared->n_pieces;
     self->shared->turn = NULL;
     self->shared->over = 1;
     free(self);
@@ -121,6 +134,7 @@ const struct link_ops link_memory = {
     .poll = memory_poll,
     .read = memory_read,
     .write = memory_write,
+    .lend = memory_lend,
     .end = memory_end,
     .close = memory_close,
 };

@@ -11,7 +11,7 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-enum { MEMORY_ROOM = 4096 };
+enum { MEMORY_ROOM = 4096, MEMORY_PIECES = 16 /* between two turns */ };
 
 /* What both ends share. It begins as zeros, and outlives the link. */
 struct link_memory {
@@ -19,8 +19,11 @@ struct link_memory {
      * NULL: it has not begun. */
     void (*turn)(void *owner, int timeout_ms);
     void *owner;
-    const uint8_t *bytes; /* written; NULL: nothing that the client has not taken */
-    size_t len;
+    struct {
+        const uint8_t *bytes;
+        size_t len;
+    } piece[MEMORY_PIECES]; /* written; those from n_taken on are not taken yet */
+    uint32_t n_pieces, n_taken;
     uint8_t sent[MEMORY_ROOM]; /* by the client */
     size_t sent_len;
     int over; /* the owner writes nothing more */

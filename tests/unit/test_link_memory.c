@@ -50,6 +50,32 @@ static void a_write_is_read_where_it_lies(void **state)
     bench_close(&bench);
 }
 
+/* Bytes that are lent count as written at once, while there is room. They come in order, before a write. */
+static void pieces_come_in_their_order(void **state)
+{
+    (void)state;
+    struct link_memory memory = {0};
+    struct bench bench = open_memory(&memory);
+    const uint8_t *bytes;
+    for (int round = 0; round < 2; round++) {
+        const size_t n = round == 0 ? 3 : MEMORY_PIECES;
+        for (size_t i = 0; i < n; i++)
+            assert_int_equal(bench.ops->lend(bench.link, 0, WRITTEN + i, i + 1), i + 1);
+        assert_int_equal(bench.ops->write(bench.link, 0, WRITTEN, 9), 0);
+        if (round == 1) assert_int_equal(bench.ops->lend(bench.link, 0, WRITTEN, 5), 0);
+        for (size_t i = 0; i < n; i++) {
+            assert_int_equal(bench_poll(&bench, 1, 0), 0);
+            assert_int_equal(memory_take(&memory, &bytes), i + 1);
+            assert_ptr_equal(bytes, WRITTEN + i);
+        }
+        if (round == 0) assert_int_equal(memory_take(&memory, &bytes), 9);
+        assert_int_equal(memory_take(&memory, &bytes), 0);
+        bench_expect(&bench, LINK_WRITABLE, 1);
+        if (round == 0) assert_int_equal(bench.ops->write(bench.link, 0, WRITTEN, 9), 9);
+    }
+    bench_close(&bench);
+}
+
 static void a_client_sends_until_there_is_no_room(void **state)
 {
     (void)state;
@@ -113,9 +139,10 @@ static void each_end_may_go(void **state)
 
 /* ---- a head and its client */
 
-/* A queue of ten ticks is full at once when its reader does not read. */
-static const char *const SETS[] = {"loop.pace=fast", "head.frames=1", "loop.queue_ms=10", "loop.ahead_ms=5",
-                                   "loop.threads=2"};
+/* A queue of ten ticks is full at once when its reader does not read. So is one of two long ticks, which are lent. */
+static const char *const SETS[][5] = {
+    {"loop.pace=fast", "head.frames=1", "loop.queue_ms=10", "loop.threads=2", "loop.ahead_ms=5"},
+    {"loop.pace=fast", "head.frames=1", "loop.queue_ms=10", "loop.threads=2", "loop.tick_hz=100"}};
 
 enum { FRAMES_MOST = 1000000, NEXT_MS = 60000 };
 
@@ -164,15 +191,15 @@ static void scan(struct scanhead *sh, int pauses, struct seen *seen)
     scanhead_hash_hex(sh, seen->sha256);
 }
 
-static struct rig *open_rig(void)
+static struct rig *open_rig(int has_long_ticks)
 {
-    return rig_open(&(struct device_options){.start = 0}, SETS, sizeof SETS / sizeof *SETS);
+    return rig_open(&(struct device_options){.start = 0}, SETS[has_long_ticks], 5);
 }
 
 /* The same through the socket pair, whose link has a thread of its own. */
-static void scan_through_socket(struct seen *seen)
+static void scan_through_socket(int has_long_ticks, struct seen *seen)
 {
-    struct rig *rig = open_rig();
+    struct rig *rig = open_rig(has_long_ticks);
     struct link_spec spec = {.fd = -1};
     const struct loop_options options = {.extra = &spec};
     struct scanhead *sh;
@@ -195,13 +222,13 @@ static void the_stream_is_that_of_a_socket(void **state)
     (void)state;
     struct seen wanted, seen;
     struct sh_err err;
-    scan_through_socket(&wanted);
-    assert_true(wanted.pulses > 1000);
-    for (int pauses = 0; pauses < 2; pauses++) {
-        struct rig *rig = open_rig();
+    for (int i = 0; i < 4; i++) {
+        if (i % 2 == 0) scan_through_socket(i / 2, &wanted);
+        assert_true(wanted.pulses > 1000);
+        struct rig *rig = open_rig(i / 2);
         struct offline off = {0};
         need(offline_open_at(rig->site, 0.0, NULL, &off, &err), &err);
-        scan(off.sh, pauses, &seen);
+        scan(off.sh, i % 2, &seen);
         assert_int_equal(seen.pulses, wanted.pulses);
         assert_string_equal(seen.sha256, wanted.sha256);
         offline_close(&off);
@@ -213,7 +240,7 @@ static void the_stream_is_that_of_a_socket(void **state)
 static void a_client_may_go_within_a_scan(void **state)
 {
     (void)state;
-    struct rig *rig = open_rig();
+    struct rig *rig = open_rig(1);
     struct offline off = {0};
     struct scanhead_frame frame = {0};
     struct scanhead_stats before, after;
@@ -240,7 +267,7 @@ static void a_client_may_go_within_a_scan(void **state)
 static void a_head_may_end_within_a_scan(void **state)
 {
     (void)state;
-    struct rig *rig = open_rig();
+    struct rig *rig = open_rig(1);
     struct offline off = {0};
     struct scanhead_frame frame = {0};
     struct scanhead_stats stats;
@@ -262,11 +289,9 @@ static void a_head_may_end_within_a_scan(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_write_is_read_where_it_lies),
-        cmocka_unit_test(a_client_sends_until_there_is_no_room),
-        cmocka_unit_test(each_end_may_go),
-        cmocka_unit_test(the_stream_is_that_of_a_socket),
-        cmocka_unit_test(a_client_may_go_within_a_scan),
+        cmocka_unit_test(a_write_is_read_where_it_lies),  cmocka_unit_test(a_client_sends_until_there_is_no_room),
+        cmocka_unit_test(pieces_come_in_their_order),     cmocka_unit_test(each_end_may_go),
+        cmocka_unit_test(the_stream_is_that_of_a_socket), cmocka_unit_test(a_client_may_go_within_a_scan),
         cmocka_unit_test(a_head_may_end_within_a_scan),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -67,7 +67,7 @@ static int offline_wait(struct host_source *source, short events, int64_t deadli
     struct link_memory *memory = source->ctx;
     for (int is_late = 0;; is_late = host_deadline_ns(0) >= deadline_ns) {
         const int64_t left_ms = (deadline_ns - host_deadline_ns(0) + 999999) / 1000000;
-        *revents = memory->bytes != NULL || memory->over ? POLLIN : 0;
+        *revents = memory->n_taken != memory->n_pieces || memory->over ? POLLIN : 0;
         if (memory->sent_len < sizeof memory->sent) *revents |= POLLOUT;
         *revents &= events;
         if (*revents != 0 || is_late) return *revents != 0;
