@@ -103,7 +103,8 @@ static ssize_t capture_write(struct host_source *source, const void *data, size_
     return host_fd_ops.write(source, data, len);
 }
 
-static const struct host_source_ops capture_ops = {capture_read, capture_write, capture_wait, capture_close};
+static const struct host_source_ops capture_ops = {
+    .read = capture_read, .write = capture_write, .wait = capture_wait, .close = capture_close};
 
 /* The first interface says what the packets are. */
 static int check_front(struct host_source *source, struct sh_err *err)

@@ -43,21 +43,26 @@ static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, 
     }
 }
 
+struct scanhead *host_open(const struct host_source *source)
+{
+    struct scanhead *sh = calloc(1, sizeof *sh);
+    if (sh == NULL) return NULL;
+    sh->source = *source;
+    native_parser_init(&sh->parser);
+    host_listen(sh);
+    host_turn_table(sh);
+    return sh;
+}
+
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len)
 {
     struct sh_err why = {0};
-    int rc;
-    struct scanhead *sh = calloc(1, sizeof *sh);
+    struct host_source opened;
     *out = NULL;
-    if (sh == NULL) {
+    int rc = open_in_time(source, 0, host_deadline_ns(timeout_ms), &opened, &why);
+    if (rc == SH_OK && (*out = host_open(&opened)) == NULL) {
+        opened.ops->close(&opened);
         rc = sh_fail(&why, SH_ENOMEM, "no memory for a scan head handle");
-    } else if ((rc = open_in_time(source, 0, host_deadline_ns(timeout_ms), &sh->source, &why)) != 0) {
-        free(sh);
-    } else {
-        native_parser_init(&sh->parser);
-        host_listen(sh);
-        host_turn_table(sh);
-        *out = sh;
     }
     if (err != NULL && err_len > 0) snprintf(err, err_len, "%s", rc == SH_OK ? "" : why.text);
     return rc;
@@ -71,7 +76,7 @@ int scanhead_open(const char *source, struct scanhead **out, char *err, size_t e
 int scanhead_reattach(struct scanhead *sh, int timeout_ms)
 {
     char name[sizeof sh->source.name];
-    if (sh->source.is_file || strncmp(sh->source.name, "fd:", 3) == 0)
+    if (sh->source.is_file || sh->source.ctx != NULL || strncmp(sh->source.name, "fd:", 3) == 0)
         return sh_fail(&sh->err, SCANHEAD_ESTATE,
                        "%s: this source can't be reattached; allowed are usb, tty:PATH and tcp:HOST:PORT",
                        sh->source.name);
@@ -88,6 +93,15 @@ int scanhead_reattach(struct scanhead *sh, int timeout_ms)
     native_parser_resume(&sh->parser);
     host_note_reattached(sh);
     return SCANHEAD_OK;
+}
+
+void host_hang_up(struct scanhead *sh)
+{
+    if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
+    sh->source.ops = NULL;
+    sh->payload = NULL;
+    sh->ended = 1;
+    native_parser_lend(&sh->parser, NULL, 0);
 }
 
 static void free_nodes(struct host_node *node)

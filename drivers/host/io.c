@@ -46,7 +46,7 @@ static void fd_close(struct host_source *source)
     close(source->fd);
 }
 
-const struct host_source_ops host_fd_ops = {fd_read, fd_write, fd_wait, fd_close};
+const struct host_source_ops host_fd_ops = {.read = fd_read, .write = fd_write, .wait = fd_wait, .close = fd_close};
 
 int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *revents)
 {
@@ -75,16 +75,28 @@ void host_note_loss(struct scanhead *sh, int error)
     sh->lost = sh->source.usb != NULL && !sh->reset;
 }
 
+/* Bytes from the source into the parser: as read(). */
+static ssize_t take(struct scanhead *sh)
+{
+    struct host_source *source = &sh->source;
+    const uint8_t *items;
+    size_t room;
+    if (source->ops->lend != NULL) {
+        const ssize_t n = source->ops->lend(source, &items);
+        if (n > 0) native_parser_lend(&sh->parser, items, (size_t)n);
+        return n;
+    }
+    uint8_t *to = native_parser_room(&sh->parser, &room);
+    const ssize_t n = source->ops->read(source, to, room);
+    if (n > 0) native_parser_added(&sh->parser, (size_t)n);
+    return n;
+}
+
 int host_fill(struct scanhead *sh, int64_t deadline_ns)
 {
-    size_t room;
-    uint8_t *to = native_parser_room(&sh->parser, &room);
     for (;;) {
-        ssize_t n = sh->source.ops->read(&sh->source, to, room);
-        if (n > 0) {
-            native_parser_added(&sh->parser, (size_t)n);
-            return 0;
-        }
+        const ssize_t n = take(sh);
+        if (n > 0) return 0;
         if (n == 0 || host_is_hang_up(sh, errno)) {
             native_parser_finish(&sh->parser);
             sh->ended = 1;

@@ -10,11 +10,15 @@
 
 #include "core/err.h"
 
-/* How bytes come and go, without blocking; one table for descriptors, one for USB. */
+/* How bytes come and go, without blocking; one table for descriptors, one for USB, one for a head in this process. */
 struct host_source;
+struct scanhead;
 struct host_source_ops {
     /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
+    /* In place of read, as native_parser_lend() needs it; NULL: there is only read. The bytes stay until the next call of
+     * wait or close. */
+    ssize_t (*lend)(struct host_source *source, const uint8_t **bytes);
     ssize_t (*write)(struct host_source *source, const void *data, size_t len);
     /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with
      * errno. */
@@ -27,11 +31,17 @@ struct host_source {
     int fd;
     struct host_usb *usb;
     struct host_capture *capture; /* of a .pcapng; else NULL */
+    void *ctx;                    /* of host_open()'s caller */
     int is_file, is_socket;
     int unsettled;  /* lines may come that answer no command of ours: on a new terminal, after a time-out */
     int asked;      /* *IDN? that went out to skip such lines, and have no answer yet */
     char name[256]; /* for messages, and to open it again */
 };
+
+/* host.c: a handle with a source that the caller has opened. NULL: no memory, and the source is still the caller's. */
+struct scanhead *host_open(const struct host_source *source);
+/* The source is closed, and the handle gives nothing more. It keeps what it was told. */
+void host_hang_up(struct scanhead *sh);
 
 /* Opens what `source` names, non-blocking. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);

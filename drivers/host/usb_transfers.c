@@ -293,7 +293,8 @@ static void usb_close(struct host_source *source)
     usb_free(usb);
 }
 
-static const struct host_source_ops usb_ops = {usb_read, usb_write, usb_wait, usb_close};
+static const struct host_source_ops usb_ops = {
+    .read = usb_read, .write = usb_write, .wait = usb_wait, .close = usb_close};
 
 static int make_transfers(struct host_usb *usb, struct sh_err *err)
 {

@@ -3,10 +3,12 @@
 
 /* The one list of links. A new one is a file of this folder that defines its link_ops, a type in link.h, and
  * a row here. */
-extern const struct link_ops link_null, link_file, link_pty, link_tcp, link_usb, link_fd, link_udp, link_web;
+extern const struct link_ops link_null, link_file, link_pty, link_tcp, link_usb, link_fd, link_udp, link_web,
+    link_memory;
 static const struct link_ops *const links[] = {
-    [LINK_NULL] = &link_null, [LINK_FILE] = &link_file, [LINK_PTY] = &link_pty, [LINK_TCP] = &link_tcp,
-    [LINK_USB] = &link_usb,   [LINK_FD] = &link_fd,     [LINK_UDP] = &link_udp, [LINK_WEB] = &link_web,
+    [LINK_NULL] = &link_null, [LINK_FILE] = &link_file, [LINK_PTY] = &link_pty,
+    [LINK_TCP] = &link_tcp,   [LINK_USB] = &link_usb,   [LINK_FD] = &link_fd,
+    [LINK_UDP] = &link_udp,   [LINK_WEB] = &link_web,   [LINK_MEMORY] = &link_memory,
 };
 enum { N_LINKS = sizeof links / sizeof links[0] };
 

@@ -16,13 +16,14 @@
 
 enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
-enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_WEB, LINK_FD };
+enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_WEB, LINK_FD, LINK_MEMORY };
 
 /* Whether the paces fast and step wait for the readers of a link, so that they lose nothing. Readers of other links
  * lose frames as in real time. */
 enum link_waits { LINK_WAITS_BY_TYPE /* all but web do */, LINK_WAITS_YES, LINK_WAITS_NO };
 
-struct web_source; /* web.h */
+struct web_source;  /* web.h */
+struct link_memory; /* memory.h */
 
 struct link_spec {
     enum link_type type;
@@ -45,6 +46,7 @@ struct link_spec {
     int clean;                    /* 1: it gets no injected faults; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
+    struct link_memory *memory;   /* memory: what it shares with its client (memory.h); outlives the link */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
@@ -120,6 +122,9 @@ struct link_ops {
      * LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
+
+    /* As write, but the bytes are read where they lie, and stay until the next poll. NULL: there is only write. */
+    ssize_t (*lend)(void *link, int session, const void *buf, size_t len);
 
     /* Number of writes that were taken and did not arrive, as far as the system reports it: refused, or without a
      * route. NULL: none. To be called by the link's thread, or after it has ended. */

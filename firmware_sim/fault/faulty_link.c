@@ -218,6 +218,13 @@ static ssize_t faulty_write(void *link, int session, const void *buf, size_t len
     return n;
 }
 
+/* Of a link that has no faults: nothing of it goes through a wire. */
+static ssize_t faulty_lend(void *link, int session, const void *buf, size_t len)
+{
+    const struct faulty_link *f = link;
+    return f->inner->lend(f->link, session, buf, len);
+}
+
 static void faulty_endpoint(const void *link, char *buf, size_t len)
 {
     const struct faulty_link *f = link;
@@ -282,6 +289,7 @@ int faulty_open(const struct faulty_spec *faults, const struct link_spec *spec, 
     f->ops.poll = faulty_poll;
     f->ops.read = faulty_read;
     f->ops.write = faulty_write;
+    f->ops.lend = f->inner->lend != NULL && faults->board == NULL ? faulty_lend : NULL;
     f->ops.close = faulty_close;
     if (f->ops.capacity != NULL) f->ops.capacity = faulty_capacity;
     if (f->ops.refused != NULL) f->ops.refused = faulty_refused;

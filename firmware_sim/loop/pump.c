@@ -7,6 +7,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "drivers/link/memory.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
@@ -76,10 +77,11 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->links = links;
     pump->index = index;
     pump->stream = links->stream;
-    pump->is_clean = spec->type == LINK_FD || spec->clean;
+    pump->is_clean = spec->type == LINK_FD || spec->type == LINK_MEMORY || spec->clean;
     pump->can_unplug = (link_faults(spec) & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->dialect = spec->dialect;
+    pump->client = spec->type == LINK_MEMORY ? spec->memory : NULL;
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
     struct link_spec with = *spec;
     with.web = links->web;
@@ -247,12 +249,14 @@ static int set_wake(struct pump *pump)
     return stream_wake_at(pump->stream, pump->listener, sessions, tick);
 }
 
-/* The time to wait for events. */
-static int timeout_ms(const struct pump *pump, int over)
+/* The time to wait for events, at most most_ms. */
+static int timeout_ms(const struct pump *pump, int over, int most_ms)
 {
+    int ms = over ? 50 : -1;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++)
-        if (pump->session[i].open && session_waits_for_files(pump)) return STREAM_FILES_NS / 1000000;
-    return over ? 50 : -1;
+        if (pump->session[i].open && session_waits_for_files(pump)) ms = STREAM_FILES_NS / 1000000;
+    if (pump->at_once) ms = 0;
+    return most_ms >= 0 && (ms < 0 || ms > most_ms) ? most_ms : ms;
 }
 
 /* Returns the session's bit where the link is full. */
@@ -264,26 +268,27 @@ static uint32_t write_one(struct pump *pump, int index)
     return 0;
 }
 
-static void *pump_main(void *arg)
+/* Waits for events, for most_ms at most (-1: for ever), and does what there is to do. 0: there will be nothing more. */
+static int pump_turn(struct pump *pump, int most_ms)
 {
-    struct pump *pump = arg;
-    uint32_t want_write = 0;
-    int at_once = 1; /* there is something to do without waiting for events: sessions may be open from the start */
-    for (;;) {
-        int over = atomic_load(&pump->stream->over);
-        if (over && !has_more(pump)) break;
-        if (take_events(pump, want_write, at_once ? 0 : timeout_ms(pump, over)) < 0) {
-            sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
-            break;
-        }
-        want_write = 0;
-        for (int i = 0; i < LINK_MAX_SESSIONS; i++)
-            if (pump->session[i].open) want_write |= write_one(pump, i);
-        stream_rest_reader(pump->stream);
-        at_once = pump_rest(pump);
-        at_once |= pump_power(pump, want_write);
-        at_once |= set_wake(pump);
+    const int over = atomic_load(&pump->stream->over);
+    if (over && !has_more(pump)) return 0;
+    if (take_events(pump, pump->want_write, timeout_ms(pump, over, most_ms)) < 0) {
+        sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
+        return 0;
     }
+    pump->want_write = 0;
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+        if (pump->session[i].open) pump->want_write |= write_one(pump, i);
+    stream_rest_reader(pump->stream);
+    pump->at_once = pump_rest(pump);
+    pump->at_once |= pump_power(pump, pump->want_write);
+    pump->at_once |= set_wake(pump);
+    return 1;
+}
+
+static void pump_finish(struct pump *pump)
+{
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         if (pump->session[i].open && pump->session[i].unread > 0)
             sh_warn(pump->links->report,
@@ -292,8 +297,24 @@ static void *pump_main(void *arg)
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);
     }
     faulty_end_cable(pump->link);
+    pump->is_done = 1;
     atomic_fetch_sub(&pump->links->n_busy, 1);
+}
+
+static void *pump_main(void *arg)
+{
+    while (pump_turn(arg, -1))
+        continue;
+    pump_finish(arg);
     return NULL;
+}
+
+static void turn_for_client(void *owner, int most_ms)
+{
+    struct pump *pump = owner;
+    if (pump->is_done || pump_turn(pump, most_ms)) return;
+    pump_finish(pump);
+    pump->client->over = 1;
 }
 
 int pump_start(struct pump *pump, struct sh_err *err)
@@ -301,7 +322,12 @@ int pump_start(struct pump *pump, struct sh_err *err)
     /* Sessions that are open from the start (a file's) begin with the first tick, however late this thread starts. */
     take_events(pump, 0, 0);
     atomic_fetch_add(&pump->links->n_busy, 1);
-    int rc = pthread_create(&pump->thread, NULL, pump_main, pump);
+    pump->at_once = 1; /* for these sessions */
+    if (pump->client != NULL) {
+        pump->client->turn = turn_for_client;
+        pump->client->owner = pump;
+    }
+    int rc = pump->client == NULL ? pthread_create(&pump->thread, NULL, pump_main, pump) : 0;
     if (rc != 0) {
         atomic_fetch_sub(&pump->links->n_busy, 1);
         return sh_fail(err, SH_EIO, "link %s: no thread: %s", pump->ops->name, strerror(rc));
@@ -310,7 +336,12 @@ int pump_start(struct pump *pump, struct sh_err *err)
     return SH_OK;
 }
 
+/* A client that doesn't ask any more waits for nothing. */
 void pump_join(struct pump *pump)
 {
-    if (pump->running) pthread_join(pump->thread, NULL);
+    if (!pump->running) return;
+    if (pump->client == NULL)
+        pthread_join(pump->thread, NULL);
+    else if (!pump->is_done)
+        pump_finish(pump);
 }

@@ -87,10 +87,14 @@ struct pump {
     uint32_t power_seen;             /* changes of power that were done here */
     int is_off;                      /* the head has no power */
     struct session session[LINK_MAX_SESSIONS];
+    struct link_memory *client; /* it lets this link work, in its own thread; NULL: the link has a thread */
     pthread_t thread;
-    int running;
-    int64_t over_ns; /* clock: when it was first seen that the run is over; 0: it is not */
-    int failed;      /* a write failed; the reason is still to come */
+    int running;         /* it has begun, and has not been joined */
+    int is_done;         /* it has ended */
+    uint32_t want_write; /* a bit for each session whose link took no more */
+    int at_once;         /* there is something to do without waiting for events */
+    int64_t over_ns;     /* clock: when it was first seen that the run is over; 0: it is not */
+    int failed;          /* a write failed; the reason is still to come */
 };
 
 /* pump.c: warns the user, with the link's name. */

@@ -8,10 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/link/memory.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
 enum { STRAIGHT_BYTES = 16384 }; /* a tick this long is worth a system call of its own */
+_Static_assert((int)BATCH_BYTES / (int)STRAIGHT_BYTES <= 8 && MEMORY_PIECES > 8, "ticks that are lent in one turn");
 
 static void clear(struct session *s)
 {
@@ -175,6 +177,13 @@ static int follows(const struct session *s, const struct ring_copy *tick)
     return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
 }
 
+/* Whether ticks are read where they lie. Those of one turn are BATCH_BYTES / STRAIGHT_BYTES at most. In the paces that wait
+ * for this reader, the ring still has as many: it has 8 slots and more beyond those that it needs. */
+static int lends(const struct pump *pump)
+{
+    return pump->ops->lend != NULL && pump->holds && pump->stream->waits;
+}
+
 /* Writes the next tick without a copy. Returns its bytes, or 0: there is no such tick, or the buffer has bytes that go
  * before the next one. */
 static uint32_t write_straight(struct pump *pump, struct session *s)
@@ -188,7 +197,8 @@ static uint32_t write_straight(struct pump *pump, struct session *s)
         s->cursor < session_off_tick(pump, s)) {
         session_check_lost(pump, s, &tick, stream_released(pump->stream));
         s->cursor++;
-        const ssize_t n = pump->ops->write(pump->link, session_index(pump, s), tick.buf, tick.len);
+        const ssize_t n =
+            (lends(pump) ? pump->ops->lend : pump->ops->write)(pump->link, session_index(pump, s), tick.buf, tick.len);
         taken = n > 0 ? (uint32_t)n : 0;
         if (taken < tick.len) keep_rest(s, &tick, taken);
         taken = taken == tick.len ? taken : 0;
@@ -285,7 +295,10 @@ int session_write(struct pump *pump, struct session *s, int index)
     for (;;) {
         const uint64_t from = s->cursor;
         ssize_t n = s->out_pos == s->out_len ? fill_if_link_takes(pump, s) : 1;
-        if (n > 0 && s->out_pos == s->out_len && s->cursor != from) continue;
+        if (n > 0 && s->out_pos == s->out_len && s->cursor != from) {
+            if (lends(pump)) return 1; /* until they are taken */
+            continue;
+        }
         if (n > 0 && s->out_pos == s->out_len) {
             stream_note_written(pump->stream, s->reader, s->cursor); /* bytes that a fault holds back hold up nobody */
             return 0;

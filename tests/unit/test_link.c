@@ -10,13 +10,13 @@
 static void test_table(void **state)
 {
     (void)state;
-    const char *const names[] = {"null", "file", "pty", "tcp", "fd", "udp", "web"};
-    const enum link_type types[] = {LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD, LINK_UDP, LINK_WEB};
+    const char *const names[] = {"null", "file", "pty", "tcp", "fd", "udp", "web", "memory"};
+    const enum link_type types[] = {LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD, LINK_UDP, LINK_WEB, LINK_MEMORY};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         assert_string_equal(link_ops_get(types[i])->name, names[i]);
         assert_null(link_ops_get(types[i])->capacity); /* no fixed limit */
     }
-    assert_null(link_ops_get((enum link_type)(LINK_FD + 1)));
+    assert_null(link_ops_get((enum link_type)(LINK_MEMORY + 1)));
     assert_string_equal(link_ops_get(LINK_USB)->name, "usb");
     assert_null(link_ops_get((enum link_type) - 1));
 }

@@ -132,6 +132,37 @@ static void test_seq_jumps_back(void **state)
     assert_int_equal(parser.stats.frames, 5);
 }
 
+/* Items come out where they lie. A header that was changed is found there, too. */
+static void test_parser_lent(void **state)
+{
+    (void)state;
+    make_stream();
+    for (int at_once = 1; at_once <= n_pieces; at_once++) {
+        enum native_item item;
+        int k = 0;
+        begin();
+        for (int from = 0; from < n_pieces; from += at_once) {
+            const struct piece *last = &piece[from + at_once < n_pieces ? from + at_once - 1 : n_pieces - 1];
+            native_parser_lend(&parser, stream + piece[from].at, last->at + last->len - piece[from].at);
+            for (; (item = native_parser_next(&parser)) != NATIVE_MORE; k++) {
+                assert_int_equal(item, piece[k].is_text ? NATIVE_TEXT : NATIVE_FRAME);
+                if (item == NATIVE_FRAME) assert_ptr_equal(parser.frame, stream + piece[k].at);
+                if (item == NATIVE_TEXT) assert_memory_equal(parser.text, stream + piece[k].at, piece[k].len - 2);
+            }
+        }
+        assert_int_equal(k, n_pieces);
+        assert_int_equal(parser.stats.bytes, stream_len);
+        assert_int_equal(parser.stats.bad_bytes, 0);
+    }
+    begin();
+    stream[piece[1].at + 4] ^= 1;
+    native_parser_lend(&parser, stream, stream_len);
+    for (enum native_item item; (item = native_parser_next(&parser)) != NATIVE_MORE;)
+        n_got += item == NATIVE_FRAME;
+    assert_int_equal(n_got, 12);
+    assert_int_equal(parser.stats.bad_bytes, piece[1].len);
+}
+
 /* Garbage made to be slow: only sync bytes, and headers without payload whose length hides the following bytes. The
  * work is counted in CRC checks. The parser reads a good header at most once per frame start, so the number is
  * bounded. */
@@ -160,7 +191,7 @@ int main(void)
         cmocka_unit_test(test_parser_whole),          cmocka_unit_test(test_parser_random_chunks),
         cmocka_unit_test(test_parser_length_refused), cmocka_unit_test(test_parser_biggest_frame),
         cmocka_unit_test(test_parser_text_limits),    cmocka_unit_test(test_seq_jumps_back),
-        cmocka_unit_test(test_parser_resync_cost),
+        cmocka_unit_test(test_parser_resync_cost),    cmocka_unit_test(test_parser_lent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -50,6 +50,31 @@ static void test_point_extremes(void **state)
     assert_int_equal(native_encode_points(out, sizeof out, &block, 0), 0);
 }
 
+/* Counted as decoding the points one by one finds them; all bytes beside are noise. */
+static void test_points_counted(void **state)
+{
+    (void)state;
+    enum { N = 500 };
+    uint32_t x = 7, empty = 0, reflectances = 0, n_empty, n_reflectances;
+    for (size_t i = 0; i < 40 + 20 * N; i++)
+        out[i] = (uint8_t)((x = x * 1664525u + 1013904223u) >> 24);
+    for (uint32_t i = 0; i < N; i++) {
+        uint8_t *point = out + 40 + 20 * (size_t)i;
+        struct native_point p;
+        if (i % 3 == 0) memcpy(point + 12, "\x00\x80", 2); /* not modelled */
+        if (i % 5 == 0) point[19] &= 15;                   /* no echo */
+        native_decode_point(out, i, &p);
+        empty += p.echo_count == 0;
+        reflectances += p.echo_count != 0 && p.refl_cdb != LINE_REFL_NONE;
+    }
+    assert_true(empty > N / 6 && reflectances > N / 3);
+    native_count_points(out, N, &n_empty, &n_reflectances);
+    assert_int_equal(n_empty, empty);
+    assert_int_equal(n_reflectances, reflectances);
+    native_count_points(out, 0, &n_empty, &n_reflectances);
+    assert_int_equal(n_empty + n_reflectances, 0);
+}
+
 static void test_empty_block(void **state)
 {
     (void)state;
@@ -112,6 +137,7 @@ int main(void)
         cmocka_unit_test(test_point_extremes),
         cmocka_unit_test(test_empty_block),
         cmocka_unit_test(test_points_cut),
+        cmocka_unit_test(test_points_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

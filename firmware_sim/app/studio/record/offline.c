@@ -2,11 +2,15 @@
 #include "firmware_sim/app/studio/record/offline.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "drivers/host/source.h"
+#include "drivers/link/memory.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop.h"
 
@@ -37,19 +41,61 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
     return site_load_beside(cfg, beside, report, site, err);
 }
 
+/* ---- the client's end of a memory link, as a source of the library */
+
+static ssize_t offline_lend(struct host_source *source, const uint8_t **bytes)
+{
+    struct link_memory *memory = source->ctx;
+    const size_t n = memory_take(memory, bytes);
+    if (n != 0 || memory->over) return (ssize_t)n;
+    errno = EAGAIN;
+    return -1;
+}
+
+static ssize_t offline_write(struct host_source *source, const void *data, size_t len)
+{
+    struct link_memory *memory = source->ctx;
+    const size_t n = memory->over ? 0 : memory_send(memory, data, len);
+    if (n != 0) return (ssize_t)n;
+    errno = memory->over ? EPIPE : EAGAIN;
+    return -1;
+}
+
+/* Signals are for the caller, who looks between two waits. */
+static int offline_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
+{
+    struct link_memory *memory = source->ctx;
+    for (int is_late = 0;; is_late = host_deadline_ns(0) >= deadline_ns) {
+        const int64_t left_ms = (deadline_ns - host_deadline_ns(0) + 999999) / 1000000;
+        *revents = memory->n_taken != memory->n_pieces || memory->over ? POLLIN : 0;
+        if (memory->sent_len < sizeof memory->sent) *revents |= POLLOUT;
+        *revents &= events;
+        if (*revents != 0 || is_late) return *revents != 0;
+        memory_turn(memory, deadline_ns == INT64_MAX ? -1 : left_ms < 0 ? 0 : (int)left_ms);
+    }
+}
+
+static void offline_leave(struct host_source *source)
+{
+    memory_leave(source->ctx);
+}
+
+static const struct host_source_ops offline_ops = {
+    .lend = offline_lend, .write = offline_write, .wait = offline_wait, .close = offline_leave};
+
 /* A head at off->site. */
 static int power_up(struct offline *off, double scan_s, const struct sh_report *report, struct sh_err *err)
 {
-    struct link_spec spec = {.fd = -1};
     struct device_options device = {.scan_s = scan_s, .truth = off->truth};
-    struct loop_options options = {.extra = &spec, .report = report};
-    off->fd = offline_connect("off line", &spec, &off->sh, err);
-    if (off->fd < 0) return off->fd;
+    off->memory = calloc(1, sizeof *off->memory);
+    const struct link_spec spec = {.type = LINK_MEMORY, .memory = off->memory};
+    const struct loop_options options = {.extra = &spec, .report = report};
+    const struct host_source source = {.ops = &offline_ops, .fd = -1, .ctx = off->memory, .name = "off line"};
+    if (off->memory == NULL || (off->sh = host_open(&source)) == NULL)
+        return sh_fail(err, SH_ENOMEM, "no memory for a head off line");
     int rc = device_create(off->site, &device, &off->device, err);
     if (rc == SH_OK) rc = loop_create(off->site, off->device, &options, &off->loop, err);
-    if (rc == SH_OK) return loop_start(off->loop, err);
-    close(spec.fd);
-    return rc;
+    return rc == SH_OK ? loop_start(off->loop, err) : rc;
 }
 
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *off,
@@ -102,14 +148,14 @@ static void offline_end(struct offline *off)
 
 int offline_finish(struct offline *off, struct sh_err *err)
 {
-    if (off->sh != NULL) shutdown(off->fd, SHUT_RDWR); /* as below */
+    if (off->sh != NULL) host_hang_up(off->sh); /* as below */
     end_loop(off);
     return off->device != NULL ? device_close_journal(off->device, err) : SH_OK;
 }
 
 void offline_stop(struct offline *off)
 {
-    if (off->sh != NULL) shutdown(off->fd, SHUT_RDWR); /* a loop that waited for this reader goes on */
+    if (off->sh != NULL) host_hang_up(off->sh); /* a loop that waited for this reader goes on */
     offline_end(off);
 }
 
@@ -118,4 +164,6 @@ void offline_close(struct offline *off)
     if (off->sh != NULL) scanhead_close(off->sh); /* likewise */
     off->sh = NULL;
     offline_end(off);
+    free(off->memory);
+    off->memory = NULL;
 }

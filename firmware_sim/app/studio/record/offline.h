@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A head that runs in this process, for commands that work off line. In: a configuration. Out: a client's
- * handle, as of a head on a wire. Head and client are joined by a socket pair, and the pace is `fast`. */
+ * handle, as of a head on a wire. The pace is `fast`. Head and client are joined in memory (drivers/link/memory.h): the
+ * head's link works while the client waits for frames, in the client's thread. So one thread has the handle and all calls
+ * below. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_OFFLINE_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_OFFLINE_H
 
@@ -8,6 +10,7 @@
 #include "drivers/host/scanhead.h"
 #include "firmware_sim/site/site.h"
 
+struct link_memory;
 struct link_spec;
 struct config;
 
@@ -16,7 +19,7 @@ struct offline {
     struct scanhead *sh; /* the client's handle */
     struct site *site;
     /* inner state */
-    int fd; /* of the client */
+    struct link_memory *memory; /* between head and client */
     struct device *device;
     struct loop *loop;
     int shares_site; /* it is the caller's */
@@ -45,8 +48,9 @@ int offline_finish(struct offline *offline, struct sh_err *err);
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 
-/* A client of a head in this process: link becomes the head's end, and is to be one of its links. Returns the client's
- * descriptor, which is the handle's, or an error; then link has none (-1). who: for errors. */
+/* A client, in a thread of its own, of a head in this process: link becomes the head's end of a socket pair, and is to be
+ * one of its links. Returns the client's descriptor, which is the handle's, or an error; then link has none (-1). who: for
+ * errors. */
 int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err);
 
 #endif

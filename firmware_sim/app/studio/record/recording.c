@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/line.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
@@ -22,6 +21,7 @@ enum {
 };
 
 struct recording {
+    int64_t now_ns;    /* when the last frame came, or none */
     int64_t pulses_ns; /* when pulses came last */
     int64_t heard_ns;  /* the same, or when the head was last asked why none come */
     struct scanhead *sh;
@@ -55,13 +55,8 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
-    uint64_t empty = 0, with_reflectance = 0;
-    for (uint32_t i = 0; i < frame->n_points; i++) {
-        struct native_point point;
-        native_decode_point(frame->payload, i, &point);
-        empty += point.echo_count == 0;
-        with_reflectance += point.echo_count != 0 && point.refl_cdb != LINE_REFL_NONE;
-    }
+    uint32_t empty, with_reflectance;
+    native_count_points(frame->payload, frame->n_points, &empty, &with_reflectance);
     r->result->with_reflectance += with_reflectance;
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
@@ -105,7 +100,8 @@ static int has_lost_frames(const struct recording *r)
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
 {
-    enum recording_news news = recording_count(&r->result->counts, frame, has_lost_frames(r));
+    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* which alone asks for it */
+    enum recording_news news = recording_count(&r->result->counts, frame, lost);
     if (news == RECORDING_NOTHING) return;
     if (news == RECORDING_END_LOST) sh_warn(r->o->report, "the scan's end was lost; the head goes on without it");
     r->scan_over = r->scan_started = 1;
@@ -167,9 +163,8 @@ static double fraction_done(const struct recording *r)
 
 static int recording_report(struct recording *r, struct sh_err *err)
 {
-    int64_t now_ns = clock_now_ns();
-    if (now_ns < r->next_report_ns) return SH_OK;
-    r->next_report_ns = now_ns + 1000000000;
+    if (r->now_ns < r->next_report_ns) return SH_OK;
+    r->next_report_ns = r->now_ns + 1000000000;
     const int rc = r->o->second != NULL ? r->o->second(r->o->ctx, err) : SH_OK;
     if (rc != SH_OK || !r->o->progress) return rc;
     char text[96];
@@ -220,6 +215,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
     struct scanhead_frame frame;
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
+    r->now_ns = clock_now_ns();
     const int reported = recording_report(r, err);
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
@@ -228,7 +224,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
-        r->heard_ns = r->pulses_ns = clock_now_ns();
+        r->heard_ns = r->pulses_ns = r->now_ns;
         count_points(r, &frame);
     }
     if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)ns_since(frame.t_ns, r->scan_t0_ns);
@@ -300,7 +296,7 @@ static int recording_follow(struct recording *r, struct sh_err *err)
             return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
-        if (clock_now_ns() - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
+        if (r->now_ns - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
         rc = look_for_end(r, err);
         if (rc != SH_OK) return rc;
         r->heard_ns = clock_now_ns();

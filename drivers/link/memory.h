@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT */
+/* The memory link: one client, in the thread that owns the link. So nothing is copied, locked or waited for: while the
+ * client needs bytes, it lets the owner of the link work, and reads what that wrote where it lies.
+ *
+ * In: what the owner writes, of any length; what the client sends, MEMORY_ROOM bytes at most between two turns. The
+ * owner keeps what it wrote unchanged, and repeats a write that took nothing with the same bytes, until it was taken. */
+#ifndef DRIVERS_LINK_MEMORY_H
+#define DRIVERS_LINK_MEMORY_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+enum { MEMORY_ROOM = 4096, MEMORY_PIECES = 16 /* between two turns */ };
+
+/* What both ends share. It begins as zeros, and outlives the link. */
+struct link_memory {
+    /* Set by the link's owner: works until there is something for the client, or for at most timeout_ms (-1: for ever).
+     * NULL: it has not begun. */
+    void (*turn)(void *owner, int timeout_ms);
+    void *owner;
+    struct {
+        const uint8_t *bytes;
+        size_t len;
+    } piece[MEMORY_PIECES]; /* written; those from n_taken on are not taken yet */
+    uint32_t n_pieces, n_taken;
+    uint8_t sent[MEMORY_ROOM]; /* by the client */
+    size_t sent_len;
+    int over; /* the owner writes nothing more */
+    int left; /* the client is gone */
+};
+
+/* The client's end. Bytes that the owner wrote, which stay until the next turn; 0: none now. */
+size_t memory_take(struct link_memory *memory, const uint8_t **bytes);
+/* Sends to the owner: the number of bytes taken, 0: there is no room before the next turn. */
+size_t memory_send(struct link_memory *memory, const void *bytes, size_t len);
+/* Lets the owner work. */
+void memory_turn(struct link_memory *memory, int timeout_ms);
+/* The client goes, and its session ends at once. What it had not taken is lost. Again: does nothing. */
+void memory_leave(struct link_memory *memory);
+
+#endif
