@@ -152,8 +152,9 @@ static inline int scale_surely(double v, double power, uint64_t *whole)
 {
     uint64_t bits;
     const double product = fabs(v) * power, rounded = vec_round(product, &bits);
+    if (!(product < 0x1p43)) return 0;
     *whole = (uint64_t)(int64_t)rounded;
-    return product < 0x1p43 && fabs(product - rounded) < 0.5 - 0x1p-9;
+    return fabs(product - rounded) < 0.5 - 0x1p-9;
 }
 
 /* All of them are exact. */

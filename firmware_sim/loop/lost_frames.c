@@ -71,7 +71,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
 void session_know_next(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
-    struct ring_copy tick = {.buf = NULL};
+    struct ring_copy tick = {.first_seq = pump->stream->first_seq};
     s->lost.have_seq = s->cursor == 0 || ring_look(ring, s->reader, s->cursor - 1, &tick) == RING_READ;
     ring_leave(ring, s->reader);
     if (!s->lost.have_seq) return;

@@ -130,7 +130,7 @@ int ring_end(struct ring_slot *slot)
     size_t room;
     if (ring_grow(slot, marks_at - tick->len + marks_len, &room) != SH_OK) return ring_break(slot);
     if (slot->longer != NULL) ring_resize(slot, round_up(marks_at + marks_len)); /* where it can't shrink, it stays */
-    struct ring_mark *mark = (struct ring_mark *)(void *)(tick->bytes + marks_at);
+    struct ring_mark *mark = marks_len != 0 ? (struct ring_mark *)(void *)(tick->bytes + marks_at) : NULL;
     if (marks_len != 0) memcpy(mark, tick->mark, marks_len);
     tick->mark = mark;
     return SH_OK;
