@@ -248,8 +248,9 @@ struct scanhead_columns {
     uint16_t *label;
     uint8_t *echo, *echo_count;
 };
-/* scanhead_points() as columns: the same figures, bit for bit, in less time. Each column that is not NULL has room for
- * max; they don't overlap. Returns the number of points written, or a negative error. */
+/* Decodes points into columns: the figures of scanhead_points(), bit for bit, in less time. Each column that is not
+ * NULL needs room for max figures. Columns must not overlap. Returns the number of points written, or a negative
+ * error. */
 int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      const struct scanhead_columns *to, uint32_t max);
 
@@ -419,7 +420,7 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
  * scan's start have come. Where the head knows the time, it comes before the first points that can be
  * placed. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
-/* The same of n times, bit for bit, and much faster where they lie within one second. */
+/* The same for n times, bit for bit. It is faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 

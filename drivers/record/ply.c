@@ -233,7 +233,7 @@ static uint8_t *put_ascii(uint8_t *row, const struct ply *ply, int i)
     return (uint8_t *)to;
 }
 
-/* *to is moved on. SH_EFORMAT: a coordinate is too long; what was put before that counts. */
+/* Writes n rows and moves *to on. SH_EFORMAT: a coordinate is too long; the rows before it count. */
 static int put_text_rows(struct ply *ply, int n, uint8_t **to, struct sh_err *err)
 {
     const struct track_points *p = &ply->base.track.points;

@@ -30,7 +30,7 @@ static const char HELP[] =
     "  --rounds N      default 9, at most 99\n\n"
     "A PROGRAM is a path of scanhead and more of its options, with blanks between. Columns: medians of the rounds,\n"
     "the spread of the middle half, and the median of the ratios to the first program of the same round; then medians of\n"
-    "what the long scan had: how often its threads were taken off a processor (switch/s), how late ticks were released\n"
+    "the long scan: how often its threads were taken off a processor (switch/s), how late ticks were released\n"
     "(us), frames that clients lost (lost).\n";
 
 struct options {
@@ -38,7 +38,7 @@ struct options {
     double seconds;
     uint32_t rounds, n;
     char **program;
-    int clients; /* 1: links are read */
+    int clients; /* 1: clients read the links */
 };
 
 struct figures {

@@ -34,7 +34,7 @@ static double of_bits(uint64_t bits)
 
 static char got[DECIMAL_FIXED_ROOM + 1];
 
-/* The text, and nothing beyond the room. */
+/* Checks the text, and that nothing was written beyond the room. */
 static void expect(const char *want, const char *end, size_t room, const char *what, double v)
 {
     const size_t n = strlen(want);
@@ -109,7 +109,7 @@ static void test_borders(void **state)
         check_all(nextafter(v[i], HUGE_VAL));
     }
     check_all((double)NAN);
-    for (int k = -30; k <= 30; k++) { /* all about the powers of ten */
+    for (int k = -30; k <= 30; k++) { /* powers of ten and their neighbours */
         check_all(pow(10, k));
         check_all(nextafter(pow(10, k), 0));
         check_all(5 * pow(10, k));
@@ -130,7 +130,7 @@ static void test_ties(void **state)
         }
 }
 
-/* Bits at random have all exponents; coordinates have those that files have. */
+/* Random bits have all exponents; coordinates have those of files. */
 static void test_random(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: what comes beside points, for all values on the wire, bit for bit, and from any index on. */
+/* libscanhead: attributes, deviations and colours of points, for all values on the wire, bit for bit, and from any
+ * index on. */
 #include <math.h>
 
 #include "core/line.h"

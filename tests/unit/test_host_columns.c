@@ -137,7 +137,7 @@ static void make_rows(const struct kind *k)
         label[i] = (uint16_t)(next_random() >> 3);
         echo[i] = x % 5 == 0 ? 0 : (uint8_t)(next_random() >> 5);
     }
-    if (k->one_mirror) b[N - 1]++; /* but not in the last block */
+    if (k->one_mirror) b[N - 1]++; /* the last block has two mirror angles */
 }
 
 static struct scanhead *open_rows(const struct kind *k, struct scanhead_frame *frame)
