@@ -158,7 +158,8 @@ void beam_sort(struct beam_return *returns, uint32_t n);
 uint32_t beam_merge(const struct beam_merging *how, struct beam_return *returns, uint32_t n, struct beam_echo *echo,
                     uint64_t *left_out);
 
-/* BEAM_ALIKE footprints of n returns each. All returns have the same energy. Those of pulse i begin at index i n. */
+/* BEAM_ALIKE footprints of n returns each. All returns have the same energy. The returns of pulse i begin at index i
+ * n. */
 struct beam_alike {
     uint32_t n;
     double energy;         /* of a return */

@@ -271,7 +271,7 @@ static int scan_once(const struct options *o, const char *ending, struct offline
     *spent_s = bench_process_s() - start_s;
     unlink(cloud_path);
     if (rc == SH_OK && result.counts.pulses != RAYS)
-        return sh_fail(err, SH_ESTATE, "%llu pulses came in place of %d", (unsigned long long)result.counts.pulses, RAYS);
+        return sh_fail(err, SH_ESTATE, "%llu pulses came, not %d", (unsigned long long)result.counts.pulses, RAYS);
     return rc;
 }
 

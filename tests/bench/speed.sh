@@ -3,8 +3,8 @@
 # This prints what a pulse costs on its way to a file or a client, as ratios and beside the aims:
 #   bash tests/bench/speed.sh [--turns N] [--rounds N] [--only LIST] BUILD [AVX2_BUILD]
 # A turn runs each program for N rounds, first of BUILD, then of AVX2_BUILD. Figures are medians of the rounds of all
-# turns, by default 3 times 5. Of the programs panorama, decode and loop run on one processor, the last one that this may
-# use. LIST names parts of panorama, decode, live, loop, realtime, with commas between.
+# turns, by default 3 times 5. LIST names parts of panorama, decode, live, loop, realtime, with commas between. Panorama,
+# decode and loop run on one processor, the last one that this script may use.
 set -euo pipefail
 turns=3 rounds=5 only=panorama,decode,live,loop,realtime
 while [ $# -gt 0 ]; do

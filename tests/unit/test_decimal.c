@@ -1,15 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* core/decimal.h: each text has the bytes that libc's printf writes, for doubles of all sizes, ties, and borders. */
+#include "tests/common/cases.h"
+
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/decimal.h"
 #include "tests/common/thorough.h"
@@ -20,9 +17,7 @@ static uint64_t state_of_random = 0x9e3779b97f4a7c15;
 
 static uint64_t random_bits(void)
 {
-    state_of_random ^= state_of_random << 13;
-    state_of_random ^= state_of_random >> 7;
-    return state_of_random ^= state_of_random << 17;
+    return case_u64(&state_of_random);
 }
 
 static double of_bits(uint64_t bits)

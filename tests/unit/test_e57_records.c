@@ -2,16 +2,13 @@
 /* Records of E57 are made in vectors, column by column. Each field of each record is taken from the packet, bit by bit,
  * and compared with the plain formula of ASTM E2807's scaled integers: rint(v / scale), ties to even. The figures of a
  * packet are compared with those of a loop over its records. */
+#include "tests/common/cases.h"
+
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "drivers/record/e57_records.h"
 
@@ -19,9 +16,7 @@ static uint64_t state_of_random = 0x9e3779b97f4a7c15;
 
 static uint64_t random_bits(void)
 {
-    state_of_random ^= state_of_random << 13;
-    state_of_random ^= state_of_random >> 7;
-    return state_of_random ^= state_of_random << 17;
+    return case_u64(&state_of_random);
 }
 
 static struct track track;

@@ -45,7 +45,7 @@ static ssize_t on_write(void *cookie, const char *data, size_t n)
     for (size_t done = 0; done < n && file->error == 0;) {
         const ssize_t wrote = pwrite(file->fd, data + done, n - done, file->at + (off_t)done);
         if (wrote < 0 && errno == EINTR) continue;
-        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't after all, or a part was written before */
+        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't, or a part was written before */
             pass_cache(file, 0);
             file->is_direct = -1;
             continue;
