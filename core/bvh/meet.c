@@ -100,7 +100,7 @@ VEC_INLINE void judge_packet(const struct bvh_query *query, const struct edges *
         found->of[i] &= (uint8_t)wide[i];
 }
 
-/* The same where rays begin at points of their own. */
+/* Judges a packet whose rays begin at points of their own. */
 VEC_INLINE void judge_packet_own(const struct bvh_query *query, const struct edges *edges, uint32_t width,
                                  struct lanes *found)
 {

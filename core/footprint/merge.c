@@ -214,7 +214,7 @@ static void sum_ranges(const struct beam_alike *alike, const struct reaches *of,
     memcpy(sums->first, first, sizeof first);
 }
 
-/* The same where surfaces are modelled. */
+/* Computes the same sums where surfaces are modelled. */
 VEC_CLONES
 static void sum_returns(const struct beam_alike *alike, const struct reaches *of, struct lane_sums *sums)
 {

@@ -40,8 +40,8 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 /* Extra in a scene of a million triangles, whose planes fit into no cache; it grows with the root of their
  * number. */
 #define PLAN_COST_MILLION 10.0
-/* Cost of making the map: a fixed part, and a part per triangle. A triangle that is seen and not small costs more, and
- * so does each of as many hidden ones. So does a cell that shows more than one; its memory follows. */
+/* Cost of making the map: a fixed part, and a part per triangle. Triangles that are seen and not small cost more, and
+ * so do as many hidden ones. So do cells that show more than one; their memory follows. */
 #define PLAN_COST_SIGHT          3e6
 #define PLAN_COST_SIGHT_TRIANGLE 28.0
 #define PLAN_COST_SIGHT_SEEN     440.0

@@ -90,7 +90,7 @@ struct ply_rows {
     int n;
 };
 
-/* Columns side by side. They take one pass where their number is known. */
+/* Puts columns side by side. The compiler makes one pass of it where their number is known. */
 static inline __attribute__((always_inline)) void put_doubles(struct ply_rows *rows, const double *const *v,
                                                               int columns)
 {

@@ -231,7 +231,7 @@ static int parse(struct options *o, int argc, char **argv)
         if (c == 'h' || c == '?') return c == 'h' ? BENCH_OK : BENCH_USAGE;
     }
     if (optind == argc && o->rounds >= 1 && o->rounds <= MAX_ROUNDS && o->times >= 1 && o->times <= 1000) return -1;
-    fprintf(stderr, "live: allowed are 1 to %d rounds, and 1 to 1000 times; see --help\n", MAX_ROUNDS);
+    fprintf(stderr, "live: allowed are --rounds 1 to %d and --times 1 to 1000; see --help\n", MAX_ROUNDS);
     return BENCH_USAGE;
 }
 
