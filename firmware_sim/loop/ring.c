@@ -96,7 +96,7 @@ static size_t room_of(const struct ring_slot *slot)
     return slot->longer != NULL ? slot->longer_room : slot->store_room;
 }
 
-/* Gives a tick memory for itself alone, or changes how much that is. */
+/* Gives a tick memory of its own, or changes the size of that memory. */
 static int ring_resize(struct ring_slot *slot, size_t bytes)
 {
     uint8_t *longer = realloc(slot->longer, bytes);
