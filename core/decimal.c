@@ -152,9 +152,8 @@ static inline int scale_surely(double v, double power, uint64_t *whole)
 {
     uint64_t bits;
     const double product = fabs(v) * power, rounded = vec_round(product, &bits);
-    if (!(product < 0x1p43)) return 0;
-    *whole = (uint64_t)(int64_t)rounded;
-    return fabs(product - rounded) < 0.5 - 0x1p-9;
+    *whole = bits & 0x7ffffffffffff; /* its bits below 2^51: C can't convert what is too large */
+    return product < 0x1p43 && fabs(product - rounded) < 0.5 - 0x1p-9;
 }
 
 /* All these powers are exact. */

@@ -15,6 +15,7 @@
 #include "core/bytes.h"
 #include "core/grow.h"
 #include "core/vecmath.h"
+#include "drivers/protocol/native.h"
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_records.h"
@@ -135,7 +136,7 @@ static int fail_far(const struct e57 *e, const double p[3], struct sh_err *err)
  * streams have whole bytes. */
 static int is_due(const struct e57 *e, unsigned n, int64_t t_ns)
 {
-    return n >= 8 && t_ns - e->t0_ns >= PACKET_NS;
+    return n >= 8 && native_since_ns(t_ns, e->t0_ns) >= PACKET_NS;
 }
 
 VEC_CLONES static int64_t find_latest(const int64_t *restrict t_ns, int n)
@@ -154,7 +155,7 @@ static int count_run(const struct e57 *e, int i, int n)
     const int room = (int)(g->most - g->n);
     int k = 1;
     if (n > room) n = room;
-    if (find_latest(t_ns, n) - e->t0_ns < PACKET_NS) return n;
+    if (native_since_ns(find_latest(t_ns, n), e->t0_ns) < PACKET_NS) return n;
     while (k < n && !is_due(e, g->n + (unsigned)k, t_ns[k]))
         k++;
     return k;

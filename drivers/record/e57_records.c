@@ -42,8 +42,8 @@ VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n
     return n_bad == 0;
 }
 
-/* Finds the first point without room, for the message, by the plain formula. */
-static void find_far(const struct run *run, double scale_m, int n, double far_m[3])
+/* Returns how many points come before the first of them, by the plain formula, and where that one is. */
+static int find_far(const struct run *run, double scale_m, int n, double far_m[3])
 {
     int i = 0;
     while (i < n - 1 && fabs(rint(run->p[0][i] / scale_m)) <= INT32_MAX &&
@@ -51,6 +51,7 @@ static void find_far(const struct run *run, double scale_m, int n, double far_m[
         i++;
     for (int k = 0; k < 3; k++)
         far_m[k] = run->p[k][i];
+    return i;
 }
 
 /* A reflectance of NaN is not modelled. */
@@ -118,11 +119,8 @@ int e57_records_put(struct e57_packet *packet, const struct e57_facts *facts, co
     set_run(&run, track, facts->empty_shots, first, n);
     for (int k = 0; k < 3; k++)
         fit &= put_counts(run.p[k], scale_m, n, packet->stream[E57_X + k] + 4 * (size_t)packet->n);
-    if (!fit) {
-        find_far(&run, scale_m, n, far_m);
-        return -1;
-    }
+    if (!fit) n = find_far(&run, scale_m, n, far_m);
     put_figures(packet, facts, track, first, n);
     packet->n += (unsigned)n;
-    return 0;
+    return fit ? 0 : -1;
 }

@@ -173,6 +173,24 @@ static void test_packets(void **state)
     }
 }
 
+/* Times of a broken stream may be any: the time from the first record of a packet wraps. Sanitizers see where it overflows. */
+static void test_far_times(void **state)
+{
+    (void)state;
+    const uint64_t early = (uint64_t)-9223372036854; /* in ms: near the least time */
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    for (uint32_t line = 0; line < 3; line++)
+        rig_points(line, 1000 + 10 * line, 1000 + 10 * line, points, 5);
+    rig_points(3, early, early, points, 5);
+    record_e57(1);
+    e57rig_scan(0, 1, coloured);
+    assert_int_equal(e57rig_n_records, 20);
+    check_points(15, 1, 3, 0);
+}
+
 /* Colours are beside the label in a record, across the edges of packets, and the XML describes them. */
 static void test_colours(void **state)
 {
@@ -269,6 +287,7 @@ int main(void)
         cmocka_unit_test(test_scans),
         cmocka_unit_test(test_xml),
         cmocka_unit_test(test_packets),
+        cmocka_unit_test(test_far_times),
         cmocka_unit_test(test_no_points),
         cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_disk_full),
