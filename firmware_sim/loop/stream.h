@@ -64,6 +64,7 @@ struct stream {
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
     int as_they_are;     /* frames are recorded: numbered already, and complete */
     int steps;           /* pace step: clients let time pass, also while the head has no power */
+    uint32_t first_seq;  /* number of the first frame of all */
     struct device_counters *counters;
     struct stream_reader reader[RING_MAX_READERS];
 
