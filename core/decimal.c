@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A double is m 2^-s with a whole number m below 2^53. Its product with a power of ten is exact in 128 bits, where s and the
- * power are not too large: nearly always. So it is rounded once, as printf rounds, to even where it lies in the middle.
- * What is left is the digits of a whole number. All other doubles go to printf. */
+/* A double is m 2^-s with a whole number m below 2^53. Its product with a power of ten is exact in 128 bits, unless s
+ * or the power is too large, which is rare. The product is rounded once, as printf rounds: ties to even. Then the
+ * digits of a whole number remain to be written. printf writes all other doubles. */
 #include "core/decimal.h"
 
 #include <math.h>
@@ -15,7 +15,7 @@ __extension__ typedef unsigned __int128 u128;
 
 enum { EIGHT_DIGITS = 100000000, MOST_DECIMALS = 22, MANTISSA_BITS = 52, EXPONENTS = 2047 };
 
-/* Up to 10^19, which is the last one below 2^64. */
+/* Powers up to 10^19, the last one below 2^64. */
 static const uint64_t power_of_10[20] = {1,
                                          10,
                                          100,
@@ -39,9 +39,9 @@ static const uint64_t power_of_10[20] = {1,
 
 /* ---- digits of whole numbers */
 
-/* The eight digits of v < 10^8, a byte each, the first one in the lowest byte. Each step halves fields of a word, all at
- * once: into numbers below 10^4, below 100, below 10. A division is a product with the reciprocal, exact for such small
- * numbers, and a shift. */
+/* Returns the eight digits of v < 10^8, a byte each, the first digit in the lowest byte. Each step halves all fields of
+ * a word at once: into numbers below 10^4, below 100, below 10. A division is a product with the reciprocal and a
+ * shift, which is exact for numbers this small. */
 static uint64_t eight_digits(uint32_t v)
 {
     const uint64_t fours = v / 10000 | (uint64_t)(v % 10000) << 32;
@@ -53,7 +53,7 @@ static uint64_t eight_digits(uint32_t v)
 
 static const uint64_t ASCII_ZEROS = 0x3030303030303030;
 
-/* A whole number of n <= 20 digits, with zeros in front. */
+/* Writes a whole number of n <= 20 digits, with zeros in front. */
 static char *put_padded(char *to, uint64_t v, unsigned n)
 {
     if (n > 8) {
@@ -79,7 +79,7 @@ char *decimal_put_whole(char *to, uint64_t v)
     return put_whole(to, v);
 }
 
-/* v / 10^decimals with all its decimals. */
+/* Writes v / 10^decimals with all its decimals. */
 static inline char *put_parts(char *to, uint64_t v, unsigned decimals)
 {
     const uint64_t whole = decimals < 20 ? v / power_of_10[decimals] : 0; /* 10^20 is more than any v */
@@ -89,7 +89,7 @@ static inline char *put_parts(char *to, uint64_t v, unsigned decimals)
     return put_padded(to, decimals < 20 ? v - whole * power_of_10[decimals] : v, decimals);
 }
 
-/* v > 0 as a whole number of n digits, without the zeros at its end. */
+/* Writes v > 0 as a whole number of n digits, without the zeros at its end. */
 static char *put_stripped(char *to, uint64_t v, unsigned n)
 {
     if (n > 8) {
@@ -134,7 +134,7 @@ static inline struct parts take_apart(double v)
     return (struct parts){part | (uint64_t)(exponent != 0) << MANTISSA_BITS, 1075 - exponent};
 }
 
-/* |v| 10^decimals, rounded. 0: it may have more than 64 bits. */
+/* Sets *whole to |v| 10^decimals, rounded. Returns 0 where that may have more than 64 bits. */
 static inline int scale(struct parts v, u128 power, uint64_t *whole)
 {
     *whole = 0;
@@ -146,17 +146,18 @@ static inline int scale(struct parts v, u128 power, uint64_t *whole)
     return rounded >> 64 == 0;
 }
 
-/* The same where doubles are sure of it. The power is exact, so the product is wrong by a part of 2^-53 at most, and the
- * number is not so near to the middle of two. */
+/* The same in doubles; returns 0 where their rounding might change the result. The power is exact, so the relative
+ * error of the product is at most 2^-53. Products too near a tie are left to scale. */
 static inline int scale_surely(double v, double power, uint64_t *whole)
 {
     uint64_t bits;
     const double product = fabs(v) * power, rounded = vec_round(product, &bits);
+    if (!(product < 0x1p43)) return 0;
     *whole = (uint64_t)(int64_t)rounded;
-    return product < 0x1p43 && fabs(product - rounded) < 0.5 - 0x1p-9;
+    return fabs(product - rounded) < 0.5 - 0x1p-9;
 }
 
-/* All of them are exact. */
+/* All these powers are exact. */
 static const double double_of_10[MOST_DECIMALS + 1] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                        1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                                        1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -178,7 +179,8 @@ char *decimal_put_fixed(char *to, double v, unsigned decimals)
     return put_fixed(to, v, decimals);
 }
 
-/* A number of `digits` digits, the first one not 0, with the point after it, and a power of ten from 10^-22 on. */
+/* Writes a number of `digits` digits, the first of which is not 0, with a point after that one, and a power of ten from
+ * 10^-22 on. */
 static char *put_power(char *to, uint64_t whole, unsigned digits, int power)
 {
     to = digits > 1 ? decimal_put_short(to, whole, digits - 1) : put_whole(to, whole);
@@ -194,8 +196,8 @@ static int scale_any(double v, int decimals, uint64_t *whole)
     return scale(take_apart(v), low * high, whole);
 }
 
-/* The decimals depend on the power of ten of the first digit. That of the power of two below |v| is the same, or one less:
- * then there is a digit too many. */
+/* The number of decimals depends on the power of ten of the first digit. It is estimated from the power of two below
+ * |v|, and may be one too low. Then there is a digit too many, and one decimal less is taken. */
 char *decimal_put_general(char *to, double v, unsigned digits)
 {
     const int exponent = MANTISSA_BITS - take_apart(v).s; /* of two: 2^exponent <= |v| < 2^(exponent + 1) */

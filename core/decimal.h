@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Numbers as text, for files with a line a point. In: a number. Out: the bytes that printf writes in the C locale,
- * without a NUL, and many times as fast. Each function returns the end of the text, and may write up to 8 bytes beyond it.
- * They lie in the room that it names. Pure; any thread. */
+/* Numbers as text, for files that have a line for each point. In: a number. Out: the bytes that printf writes in the C
+ * locale, without a NUL, in less time. Each function returns the end of the text. It may write up to 8 bytes beyond
+ * that end, within the room that its comment names. Pure; any thread. */
 #ifndef CORE_DECIMAL_H
 #define CORE_DECIMAL_H
 
@@ -13,15 +13,15 @@ enum {
     DECIMAL_FIXED_ROOM = 352, /* the largest double has 309 digits before its point */
 };
 
-/* "%llu" in DECIMAL_WHOLE_ROOM. */
+/* Writes as "%llu" does, in DECIMAL_WHOLE_ROOM bytes. */
 char *decimal_put_whole(char *to, uint64_t v);
-/* "%.*f" in DECIMAL_FIXED_ROOM. decimals <= 20. */
+/* Writes as "%.*f" does, in DECIMAL_FIXED_ROOM bytes. decimals <= 20. */
 char *decimal_put_fixed(char *to, double v, unsigned decimals);
-/* "%.*g" in DECIMAL_GENERAL_ROOM. 1 <= digits <= 17. */
+/* Writes as "%.*g" does, in DECIMAL_GENERAL_ROOM bytes. 1 <= digits <= 17. */
 char *decimal_put_general(char *to, double v, unsigned digits);
-/* n such numbers, each with a comma after it, in n times that room. */
+/* Writes n such numbers, each with a comma after it, in n times that room. */
 char *decimal_put_cells(char *to, const double *v, int n, unsigned digits);
-/* v / 10^decimals, without the zeros at its end, in DECIMAL_GENERAL_ROOM. 1 <= decimals <= 20. */
+/* Writes v / 10^decimals without the zeros at its end, in DECIMAL_GENERAL_ROOM bytes. 1 <= decimals <= 20. */
 char *decimal_put_short(char *to, uint64_t v, unsigned decimals);
 
 #endif

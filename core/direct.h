@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Writing past the system's cache (O_DIRECT). It saves copying, which is most of the cost of a long file, but each write
- * then waits for the disk. For whole blocks of aligned memory, at whole blocks of the file. */
+/* Writing past the system's cache (O_DIRECT). It saves copying, which is most of the cost of a long file, but each
+ * write then waits for the disk. It takes whole blocks of aligned memory, at whole blocks of the file. */
 #ifndef CORE_DIRECT_H
 #define CORE_DIRECT_H
 
@@ -11,7 +11,8 @@ enum {
     DIRECT_FROM = 8 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
-/* It holds for the writes that follow. -1: the file system or an older kernel can't do it, and the descriptor stays as it was. */
+/* Switches it for the writes that follow. Returns 0; -1: the file system or an older kernel can't do it, and the
+ * descriptor stays as it was. */
 static inline int direct_set(int fd, int on)
 {
     const int flags = fcntl(fd, F_GETFL);

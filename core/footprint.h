@@ -158,7 +158,8 @@ void beam_sort(struct beam_return *returns, uint32_t n);
 uint32_t beam_merge(const struct beam_merging *how, struct beam_return *returns, uint32_t n, struct beam_echo *echo,
                     uint64_t *left_out);
 
-/* BEAM_ALIKE footprints of n returns each, which all have the same energy: those of pulse i from i n on. */
+/* BEAM_ALIKE footprints of n returns each. All returns have the same energy. The returns of pulse i begin at index i
+ * n. */
 struct beam_alike {
     uint32_t n;
     double energy;         /* of a return */
@@ -167,9 +168,9 @@ struct beam_alike {
     const double *rho; /* what comes back of the energy; NULL: all */
 };
 enum { BEAM_ALIKE = 16 };
-/* Merges the pulses whose returns all lie on one surface without a gap between them, as most do, several at a time: the
- * same echoes as those of beam_merge, bit by bit, except that they have no width or colour. Returns a bit for each such
- * pulse; echo has an element for each pulse. */
+/* Merges the pulses whose returns all lie on one surface without a gap, as most do, several at a time. The echoes are
+ * those of beam_merge, bit by bit, but without width and colour. Returns a bit for each pulse that was merged; echo has
+ * an element for each pulse. */
 uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alike *alike, struct beam_echo *echo);
 
 /* ---- what a footprint may reach besides the surface in its centre */

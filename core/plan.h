@@ -124,11 +124,11 @@ struct plan_sight_need {
     const char *why_not;   /* no map is possible; NULL: it is */
 };
 
-/* Shares of the pulses by what their cell shows: one triangle, nothing, a few triangles, many; or triangles that so few
- * rays meet that the map leaves them to the BVH (small). */
+/* Shares of the pulses, by their cell. It shows one triangle, nothing, a few triangles, or many (ask). small: it shows
+ * triangles that few rays meet, which the map leaves to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
-    double per_pulse; /* triangles that are seen otherwise, by the pulses */
+    double per_pulse; /* triangles that are seen and not small, per pulse */
 };
 
 /* Chooses (*map: 1: one is made) and fills row. Casts some pulses of the places, unless a map can't pay anyway. */

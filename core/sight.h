@@ -20,8 +20,8 @@
 
 struct sight;
 
-/* Triangles that fewer rays come to are left to the BVH, unless larger ones follow them in the scene's list. To examine
- * one costs as much as it saves for so many rays. */
+/* A map leaves triangles to the BVH that fewer rays than this meet, unless larger ones are in their group. Examining a
+ * triangle costs as much as it saves for this many rays. */
 #define SIGHT_GROUP_RAYS 64.0
 
 struct sight_spec {

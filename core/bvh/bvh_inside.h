@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: what a BVH consists of. Its leaves decide in double, and Embree finds the leaves.
+/* Private to core/bvh: what a BVH consists of. Embree finds the leaves. The leaves decide, in double where single
+ * precision leaves doubt.
  *
  * Meeting a triangle. A leaf has one or two triangles. Seen from the origin o of a ray, a corner A is p = A - o. The
  * ray with direction d passes an edge from p to q on the side that the sign of (p x (q - p)) . d says, and meets a
- * triangle where the sides of its edges, taken one way round, don't differ. Where the sign is certain beyond the rounding
- * of single precision, it is taken from there, by vectors (meet.c). Else it is computed again in double, in one way
- * for both triangles of the edge (edges.h), so that both get the same number with opposite signs: no ray passes between them. A ray that meets nothing nearer, but passes the
- * edges of a triangle by less than their rounding, meets that triangle. So nothing passes at corners, either, nor
- * where a corner lies on another's edge up to rounding.
+ * triangle where the sides of its edges, taken one way round, don't differ. Where the rounding of single precision
+ * can't change that sign, vectors compute it in single precision (meet.c). Else it is computed again in double
+ * (edges.h), in one way for both triangles of the edge. Both then get the same number with opposite signs, so no ray
+ * passes between them. A ray that meets nothing nearer, but passes the edges of a triangle by less than their rounding,
+ * meets that triangle. So nothing passes at corners, either, nor where a corner lies on another's edge up to rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). The nearest of the triangles that a ray
  * meets is the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever
@@ -29,8 +30,7 @@
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast
  * there anew (copies.c). The rays and triangles there are those of the scene up to the rounding of that turn, so all of
- * the above holds in each copy. Ranges come back times the copy's scale.
- */
+ * the above holds in each copy. Ranges come back times the copy's scale. */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
 

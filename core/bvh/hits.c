@@ -66,7 +66,7 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
 
 enum { LANES = 16 };
 
-/* Squares of lengths of as many vectors as there are lanes: each lane keeps its largest one. */
+/* Each lane keeps the largest squared length of its vectors so far. */
 VEC_INLINE void keep_most(const double *restrict px, const double *restrict py, const double *restrict pz,
                           double *restrict most2)
 {
@@ -76,7 +76,7 @@ VEC_INLINE void keep_most(const double *restrict px, const double *restrict py, 
     }
 }
 
-/* The largest length of n vectors. */
+/* Returns the largest length of n vectors. */
 VEC_INLINE double most_of(const double *px, const double *py, const double *pz, uint32_t n)
 {
     double most2[LANES] = {0.0};
@@ -92,7 +92,7 @@ VEC_INLINE double most_of(const double *px, const double *py, const double *pz, 
     return sqrt(most2[0]);
 }
 
-/* Origins of their own: in the local frame, and how far they are from its origin. */
+/* Takes the rays' own origins into the local frame, and finds the largest distance from its origin. */
 VEC_CLONES
 static void take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {

@@ -33,13 +33,14 @@ static float above(double x)
     return -below(-x);
 }
 
-/* As bvh_leaf_size_m reads it. */
+/* Returns the length, rounded up, in the bits that bvh_leaf_size_m reads. */
 static uint32_t length_bits(double length_m)
 {
     return (bvh_float_bits(above(length_m)) + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
 }
 
-/* The corners from the BVH's origin. Returns how far triangle 1 follows triangle 0. */
+/* Sets v to the corners, counted from the BVH's origin. Returns how far triangle 1 follows triangle 0 in the scene's
+ * list; 0: there is no triangle 1. */
 static uint32_t find_corners(const struct bvh *bvh, uint32_t first, uint32_t second, double v[4][3])
 {
     const struct scene *scene = bvh->scene;
@@ -61,7 +62,7 @@ static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t 
             bvh_bits_float((bvh_float_bits((float)corner0_m[j]) & ~mask) | (rest >> j * BVH_LEAF_BITS & mask));
 }
 
-/* The base moves by up to 2^-17 of its distance when its lowest bits are set, so that is in the size. */
+/* Setting the base's lowest bits moves it by up to 2^-17 of its distance. The size includes that. */
 static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
 {
     double v[4][3], size_m = 0.0;
@@ -171,7 +172,7 @@ struct place {
 };
 enum { KEY_BITS = 16, DIGIT_BITS = 8, DIGITS = 1 << DIGIT_BITS };
 
-/* Two zeros behind each bit. */
+/* Returns the bits of x with two zeros between each two of them. */
 static uint64_t spread_bits(uint64_t x)
 {
     x = (x | x << 16) & UINT64_C(0x0000ff0000ff);
@@ -192,7 +193,7 @@ static uint64_t key_of(const struct scene *scene, uint32_t triangle, double per_
     return key;
 }
 
-/* Sorts by the digits of the keys, the lowest first. The result is in `at` again. */
+/* Sorts by the digits of the keys, from the lowest digit on. The result is in `at` again. */
 static void sort_places(struct place *at, struct place *other, uint32_t n)
 {
     for (int shift = 0; shift < 3 * KEY_BITS; shift += DIGIT_BITS) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: leaves have the corners of their triangles in double, and Embree sees their boxes in float. */
+/* Private to core/bvh: leaves have the corners of their triangles in single precision, and the planes in double. Embree
+ * sees their boxes in float. */
 #ifndef CORE_BVH_LEAVES_H
 #define CORE_BVH_LEAVES_H
 
@@ -8,25 +9,27 @@
 #include "core/bvh.h"
 #include "core/embree.h"
 
-/* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. One that stands alone has corner 0 for 3.
+/* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. A leaf of one triangle has corner 0 in place
+ * of corner 3.
  *
- * Leaves take most of a ray's time to arrive in the cache, so each is two lines of it that lie together: in the first
- * the corners in single precision, from a point near them, for judging rays; in the second the planes in double, for
- * those that hit. The corners in double are in the scene. */
+ * Waiting for leaves to arrive in the cache takes most of a ray's time. So each leaf is two cache lines that lie
+ * together. The first has the corners in single precision, counted from a point near them: they judge rays. The second
+ * has the planes in double, for rays that hit. The scene has the corners in double. */
 struct bvh_leaf {
-    /* That point, exact as it stands, from the BVH's origin. Its lowest bits have the figures of bvh_leaf_rest. */
+    /* The point that corners count from, itself counted from the BVH's origin. It is exact as it stands. Its lowest
+     * bits hold the figures of bvh_leaf_rest. */
     float base_m[3];
     float corner_m[3][4]; /* x, y, z of the corners, from base_m */
-    uint32_t triangle;    /* 0 */
+    uint32_t triangle;    /* number of triangle 0 */
     struct bvh_plane plane[2];
 } __attribute__((aligned(128)));
 _Static_assert(sizeof(struct bvh_leaf) == 128, "there are half as many as triangles");
 
 enum {
-    BVH_LEAF_BITS = 6,       /* of each number of base_m */
+    BVH_LEAF_BITS = 6,       /* lowest bits of each number of base_m, which hold other figures */
     BVH_LEAF_AHEAD_BITS = 4, /* how far triangle 1 follows triangle 0 in the scene's list, 0: there is none */
     BVH_LEAF_AHEAD = 1 << BVH_LEAF_AHEAD_BITS,
-    BVH_LENGTH_BITS = 17, /* a length lacks the sign and so many bits of a float, and is rounded up */
+    BVH_LENGTH_BITS = 17, /* a length is a float without its sign and this many lowest bits, rounded up */
 };
 static inline uint32_t bvh_float_bits(float f)
 {
@@ -46,7 +49,7 @@ static inline uint32_t bvh_leaf_rest(const struct bvh_leaf *leaf)
     return (bvh_float_bits(leaf->base_m[0]) & mask) | (bvh_float_bits(leaf->base_m[1]) & mask) << BVH_LEAF_BITS |
            (bvh_float_bits(leaf->base_m[2]) & mask) << 2 * BVH_LEAF_BITS;
 }
-/* An upper bound of the edges' lengths, and of the corners' distances from base_m. */
+/* Returns an upper bound of the edges' lengths, and of the corners' distances from base_m. */
 static inline float bvh_leaf_size_m(uint32_t rest)
 {
     return bvh_bits_float(rest >> BVH_LEAF_AHEAD_BITS << BVH_LENGTH_BITS);

@@ -18,11 +18,11 @@ enum { EDGES = 5 };
 static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2, 0, 3, 2};
 
 /* An edge's side is (p x (q - p)) . d. In single precision its error is at most 15 units of 2^-24 of |p| times the
- * leaf's size, which no edge exceeds, and no distance of a corner from the leaf's base: the base from the ray's origin,
- * rounded, 1; the corner added to it 2; the edge 3; the cross product 3; the direction 1; the dot product 5. Where rays
- * begin at points o of their own, p counts from one of these, c, and the side is (p x (q - p)) . d + (q - p) . ((o - c)
- * x d). The second term rounds like the first, with |o - c| for |p|; the sum 1. What double precision leaves in doubt
- * (edges.h) is far less than the rest of the bound. */
+ * leaf's size. No edge is longer than the size, and no corner is further from the leaf's base. The units are: the base
+ * from the ray's origin, rounded, 1; the corner added to it 2; the edge 3; the cross product 3; the direction 1; the
+ * dot product 5. Where rays begin at points o of their own, p counts from one of these, c. Then the side is (p x (q -
+ * p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with |o - c| for |p|; the sum adds 1. The
+ * doubt of double precision (edges.h) is far less than the rest of the bound. */
 #define SIDE_DOUBT (24.0F * 0x1p-24F)
 /* Where a plane is seen at a smaller sine, the range comes from the edges. */
 #define FLAT 1e-6
@@ -52,7 +52,8 @@ VEC_INLINE int32_t judge(float a, float b, float c, float doubt)
     return in | (1 - (in | out)) << 1;
 }
 
-/* What judging needs of a leaf: edges, and their moments p x (q - p), the same for all rays from one point. */
+/* The figures of a leaf by which rays are judged: edges e, and their moments m = p x (q - p). All rays from one point
+ * share them. */
 struct edges {
     float m[EDGES][3], e[EDGES][3], doubt;
 };
@@ -79,7 +80,8 @@ VEC_INLINE void find_edges(const struct bvh_query *query, const struct bvh_leaf 
     edges->doubt = SIDE_DOUBT * 1.001F * far_m * size_m;
 }
 
-/* Judges a packet of that width, which Embree has, or fewer rays. found: all bits of the rays that Embree asks for. */
+/* Judges a packet of `width` rays, which is a width of Embree's, or fewer. found: all bits of the rays that Embree asks
+ * for. */
 VEC_INLINE void judge_packet(const struct bvh_query *query, const struct edges *edges, uint32_t width,
                              struct lanes *found)
 {
@@ -98,7 +100,7 @@ VEC_INLINE void judge_packet(const struct bvh_query *query, const struct edges *
         found->of[i] &= (uint8_t)wide[i];
 }
 
-/* The same where rays begin at points of their own. */
+/* Judges a packet whose rays begin at points of their own. */
 VEC_INLINE void judge_packet_own(const struct bvh_query *query, const struct edges *edges, uint32_t width,
                                  struct lanes *found)
 {
@@ -301,8 +303,8 @@ static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *le
     if (bvh_leaf_ahead(rest) != 0 && any(found, EITHER << SECOND)) meet_triangle(query, tfar, leaf, 1, found);
 }
 
-/* Leaves that lie together are mostly met together: so many more are fetched. It is the wait for them that costs. Those
- * after the last are not read. */
+/* Rays that meet a leaf mostly meet the leaves next to it. So this many more are fetched into the cache, since waiting
+ * for them costs most. A fetch after the last leaf does nothing. */
 enum { AHEAD = 5 };
 
 void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)

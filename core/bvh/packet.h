@@ -33,13 +33,13 @@ struct bvh_query {
     double at_origin_m;        /* no hit is nearer than this */
     uint32_t width;            /* rays of the call */
     int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
-    double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points at_local is the first of them */
+    double at[3], at_local[3]; /* prcs; from the BVH's origin, with own points that of the first ray */
     double far_m;              /* no ray begins further from the BVH's origin */
     double most_m;             /* of a float ray, as in struct bvh_batch */
     double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
     const float *dir_float;    /* [3][width] the same for Embree; may be read on to BVH_PACKET */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
-    /* Of own points, else 0: (local - at_local) x dir, and a length that no local - at_local exceeds. */
+    /* With own points: (local - at_local) x dir, and an upper bound of the length of local - at_local. Else 0. */
     float turned[3][BVH_PACKET];
     double apart_m;
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */

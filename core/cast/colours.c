@@ -21,8 +21,8 @@ static double frame_at(const struct chunk *k, uint32_t pulse)
     return a->frame + fmin(1.0, f) * (b->frame - a->frame);
 }
 
-/* Echoes that get colours, of these pulses. Neighbours mostly share their labels: colours of the last ones are kept, at
- * label % KEPT. */
+/* The echoes of a chunk that get colours. Neighbours mostly have the same label, so the colours of the last labels are
+ * kept, at label % KEPT. */
 enum { KEPT = 16, NO_LABEL = 1 << 16 };
 struct coloured {
     const struct chunk *k;

@@ -16,7 +16,7 @@ struct sub_ray {
     double from_m[3], dir[3];
 };
 
-/* The sub-ray at (x, y) of the disc of a pulse that begins at from_m. */
+/* Returns the sub-ray at (x, y) of the disc of a pulse that begins at from_m. */
 VEC_INLINE struct sub_ray sub_ray(const struct beam *beam, const struct beam_sight *sight, const double from_m[3],
                                   double x, double y)
 {
@@ -57,7 +57,7 @@ static void look_along(const struct caster *c, struct job *job)
     beam_axes(dir, job->sight.e1, job->sight.e2);
 }
 
-/* The rays of a pattern, for whole vectors of places. */
+/* Adds the rays of a pattern in whole vectors, so it may write up to LANES - 1 more after them. */
 VEC_CLONES
 static void add_pattern(const struct beam *beam, const struct beam_sight *sight, const double from_m[3],
                         const struct beam_pattern *pattern, const struct vec3_out *to_p, const struct vec3_out *to_d)

@@ -185,7 +185,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     w->n_echoes += n;
 }
 
-/* Whether the returns of whole footprints are just ranges, labels, and what comes back. */
+/* Returns whether the returns of whole footprints have only ranges, labels, and energy that comes back. */
 static int are_alike(const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -193,7 +193,7 @@ static int are_alike(const struct chunk *k)
            k->waves == NULL && !k->texels && !k->spreads;
 }
 
-/* Jobs first .. first + BEAM_ALIKE, over whole footprints. */
+/* Finishes BEAM_ALIKE jobs over whole footprints, from `first` on. */
 static void finish_alike(struct caster *c, const struct chunk *k, uint32_t first)
 {
     struct sub_ray_work *w = c->sub_rays;

@@ -156,7 +156,8 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *r, uint3
 
 /* ---- several pulses at a time, one in each lane */
 
-/* Of each pulse: its nearest return and that one's place, its farthest return; is_whole: all returns are there. */
+/* For each pulse: its nearest range, the place of that return, and its farthest range; is_whole: no return is
+ * missing. */
 struct reaches {
     double near_m[BEAM_ALIKE], far_m[BEAM_ALIKE];
     int64_t nearest[BEAM_ALIKE], is_whole[BEAM_ALIKE];
@@ -186,12 +187,12 @@ static void find_reaches(const struct beam_alike *alike, struct reaches *of)
     *of = r;
 }
 
-/* Sums of each pulse: of what comes back, and of that times the range beyond the nearest. */
+/* Sums for each pulse: the energy that comes back, and that energy times the range beyond the nearest. */
 struct lane_sums {
     double back[BEAM_ALIKE], first[BEAM_ALIKE];
 };
 
-/* The order of summing is that of beam_merge, whose first return has changed places with the nearest one. */
+/* Sums are in the order of beam_merge, which swaps the first return with the nearest one. */
 VEC_CLONES
 static void sum_ranges(const struct beam_alike *alike, const struct reaches *of, struct lane_sums *sums)
 {
@@ -213,7 +214,7 @@ static void sum_ranges(const struct beam_alike *alike, const struct reaches *of,
     memcpy(sums->first, first, sizeof first);
 }
 
-/* The same where surfaces are modelled. */
+/* Computes the same sums where surfaces are modelled. */
 VEC_CLONES
 static void sum_returns(const struct beam_alike *alike, const struct reaches *of, struct lane_sums *sums)
 {
@@ -241,7 +242,7 @@ static void sum_returns(const struct beam_alike *alike, const struct reaches *of
     *sums = s;
 }
 
-/* A bit for each pulse whose returns have one label. */
+/* Returns a bit for each pulse whose returns have one label. */
 VEC_CLONES
 static uint32_t have_one_label(const struct beam_alike *alike)
 {

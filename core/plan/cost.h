@@ -36,17 +36,17 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 #define PLAN_COST_SIGHT_ONE   2.0   /* looked up: one triangle or nothing there, */
 #define PLAN_COST_SIGHT_FEW   35.0  /* one of a few, */
 #define PLAN_COST_SIGHT_ASK   150.0 /* the BVH is asked after all, ray by ray: these have nothing in common */
-#define PLAN_COST_SIGHT_SMALL 12.0  /* neighbours ask it together */
+#define PLAN_COST_SIGHT_SMALL 12.0  /* the BVH is asked for small triangles, neighbours together */
 /* Extra in a scene of a million triangles, whose planes fit into no cache; it grows with the root of their
  * number. */
 #define PLAN_COST_MILLION 10.0
-/* Cost of making the map: fixed, per triangle, more per triangle that is seen and not small, with as many hidden ones,
- * and per cell that shows more than one; memory of such a cell. */
+/* Cost of making the map: a fixed part, and a part per triangle. Triangles that are seen and not small cost more, and
+ * so do as many hidden ones. So do cells that show more than one; their memory follows. */
 #define PLAN_COST_SIGHT          3e6
 #define PLAN_COST_SIGHT_TRIANGLE 28.0
 #define PLAN_COST_SIGHT_SEEN     440.0
 #define PLAN_COST_SIGHT_CELL     60.0
 #define PLAN_SIGHT_CELL_BYTES    25.0
-#define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle that such cells show, in each region; as many again are hidden */
+#define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle in such cells, per region; as many again are hidden */
 
 #endif

@@ -350,7 +350,7 @@ static uint32_t count_different(const uint32_t *triangle)
     return n;
 }
 
-/* The number of rays that meet the triangle, where it is not hidden; `rays` go in all directions. */
+/* Returns how many of `rays` rays in all directions meet the triangle, unless it is hidden. */
 static double rays_on(const struct bvh *bvh, const struct bvh_rays *cast, double rays)
 {
     struct bvh_plane plane;

@@ -111,7 +111,8 @@ static void bins_count(struct build_shared *b, uint32_t region, uint32_t number)
     if ((number & BUILD_IS_GROUP) == 0) b->kept[number]++;
 }
 
-/* Counts a triangle or a group by region into bin, or, after that, writes it there. */
+/* Counts a triangle or a group in each region of the range. Once all are counted, `write` puts its number into the bins
+ * of these regions. */
 static void put_range(struct build_shared *b, uint32_t face, const struct range *r, uint32_t number, int write)
 {
     for (uint32_t j = r->v0; j <= r->v1; j++)
@@ -125,7 +126,8 @@ static void put_range(struct build_shared *b, uint32_t face, const struct range 
         }
 }
 
-/* The triangles first .. end of a group that is not a candidate itself. `all` holds its triangles, where it is known. */
+/* Puts the triangles first .. end of a group that is not a candidate itself. `all` is a range that holds them all;
+ * NULL: it is not known. */
 static void put_triangles(struct build_shared *b, uint32_t face, uint32_t first, uint32_t end, const struct range *all,
                           int write)
 {

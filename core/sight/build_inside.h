@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/sight: how a sight is made.
  *
- * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as
- * Warnock's algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square is a leaf where one of the
- * triangles that may be seen in it covers it and hides the rest, or where there are none. Else its quarters are
- * examined, down to a cell (region.c).
+ * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as Warnock's
+ * algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square is a leaf where no triangle may be seen in
+ * it, or where one covers it and hides the others. Else its quarters are examined, down to a cell (region.c).
  *
  * Triangles that follow each other in the scene's list make a group. Where a group's triangles are so small that too
  * few rays meet each, the group is a candidate as a whole: the box around it says where it may be seen, and how near it
@@ -23,7 +22,7 @@ enum {
     BUILD_GROUP = 32, /* triangles of a group */
     BUILD_GROUP_BIT = 31,
 };
-/* In struct build_shared.binned: the number is that of a group. */
+/* In build_shared.binned this bit says that the number is that of a group. */
 #define BUILD_IS_GROUP (1U << BUILD_GROUP_BIT)
 
 /* The side planes of a face's pyramid are a little wider than the face. */
@@ -33,7 +32,7 @@ enum {
 /* The box around a group, from the station. */
 struct build_group {
     double lo_m[3], hi_m[3];
-    double far_m;   /* no coordinate is further */
+    double far_m;   /* no coordinate is larger */
     int8_t whole;   /* it is a candidate itself */
     uint8_t beside; /* a bit for each face that shows nothing of it */
 };
@@ -43,7 +42,7 @@ struct build_group {
 struct build_candidate {
     union {
         double edge[3][3];
-        double rect[2][2]; /* of a group: middle and half of the u and v that it is seen in */
+        double rect[2][2]; /* of a group: middle and half the width of u and v where it is seen */
     };
     double edge_slope[3]; /* |f[1]| + |f[2]| */
     double plane[3], plane_slope;
@@ -73,7 +72,7 @@ struct build_shared {
     uint32_t n_groups;
     _Atomic uint32_t next;       /* region to be divided */
     _Atomic uint64_t bytes;      /* taken, of spec->memory_bytes */
-    _Atomic uint64_t given_back; /* of these, at the end */
+    _Atomic uint64_t given_back; /* of these, freed at the end */
     struct build_arena leaf, list, record;
     _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
     int may_coarsen;           /* 1: where the memory is full, the build begins again with larger cells */
@@ -86,7 +85,8 @@ uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t 
 
 /* ---- groups.c */
 int build_groups(struct build_shared *b, struct sh_err *err);
-/* Where a group is seen on a face: u from rect[0][0] to rect[0][1], v in rect[1]. 0: no bounds are known. */
+/* Finds where a group is seen on a face: u from rect[0][0] to rect[0][1], v in rect[1]. Returns 0 where no bounds are
+ * known. */
 int build_group_rect(const struct build_group *g, uint32_t face, double rect[2][2]);
 void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c);
 
@@ -106,7 +106,7 @@ void build_record(const struct build_candidate *c, uint32_t face, struct sight_r
 /* Working memory of one thread. */
 struct build_work {
     struct build_candidate *candidate;
-    size_t n, room, groups; /* groups: of the n */
+    size_t n, room, groups; /* groups: how many of the n */
     uint16_t *where;        /* [where_room] of candidates, while a square is looked at */
     size_t where_room;
     uint32_t *stack; /* numbers of candidates, square within square */

@@ -34,7 +34,7 @@ static void find_box(const struct build_shared *b, uint32_t group, uint32_t n, s
         g->far_m = fmax(g->far_m, fmax(-g->lo_m[k], g->hi_m[k]));
 }
 
-/* What a box reaches along an axis of a face. */
+/* The interval that a box takes along an axis of a face. */
 struct reach {
     double lo_m, hi_m;
 };
@@ -47,7 +47,8 @@ static void to_face(const struct build_group *g, uint32_t face, struct reach at[
     if (face & 1) at[0] = (struct reach){-at[0].hi_m, -at[0].lo_m};
 }
 
-/* As for a triangle (bins.c): the whole box lies beyond one side of the face's pyramid, or behind the station. */
+/* Returns whether the whole box lies beyond one side of the face's pyramid, or behind the station. bins.c asks the same
+ * of a triangle. */
 static int is_beside(const struct build_group *g, uint32_t face)
 {
     struct reach at[3];
@@ -72,7 +73,7 @@ int build_group_rect(const struct build_group *g, uint32_t face, double rect[2][
     return 1;
 }
 
-/* The share of the group's rectangle on a face. */
+/* Returns the area of the group's rectangle that lies on a face. */
 static double area_on(const double rect[2][2])
 {
     double area = 1.0;
@@ -81,7 +82,7 @@ static double area_on(const double rect[2][2])
     return area;
 }
 
-/* Whether so few rays come to the group that it is a candidate as a whole. */
+/* Returns whether so few rays come to the group that it is a candidate as a whole. */
 static int is_whole(const struct build_shared *b, const struct build_group *g, uint32_t n)
 {
     const double faces_area = 4.0 * SIGHT_FACES;
@@ -115,7 +116,7 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* Its nearest point is that of the box: sums of squares lose less than 1e-12. */
+/* near_m is that of the box's nearest point. The rounding of its squares loses less than 1e-12. */
 void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c)
 {
     double rect[2][2], near2 = 0.0;

@@ -20,8 +20,8 @@ struct seen {
     uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
     uint32_t *above;   /* where the stack is free */
     uint32_t cover;    /* hides all others of the list; or NO_CANDIDATE */
-    uint32_t groups;   /* of the candidates; */
-    int filled;        /* one of them may be seen in all of the square */
+    uint32_t groups;   /* how many candidates are groups */
+    int filled;        /* a group may be seen in all of the square */
     uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
     uint32_t own_leaf;
 };
@@ -49,10 +49,10 @@ struct quarters {
     quad first, plane[3], slope, slack;
 };
 
-/* Flags of a candidate in the four quarters: outside, covers; four bits each, one a quarter. A group covers what
- * its rectangle does. */
+/* Flags of a candidate: outside, covers. Each has four bits, one for each quarter. A group covers the parts that its
+ * rectangle covers. */
 enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4, GROUP_SHIFT = 8 };
-/* Where groups alone may be seen, squares of so many cells are small enough. */
+/* A square of this many cells is not divided where groups alone may be seen. */
 enum { GROUPS_SIZE = SIGHT_TILE / 2 };
 
 VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
@@ -74,7 +74,7 @@ VEC_INLINE void find_clear(const struct build_candidate *c, const quad *middle, 
     *clear = (quad_mask)(*middle - r > 2.0 * c->graze) & (quad_mask)(*middle + r < SIGHT_NEAR);
 }
 
-/* The flags of a group. */
+/* Returns the flags of a group. */
 VEC_INLINE uint16_t place_group(const struct build_candidate *c, const struct quarters *four)
 {
     const double half = four->half, *u = c->rect[0], *v = c->rect[1];

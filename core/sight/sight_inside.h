@@ -28,14 +28,13 @@
  *   so it comes later as well.
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
  *   the square, the triangle's nearest point is further away than what covers the square is anywhere.
- * Groups of small triangles (groups.c) are left out only beside a square, where it lies outside of the box that holds
- * them, with a margin that is that of regions, or behind as a whole, by the box's nearest point. A square where a group
- * is left asks core/bvh.
- * The leaf holds the triangles that are left: one that covers the square (SIGHT_ONE), none (SIGHT_NOTHING), or a
- * few. A few are decided ray by ray with the same doubts (candidate_list.c). Where a doubt remains, core/bvh decides. Planes
- * seen at a sine below SIGHT_GRAZE neither cover nor hide. A doubt bounds the rounding error of such a function,
- * per unit length of a ray. A ray whose largest component is 1 is up to sqrt(3) long: over squares they count
- * twice. */
+ * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: it lies outside of the box
+ * that holds them, with the margin of regions. Behind as a whole: by the box's nearest point. Where a group is not left
+ * out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that covers the square
+ * (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts (candidate_list.c).
+ * Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover nor hide. A doubt
+ * bounds the rounding error of such a function, per unit length of a ray. A ray whose largest component is 1 is up to
+ * sqrt(3) long: over squares they count twice. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 

@@ -47,7 +47,8 @@ static int attributes_from(struct scanhead *sh, const struct scanhead_frame *fra
     return (int)(n < max ? n : max);
 }
 
-/* Indices begin at 0, and `from` is the payload as many records on: a sum that may wrap makes no vectors. */
+/* Indices begin at 0, and `from` is at the first record wanted. Compilers make no vectors of an index that is a sum, as
+ * it may wrap. */
 VEC_CLONES static void set_deviations(const uint8_t *restrict from, uint32_t n_points, uint32_t n,
                                       double *restrict deviation)
 {

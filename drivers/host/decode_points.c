@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points of a frame as doubles. The hot path of every recorder.
+/* Decodes the points of a stream frame into doubles. It is the hot path of every recorder.
  *
  * A frame is taken in blocks of rows. The rows of a block become columns of words, and loops that compilers turn into
  * vectors make each column of figures from these. */
@@ -10,7 +10,7 @@
 
 enum { BLOCK = HOST_BLOCK };
 
-/* It holds the rows of the wire as columns, and columns that nobody wants but others are computed from. */
+/* It holds the rows of the wire as columns, and columns that the caller doesn't want but others are computed from. */
 struct block {
     uint32_t a[BLOCK], b[BLOCK], c[BLOCK], middle[BLOCK], tail[BLOCK];
     double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];
@@ -31,7 +31,7 @@ VEC_CLONES static void split_fours(const uint32_t (*restrict four)[4], int n, st
     }
 }
 
-/* Words that are four apart come into columns by shuffles; those that are five apart don't. */
+/* Compilers make shuffles for words that are four apart, but not for words that are five apart. */
 static void take_words(const uint8_t *row, int n, struct block *b)
 {
     uint32_t four[BLOCK][4];
@@ -313,7 +313,7 @@ struct points_room {
     uint8_t echo[BLOCK], echo_count[BLOCK];
 };
 
-/* The loops are apart because one size of figures a loop makes the better vectors. */
+/* There are two loops because a loop over figures of one size makes better vectors. */
 static void put_points(const struct points_room *restrict from, int n, struct scanhead_point *restrict points)
 {
     for (int i = 0; i < n; i++) {

@@ -82,7 +82,7 @@ struct scanhead {
     int hashing;
     struct sha256_ctx sha256;
     struct sh_err err;
-    struct host_turn_part turn_part[HOST_TURN_PARTS]; /* of whole parts of a turn */
+    struct host_turn_part turn_part[HOST_TURN_PARTS]; /* sines and cosines of whole 1/256 turns */
 };
 
 /* notices.c: hands on what the parser notices. Called once, after native_parser_init. */
@@ -111,7 +111,7 @@ void host_forget_poses(struct scanhead *sh);
  * rest. */
 void host_turn_table(struct scanhead *sh);
 void host_sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c);
-/* Angles of u turns in radians, folded into [lo, lo + 1) turns. */
+/* Sets rad to the angles of u turns in radians, folded into [lo, lo + 1) turns. */
 void host_fold_turns(const double *u, int n, double lo, double *rad);
 
 #endif

@@ -75,7 +75,7 @@ void host_note_loss(struct scanhead *sh, int error)
     sh->lost = sh->source.usb != NULL && !sh->reset;
 }
 
-/* Bytes from the source into the parser: as read(). */
+/* Takes bytes from the source into the parser. Returns as read() does. */
 static ssize_t take(struct scanhead *sh)
 {
     struct host_source *source = &sh->source;

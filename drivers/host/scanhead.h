@@ -248,8 +248,8 @@ struct scanhead_columns {
     uint16_t *label;
     uint8_t *echo, *echo_count;
 };
-/* scanhead_points() as columns: the same figures, bit for bit, in less time. Each column that is not NULL has room for
- * max; they don't overlap. Returns the number of points written, or a negative error. */
+/* scanhead_points() into columns: the same figures, bit for bit, in less time. Columns need room for max figures each,
+ * and must not overlap. Returns the number of points written, or a negative error. */
 int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      const struct scanhead_columns *to, uint32_t max);
 
@@ -410,16 +410,15 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
  * frames were lost; their coordinates are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
-/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted
- * standard form: seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by
- * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last.
- * It counts from the last time that the head reported, at the scan's start and each second (events
- * SCAN_START, PPS, TIME). It is exact to the nanosecond where the head's clock has no drift; a double of that
- * size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the
- * scan's start have come. Where the head knows the time, it comes before the first points that can be
- * placed. */
+/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
+ * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
+ * of week. It is valid for frames up to the one that scanhead_next returned last. It counts from the last time that the
+ * head reported, at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
+ * where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head
+ * doesn't know the time, or before the time and the scan's start have come. Where the head knows the time, it comes
+ * before the first points that can be placed. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
-/* The same of n times, bit for bit, and much faster where they lie within one second. */
+/* The same for n times, bit for bit. It is faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 

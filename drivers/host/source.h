@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a handle's bytes come from: a descriptor, a device on USB, or a captured file. Private to libscanhead.
+/* Where a handle's bytes come from: a descriptor, a device on USB, a captured file, or a head in this process. Private
+ * to libscanhead.
  *
  * In: the name of a source. Out: its bytes, without blocking, and waits with a deadline. */
 #ifndef DRIVERS_HOST_SOURCE_H
@@ -10,14 +11,15 @@
 
 #include "core/err.h"
 
-/* How bytes come and go, without blocking; one table for descriptors, one for USB, one for a head in this process. */
+/* How bytes come and go, without blocking. Descriptors, USB, captured files and a head in this process have a table
+ * each. */
 struct host_source;
 struct scanhead;
 struct host_source_ops {
     /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
-    /* In place of read, as native_parser_lend() needs it; NULL: there is only read. The bytes stay until the next call of
-     * wait or close. */
+    /* In place of read: sets *bytes to whole items, as native_parser_lend() needs them. NULL: there is only read.
+     * Returns as read does. The bytes stay until the next call of wait or close. */
     ssize_t (*lend)(struct host_source *source, const uint8_t **bytes);
     ssize_t (*write)(struct host_source *source, const void *data, size_t len);
     /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with
@@ -40,7 +42,7 @@ struct host_source {
 
 /* host.c: a handle with a source that the caller has opened. NULL: no memory, and the source is still the caller's. */
 struct scanhead *host_open(const struct host_source *source);
-/* The source is closed, and the handle gives nothing more. It keeps what it was told. */
+/* Closes the source. The handle gives nothing more, but keeps its state and counts. */
 void host_hang_up(struct scanhead *sh);
 
 /* Opens what `source` names, non-blocking. */

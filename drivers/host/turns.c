@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Angles in turns: they need no reduction by an inexact pi. */
+/* Sines of angles. Angles are in turns, so that none has to be reduced by an inexact pi. */
 #include <math.h>
 
 #include "core/vecmath.h"
@@ -15,7 +15,7 @@ void host_turn_table(struct scanhead *sh)
     }
 }
 
-/* The largest whole number that is not above |x| < 2^51. */
+/* Returns the largest whole number that is not above x. |x| < 2^51. */
 VEC_INLINE double floor_of(double x, uint64_t *bits)
 {
     const double near = vec_round(x, bits);
@@ -24,7 +24,7 @@ VEC_INLINE double floor_of(double x, uint64_t *bits)
     return near - (double)(int)above;
 }
 
-/* Finds the table's part that is nearest to u[n] >= 0 turns, and the rest beside it in radians. */
+/* Finds the table's part that is nearest to u[i] >= 0 turns, and the rest beside it in radians. */
 VEC_CLONES static void split_turns(const double *restrict u, int n, uint32_t *restrict part, double *restrict rest_rad)
 {
     for (int i = 0; i < n; i++) {
@@ -36,8 +36,8 @@ VEC_CLONES static void split_turns(const double *restrict u, int n, uint32_t *re
     }
 }
 
-/* |r| <= pi/256, so the first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66, far below the rounding of
- * the angle itself. */
+/* |r| <= pi/256, so the first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66. The rounding of the angle
+ * itself is far larger. */
 VEC_CLONES static void add_rests(const struct host_turn_part *restrict part, const double *restrict rest_rad, int n,
                                  double *restrict s, double *restrict c)
 {
@@ -51,7 +51,8 @@ VEC_CLONES static void add_rests(const struct host_turn_part *restrict part, con
     }
 }
 
-/* The table is read between the vectors: a part as a whole, which costs less than picking its figures into them. */
+/* The table is read between the loops of vectors, one whole part at a time. That costs less than gathering its figures
+ * into vectors. */
 void host_sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c)
 {
     uint32_t k[HOST_BLOCK];

@@ -42,7 +42,7 @@ struct link_spec {
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
     int waits; /* enum link_waits; its owner sees to it */
-    int latency_ms;               /* in real time bytes may wait so long for others; its owner sees to it */
+    int latency_ms;               /* in real time bytes may wait this long for others; its owner sees to it */
     int clean;                    /* 1: it gets no injected faults; its owner sees to it */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
@@ -123,7 +123,8 @@ struct link_ops {
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 
-    /* As write, but the bytes are read where they lie, and stay until the next poll. NULL: there is only write. */
+    /* As write, but the client reads the bytes where they lie, so they stay there until the next poll. NULL: there is
+     * only write. */
     ssize_t (*lend)(void *link, int session, const void *buf, size_t len);
 
     /* Number of writes that were taken and did not arrive, as far as the system reports it: refused, or without a

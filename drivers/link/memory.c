@@ -9,7 +9,7 @@
 
 struct memory_link {
     struct link_memory *shared;
-    size_t written; /* bytes of the last write, which the client may need yet; 0: none */
+    size_t written; /* bytes of the last write, which the client may still need; 0: none */
     int reported_opened, reported_closed;
 };
 
@@ -95,7 +95,7 @@ static ssize_t memory_lend(void *link, int session, const void *buf, size_t len)
     return (ssize_t)len;
 }
 
-/* A write counts as taken in the turn after the client took it: only then does the client need the bytes no more. */
+/* A write counts as taken one turn after the client took it, since until then the client needs the bytes. */
 static ssize_t memory_write(void *link, int session, const void *buf, size_t len)
 {
     struct memory_link *self = link;

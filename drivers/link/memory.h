@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The memory link: one client, in the thread that owns the link. So nothing is copied, locked or waited for: while the
- * client needs bytes, it lets the owner of the link work, and reads what that wrote where it lies.
+/* The memory link: one client, in the thread that owns the link. So nothing is copied, locked or waited for. A client
+ * that needs bytes lets the link's owner work, and then reads the bytes where the owner wrote them.
  *
- * In: what the owner writes, of any length; what the client sends, MEMORY_ROOM bytes at most between two turns. The
- * owner keeps what it wrote unchanged, and repeats a write that took nothing with the same bytes, until it was taken. */
+ * In: the owner's writes, of any length; the bytes that the client sends, at most MEMORY_ROOM between two turns. The
+ * owner leaves its bytes unchanged. It repeats a write that took nothing, with the same bytes, until they are taken. */
 #ifndef DRIVERS_LINK_MEMORY_H
 #define DRIVERS_LINK_MEMORY_H
 
@@ -13,10 +13,10 @@
 
 enum { MEMORY_ROOM = 4096, MEMORY_PIECES = 16 /* between two turns */ };
 
-/* What both ends share. It begins as zeros, and outlives the link. */
+/* Both ends share this. It begins as zeros, and outlives the link. */
 struct link_memory {
-    /* Set by the link's owner: works until there is something for the client, or for at most timeout_ms (-1: for ever).
-     * NULL: it has not begun. */
+    /* The link's owner sets this. It works until there is something for the client, or for at most timeout_ms (-1: for
+     * ever). NULL: the owner has not begun. */
     void (*turn)(void *owner, int timeout_ms);
     void *owner;
     struct {
@@ -30,13 +30,14 @@ struct link_memory {
     int left; /* the client is gone */
 };
 
-/* The client's end. Bytes that the owner wrote, which stay until the next turn; 0: none now. */
+/* The client's end. Returns how many bytes the owner wrote at *bytes, where they stay until the next turn; 0: none
+ * now. */
 size_t memory_take(struct link_memory *memory, const uint8_t **bytes);
-/* Sends to the owner: the number of bytes taken, 0: there is no room before the next turn. */
+/* Sends bytes to the owner. Returns how many were taken; 0: there is no room before the next turn. */
 size_t memory_send(struct link_memory *memory, const void *bytes, size_t len);
 /* Lets the owner work. */
 void memory_turn(struct link_memory *memory, int timeout_ms);
-/* The client goes, and its session ends at once. What it had not taken is lost. Again: does nothing. */
+/* The client goes, and its session ends at once. Bytes that it had not taken are lost. A second call does nothing. */
 void memory_leave(struct link_memory *memory);
 
 #endif

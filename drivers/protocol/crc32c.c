@@ -82,8 +82,8 @@ __attribute__((target("sse4.2"))) uint32_t crc32c_hw(uint32_t crc, const void *d
     return ~crc;
 }
 
-/* Folding: a piece of 128 bits, N bits before its end, is replaced by its products with x^(N+63) and x^(N-1) mod P, bits
- * reflected, at that end. Here each vector has four pieces, and four vectors go on at once. */
+/* Folding replaces a piece of 128 bits by a piece N bits further on. That is the sum of the products of its halves with
+ * x^(N+63) and x^(N-1) mod P, bits reflected. Here each vector has four pieces, and four vectors go on at once. */
 enum { FOLD = 64, FOLDS = 4 * FOLD, FOLD_LEAST = 2 * FOLDS };
 #define FOLD_ONE_LO  0x1c19243b00000000
 #define FOLD_ONE_HI  0x75bba45b00000000
@@ -176,7 +176,7 @@ uint32_t crc32c_wide(uint32_t crc, const void *data, size_t len)
 
 uint32_t crc32c(uint32_t crc, const void *data, size_t len)
 {
-    /* the answers are constants that were found before main: no lock, any thread */
+    /* the processor's features were found before main, so that this needs no lock */
     if (crc32c_has_wide()) return crc32c_wide(crc, data, len);
     return crc32c_has_hw() ? crc32c_hw(crc, data, len) : crc32c_table(crc, data, len);
 }

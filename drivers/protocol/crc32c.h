@@ -12,8 +12,8 @@
  * b. */
 uint32_t crc32c(uint32_t crc, const void *data, size_t len);
 
-/* The three ways, for tests and the bench. Those by hardware may only be called when crc32c_has_hw(), or
- * crc32c_has_wide(). */
+/* The three ways, for tests and the bench. Only where crc32c_has_hw() returns 1 may crc32c_hw be called, and likewise
+ * crc32c_wide. */
 int crc32c_has_hw(void);
 uint32_t crc32c_hw(uint32_t crc, const void *data, size_t len);
 int crc32c_has_wide(void);

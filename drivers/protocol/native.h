@@ -219,7 +219,7 @@ static inline void native_decode_point(const uint8_t *payload, uint32_t i, struc
     *out = native_point_of(word);
 }
 
-/* Of the first n points: how many are shots without an echo, and how many are echoes whose reflectance is modelled. */
+/* Counts among the first n points the shots without an echo, and the echoes whose reflectance is modelled. */
 void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, uint32_t *n_reflectances);
 
 struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4. Begin of a colours
@@ -396,9 +396,10 @@ struct native_parser {
 void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
-/* In place of these two, for bytes that are in memory already: whole items of this process, which stay until the parser has
- * given them all, and the last one is no longer used. Their payloads are right, so the CRCs of these are not looked at.
- * After NATIVE_MORE, or with n 0: then nothing is left of what was lent before. A parser gets all its bytes in one way. */
+/* In place of these two, for whole items that this process made in memory. They stay there until the parser has given
+ * them all and the last one is no longer used. Their payloads are right, so CRCs of payloads are not checked. It is
+ * called after NATIVE_MORE; or at any time with n 0, which drops the items that were not given yet. A parser gets all
+ * its bytes in one way. */
 void native_parser_lend(struct native_parser *parser, const uint8_t *items, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
 /* Nothing more will be added. An incomplete frame is then searched as garbage, so that whole frames after a cut

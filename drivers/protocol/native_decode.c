@@ -55,7 +55,7 @@ int native_decode_points(const uint8_t *payload, size_t len, struct native_point
     return rc;
 }
 
-/* Without branches, and with one load per point: this is all that some readers need. */
+/* It has no branches, and one load per point: some readers decode nothing else. */
 void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, uint32_t *n_reflectances)
 {
     const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + 12;

@@ -14,7 +14,7 @@ void native_parser_init(struct native_parser *parser)
     parser->last_t_ns = NATIVE_NO_TIME;
 }
 
-/* Where the bytes are that start and end count in. */
+/* Returns the bytes that start and end count in. */
 static const uint8_t *bytes_of(const struct native_parser *parser)
 {
     return parser->lent != NULL ? parser->lent : parser->buf;

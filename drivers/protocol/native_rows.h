@@ -7,11 +7,11 @@
 
 #include "core/line.h"
 
-/* Writes entries first .. first + n of the block, with times after dt0_ns. Returns the bits of any time beyond the 24
- * that have room. */
+/* Writes entries first .. first + n of the block, with times after dt0_ns. Returns the bits of times beyond the 24 that
+ * a row holds; 0: all fit. */
 uint32_t native_put_rows(uint8_t *dst, const struct line_block *block, uint32_t first, uint32_t n, uint32_t dt0_ns);
 
-/* The same without vectors, for tests. */
+/* The same without vectors. Tests compare both. */
 uint32_t native_put_rows_plain(uint8_t *dst, const struct line_block *block, uint32_t first, uint32_t n,
                                uint32_t dt0_ns);
 

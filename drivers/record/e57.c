@@ -131,8 +131,8 @@ static int fail_far(const struct e57 *e, const double p[3], struct sh_err *err)
         e->base.file.path, p[0], p[1], p[2], 2147483647 * e->scan->scale_m, e->scan->scale_m);
 }
 
-/* Whether the packet has to end before a point of this time. Only whole bytes of all streams may end a packet that is not
- * the last one. */
+/* Returns whether the packet has to end before a point of this time. Each packet but the last one ends where all
+ * streams have whole bytes. */
 static int is_due(const struct e57 *e, unsigned n, int64_t t_ns)
 {
     return n >= 8 && t_ns - e->t0_ns >= PACKET_NS;
@@ -146,7 +146,7 @@ VEC_CLONES static int64_t find_latest(const int64_t *restrict t_ns, int n)
     return latest;
 }
 
-/* How many points from i on, of at most n, go into one packet one after the other: 1 at least. */
+/* Returns how many of the n points from i on go into the present packet: at least 1. */
 static int count_run(const struct e57 *e, int i, int n)
 {
     const struct e57_packet *g = &e->gathered;

@@ -46,8 +46,8 @@ void e57_packet_begin(struct e57_packet *packet, const struct e57_facts *facts)
     }
 }
 
-/* Eight records of `bits` each, a byte a record, side by side from the low end on: fields of 8 bits become fields of 16 with
- * two records each, then of 32 with four. */
+/* Packs eight records of `bits` each, which come a byte a record, side by side from the low end on. Fields of 8 bits
+ * become fields of 16 with two records each, then of 32 with four. */
 VEC_INLINE uint64_t pack_eight(uint64_t v, unsigned bits)
 {
     const uint64_t two = ((uint64_t)1 << 2 * bits) - 1, four = ((uint64_t)1 << 4 * bits) - 1;
@@ -56,7 +56,7 @@ VEC_INLINE uint64_t pack_eight(uint64_t v, unsigned bits)
     return v | v >> (32 - 4 * bits);
 }
 
-/* Groups of eight records; those beyond the last record are 0. */
+/* Packs groups of eight records; those beyond the last record are 0. */
 VEC_CLONES static void pack(const uint8_t *restrict v, unsigned bits, size_t n_eights, uint8_t *restrict out)
 {
     if (bits == 1)
@@ -70,7 +70,7 @@ VEC_CLONES static void pack(const uint8_t *restrict v, unsigned bits, size_t n_e
             le_put32(out + 4 * i, (uint32_t)pack_eight(le_get64(v + 8 * i), 4));
 }
 
-/* The first n records of a stream, in the packet at `at`. */
+/* Puts the first n records of a stream into the packet at `at`. */
 static void put_stream(struct e57_packet *packet, int s, unsigned n, uint8_t *at)
 {
     uint8_t *stream = packet->stream[s];
@@ -158,7 +158,7 @@ VEC_CLONES static void find_limits16(const uint8_t *restrict v, unsigned n, uint
     limit[1] = high;
 }
 
-/* Two records a byte; the last byte may have a 0 besides. */
+/* A byte has two records; the last byte may have one and a 0. */
 VEC_CLONES static unsigned find_most4(const uint8_t *restrict v, size_t n_bytes)
 {
     uint8_t most = 0;
@@ -171,8 +171,8 @@ VEC_CLONES static unsigned find_most4(const uint8_t *restrict v, size_t n_bytes)
 
 typedef void count_run(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n);
 
-/* Counts the records whose field in stream s is 0, run by run. Bytes with nothing but such records are one step, and so
- * are bytes with none. */
+/* Counts the records whose field in stream s is 0, run by run. A byte of such records alone is one step, and so is a
+ * byte without any. */
 static void count_zeros(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], int s, unsigned n,
                         count_run *count)
 {
@@ -188,7 +188,8 @@ static void count_zeros(struct e57_scan *scan, const uint8_t *const stream[E57_N
     }
 }
 
-/* Points of the records from `first` on. Coordinates are counted from the least int32: their order is that of these counts. */
+/* Counts the points of the records from `first` on. Coordinates count from the least int32, so their order is that of
+ * the counts. */
 static void count_points(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n)
 {
     const uint32_t least = 0x80000000u;
@@ -203,7 +204,7 @@ static void count_points(struct e57_scan *scan, const uint8_t *const stream[E57_
     scan->n_points += n;
 }
 
-/* Intensities of the records from `first` on, all modelled. */
+/* Counts the intensities of the records from `first` on, all modelled. */
 static void count_intensities(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first,
                               unsigned n)
 {

@@ -39,8 +39,8 @@ enum e57_stream {
     E57_N_STREAMS
 };
 
-/* Records that are gathered for a packet. Streams of whole bytes lie where they will be in a full packet, so that it is not
- * copied. Streams of bits have a byte a record until the packet is made. */
+/* Records that are gathered for a packet. Streams of whole bytes lie where they will be in a full packet, which
+ * therefore needs no copy. Streams of bits have a byte a record until the packet is made. */
 struct e57_packet {
     unsigned n, most;               /* records in the streams, and in a full packet */
     uint8_t *stream[E57_N_STREAMS]; /* of a field that the file lacks: nothing may be put there */
@@ -48,7 +48,7 @@ struct e57_packet {
     uint8_t full[E57_PACKET_MAX], part[E57_PACKET_MAX];
 };
 
-/* Without records, for a file with these fields. The packet must stay where it is. */
+/* Begins a packet without records, for a file with these fields. It must stay where it is in memory. */
 void e57_packet_begin(struct e57_packet *packet, const struct e57_facts *facts);
 /* Makes the packet of the first n <= packet->n records. Its bytes are good until the next records are put. The records
  * after them (fewer than 8) become the first ones of the next packet. */

@@ -29,7 +29,7 @@ static void set_run(struct run *run, const struct track *t, int has_empty, int f
             if (points->echo_count[first + i] == 0) run->own[k][i] = 0;
 }
 
-/* Coordinates in counts from the least int32. 0: one of them has no room. */
+/* Puts coordinates in counts from the least int32. Returns 0 where one of them has no room. */
 VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n, uint8_t *restrict to)
 {
     uint64_t n_bad = 0;
@@ -42,7 +42,7 @@ VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n
     return n_bad == 0;
 }
 
-/* The message needs the first of them; the plain formula finds it. */
+/* Finds the first point without room, for the message, by the plain formula. */
 static void find_far(const struct run *run, double scale_m, int n, double far_m[3])
 {
     int i = 0;
@@ -53,7 +53,7 @@ static void find_far(const struct run *run, double scale_m, int n, double far_m[
         far_m[k] = run->p[k][i];
 }
 
-/* NaN: not modelled. */
+/* A reflectance of NaN is not modelled. */
 VEC_CLONES static void put_intensities(const double *restrict reflectance_db, int n, uint8_t *restrict to,
                                        uint8_t *restrict none)
 {

@@ -6,9 +6,9 @@
 #include "drivers/record/e57_packet.h"
 #include "drivers/record/track.h"
 
-/* Puts the n points of the batch from `first` on into the packet, which has room for them. Coordinates are in the head's
- * frame, in the steps of the file's last scan. A point without an echo is an empty shot. 0; or -1 where 32 bits don't hold
- * all places: then none is put, and far_m is the first such place. */
+/* Puts the n points of the batch from `first` on into the packet, which has room for them. Coordinates are in the
+ * head's frame, in the steps of the file's last scan. A point without an echo is an empty shot. Returns 0, or -1 where
+ * 32 bits don't hold all places: then no point is put, and far_m is the first such place. */
 int e57_records_put(struct e57_packet *packet, const struct e57_facts *facts, const struct track *track, int first,
                     int n, double far_m[3]);
 

@@ -10,7 +10,7 @@
 
 /* ---- coordinates */
 
-/* rint, also for what is too far: that stays too far. */
+/* Rounds as rint does. Numbers that are too far stay too far; then it returns 0. */
 VEC_CLONES static int counts_fit(const double *restrict at, int n, double offset, double scale, int32_t *restrict to)
 {
     uint64_t any_beyond = 0;
@@ -71,9 +71,9 @@ VEC_INLINE float near_atan(float r)
     return r + r * (z * s);
 }
 
-/* The same to a hundredth of a count. The series and its rounding, two sums below pi and atan2f are off by less than
- * 8e-7 rad together, which is 0.008 counts; either product, by half a last bit, is off by 0.001. The formula decides
- * where this is within 0.015 of a half: SCAN_ANGLE_NONE, as where an angle is NaN. */
+/* The same to a hundredth of a count. The errors of the series and its rounding, of two sums below pi and of atan2f are
+ * below 8e-7 rad together, or 0.008 counts. The error of either product is half a last bit, or 0.001 counts. Angles
+ * within 0.015 counts of a half, or NaN, are set to SCAN_ANGLE_NONE: there the formula decides. */
 VEC_CLONES static void near_scan_angles(const double *restrict x, const double *restrict y, const double *restrict z,
                                         int n, uint16_t *restrict to)
 {

@@ -18,13 +18,13 @@ struct las_columns {
     float location_ps[TRACK_BATCH], back_ps[TRACK_BATCH][3];
 };
 
-/* One coordinate in counts of `scale` from `offset`, rounded. Returns the number of points before the first one that is
- * too far for 32 bits, or NaN. */
+/* Sets one coordinate in counts of `scale` from `offset`, rounded. Returns the number of points before the first one
+ * that is too far for 32 bits, or NaN. */
 int las_set_counts(const double *at, int n, double offset, double scale, int32_t *to);
-/* 32768 + 100 times the reflectance; 0 where it is not modelled. */
+/* Sets 32768 + 100 times the reflectance; 0 where it is not modelled. */
 void las_set_intensities(const double *reflectance_db, int n, uint16_t *to);
-/* The angle from straight down, of points in the head's frame, in steps of 0.006 degrees: las_scan_angle of each.
- * Returns how many have none; theirs is 0. */
+/* Sets las_scan_angle of each point in the head's frame: the angle from straight down, in steps of 0.006 degrees.
+ * Returns how many points have none; theirs is 0. */
 uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, int n, uint16_t *to);
 /* This is the formula. It gives SCAN_ANGLE_NONE where the angle is NaN. */
 enum { SCAN_ANGLE_NONE = UINT16_MAX };

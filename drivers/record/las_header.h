@@ -60,7 +60,8 @@ struct las_facts {
 
 /* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
 size_t las_point_len(const struct las_facts *facts);
-/* Of these, how many are the format's own; extra bytes follow. And where the time stands, after which a colour may. */
+/* The first returns how many of these bytes are the format's own; extra bytes follow them. The second is where the time
+ * begins; a colour may follow it. */
 size_t las_own_len(const struct las_facts *facts);
 size_t las_time_at(const struct las_facts *facts);
 

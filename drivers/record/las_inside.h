@@ -32,7 +32,7 @@ static inline void las_swap(double v[3])
     v[1] = x;
 }
 
-/* Writes what comes before the points again, with the facts as they are now. */
+/* Writes the bytes before the points again, with the present facts. */
 int las_write_front(struct las *las, struct sh_err *err);
 /* Takes the n points of the batch (las_points.c). */
 int las_points(void *rec, int n, struct sh_err *err);

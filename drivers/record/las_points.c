@@ -7,7 +7,7 @@
 
 #define M_PER_PS (0.5 * 299792458e-12) /* range, of a pulse's way out and back */
 
-/* ---- the batch's columns. Those that fail return how many points come before. */
+/* ---- the batch's columns. A function that fails returns how many points come before the failure. */
 
 static int too_far(const struct las *las, const double p[3], struct sh_err *err)
 {
@@ -124,7 +124,7 @@ static void set_angles(struct las *las, int n)
     las->n_no_angle += las_set_scan_angles(x, y, z, n, las->columns.scan_angle);
 }
 
-/* LAS 1.2 counts to five. */
+/* LAS 1.2 has room for five returns. */
 static void set_returns(struct las *las, int n)
 {
     const struct track_points *p = &las->base.track.points;
@@ -136,7 +136,7 @@ static void set_returns(struct las *las, int n)
     }
 }
 
-/* 0.01 dB and 0.01 ns, as on the wire. */
+/* Units are 0.01 dB and 0.01 ns, as on the wire. */
 static void set_attributes(struct las *las, int n)
 {
     const struct track *t = &las->base.track;

@@ -8,7 +8,8 @@
 #include "core/vecmath.h"
 
 /* All formats begin with x, y, z, intensity and returns. Then come classification, flags and user data, which are 0,
- * scan angle (not in LAS 1.2), station and time. Each store may go into the next figure's place. */
+ * scan angle (not in LAS 1.2), station and time. A store may reach into the next figure's place, which is written
+ * later. */
 static void put_common(const struct las_facts *f, const struct las_columns *c, int n, uint8_t *to)
 {
     const size_t len = las_point_len(f), time_at = las_time_at(f);
@@ -28,7 +29,7 @@ static void put_colours(const struct las_facts *f, int n, uint8_t *to)
     const size_t len = las_point_len(f);
     for (int i = 0; i < n; i++, to += len) {
         for (int k = 0; k < 3; k++)
-            le_put16(to + 2 * k, (uint16_t)(257 * f->track->rgb[i][k])); /* 255 is 65535 */
+            le_put16(to + 2 * k, (uint16_t)(257 * f->track->rgb[i][k])); /* 255 becomes 65535 */
         if (f->has_waves) le_put16(to + 6, 0);
     }
 }

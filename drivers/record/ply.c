@@ -90,7 +90,7 @@ struct ply_rows {
     int n;
 };
 
-/* Columns side by side. They take one pass where their number is known. */
+/* Puts columns side by side. The compiler makes one pass of it where their number is known. */
 static inline __attribute__((always_inline)) void put_doubles(struct ply_rows *rows, const double *const *v,
                                                               int columns)
 {
@@ -233,7 +233,7 @@ static uint8_t *put_ascii(uint8_t *row, const struct ply *ply, int i)
     return (uint8_t *)to;
 }
 
-/* *to is moved on. SH_EFORMAT: a coordinate is too long; what was put before that counts. */
+/* Writes n rows and moves *to on. SH_EFORMAT: a coordinate is too long; the rows before it count. */
 static int put_text_rows(struct ply *ply, int n, uint8_t **to, struct sh_err *err)
 {
     const struct track_points *p = &ply->base.track.points;

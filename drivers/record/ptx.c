@@ -28,10 +28,10 @@
 enum {
     PADDING_FREE = 1 << 24, /* 160 MiB of text: enough for 4,500 lines of 3,700 pulses if only one line came */
     PADDING_PER_SHOT = 8,
-    N_KNOWN = 1024, /* of the stream's steps of 0.01 dB */
+    N_KNOWN = 1024, /* intensities that are kept, by the stream's steps of 0.01 dB */
 };
 
-/* An intensity that was needed before: scans have few different reflectances, and a power takes long. */
+/* An intensity that was computed before. Scans have few different reflectances, and a power takes long to compute. */
 struct known {
     double reflectance_db;
     float intensity;
@@ -147,7 +147,7 @@ static int begin_grid(struct ptx *ptx, struct sh_err *err)
     return rc == 0 ? outfile_patch(file, file->written, text, sizeof text - 1, err) : rc;
 }
 
-/* Makes the cell of the batch's point i. 1, or 0: it has none. */
+/* Makes the cell of the batch's point i. Returns 0 where it has none, else 1. */
 static int take_shot(struct ptx *ptx, int i, struct ptx_cell *cell)
 {
     const struct track *t = &ptx->base.track;

@@ -116,7 +116,7 @@ struct drain {
     struct ptx_cell cell[CELLS_AT_ONCE];
 };
 
-/* The next cell; NULL: there is none, or it could not be read, which rc then says. */
+/* Returns the next cell; NULL: there is none, or it could not be read, as *rc then says. */
 static const struct ptx_cell *look_at_cell(struct ptx_grid *grid, struct drain *d, int *rc, struct sh_err *err)
 {
     if (d->left == 0) return NULL;
@@ -128,7 +128,7 @@ static const struct ptx_cell *look_at_cell(struct ptx_grid *grid, struct drain *
     return NULL;
 }
 
-/* The cells of column `at`. */
+/* Fills the cells of column `at`. */
 static int ptx_grid_fill(struct ptx_grid *grid, uint32_t at, struct ptx_cell *column, struct drain *d,
                          struct sh_err *err)
 {

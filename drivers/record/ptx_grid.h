@@ -18,7 +18,7 @@ struct ptx_cell {
     uint32_t column, row;
     float intensity; /* 0..1 */
     uint8_t rgb[3];
-    uint8_t check; /* of the other bytes; ptx_grid_cells sets it. No gap: cells are written as they are */
+    uint8_t check; /* checksum of the other bytes, by ptx_grid_cells. Cells have no gap, as they are written whole */
     double p_socs[3];
 };
 
@@ -48,7 +48,7 @@ int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station
 /* Takes a shot at this place; 1: it makes the grid larger. A cell is then given for each shot with an echo. Columns
  * never go back. */
 int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row);
-/* n cells; intensity -1: a shot without echo. */
+/* Takes n cells; intensity -1: a shot without echo. */
 int ptx_grid_cells(struct ptx_grid *grid, struct ptx_cell *cell, int n, struct sh_err *err);
 /* Writes what was given to the file. */
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err);

@@ -61,7 +61,7 @@ static void say_progress(struct ptx_text *t, uint32_t n_rows)
     sh_progress(t->report, what, (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
 }
 
-/* Returns the end of the line, which may be LINE_MAX_LEN and more away. */
+/* Returns the end of the line, which may be more than LINE_MAX_LEN away. */
 static char *put_cell(char *to, const struct ptx_cell *c, int coloured)
 {
     static const char empty[2][17] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};

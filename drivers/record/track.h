@@ -56,7 +56,7 @@ struct track_ops {
 struct track_missing {
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
-    uint64_t n_empty;              /* shots without echo, with no_empty */
+    uint64_t n_empty;              /* shots without echo that no_empty left out */
     uint64_t n_nowhere;            /* echoes whose coordinates are infinite or NaN, of a broken stream */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */

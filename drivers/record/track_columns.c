@@ -9,7 +9,7 @@
 struct scanhead_columns track_columns_to(struct track *t)
 {
     struct track_points *p = &t->points;
-    const int made = t->has_colours && t->colour.given; /* a colour shows any figure */
+    const int made = t->has_colours && t->colour.given; /* a colour may show any figure */
     const unsigned spared = made || track_waits(t) || t->info.moving ? 0 : t->spared;
     return (struct scanhead_columns){
         .x = p->x,

@@ -41,7 +41,7 @@ static inline void track_set_point(struct track *track, int i, const struct scan
 struct scanhead_columns track_columns_to(struct track *track);
 /* Numbers the rows of n points. `row` is the number of pulses of the line before them; returns that after them. */
 uint64_t track_number_rows(struct track *track, uint64_t row, int n);
-/* As scanhead_to_scene. */
+/* Takes the points of a moving head to the scene. Returns as scanhead_to_scene does. */
 int track_to_scene(struct track *track, int n);
 
 /* ---- points that wait (track_waiting.c) */

@@ -32,7 +32,7 @@ static int put_title(struct waves_file *file, struct sh_err *err)
     return outfile_write(&file->base.file, title[0], strlen(title[0]), err);
 }
 
-/* The columns before the samples. */
+/* Writes the columns before the samples. */
 static char *put_front(char *at, const struct track *t, const struct scanhead_wave *w)
 {
     const uint64_t whole[] = {t->n_scans, t->info.station, w->pulse};

@@ -218,7 +218,7 @@ static ssize_t faulty_write(void *link, int session, const void *buf, size_t len
     return n;
 }
 
-/* Of a link that has no faults: nothing of it goes through a wire. */
+/* Links with faults don't lend, since their bytes go through a wire. */
 static ssize_t faulty_lend(void *link, int session, const void *buf, size_t len)
 {
     struct faulty_link *f = link;

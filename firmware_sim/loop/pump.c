@@ -61,7 +61,8 @@ static int open_link(struct pump *pump, const struct link_spec *spec, uint32_t i
     return rc;
 }
 
-/* Returns how many ticks of real time go out together. Nobody waits at a file for its end. */
+/* Returns how many ticks of real time go out together. No reader waits for a file or a null link, so these take the
+ * most. */
 static uint64_t ticks_a_wake_up(const struct stream *stream, const struct link_spec *spec)
 {
     const uint64_t most = stream->lazy_ticks;
@@ -249,7 +250,7 @@ static int set_wake(struct pump *pump)
     return stream_wake_at(pump->stream, pump->listener, sessions, tick);
 }
 
-/* The time to wait for events, at most most_ms. */
+/* Returns the time to wait for events, at most most_ms. */
 static int timeout_ms(const struct pump *pump, int over, int most_ms)
 {
     int ms = over ? 50 : -1;
@@ -336,7 +337,7 @@ int pump_start(struct pump *pump, struct sh_err *err)
     return SH_OK;
 }
 
-/* A client that doesn't ask any more waits for nothing. */
+/* A memory link without a thread is finished here: its client no longer asks for turns. */
 void pump_join(struct pump *pump)
 {
     if (!pump->running) return;

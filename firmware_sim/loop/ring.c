@@ -96,7 +96,7 @@ static size_t room_of(const struct ring_slot *slot)
     return slot->longer != NULL ? slot->longer_room : slot->store_room;
 }
 
-/* Gives a tick memory for itself alone, or changes how much that is. */
+/* Gives a tick memory of its own, or changes the size of that memory. */
 static int ring_resize(struct ring_slot *slot, size_t bytes)
 {
     uint8_t *longer = realloc(slot->longer, bytes);
@@ -130,7 +130,7 @@ int ring_end(struct ring_slot *slot)
     size_t room;
     if (ring_grow(slot, marks_at - tick->len + marks_len, &room) != SH_OK) return ring_break(slot);
     if (slot->longer != NULL) ring_resize(slot, round_up(marks_at + marks_len)); /* where it can't shrink, it stays */
-    struct ring_mark *mark = (struct ring_mark *)(void *)(tick->bytes + marks_at);
+    struct ring_mark *mark = marks_len != 0 ? (struct ring_mark *)(void *)(tick->bytes + marks_at) : NULL;
     if (marks_len != 0) memcpy(mark, tick->mark, marks_len);
     tick->mark = mark;
     return SH_OK;

@@ -99,7 +99,7 @@ int ring_grow(struct ring_slot *slot, size_t more, size_t *room);
 int ring_end(struct ring_slot *slot);
 /* The tick is broken: its slot holds no frame. Returns SH_ENOMEM. */
 int ring_break(struct ring_slot *slot);
-/* All of these with a copy of frames, marks and counts that lie elsewhere. */
+/* Does all of this, from ring_begin to ring_end, with a copy of a tick that lies elsewhere. */
 int ring_put(struct ring_slot *slot, const struct ring_tick *tick);
 /* The caster is done with the slot. 0 when the tick was lost meanwhile. */
 int ring_ready(struct ring_slot *slot, uint64_t tick);

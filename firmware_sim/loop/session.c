@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
  *
- * A long tick is written from where it lies in the ring, where the link's write() never waits. Short ticks, and what
- * the link did not take, are copied first. So a slow reader holds up nobody. When what a session has to read next is
- * too old, it loses whole frames, and goes on with newer ones (lost_frames.c). */
+ * A long tick is written from where it lies in the ring, where the link's write() never waits. Short ticks, and bytes
+ * that the link did not take, are copied first. So a slow reader holds up nobody. A session whose next tick is no
+ * longer in the ring loses whole frames, and goes on with newer ones (lost_frames.c). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -163,7 +163,7 @@ static int take_tick(struct pump *pump, struct session *s)
     return 1;
 }
 
-/* Keeps what a link did not take of a tick. It begins with a frame, as count_unwritten expects. */
+/* Keeps the bytes of a tick that a link did not take. They begin with a whole frame, as count_unwritten expects. */
 static void keep_rest(struct session *s, const struct ring_copy *tick, uint32_t taken)
 {
     uint32_t at = 0, len;
@@ -179,8 +179,8 @@ static int follows(const struct session *s, const struct ring_copy *tick)
     return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
 }
 
-/* Whether ticks are read where they lie. In the paces that wait for this reader, the ring still has the last LENT_TICKS
- * before its cursor. */
+/* Returns whether ticks are lent. In the paces that wait for this reader, the ring still has the last LENT_TICKS before
+ * its cursor. */
 static int lends(const struct pump *pump)
 {
     return pump->ops->lend != NULL && pump->holds && pump->stream->waits;
@@ -281,8 +281,8 @@ int session_pass(struct pump *pump, struct session *s, int is_last)
     return faulty_pass(pump->link, session_index(pump, s), t_ns);
 }
 
-/* Takes more once the link has taken all. As session_pass; when there is nothing, the buffer stays empty, and the cursor
- * where it is. */
+/* Takes more once the link has taken all. Returns as session_pass does. When there is nothing, buffer and cursor stay
+ * as they are. */
 static int fill_if_link_takes(struct pump *pump, struct session *s)
 {
     const int is_over = atomic_load(&pump->stream->over);
@@ -300,7 +300,7 @@ int session_write(struct pump *pump, struct session *s, int index)
         const uint64_t from = s->cursor;
         ssize_t n = s->out_pos == s->out_len ? fill_if_link_takes(pump, s) : 1;
         if (n > 0 && s->out_pos == s->out_len && s->cursor != from) {
-            if (lends(pump)) return 1; /* until they are taken */
+            if (lends(pump)) return 1; /* the link is full until they are taken */
             continue;
         }
         if (n > 0 && s->out_pos == s->out_len) {

@@ -10,12 +10,11 @@
  *
  * Wake-ups. In real time a link is woken at each tick that it wants, or once in `every` ticks. Casters are woken once a
  * quarter of the ticks ahead is free, and the hash once an eighth of the queue was released: they have time. The pacing
- * thread sleeps up to the next tick that wakes one of them. In the paces that wait for
- * readers, wake-ups are saved up, since nobody waits for a single tick, and ticks pass from thread to thread in
- * batches. One rule prevents a deadlock: a thread that is about to sleep first wakes all threads that can go on by its
- * work. Casters announce the ticks that they made, the pacing thread those that it released, readers how far they are.
- * So when all threads sleep, each has seen all work of the others, and there is nothing to do. Batches change when a
- * tick is read, never its bytes.
+ * thread sleeps up to the next tick that wakes one of them. In the paces that wait for readers, nobody waits for a
+ * single tick. So wake-ups are saved up, and ticks pass from thread to thread in batches. One rule prevents a deadlock:
+ * a thread that is about to sleep first wakes all threads that can go on by its work. Casters announce the ticks that
+ * they made, the pacing thread those that it released, readers how far they are. So when all threads sleep, each has
+ * seen all work of the others, and there is nothing to do. Batches change when a tick is read, never its bytes.
  *
  * Units: ticks from power-up, device time in ns. */
 #ifndef FIRMWARE_SIM_LOOP_STREAM_H
@@ -64,7 +63,7 @@ struct stream {
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
     int as_they_are;     /* frames are recorded: numbered already, and complete */
     int steps;           /* pace step: clients let time pass, also while the head has no power */
-    uint32_t first_seq;  /* number of the first frame of all */
+    uint32_t first_seq;  /* of its first frame: near to the wrap by an injected fault */
     struct device_counters *counters;
     struct stream_reader reader[RING_MAX_READERS];
 
@@ -115,8 +114,8 @@ void stream_free(struct stream *stream);
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */
 int stream_lose(struct stream *stream, uint64_t tick);
-/* Real time: ticks from `tick` to this one may be released together, when that one is due. Nobody waits for more than
- * they accept. */
+/* Real time: returns the last tick that may be released together with `tick`, once that last one is due. No link waits
+ * longer than it accepts. */
 uint64_t stream_next_wake(const struct stream *stream, uint64_t tick);
 /* Real time: waits until a tick that is late is ready, up to a time at most. May return before. */
 void stream_await(struct stream *stream, uint64_t tick, int64_t until_ns);

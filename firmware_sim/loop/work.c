@@ -104,7 +104,7 @@ uint32_t worker_usual_bytes(const struct site *site)
                       site_usual_waves(site, n_points));
 }
 
-/* Where the next frame goes. */
+/* The place of the next frame. */
 struct place {
     uint8_t *at;
     size_t room; /* 0: there is no memory */

@@ -36,7 +36,7 @@ enum { BATCH = 1024, THREADS = 2 };
 static const double BOUND_M = 1e-6;
 static const double RANGE_MAX_M = 1e4;
 
-/* The sight is made for so many rays, more than are cast, so that small triangles are examined one by one, too. */
+/* The sight is made for more rays than are cast, so that small triangles are examined one by one, too. */
 static const double SIGHT_RAYS = 5e7;
 /* The share of rays in ordinary scans that a sight leaves to the BVH. Without a bound the BVH could do everything. It
  * was 0.00 % in the room, 0.06 % on the terrain and 0.18 % in the house. Each cell that an outline cuts may need the

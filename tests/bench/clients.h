@@ -13,8 +13,8 @@ struct bench_clients {
     int n;
 };
 
-/* Waits until the head says on ready_fd (--ready-fd), which this closes, that its links are open. reads: 1: a client for
- * each pty and tcp link; 0: none. */
+/* Waits until the head says on ready_fd (--ready-fd) that its links are open, and closes ready_fd. reads: 1: begins a
+ * client for each pty and tcp link; 0: none. */
 void bench_clients_begin(struct bench_clients *clients, int ready_fd, int reads);
 /* Clients end with their link. Waits for them. */
 void bench_clients_end(const struct bench_clients *clients);

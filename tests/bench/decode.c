@@ -103,7 +103,7 @@ int main(int argc, char **argv)
         bad |= c == '?';
     }
     if (bad || optind != argc || rounds < 1 || rounds > MAX_ROUNDS) {
-        fprintf(stderr, "decode [--rounds N] [--raw]: allowed are 1 to %d rounds\n", MAX_ROUNDS);
+        fprintf(stderr, "decode [--rounds N] [--raw]: allowed is N from 1 to %d\n", MAX_ROUNDS);
         return BENCH_USAGE;
     }
     pin(NULL);

@@ -3,10 +3,11 @@
  *
  *   build/tests/bench/live [options]
  *
- * A stream of 20 million points a second is made before. On sockets another process only writes these bytes, a megabyte
- * at a time, again and again, on another processor where there is one. On USB the stand-in for libusb of the unit tests
- * copies them into each transfer, as the kernel does; no bus is in these figures. The client decodes all points into
- * columns, or into structs. Figures are processor time of the client's thread, kernel included, and the clock's. */
+ * The stream of a head of 20 million points a second is made beforehand. On sockets another process only writes its
+ * bytes again and again, a megabyte at a time, on another processor where there is one. On USB the stand-in for libusb
+ * of the unit tests copies them into each transfer, as the kernel does; no bus is in these figures. The client decodes
+ * all points into columns, or into structs. Figures are processor time of the client's thread, kernel included, and the
+ * clock's. */
 #include <arpa/inet.h>
 #include <getopt.h>
 #include <signal.h>
@@ -36,7 +37,7 @@ static const char *const TAKE[TAKES] = {"columns", "points", "frames"};
 static const char HELP[] =
     "live [options]: points a second that a client with libscanhead takes\n\n"
     "  --rounds N   default 15, at most 99\n"
-    "  --times N    the stream of 2 million points is sent so many times a round, default 5\n"
+    "  --times N    how often a round sends the stream of 2 million points, default 5, at most 1000\n"
     "  --raw        each round's figures, a line each, in place of medians\n\n"
     "tcp: a socket on loopback; unix: a socket pair; usb: the library's transfers, with a stand-in for libusb.\n"
     "columns: all columns of scanhead_columns(); points: scanhead_points(); frames: no point is decoded.\n";
@@ -144,7 +145,7 @@ static int take_frame(struct scanhead *sh, const struct scanhead_frame *frame, e
     return n < 0 ? n : 0;
 }
 
-/* Takes so many points. */
+/* Takes frames until `wanted` points have come. */
 static int take_points(struct scanhead *sh, enum take take, uint64_t wanted)
 {
     struct scanhead_frame frame;
@@ -158,7 +159,7 @@ static int take_points(struct scanhead *sh, enum take take, uint64_t wanted)
     return rc;
 }
 
-/* The stream comes again and again, so its numbers begin again; but nothing is missing. */
+/* Returns whether nothing is missing. The stream comes again and again, so its numbers begin again each time. */
 static int is_whole(const struct scanhead *sh, uint32_t times)
 {
     struct scanhead_stats stats;
@@ -230,7 +231,7 @@ static int parse(struct options *o, int argc, char **argv)
         if (c == 'h' || c == '?') return c == 'h' ? BENCH_OK : BENCH_USAGE;
     }
     if (optind == argc && o->rounds >= 1 && o->rounds <= MAX_ROUNDS && o->times >= 1 && o->times <= 1000) return -1;
-    fprintf(stderr, "live: allowed are 1 to %d rounds, and 1 to 1000 times; see --help\n", MAX_ROUNDS);
+    fprintf(stderr, "live: allowed are --rounds 1 to %d and --times 1 to 1000; see --help\n", MAX_ROUNDS);
     return BENCH_USAGE;
 }
 

@@ -29,16 +29,16 @@ static const char HELP[] =
     "  --seconds S     of device time in the long scan, default 16; the short one has an eighth\n"
     "  --rounds N      default 9, at most 99\n\n"
     "A PROGRAM is a path of scanhead and more of its options, with blanks between. Columns: medians of the rounds,\n"
-    "the spread of the middle half, and the median of the ratios to the first program of the same round; then medians of\n"
-    "what the long scan had: how often its threads were taken off a processor (switch/s), how late ticks were released\n"
-    "(us), frames that clients lost (lost).\n";
+    "the spread of the middle half, and the median of the ratios to the first program of the same round. Then medians\n"
+    "of the long scan: how often a second its threads were taken off a processor (switch/s), how late ticks were\n"
+    "released (us), and the frames that clients lost (lost).\n";
 
 struct options {
     const char *config, *pace;
     double seconds;
     uint32_t rounds, n;
     char **program;
-    int clients; /* 1: links are read */
+    int clients; /* 1: clients read the links */
 };
 
 struct figures {

@@ -18,7 +18,7 @@ struct maker {
     uint32_t seq, random;
 };
 
-/* Numbers the frames at the stream's end: len bytes. */
+/* Adds the len bytes of frames that were written after the stream's end, and numbers them. */
 static void add_frames(struct maker *m, size_t len)
 {
     uint8_t *at = m->out->bytes + m->out->len, *end = at + len;

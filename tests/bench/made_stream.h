@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A stream in memory, as a head of 20 million points a second sends it, for programs that measure its readers.
  *
- * A tick of 1 ms is a block of 20,000 points; a line is five of them. Ranges, labels and reflectances look like those of
- * a scene in that no two of them follow from each other. Every 50th shot has no echo. */
+ * A tick of 1 ms is a block of 20,000 points; a line is five of them. As in a scene, no range, label or reflectance
+ * follows from another. Every 50th shot has no echo. */
 #ifndef TESTS_BENCH_MADE_STREAM_H
 #define TESTS_BENCH_MADE_STREAM_H
 
@@ -20,7 +20,7 @@ struct made_stream {
 
 /* Returns 0, or -1 without memory. The caller frees out->bytes. */
 int made_stream_create(enum made_layout layout, uint32_t ticks, struct made_stream *out);
-/* The source (fd:N) of a file in memory with the stream, for scanhead_open. Returns 0, or -1. */
+/* Writes the stream into a file in memory, and sets `source` to its name (fd:N) for scanhead_open. Returns 0, or -1. */
 int made_stream_source(const struct made_stream *stream, char *source, size_t len);
 
 #endif

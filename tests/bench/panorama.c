@@ -254,7 +254,7 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return record_files_frame(ctx, sh, frame, err);
 }
 
-/* Sets the seconds for a scan, a file of that ending included. */
+/* Sets *spent_s to the processor time of a scan and its file of that ending. */
 static int scan_once(const struct options *o, const char *ending, struct offline *off, double *spent_s,
                      struct sh_err *err)
 {
@@ -271,7 +271,7 @@ static int scan_once(const struct options *o, const char *ending, struct offline
     *spent_s = bench_process_s() - start_s;
     unlink(cloud_path);
     if (rc == SH_OK && result.counts.pulses != RAYS)
-        return sh_fail(err, SH_ESTATE, "%llu pulses came; %d were to", (unsigned long long)result.counts.pulses, RAYS);
+        return sh_fail(err, SH_ESTATE, "%llu pulses came, not %d", (unsigned long long)result.counts.pulses, RAYS);
     return rc;
 }
 
@@ -336,7 +336,7 @@ static int run(const struct options *o, struct bench_target *t, struct alone *a,
     return rc;
 }
 
-/* Splits the list where it lies. */
+/* Splits the list in place. */
 static void split_endings(struct options *o, char *list)
 {
     for (char *save = NULL, *name; o->n_endings < MAX_ENDINGS && (name = strtok_r(list, ",", &save)) != NULL;

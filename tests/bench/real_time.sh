@@ -35,7 +35,7 @@ head: {profile: $PWD/config/heads/any-rate.yaml, prr_hz: 300000, lines_hz: 100, 
 scene: {meshes: [{file: $PWD/config/scenes/glass_room.obj, up: z, scale: 1}]}
 stations: [{position_m: [0, 0, 1.5]}]
 links: [{type: "null"}]
-loop: {ahead_ms: 2} # with so few ticks ahead casters are woken at each one, and so is the pacing thread
+loop: {ahead_ms: 2} # with this few ticks ahead, casters and the pacing thread are woken at each tick
 END
 
 # cyclic NUMBER: runs cyclictest and prints its p50, p99 and largest, in us. It tunes nothing that the head does not

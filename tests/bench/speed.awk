@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-# Lines of `set, figure, value` become medians, beside what is aimed at. speed.sh calls this.
+# Lines of `set, figure, value` become medians, beside the aims. speed.sh calls this.
 function median(of, n, i, j, t, x) {
     for (i = 1; i <= n; i++) x[i] = value[of, i]
     for (i = 2; i <= n; i++)
         for (j = i; j > 1 && x[j] < x[j - 1]; j--) { t = x[j]; x[j] = x[j - 1]; x[j - 1] = t }
     return n % 2 ? x[(n + 1) / 2] : (x[n / 2] + x[n / 2 + 1]) / 2
 }
-# most: at most so much is aimed at, with the best instruction set; "": nothing is. AVX2 may take 1.6 times as long.
+# most: the largest figure that is aimed at, with the best instruction set; "": there is no aim. AVX2 may take 1.6 times as long.
 function row(text, figure, unit, most, a, b, said) {
     if (!n["native", figure]) return
     a = median("native" SUBSEP figure, n["native", figure])

@@ -1,10 +1,10 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# This prints what a pulse costs on its way, as ratios and beside what is aimed at:
+# This prints what a pulse costs on its way to a file or a client, as ratios and beside the aims:
 #   bash tests/bench/speed.sh [--turns N] [--rounds N] [--only LIST] BUILD [AVX2_BUILD]
-# A turn runs each program with so many rounds, first of BUILD, then of AVX2_BUILD; figures are medians of the rounds of
-# all turns, by default 3 times 5. Programs run on one processor, the last one that this may use. LIST names parts of
-# panorama, decode, live, loop, realtime, with commas between.
+# A turn runs each program for N rounds, first of BUILD, then of AVX2_BUILD. Figures are medians of the rounds of all
+# turns, by default 3 times 5. LIST names parts of panorama, decode, live, loop, realtime, with commas between. Panorama,
+# decode and loop run on one processor, the last one that this script may use.
 set -euo pipefail
 turns=3 rounds=5 only=panorama,decode,live,loop,realtime
 while [ $# -gt 0 ]; do
@@ -49,7 +49,7 @@ keep_loop() {
         }'
 }
 
-# loop_programs OPTIONS...: each of them with the program of each set.
+# loop_programs OPTIONS...: sets programs to each OPTIONS with the program of each set.
 loop_programs() {
     local options s
     programs=()
@@ -69,7 +69,7 @@ pinned() {
     taskset -c "$processor" "$@"
 }
 
-# part NAME COMMAND...: the raw figures of one program of one set.
+# part NAME COMMAND...: keeps the raw figures of one program of one set.
 part() {
     is_wanted "$1" || return 0
     shift
@@ -99,5 +99,5 @@ while [ "$turn" -le "$turns" ]; do
 done
 
 engine=$("${folder[native]}/tests/bench/decode" --rounds 1 | head -n 1)
-echo "$(sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo | head -n 1); $engine; $((turns * rounds)) pairs, processor $processor"
+echo "$(sed -n 's/^model name[^:]*: *//p' /proc/cpuinfo | head -n 1); $engine; $((turns * rounds)) rounds, processor $processor"
 awk -f "$here/speed.awk" "$out/figures"

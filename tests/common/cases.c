@@ -13,7 +13,7 @@ uint64_t case_u64(uint64_t *state)
 
 int64_t case_between(uint64_t *state, int64_t lo, int64_t hi)
 {
-    return lo + (int64_t)(case_u64(state) % ((uint64_t)(hi - lo) + 1));
+    return (int64_t)((uint64_t)lo + case_u64(state) % ((uint64_t)hi - (uint64_t)lo + 1));
 }
 
 double case_unit(uint64_t *state)

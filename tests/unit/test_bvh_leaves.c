@@ -49,7 +49,7 @@ static void corner_of(const struct bvh *bvh, const struct bvh_leaf *leaf, int k,
         v[j] = bvh->origin_m[j] + (double)leaf->base_m[j] + (double)leaf->corner_m[j][k];
 }
 
-/* The triangle's corners are those of the leaf, one by one: up to rounding to float of the leaf's size, and of the
+/* Each corner of the triangle is one of the leaf. They differ by rounding alone: of the leaf's size to float, and of
  * coordinates in double, which are up to 5e6 m here. Planes are those of the triangles, bit by bit. */
 static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, int which)
 {

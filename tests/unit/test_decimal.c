@@ -1,15 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* core/decimal.h: each text has the bytes that libc's printf writes, for doubles of all sizes, ties, and borders. */
+#include "tests/common/cases.h"
+
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/decimal.h"
 #include "tests/common/thorough.h"
@@ -20,9 +17,7 @@ static uint64_t state_of_random = 0x9e3779b97f4a7c15;
 
 static uint64_t random_bits(void)
 {
-    state_of_random ^= state_of_random << 13;
-    state_of_random ^= state_of_random >> 7;
-    return state_of_random ^= state_of_random << 17;
+    return case_u64(&state_of_random);
 }
 
 static double of_bits(uint64_t bits)
@@ -34,7 +29,7 @@ static double of_bits(uint64_t bits)
 
 static char got[DECIMAL_FIXED_ROOM + 1];
 
-/* The text, and nothing beyond the room. */
+/* Checks the text, and that nothing was written beyond the room. */
 static void expect(const char *want, const char *end, size_t room, const char *what, double v)
 {
     const size_t n = strlen(want);
@@ -109,7 +104,7 @@ static void test_borders(void **state)
         check_all(nextafter(v[i], HUGE_VAL));
     }
     check_all((double)NAN);
-    for (int k = -30; k <= 30; k++) { /* all about the powers of ten */
+    for (int k = -30; k <= 30; k++) { /* powers of ten and their neighbours */
         check_all(pow(10, k));
         check_all(nextafter(pow(10, k), 0));
         check_all(5 * pow(10, k));
@@ -130,7 +125,7 @@ static void test_ties(void **state)
         }
 }
 
-/* Bits at random have all exponents; coordinates have those that files have. */
+/* Random bits have all exponents; coordinates have those of files. */
 static void test_random(void **state)
 {
     (void)state;

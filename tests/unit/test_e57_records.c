@@ -1,17 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* Records of E57 are made in vectors, column by column. Here each field of each record is taken from the packet, bit by bit,
+/* Records of E57 are made in vectors, column by column. Each field of each record is taken from the packet, bit by bit,
  * and compared with the plain formula of ASTM E2807's scaled integers: rint(v / scale), ties to even. The figures of a
  * packet are compared with those of a loop over its records. */
+#include "tests/common/cases.h"
+
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "drivers/record/e57_records.h"
 
@@ -19,9 +16,7 @@ static uint64_t state_of_random = 0x9e3779b97f4a7c15;
 
 static uint64_t random_bits(void)
 {
-    state_of_random ^= state_of_random << 13;
-    state_of_random ^= state_of_random >> 7;
-    return state_of_random ^= state_of_random << 17;
+    return case_u64(&state_of_random);
 }
 
 static struct track track;
@@ -29,7 +24,7 @@ static struct e57_packet packet;
 static struct e57_scan scan;
 static struct e57_facts facts;
 
-/* What a record has to hold, as the whole numbers that are in the file. */
+/* The fields of a record, as the whole numbers that the file has to hold. */
 struct plain {
     int64_t field[E57_N_STREAMS];
 };
@@ -48,7 +43,8 @@ static void begin(int empty_shots, int has_colours, int geo, double scale_m)
     n_want = 0;
 }
 
-/* A coordinate in the head's frame: any, in the middle between two counts, a whole count, or at an end of the range. */
+/* Returns a coordinate in the head's frame: any, halfway between two counts, a whole count, or at an end of the
+ * range. */
 static double coordinate(double scale_m)
 {
     const double k = (double)(int32_t)random_bits();
@@ -169,7 +165,7 @@ static void keep_lowest(int64_t *low, int64_t *high, int64_t v, int is_first)
     if (is_first || v > *high) *high = v;
 }
 
-/* The figures of records 0 to n - 1, by a loop. */
+/* Computes the figures of records 0 to n - 1 by a loop. */
 static void check_figures(const struct e57_scan *got, unsigned n)
 {
     int64_t low[E57_N_STREAMS] = {0}, high[E57_N_STREAMS] = {0};
@@ -202,7 +198,7 @@ static void check_figures(const struct e57_scan *got, unsigned n)
 
 /* ---- tests */
 
-/* Full packets, and shorter ones of all lengths; then the records that were left. */
+/* Packets are full, or shorter, of all lengths. The records that were left come last. */
 static void test_plain(void **state)
 {
     (void)state;

@@ -220,7 +220,7 @@ static void test_file(void **state)
     unlink(path);
 }
 
-/* Times within a second, across its end, back and forth, and of a broken stream. */
+/* Compares times within a second, across its end, back and forth, and of a broken stream. */
 static void expect_same_times(const struct scanhead *sh)
 {
     static const int64_t from_step_ns[][2] = {

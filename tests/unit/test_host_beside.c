@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: what comes beside points, for all values on the wire, bit for bit, and from any index on. */
+/* libscanhead: attributes, deviations and colours of points, for all values on the wire, bit for bit, and from any
+ * index on. */
 #include <math.h>
 
 #include "core/line.h"
@@ -51,17 +52,25 @@ static void expect_values(uint32_t first, uint32_t n)
     }
 }
 
+/* Returns a client that has the descriptor of a head with all of these. */
+static struct scanhead *open_described(int *head)
+{
+    struct scanhead *sh = open_pair(head);
+    struct native_descriptor d = make_descriptor(0, 1);
+    struct scanhead_frame frame;
+    d.content = NATIVE_HAS_ATTRIBUTES | NATIVE_HAS_COLOURS | NATIVE_HAS_DEVIATIONS;
+    native_encode_descriptor(out, sizeof out, &d, 1, 0);
+    put_all(*head, out, native_finish_frame(out, rig_next_seq()));
+    expect_frame(sh, SCANHEAD_DESCRIPTOR, &frame);
+    return sh;
+}
+
 static void test_all_values(void **state)
 {
     (void)state;
     int head;
     struct scanhead_frame frame;
-    struct scanhead *sh = open_pair(&head);
-    struct native_descriptor d = make_descriptor(0, 1);
-    d.content = NATIVE_HAS_ATTRIBUTES | NATIVE_HAS_COLOURS | NATIVE_HAS_DEVIATIONS;
-    native_encode_descriptor(out, sizeof out, &d, 1, 0);
-    put_all(head, out, native_finish_frame(out, rig_next_seq()));
-    expect_frame(sh, SCANHEAD_DESCRIPTOR, &frame);
+    struct scanhead *sh = open_described(&head);
     for (uint32_t from = 0; from < VALUES; from += N) {
         const uint32_t first = from % 7, n = N - first;
         put_values(head, from);
@@ -84,13 +93,8 @@ static void test_parts(void **state)
     (void)state;
     int head;
     struct scanhead_frame frame;
-    struct scanhead *sh = open_pair(&head);
-    struct native_descriptor d = make_descriptor(0, 1);
-    d.content = NATIVE_HAS_ATTRIBUTES | NATIVE_HAS_COLOURS | NATIVE_HAS_DEVIATIONS;
-    native_encode_descriptor(out, sizeof out, &d, 1, 0);
-    put_all(head, out, native_finish_frame(out, rig_next_seq()));
+    struct scanhead *sh = open_described(&head);
     put_values(head, 0);
-    expect_frame(sh, SCANHEAD_DESCRIPTOR, &frame);
     expect_frame(sh, SCANHEAD_POINTS, &frame);
     expect_frame(sh, SCANHEAD_ATTRIBUTES, &frame);
     memset(attribute, 0, sizeof attribute);

@@ -137,7 +137,7 @@ static void make_rows(const struct kind *k)
         label[i] = (uint16_t)(next_random() >> 3);
         echo[i] = x % 5 == 0 ? 0 : (uint8_t)(next_random() >> 5);
     }
-    if (k->one_mirror) b[N - 1]++; /* but not in the last block */
+    if (k->one_mirror) b[N - 1]++; /* the last block has two mirror angles */
 }
 
 static struct scanhead *open_rows(const struct kind *k, struct scanhead_frame *frame)
@@ -266,6 +266,15 @@ static void check_columns(struct scanhead *sh, const struct scanhead_frame *fram
 
 /* ---- the tests */
 
+/* Makes rows of a kind and the points that are wanted of them. Returns the client that has the frame. */
+static struct scanhead *open_kind(const struct kind *k, struct scanhead_frame *frame)
+{
+    make_rows(k);
+    for (uint32_t i = 0; i < N; i++)
+        point_plain(k, i, &want[i]);
+    return open_rows(k, frame);
+}
+
 static void test_all_kinds(void **state)
 {
     (void)state;
@@ -273,10 +282,7 @@ static void test_all_kinds(void **state)
     for (size_t j = 0; j < sizeof KINDS / sizeof *KINDS; j++) {
         const struct kind *k = &KINDS[j];
         struct scanhead_frame frame;
-        make_rows(k);
-        struct scanhead *sh = open_rows(k, &frame);
-        for (uint32_t i = 0; i < N; i++)
-            point_plain(k, i, &want[i]);
+        struct scanhead *sh = open_kind(k, &frame);
         assert_int_equal(scanhead_points(sh, &frame, 0, got, N), N);
         expect_points(k);
         check_columns(sh, &frame, k, &all, 0, N + 9);
@@ -294,10 +300,7 @@ static void test_parts(void **state)
     for (size_t j = 0; j < sizeof KINDS / sizeof *KINDS; j++) {
         const struct kind *k = &KINDS[j];
         struct scanhead_frame frame;
-        make_rows(k);
-        struct scanhead *sh = open_rows(k, &frame);
-        for (uint32_t i = 0; i < N; i++)
-            point_plain(k, i, &want[i]);
+        struct scanhead *sh = open_kind(k, &frame);
         for (size_t i = 0; i < sizeof part / sizeof *part; i++)
             check_columns(sh, &frame, k, &all, part[i][0], part[i][1]);
         scanhead_close(sh);
@@ -326,10 +329,7 @@ static void test_chosen(void **state)
     for (size_t j = 0; j < sizeof KINDS / sizeof *KINDS; j++) {
         const struct kind *k = &KINDS[j];
         struct scanhead_frame frame;
-        make_rows(k);
-        struct scanhead *sh = open_rows(k, &frame);
-        for (uint32_t i = 0; i < N; i++)
-            point_plain(k, i, &want[i]);
+        struct scanhead *sh = open_kind(k, &frame);
         for (size_t i = 0; i < sizeof one / sizeof *one; i++)
             check_columns(sh, &frame, k, &one[i], 3, 300);
         scanhead_close(sh);

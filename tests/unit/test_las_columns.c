@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* LAS's columns and rows, which vectors make, beside the plain formulas: random figures with a fixed seed, figures beside
- * each place where a vector may decide otherwise, and the ends of what there is. The bytes of rows are those of the
+/* LAS's columns and rows, which vectors make, beside the plain formulas. Figures are random with a fixed seed, beside
+ * each place where a vector may decide otherwise, and at the ends of their ranges. The bytes of rows are those of the
  * ASPRS specification (LAS 1.4 R15, LAS 1.2), which the test lays out field by field. */
 #include "tests/common/cases.h"
 
@@ -51,7 +51,7 @@ static void random_directions_have_the_formulas_angle(void **state)
     }
 }
 
-/* Each half count, and the numbers of single precision beside it. */
+/* Angles at each half count, and at numbers of single precision beside it. */
 static void directions_beside_each_tie_have_the_formulas_angle(void **state)
 {
     (void)state;
@@ -70,7 +70,7 @@ static void directions_beside_each_tie_have_the_formulas_angle(void **state)
     expect_angles((const double(*)[TRACK_BATCH])p, n);
 }
 
-/* All triples of these. */
+/* The positions are all triples of `odd`. */
 static void odd_positions_have_the_formulas_angle(void **state)
 {
     (void)state;

@@ -134,7 +134,7 @@ static void each_end_may_go(void **state)
     assert_int_equal(bench.ops->write(bench.link, 0, WRITTEN, 5), 0);
     bench.ops->end(bench.link, 0);
     assert_true(memory.over);
-    assert_int_equal(memory_take(&memory, &bytes), 5); /* what was written before still comes */
+    assert_int_equal(memory_take(&memory, &bytes), 5); /* bytes written before still come */
     bench_close(&bench);
     assert_int_equal(memory_take(&memory, &bytes), 0);
     memory_turn(&memory, -1); /* nobody is there, so this must not wait */
@@ -172,7 +172,8 @@ static void wait_idle(struct scanhead *sh)
     }
 }
 
-/* Reads to the scan's end. Now and then: pauses, so that the head must wait; and asks, so that frames are kept. */
+/* Reads to the scan's end. With `pauses` it pauses now and then, so that the head must wait, and asks, so that frames
+ * are kept. */
 static void scan(struct scanhead *sh, int pauses, struct seen *seen)
 {
     struct scanhead_frame frame;
@@ -266,7 +267,7 @@ static void a_client_may_go_within_a_scan(void **state)
     rig_close(rig);
 }
 
-/* What was released before the head's end still comes, also to a client that reads late. */
+/* Frames that were released before the head's end still come, also to a client that reads late. */
 static void a_head_may_end_within_a_scan(void **state)
 {
     (void)state;

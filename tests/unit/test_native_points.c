@@ -50,7 +50,7 @@ static void test_point_extremes(void **state)
     assert_int_equal(native_encode_points(out, sizeof out, &block, 0), 0);
 }
 
-/* Counted as decoding the points one by one finds them; all bytes beside are noise. */
+/* The counts are those of points decoded one by one. All other bytes are random. */
 static void test_points_counted(void **state)
 {
     (void)state;

@@ -53,7 +53,7 @@ static void put_le(uint8_t *at, uint32_t value, int bytes)
         at[i] = (uint8_t)(value >> 8 * i);
 }
 
-/* Byte by byte, as the page has it. */
+/* Writes a row byte by byte, as the page lays it out. */
 static void put_expected(uint8_t *row, uint32_t i, uint32_t dt0_ns)
 {
     put_le(row, block.a[i], 4);
@@ -87,14 +87,14 @@ static void rows_are_as_the_page_says(void **state)
     check_rows(native_put_rows);
 }
 
-static void so_are_rows_without_vectors(void **state)
+static void rows_without_vectors_are_the_same(void **state)
 {
     (void)state;
     check_rows(native_put_rows_plain);
 }
 
-/* Wherever a time has a bit too many. */
-static void long_times_are_told(void **state)
+/* A time with a bit too many is reported, at each place of the block. */
+static void times_with_too_many_bits_are_reported(void **state)
 {
     (void)state;
     uint8_t got[MOST * NATIVE_POINT_LEN];
@@ -111,8 +111,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_are_as_the_page_says),
-        cmocka_unit_test(so_are_rows_without_vectors),
-        cmocka_unit_test(long_times_are_told),
+        cmocka_unit_test(rows_without_vectors_are_the_same),
+        cmocka_unit_test(times_with_too_many_bits_are_reported),
     };
     return cmocka_run_group_tests(tests, make_block, free_block);
 }

@@ -24,7 +24,7 @@ struct machine {
     int64_t cast_ns; /* NEVER: casters make nothing */
     int64_t still_at_ns, still_ns;
     uint64_t ahead_ticks, n_ticks, n_lost;
-    uint64_t together; /* so many ticks go out together; 0: each one alone */
+    uint64_t together; /* this many ticks go out together; 0: each one alone */
     int64_t now_ns;
     int64_t ready_ns[MAX_TICKS];                  /* when the tick is made */
     int64_t let_ns[MAX_TICKS], out_ns[MAX_TICKS]; /* released or lost, and so may be followed; out: published */

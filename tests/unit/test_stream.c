@@ -209,7 +209,7 @@ static void grants_add_up(void **state)
 
 enum { LISTENERS = 3, POWER_TICK = 57, END_TICK = 100 };
 
-/* What is due to each listener, and to casters (the last one): the first tick that it wants and was not woken for. */
+/* For each listener, and for casters (the last one): the first tick that it wants and was not woken for. */
 struct due {
     uint64_t from[LISTENERS + 1];
 };
@@ -248,8 +248,8 @@ static void release_noting(uint64_t tick, int frames, struct due *due)
         due->from[LISTENERS] = UINT64_MAX;
 }
 
-/* Ticks that are released together wait for the last one of them. Nobody then waits for longer than `every` ticks, or
- * casters than say_ticks, from the first tick that it wants on. */
+/* Ticks that are released together wait for the last one of them. From the first tick that it wants, no listener then
+ * waits longer than `every` ticks, and no caster longer than say_ticks. */
 static void nobody_is_woken_too_late(void **state)
 {
     (void)state;

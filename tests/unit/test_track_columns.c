@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What recorders share of a batch's columns, beside the plain formulas: seconds, places, and points that are left out. */
+/* The columns of a batch, which recorders share, beside the plain formulas: seconds, places, and points that are left
+ * out. */
 #include "tests/common/cases.h"
 
 #include <math.h>
@@ -19,7 +20,7 @@ static void expect_seconds(void)
             fail_msg("%lld ns: %a s", (long long)track.points.t_ns[i], seen[i]);
 }
 
-/* Up to 2^51 ns vectors convert; one time beyond, or before its negative, is enough for the plain way. */
+/* Vectors convert times from -2^51 to 2^51 ns. With one time outside, the plain way converts all. */
 static void seconds_are_those_of_the_division(void **state)
 {
     (void)state;
@@ -46,7 +47,7 @@ static double any_number(uint64_t *seed)
     return k < 6 ? odd[k] : ldexp(2 * case_unit(seed) - 1, (int)case_between(seed, -10, 20));
 }
 
-/* NaN, too, are the same: bit by bit. */
+/* Places are the same bit by bit. Where one is NaN, so is the other. */
 static void places_are_those_of_one_point(void **state)
 {
     (void)state;
@@ -77,7 +78,7 @@ static void places_are_those_of_one_point(void **state)
 
 enum { KIND_PLACED, KIND_EMPTY, KIND_NOWHERE };
 
-/* The index is in each column. */
+/* Each column gets the point's index. */
 static void set_point(int i, int kind)
 {
     static const double none[] = {INFINITY, -INFINITY, NAN};

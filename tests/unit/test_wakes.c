@@ -237,9 +237,10 @@ static double ticks_a_sleep(const struct link_spec *link)
     return ticks / sleeps;
 }
 
-/* A machine that stands still only makes for fewer sleeps. Casters are woken once 17 of 65 ticks ahead are free, a null
- * link every 32nd tick (an eighth of 250 ms, and the current one), and a link with a latency of 8 ms every 9th. So there
- * are at least 17 * 32 / (17 + 32) = 11.1, and 17 * 9 / (17 + 9) = 5.9 ticks a sleep, less some at both ends of the run. */
+/* A machine that stands still only makes sleeps fewer. Casters are woken once 17 of 65 ticks ahead are free. A null
+ * link is woken every 32nd tick: an eighth of 250 ms, and the current one. A link with a latency of 8 ms is woken every
+ * 9th. So there are at least 17 * 32 / (17 + 32) = 11.1, and 17 * 9 / (17 + 9) = 5.9 ticks a sleep, less some at both
+ * ends of the run. */
 static void ticks_that_nobody_awaits_go_out_together(void **state)
 {
     (void)state;

@@ -89,7 +89,7 @@ static void test_pace_threads_link(void **state)
     assert_string_equal(first.head, other.head);
 }
 
-/* A tick of 80 kB is more than a pty or a socket takes at once: what is left of it goes out later, and whole. */
+/* A tick of 80 kB is more than a pty or a socket takes at once. The rest of it goes out later, and no byte is lost. */
 static void test_ticks_longer_than_a_pty(void **state)
 {
     static const char *const links[] = {"pty", "tcp"};

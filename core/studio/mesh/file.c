@@ -24,14 +24,14 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
 /* ---- a stream that remembers why it failed. It seems to take all that follows: Assimp's exporter of FBX ends the program
  * where a write does not move its place on. */
 
-/* Whether the writes that follow go past the system's cache. */
+/* Sets whether the writes that follow go past the system's cache. */
 static void pass_cache(struct mesh_file *file, int on)
 {
     if (file->is_direct < 0 || file->is_direct == on) return;
     file->is_direct = direct_set(file->fd, on) == 0 ? on : -1;
 }
 
-/* A full buffer, as the stream writes them one after the other. */
+/* Returns whether these are full buffers of a long file, as the stream writes them one after the other. */
 static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
 {
     return file->at >= DIRECT_FROM && (uintptr_t)data % DIRECT_BLOCK == 0 && n % DIRECT_BLOCK == 0 &&
@@ -45,7 +45,7 @@ static ssize_t on_write(void *cookie, const char *data, size_t n)
     for (size_t done = 0; done < n && file->error == 0;) {
         const ssize_t wrote = pwrite(file->fd, data + done, n - done, file->at + (off_t)done);
         if (wrote < 0 && errno == EINTR) continue;
-        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't after all, or wrote a part before */
+        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't, or a part was written before */
             pass_cache(file, 0);
             file->is_direct = -1;
             continue;

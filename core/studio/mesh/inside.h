@@ -53,8 +53,8 @@ struct mesh_work {
 };
 int mesh_work_step(struct mesh_work *work, struct sh_err *err);
 
-/* A coordinate in metres as decimals to the nanometre, without zeros at its end, in DECIMAL_GENERAL_ROOM (core/decimal.h).
- * Returns the end. */
+/* Writes a coordinate in metres as decimals to the nanometre, without zeros at its end, in DECIMAL_GENERAL_ROOM bytes
+ * (core/decimal.h). Returns the end. */
 char *mesh_put_number(char *to, double v);
 
 /* The path's name without folders; its length without the ending. */

@@ -99,7 +99,7 @@ static char *put_face(char *p, const struct mesh *m, uint32_t i)
     return p;
 }
 
-/* A point that no face uses. */
+/* Writes a point that no face uses. */
 static char *put_point(char *p, const struct mesh *m, uint32_t i)
 {
     (void)m;
@@ -108,7 +108,7 @@ static char *put_point(char *p, const struct mesh *m, uint32_t i)
     return p;
 }
 
-/* work: NULL where the rows are none of it. */
+/* work: counts the rows; NULL: they don't count. */
 static int put_rows(const struct obj *o, char *(*put)(char *p, const struct mesh *m, uint32_t i), uint32_t first,
                     uint32_t n, struct mesh_work *work, struct sh_err *err)
 {

@@ -53,7 +53,7 @@ static void put_bytes(struct row *r, const void *data, size_t n)
     r->n += n;
 }
 
-/* The place of the next figure in a text, and its end. */
+/* Returns the place of the next figure in a row of text. end_text takes the figure's end. */
 static char *begin_text(struct row *r)
 {
     if (r->n > 0) r->byte[r->n++] = ' ';

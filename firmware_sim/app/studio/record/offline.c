@@ -61,7 +61,7 @@ static ssize_t offline_write(struct host_source *source, const void *data, size_
     return -1;
 }
 
-/* Signals are for the caller, who looks between two waits. */
+/* A signal ends no wait: the caller looks for signals between two waits. */
 static int offline_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
 {
     struct link_memory *memory = source->ctx;

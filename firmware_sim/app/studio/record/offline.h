@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that runs in this process, for commands that work off line. In: a configuration. Out: a client's
- * handle, as of a head on a wire. The pace is `fast`. Head and client are joined in memory (drivers/link/memory.h): the
- * head's link works while the client waits for frames, in the client's thread. So one thread has the handle and all calls
+/* A head that runs in this process, for commands that work off line. In: a configuration. Out: a client's handle, as of
+ * a head on a wire. The pace is `fast`. Head and client are joined in memory (drivers/link/memory.h): the head's link
+ * works while the client waits for frames, in the client's thread. So one thread uses the handle, and makes all calls
  * below. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_OFFLINE_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_OFFLINE_H
@@ -48,9 +48,9 @@ int offline_finish(struct offline *offline, struct sh_err *err);
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 
-/* A client, in a thread of its own, of a head in this process: link becomes the head's end of a socket pair, and is to be
- * one of its links. Returns the client's descriptor, which is the handle's, or an error; then link has none (-1). who: for
- * errors. */
+/* Joins a client that has a thread of its own to a head in this process. link becomes the head's end of a socket pair,
+ * and has to be one of the head's links. Returns the client's descriptor, which belongs to the handle; or an error, and
+ * link->fd is -1. who: for errors. */
 int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err);
 
 #endif

@@ -21,7 +21,7 @@ enum {
 };
 
 struct recording {
-    int64_t now_ns;    /* when the last frame came, or none */
+    int64_t now_ns;    /* when the last wait for a frame ended */
     int64_t pulses_ns; /* when pulses came last */
     int64_t heard_ns;  /* the same, or when the head was last asked why none come */
     struct scanhead *sh;
@@ -100,7 +100,7 @@ static int has_lost_frames(const struct recording *r)
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
 {
-    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* which alone asks for it */
+    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* telemetry alone asks for it */
     enum recording_news news = recording_count(&r->result->counts, frame, lost);
     if (news == RECORDING_NOTHING) return;
     if (news == RECORDING_END_LOST) sh_warn(r->o->report, "the scan's end was lost; the head goes on without it");
