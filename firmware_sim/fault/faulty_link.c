@@ -221,8 +221,10 @@ static ssize_t faulty_write(void *link, int session, const void *buf, size_t len
 /* Links with faults don't lend, since their bytes go through a wire. */
 static ssize_t faulty_lend(void *link, int session, const void *buf, size_t len)
 {
-    const struct faulty_link *f = link;
-    return f->inner->lend(f->link, session, buf, len);
+    struct faulty_link *f = link;
+    const ssize_t n = f->inner->lend(f->link, session, buf, len);
+    if (n > 0) f->session[session].moved_ns = clock_now_ns();
+    return n;
 }
 
 static void faulty_endpoint(const void *link, char *buf, size_t len)

@@ -68,12 +68,17 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
     return frames;
 }
 
+/* Ticks that the head itself lost have no numbers, so one before them will do. */
 void session_know_next(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
     struct ring_copy tick = {.first_seq = pump->stream->first_seq};
-    s->lost.have_seq = s->cursor == 0 || ring_look(ring, s->reader, s->cursor - 1, &tick) == RING_READ;
-    ring_leave(ring, s->reader);
+    enum ring_read got = RING_LOST;
+    for (uint64_t at = s->cursor; at != 0 && s->cursor - at < ring->queue_ticks && got == RING_LOST; at--) {
+        got = ring_look(ring, s->reader, at - 1, &tick);
+        ring_leave(ring, s->reader);
+    }
+    s->lost.have_seq = s->cursor == 0 || got == RING_READ;
     if (!s->lost.have_seq) return;
     s->lost.next_seq = tick.first_seq + tick.n_frames;
     s->lost.next_pulse = tick.pulses_before + tick.n_cast;

@@ -13,7 +13,9 @@
 #include "firmware_sim/loop/pump_inside.h"
 
 enum { STRAIGHT_BYTES = 16384 }; /* a tick this long is worth a system call of its own */
-_Static_assert((int)BATCH_BYTES / (int)STRAIGHT_BYTES <= 8 && MEMORY_PIECES > 8, "ticks that are lent in one turn");
+enum { LENT_TICKS = 8 };         /* the ring has so many slots beyond those that it needs */
+_Static_assert((int)BATCH_BYTES / (int)STRAIGHT_BYTES <= (int)LENT_TICKS && (int)MEMORY_PIECES > (int)LENT_TICKS,
+               "ticks that are lent in one turn");
 
 static void clear(struct session *s)
 {
@@ -177,8 +179,8 @@ static int follows(const struct session *s, const struct ring_copy *tick)
     return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
 }
 
-/* Returns whether ticks are lent. One turn lends at most BATCH_BYTES / STRAIGHT_BYTES of them. In the paces that wait
- * for this reader, the ring still has them: it has at least 8 slots beyond those that it needs. */
+/* Returns whether ticks are lent. In the paces that wait for this reader, the ring still has the last LENT_TICKS before
+ * its cursor. */
 static int lends(const struct pump *pump)
 {
     return pump->ops->lend != NULL && pump->holds && pump->stream->waits;
@@ -226,17 +228,19 @@ static int has_stepped(const struct pump *pump, const struct session *s)
     return s->cursor >= tick && stream_has_written(pump->stream, pump->listener, s->reader, tick);
 }
 
-/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. */
+/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. Where ticks were lent,
+ * the cursor goes on by LENT_TICKS at most, empty ticks included. */
 static void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
     take_replies(pump, s);
     s->frames_from = s->out_len;
+    const uint64_t end = lends(pump) ? s->cursor + LENT_TICKS : UINT64_MAX;
     uint32_t straight = 0;
     for (uint32_t n; straight < BATCH_BYTES && (n = write_straight(pump, s)) != 0; straight += n)
         stream_move_reader(pump->stream, s->reader, s->cursor);
-    while (straight + s->out_len < BATCH_BYTES && take_tick(pump, s))
+    while (straight + s->out_len < BATCH_BYTES && (straight == 0 || s->cursor < end) && take_tick(pump, s))
         continue;
     s->frames_to = s->out_len;
     while (c->stepping && has_stepped(pump, s)) {

@@ -7,8 +7,11 @@
 
 #include "drivers/host/scanhead.h"
 #include "drivers/link/memory.h"
+#include "drivers/protocol/crc32c.h"
+#include "drivers/protocol/native.h"
 #include "firmware_sim/app/studio/record/offline.h"
-#include "firmware_sim/loop/loop.h"
+#include "firmware_sim/fault/faulty_link.h"
+#include "firmware_sim/loop/loop_inside.h"
 
 /* ---- the two ends */
 
@@ -287,13 +290,85 @@ static void a_head_may_end_within_a_scan(void **state)
     rig_close(rig);
 }
 
+/* Waits until the head stops: each tick is claimed that its one reader leaves room for, or the scan is over. */
+static void wait_full(struct loop *loop)
+{
+    struct stream *stream = &loop->stream;
+    int is_full = 0;
+    while (!is_full && !device_is_idle(loop->device)) {
+        poll(NULL, 0, 1);
+        pthread_mutex_lock(&loop->casters.claim_lock);
+        const uint64_t claimed = loop->casters.next_tick;
+        pthread_mutex_unlock(&loop->casters.claim_lock);
+        for (int i = 0; i < RING_MAX_READERS; i++)
+            is_full |= atomic_load(&stream->reader[i].active) && claimed == atomic_load(&stream->reader[i].cursor) +
+                                                                                stream->ring.queue_ticks - 1 +
+                                                                                loop->casters.ahead_ticks;
+    }
+}
+
+/* Each line has two ticks of more bytes than a turn takes, a shorter one that is lent, and 97 empty ones, which the same
+ * turn may take. The queue is long, and ticks that are 300 apart, three lines, have the same slot. */
+static void a_lent_tick_stays_while_its_client_reads(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {
+        "loop.pace=fast",  "head.frames=1",     "loop.queue_ms=2650",    "loop.ahead_ms=5",      "loop.tick_hz=100",
+        "head.lines_hz=1", "head.pan_deg_s=10", "head.line_start_deg=0", "head.line_stop_deg=4", "head.prr_hz=1000000"};
+    struct rig *rig = rig_open(NULL, sets, sizeof sets / sizeof *sets);
+    struct offline off = {0};
+    struct scanhead_frame frame;
+    struct sh_err err;
+    uint64_t pulses = 0;
+    need(offline_open_at(rig->site, 0.0, NULL, &off, &err), &err);
+    wait_idle(off.sh);
+    ask(off.sh, "SCAN:STAR", "OK");
+    assert_int_equal(off.loop->stream.ring.n_slots, 300);
+    do {
+        struct native_header header;
+        wait_full(off.loop);
+        if (scanhead_next(off.sh, &frame, NEXT_MS) != SCANHEAD_OK) fail_msg("%s", scanhead_error(off.sh));
+        wait_full(off.loop);
+        native_read_header(frame.raw, &header);
+        assert_int_equal(crc32c(0, frame.payload, frame.payload_len), header.payload_crc);
+        if (frame.type == SCANHEAD_POINTS) pulses += frame.n_pulses;
+    } while (frame.type != SCANHEAD_EVENT || frame.event != SCANHEAD_EV_SCAN_END);
+    assert_true(pulses > 9 * 10000);
+    offline_close(&off);
+    rig_close(rig);
+}
+
+static int64_t no_time(void *owner)
+{
+    (void)owner;
+    return 0;
+}
+
+/* At the end of a run a reader has time for as long as it takes bytes: those that are lent count, too. */
+static void bytes_that_are_lent_move(void **state)
+{
+    (void)state;
+    struct link_memory memory = {0};
+    const struct link_spec spec = {.type = LINK_MEMORY, .memory = &memory};
+    const struct faulty_spec faults = {.protocol = protocol_ops_get(PROTOCOL_NATIVE), .time_ns = no_time};
+    struct faulty_link *link;
+    struct sh_err err;
+    need(faulty_open(&faults, &spec, &link, &err), &err);
+    const struct link_ops *ops = faulty_ops(link);
+    assert_int_equal(faulty_look(link, 0).moved_ns, 0);
+    assert_int_equal(ops->lend(link, 0, WRITTEN, 5), 5);
+    assert_true(faulty_look(link, 0).moved_ns != 0);
+    ops->close(link);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_write_is_read_where_it_lies),  cmocka_unit_test(a_client_sends_until_there_is_no_room),
         cmocka_unit_test(pieces_come_in_their_order),     cmocka_unit_test(each_end_may_go),
         cmocka_unit_test(the_stream_is_that_of_a_socket), cmocka_unit_test(a_client_may_go_within_a_scan),
-        cmocka_unit_test(a_head_may_end_within_a_scan),
+        cmocka_unit_test(a_head_may_end_within_a_scan),   cmocka_unit_test(a_lent_tick_stays_while_its_client_reads),
+        cmocka_unit_test(bytes_that_are_lent_move),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

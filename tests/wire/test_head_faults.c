@@ -241,9 +241,10 @@ static void test_wrap(void **state)
     }
     assert_in_range(seq, 300, 100000); /* a frame a tick, at least */
     scanhead_get_stats(sh, &stats);
-    assert_int_equal(stats.seq_gaps + stats.seq_lost + stats.bad_payload + stats.bad_bytes, 0);
+    assert_int_equal(stats.seq_gaps + stats.seq_lost + stats.reader_lost + stats.bad_payload + stats.bad_bytes, 0);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
+    assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
 }
 
 /* Takes frames until the head hangs up. Returns the device time of the last points, and writes the pulse after them. */
