@@ -3,11 +3,11 @@
  *
  * Meeting a triangle. A leaf has one or two triangles. Seen from the origin o of a ray, a corner A is p = A - o. The
  * ray with direction d passes an edge from p to q on the side that the sign of (p x (q - p)) . d says, and meets a
- * triangle where the sides of its edges, taken one way round, don't differ. Where the sign is certain beyond the rounding
- * of single precision, it is taken from there, by vectors (meet.c). Else it is computed again in double, in one way
- * for both triangles of the edge (edges.h), so that both get the same number with opposite signs: no ray passes between them. A ray that meets nothing nearer, but passes the
- * edges of a triangle by less than their rounding, meets that triangle. So nothing passes at corners, either, nor
- * where a corner lies on another's edge up to rounding.
+ * triangle where the sides of its edges, taken one way round, don't differ. Where the sign is certain beyond the
+ * rounding of single precision, it is taken from there, by vectors (meet.c). Else it is computed again in double, in
+ * one way for both triangles of the edge (edges.h), so that both get the same number with opposite signs: no ray passes
+ * between them. A ray that meets nothing nearer, but passes the edges of a triangle by less than their rounding, meets
+ * that triangle. So nothing passes at corners, either, nor where a corner lies on another's edge up to rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). The nearest of the triangles that a ray
  * meets is the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever

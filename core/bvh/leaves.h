@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: leaves have the corners of their triangles in double, and Embree sees their boxes in float. */
+/* Private to core/bvh: leaves have the corners of their triangles in single precision and the planes in
+ * double, and Embree sees their boxes in float. */
 #ifndef CORE_BVH_LEAVES_H
 #define CORE_BVH_LEAVES_H
 
@@ -54,11 +55,6 @@ static inline float bvh_leaf_size_m(uint32_t rest)
 static inline uint32_t bvh_leaf_ahead(uint32_t rest)
 {
     return rest % BVH_LEAF_AHEAD;
-}
-
-static inline int bvh_leaf_has_two(const struct bvh_leaf *leaf)
-{
-    return bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0;
 }
 static inline uint32_t bvh_leaf_triangle(const struct bvh_leaf *leaf, int which)
 {
