@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: leaves have the corners of their triangles in single precision and the planes in
- * double, and Embree sees their boxes in float. */
+/* Private to core/bvh: leaves have the corners of their triangles in single precision and their planes in double. Embree
+ * sees their boxes in float. */
 #ifndef CORE_BVH_LEAVES_H
 #define CORE_BVH_LEAVES_H
 
