@@ -75,8 +75,7 @@ static void find_origin(const struct bvh_query *query, const struct bvh_copy *co
 {
     scene_copy_put_back(copy->at, query->at, in->at);
     vec3_sub(in->at, copy->mesh->origin_m, in->at_local);
-    in->far_m = vec3_length(in->at_local);
-    const double start_m = fmax(0.0, in->far_m - copy->mesh->radius_m);
+    const double start_m = fmax(0.0, vec3_length(in->at_local) - copy->mesh->radius_m);
     for (uint32_t i = 0; i < BVH_PACKET; i++)
         in->start_m[i] = start_m;
 }
@@ -88,7 +87,6 @@ static void find_origins(const struct bvh_query *query, const struct bvh_copy *c
     const double *origin = copy->mesh->origin_m, c = copy->at->cosine, s = copy->at->sine, scale = copy->at->scale;
     const double radius_m = copy->mesh->radius_m, ax = at[0], ay = at[1], az = at[2];
     const double ox = origin[0], oy = origin[1], oz = origin[2];
-    double far2[BVH_PACKET], most2 = 0.0;
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
         const double vx = x[i] - ax, vy = y[i] - ay, vz = z[i] - az;
@@ -100,13 +98,9 @@ static void find_origins(const struct bvh_query *query, const struct bvh_copy *c
         in->local[0][i] = lx;
         in->local[1][i] = ly;
         in->local[2][i] = lz;
-        far2[i] = lx * lx + ly * ly + lz * lz;
-        const double start_m = sqrt(far2[i]) - radius_m;
+        const double start_m = sqrt(lx * lx + ly * ly + lz * lz) - radius_m;
         in->start_m[i] = start_m > 0.0 ? start_m : 0.0;
     }
-    for (uint32_t i = 0; i < query->width; i++)
-        most2 = far2[i] > most2 ? far2[i] : most2;
-    in->far_m = sqrt(most2);
 }
 
 /* The float rays begin at start_m. Fields are those of `width` rays. */

@@ -214,21 +214,23 @@ static void sort_places(struct place *at, struct place *other, uint32_t n)
 }
 _Static_assert(3 * KEY_BITS / DIGIT_BITS % 2 == 0, "back where it began");
 
-/* Returns how many leaves there are. */
-static uint32_t find_places(const struct scene *scene, uint64_t *taken, struct place *place)
+/* Finds the leaves, and sets n_leaves. */
+static int find_places(struct bvh *bvh, uint64_t *taken, struct place *place, const struct sh_report *report,
+                       struct sh_err *err)
 {
-    uint32_t leaves = 0;
+    const struct scene *scene = bvh->scene;
     double size_m = 0.0;
     for (int j = 0; j < 3; j++)
         size_m = fmax(size_m, scene->max_m[j] - scene->min_m[j]);
     const double per_m = size_m > 0.0 ? (double)((1 << KEY_BITS) - 1) / (3.0 * size_m) : 0.0;
     for (uint32_t i = 0; i < scene->n_triangles; i++) {
+        if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
         if (is_taken(taken, i)) continue;
         const uint32_t second = partner(scene, i, taken);
         if (second != BVH_NO_TRIANGLE) taken[second / 64] |= UINT64_C(1) << second % 64;
-        place[leaves++] = (struct place){key_of(scene, i, per_m), i, second};
+        place[bvh->n_leaves++] = (struct place){key_of(scene, i, per_m), i, second};
     }
-    return leaves;
+    return SH_OK;
 }
 
 int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
@@ -238,9 +240,8 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     measure(bvh);
     struct place *place = malloc((2 * n + 1) * sizeof *place);
     uint64_t *taken = calloc(n / 64 + 1, sizeof *taken);
-    int rc = place != NULL && taken != NULL ? sh_check_stop(report, err) : SH_ENOMEM;
+    int rc = place != NULL && taken != NULL ? find_places(bvh, taken, place, report, err) : SH_ENOMEM;
     if (rc == SH_OK) {
-        bvh->n_leaves = find_places(scene, taken, place);
         sort_places(place, place + bvh->n_leaves, bvh->n_leaves);
         bvh->leaf = huge_pages_alloc((bvh->n_leaves + 1) * sizeof *bvh->leaf);
         if (bvh->leaf == NULL) rc = SH_ENOMEM;

@@ -58,11 +58,6 @@ static inline uint32_t bvh_leaf_ahead(uint32_t rest)
 {
     return rest % BVH_LEAF_AHEAD;
 }
-
-static inline int bvh_leaf_has_two(const struct bvh_leaf *leaf)
-{
-    return bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0;
-}
 static inline uint32_t bvh_leaf_triangle(const struct bvh_leaf *leaf, int which)
 {
     return leaf->triangle + (which == 0 ? 0 : bvh_leaf_ahead(bvh_leaf_rest(leaf)));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A packet at a leaf, in double: finds which rays hit its triangles, and at what range. The rules are in
- * bvh_inside.h. */
+/* A packet at a leaf: finds which rays hit its triangles, and at what range. Single precision says where that is
+ * certain, else double. The rules are in bvh_inside.h. */
 #include "core/bvh/meet.h"
 
 #include <math.h>
@@ -17,12 +17,13 @@
 enum { EDGES = 5 };
 static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2, 0, 3, 2};
 
-/* An edge's side is (p x (q - p)) . d. In single precision its error is at most 15 units of 2^-24 of |p| times the
- * leaf's size. No edge is longer than the size, and no corner is further from the leaf's base. The units are: the base
- * from the ray's origin, rounded, 1; the corner added to it 2; the edge 3; the cross product 3; the direction 1; the
- * dot product 5. Where rays begin at points o of their own, p counts from one of these, c. Then the side is (p x (q -
- * p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with |o - c| for |p|; the sum adds 1. The
- * doubt of double precision (edges.h) is far less than the rest of the bound. */
+/* An edge's side is (p x (q - p)) . d. L is the leaf's size: no edge is longer, and no corner is further from the leaf's
+ * base. F is the distance of that base from the ray's origin, plus L. In single precision the side's error is at most 15
+ * units of 2^-24 of F L: the base from the ray's origin, rounded, 1; the corner, rounded and added to it, 2; the edge 3;
+ * the cross product 3; the direction 1; the dot product 5. |p| itself is no measure, since it may be far smaller than
+ * what it is the sum of. Where rays begin at points o of their own, p counts from one of these, c. Then the side is
+ * (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with |o - c| for F; the sum adds
+ * 1. The doubt of double precision (edges.h) is far less than the rest of the bound. */
 #define SIDE_DOUBT (24.0F * 0x1p-24F)
 /* Where a plane is seen at a smaller sine, the range comes from the edges. */
 #define FLAT 1e-6
@@ -177,8 +178,8 @@ static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle,
     query->near[lane] = triangle;
 }
 
-/* Decides one ray and one triangle where double precision in lanes is in doubt whether they meet, or
- * where. */
+/* Decides one ray and one triangle where single precision is in doubt whether they meet, or the plane's range is of no
+ * use. */
 static void try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
 {
     const uint32_t triangle = bvh_leaf_triangle(leaf, which);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: a packet meets a leaf, in double. */
+/* Private to core/bvh: a packet meets a leaf. */
 #ifndef CORE_BVH_MEET_H
 #define CORE_BVH_MEET_H
 

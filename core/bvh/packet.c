@@ -175,7 +175,6 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     query->bvh = bvh;
     query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
-    query->far_m = batch->far_m;
     query->most_m = batch->most_m;
     query->apart_m = 0.0;
     query->decided = query->leaves = 0;

@@ -33,15 +33,13 @@ struct bvh_query {
     double at_origin_m;        /* no hit is nearer than this */
     uint32_t width;            /* rays of the call */
     int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
-    double at[3], at_local[3]; /* prcs; from the BVH's origin, with own points that of the first ray */
-    double far_m;              /* no ray begins further from the BVH's origin */
+    double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points at_local is the first of them */
     double most_m;             /* of a float ray, as in struct bvh_batch */
     double dir[3][BVH_PACKET]; /* of lanes without a ray: any */
     const float *dir_float;    /* [3][width] the same for Embree; may be read on to BVH_PACKET */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
-    /* With own points: (local - at_local) x dir, and an upper bound of the length of local - at_local. Else 0. */
-    float turned[3][BVH_PACKET];
-    double apart_m;
+    float turned[3][BVH_PACKET];   /* of own points: (local - at_local) x dir */
+    double apart_m;                /* no local - at_local is longer; 0 where all begin at one point */
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
@@ -108,7 +106,8 @@ struct bvh_batch {
     struct vec3_floats dir, org; /* org.x NULL: all at at_local */
     const double *start_m;       /* NULL: 0 */
     struct vec3_in local;        /* origins from the BVH's origin; x NULL: all at at_local */
-    double at_local[3], far_m;
+    double at_local[3];
+    double far_m; /* no ray begins further from the BVH's origin */
     float t_max;
     double most_m;                 /* of a float ray; INFINITY: what is further than t_max may or may not be met */
     struct bvh_counters *counters; /* counted up */

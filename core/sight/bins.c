@@ -126,8 +126,7 @@ static void put_range(struct build_shared *b, uint32_t face, const struct range 
         }
 }
 
-/* Puts the triangles first .. end of a group that is not a candidate itself. `all` is a range that holds them all;
- * NULL: it is not known. */
+/* Puts the triangles first .. end of a group that is not a candidate itself. `all` holds their range, or NULL. */
 static void put_triangles(struct build_shared *b, uint32_t face, uint32_t first, uint32_t end, const struct range *all,
                           int write)
 {

@@ -98,7 +98,7 @@ static uint32_t check_leaves(const struct scene *scene)
     assert_non_null(seen);
     assert_int_equal(bvh_make_leaves(&bvh, NULL, &err), SH_OK);
     for (uint32_t i = 0; i < bvh.n_leaves; i++)
-        for (int which = 0; which <= bvh_leaf_has_two(&bvh.leaf[i]); which++) {
+        for (int which = 0; which <= (bvh_leaf_ahead(bvh_leaf_rest(&bvh.leaf[i])) != 0); which++) {
             assert_int_equal(seen[bvh_leaf_triangle(&bvh.leaf[i], which)]++, 0);
             check_corners(&bvh, &bvh.leaf[i], which);
             check_size(&bvh, &bvh.leaf[i]);
@@ -134,6 +134,28 @@ static void test_each_triangle_once(void **state)
     assert_in_range(check_leaves(shared), shared->n_triangles / 2, shared->n_triangles * 9 / 10);
     scene_free(shared);
     scene_free(private);
+}
+
+/* Stops at its second call. */
+static int stop_later(void *ctx)
+{
+    return ++*(unsigned *)ctx > 1;
+}
+
+/* Triangles are paired before there is memory for leaves. That takes most of the time, so it asks whether to stop. */
+static void test_pairing_stops(void **state)
+{
+    (void)state;
+    struct scene *scene = terrain(140000);
+    struct bvh bvh = {.scene = scene};
+    struct sh_err err = {0};
+    unsigned calls = 0;
+    const struct sh_report report = {.ctx = &calls, .stop = stop_later};
+    assert_int_equal(bvh_make_leaves(&bvh, &report, &err), SH_ESTOPPED);
+    assert_int_equal(calls, 2);
+    assert_null(bvh.leaf);
+    free(bvh.leaf);
+    scene_free(scene);
 }
 
 enum { RAYS = 1000 };
@@ -186,6 +208,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_each_triangle_once),
+        cmocka_unit_test(test_pairing_stops),
         cmocka_unit_test(test_memory_of_a_large_surface),
     };
     cmocka_set_message_output(CM_OUTPUT_TAP);
