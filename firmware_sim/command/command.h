@@ -127,6 +127,7 @@ struct command_time_server {
     uint8_t address[4];
     uint32_t update_s; /* from request to request */
     int32_t zone_h;    /* what local time is ahead of UTC */
+    uint32_t n_roles;  /* how often the role has changed: whoever looks now and then may miss that it did */
 };
 /* Its answers since power-up. */
 struct command_time_answers {

@@ -93,6 +93,7 @@ int command_server_change(struct command_call *call)
         s.address[i] = (uint8_t)a[i];
     s.update_s = update_s;
     s.zone_h = zone_h;
+    s.n_roles = call->dev->server.n_roles + (s.role != call->dev->server.role);
     call->dev->server = s;
     call->out->effect = COMMAND_SERVER;
     return command_reply(call, "OK");

@@ -96,7 +96,7 @@ static void take_settings(struct time_client *c)
         c->answers = (struct command_time_answers){.max_offset_ns = now.max_offset_ns};
         c->zone_ns = c->is_set = 0;
     }
-    if (now.set.role != c->server.set.role) c->is_set = 0;
+    if (now.set.n_roles != c->server.set.n_roles) c->is_set = 0;
     c->server = now;
     close_server(c);
     if (now.asks)

@@ -254,9 +254,11 @@ static void wrong_servers(void **state)
     const int64_t step_us = date_us - date0_us - (start_us - start0_us);
     assert_true(step_us <= 17999 * SECOND_US + 2 &&
                 step_us > 17998 * SECOND_US); /* less half of the delay, below 1 s */
-    cola_client_expect(&scanner, "sWN TSCRole 0", "sWA TSCRole");
-    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
-    /* The limit is for a clock that this role has set. */
+    /* The limit is for a clock that this role has set. The role is there again before anybody has looked. */
+    static const char both[] = "\2sWN TSCRole 0\3\2sWN TSCRole 1\3";
+    raw_send(scanner.fd, both, sizeof both - 1);
+    for (int i = 0; i < 2; i++)
+        assert_string_equal(cola_client_next(&scanner), "sWA TSCRole");
     serve(sh, &server, server_wait(&server), after_t1(20000.0), "SET");
     ask_again(&server);
     unsigned good, refused, none;
