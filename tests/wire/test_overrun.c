@@ -9,7 +9,7 @@
  * station's visibility map (cast.sight) would make them cheap, so it is off. Two casters are to be too slow by far. Yet
  * each tick must take much less than the 164 ms that it has (loop.ahead_ms and late_ms), also where others use the
  * processors: hence ticks are short. */
-enum { NEEDLES = 2000 };
+enum { NEEDLES = 8000 };
 
 static double between(uint64_t *x, double lo, double hi)
 {
