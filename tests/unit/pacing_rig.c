@@ -335,7 +335,7 @@ int pacing_found(void)
     const int all = atomic_load(&n_found) < MOST_FOUND ? atomic_load(&n_found) : MOST_FOUND;
     for (int i = 0; i < all; i++) {
         if (is_the_end(&found[i])) continue;
-        if (n++ < 10) print_message("# %s, after %d sleeps\n", found[i].name, found[i].at_sleep);
+        if (n++ < 20) print_message("# %s, after %d sleeps\n", found[i].name, found[i].at_sleep);
     }
     return n;
 }
