@@ -29,7 +29,7 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     memset(file, 0, sizeof *file);
     file->fd = -1;
     file->path = strdup(path);
-    file->buf = aligned_alloc(OUTFILE_BLOCK, OUTFILE_BUFFER);
+    file->buf = aligned_alloc(DIRECT_BLOCK, OUTFILE_BUFFER);
     if (file->path == NULL || file->buf == NULL || asprintf(&file->part, "%s.part", path) < 0) {
         file->part = NULL;
         release(file);
@@ -112,10 +112,10 @@ int outfile_save(struct outfile *file, struct sh_err *err)
 /* Makes room in the middle of a file. Direct, only whole blocks go. */
 static int outfile_make_room(struct outfile *file, struct sh_err *err)
 {
-    if (!file->may_be_direct || file->written < OUTFILE_DIRECT_FROM) return write_buffered(file, file->len, err);
-    const size_t rest = (size_t)((file->written + file->len) % OUTFILE_BLOCK);
+    if (!file->may_be_direct || file->written < DIRECT_FROM) return write_buffered(file, file->len, err);
+    const size_t rest = (size_t)((file->written + file->len) % DIRECT_BLOCK);
     if (rest >= file->len) return SH_OK;
-    set_direct(file, file->written % OUTFILE_BLOCK == 0);
+    set_direct(file, file->written % DIRECT_BLOCK == 0);
     return write_buffered(file, file->len - rest, err);
 }
 
@@ -210,7 +210,7 @@ void outfile_release(struct outfile *file)
 int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err)
 {
     *file = (struct outfile){.fd = fd, .written = at, .path = strdup(path), .part = strdup(path)};
-    file->buf = aligned_alloc(OUTFILE_BLOCK, OUTFILE_BUFFER);
+    file->buf = aligned_alloc(DIRECT_BLOCK, OUTFILE_BUFFER);
     if (file->path != NULL && file->part != NULL && file->buf != NULL) return 0;
     release(file);
     return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);

@@ -10,11 +10,7 @@
 #include "core/direct.h"
 #include "core/err.h"
 
-enum {
-    OUTFILE_BUFFER = 1 << 20,
-    OUTFILE_BLOCK = DIRECT_BLOCK, /* of direct writing (core/direct.h) */
-    OUTFILE_DIRECT_FROM = DIRECT_FROM,
-};
+enum { OUTFILE_BUFFER = 1 << 20 };
 
 struct outfile {
     int fd;
@@ -24,7 +20,7 @@ struct outfile {
     uint64_t written; /* bytes of the file that are before buf */
     int error;        /* errno of the first write that failed: something of the file may be missing; 0: none */
     uint64_t saved;   /* of these, when outfile_save was called last */
-    /* 1: what goes beyond OUTFILE_DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
+    /* 1: what goes beyond DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
      * do that. It saves copying, which is most of the cost of a long recording, but each write then waits for the disk:
      * for writers that may wait. Set after opening. */
     int may_be_direct;

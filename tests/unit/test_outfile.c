@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* drivers/record/outfile.h: beyond OUTFILE_DIRECT_FROM a file is written past the system's cache, in whole blocks. Its
+/* drivers/record/outfile.h: beyond DIRECT_FROM a file is written past the system's cache, in whole blocks. Its
  * bytes are the given ones, in any pieces, and on any file system. Files begin with a hole up to there, so that the
  * tests cost little. */
 #include <errno.h>
@@ -34,8 +34,8 @@ ssize_t pwrite(int fd, const void *from, size_t len, off_t at)
 {
     if (fcntl(fd, F_GETFL) & O_DIRECT) {
         n_direct++;
-        if (disk == NOT_DIRECT || len % OUTFILE_BLOCK != 0 || at % OUTFILE_BLOCK != 0 ||
-            (uintptr_t)from % OUTFILE_BLOCK != 0) {
+        if (disk == NOT_DIRECT || len % DIRECT_BLOCK != 0 || at % DIRECT_BLOCK != 0 ||
+            (uintptr_t)from % DIRECT_BLOCK != 0) {
             assert_true(disk == NOT_DIRECT || disk == HALF_OF_IT);
             errno = EINVAL;
             return -1;
@@ -92,7 +92,7 @@ static void test_pieces(void **state)
     for (int mode = AS_IT_IS; mode < FULL; mode++)
         for (int shift = -1; shift <= 1; shift++) {
             struct outfile file;
-            const uint64_t at = (uint64_t)(OUTFILE_DIRECT_FROM + shift);
+            const uint64_t at = (uint64_t)(DIRECT_FROM + shift);
             disk = mode;
             begin(&file, at);
             const size_t n = write_pieces(&file, 0);
@@ -108,14 +108,14 @@ static void test_whole_buffer(void **state)
 {
     struct outfile file;
     (void)state;
-    begin(&file, OUTFILE_DIRECT_FROM + 5);
+    begin(&file, DIRECT_FROM + 5);
     assert_int_equal(outfile_write(&file, data, 10, &err), 0);
     uint8_t *to = outfile_room(&file, OUTFILE_BUFFER, &err);
     assert_non_null(to);
     memcpy(to, data + 10, OUTFILE_BUFFER);
     outfile_used(&file, OUTFILE_BUFFER);
     assert_int_equal(outfile_close(&file, 1, &err), 0);
-    expect_data(OUTFILE_DIRECT_FROM + 5, 10 + OUTFILE_BUFFER);
+    expect_data(DIRECT_FROM + 5, 10 + OUTFILE_BUFFER);
 }
 
 /* A file that ends where direct writing begins uses none of it. */
@@ -123,18 +123,18 @@ static void test_border(void **state)
 {
     struct outfile file;
     (void)state;
-    begin(&file, OUTFILE_DIRECT_FROM - OUTFILE_BUFFER);
+    begin(&file, DIRECT_FROM - OUTFILE_BUFFER);
     assert_int_equal(outfile_write(&file, data, OUTFILE_BUFFER, &err), 0);
     assert_int_equal(outfile_close(&file, 1, &err), 0);
     assert_int_equal(n_direct, 0);
-    expect_data(OUTFILE_DIRECT_FROM - OUTFILE_BUFFER, OUTFILE_BUFFER);
+    expect_data(DIRECT_FROM - OUTFILE_BUFFER, OUTFILE_BUFFER);
 }
 
 static void test_full(void **state)
 {
     struct outfile file;
     (void)state;
-    begin(&file, OUTFILE_DIRECT_FROM);
+    begin(&file, DIRECT_FROM);
     assert_int_equal(outfile_write(&file, data, OUTFILE_BUFFER, &err), 0);
     disk = FULL;
     assert_int_equal(outfile_write(&file, data, OUTFILE_BUFFER, &err), SH_EIO);

@@ -7,14 +7,19 @@
 
 #include "core/bytes.h"
 
+/* Returns what a head in the right leg sees. */
+static struct web_body see_leg(struct room *r)
+{
+    return room_need(r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+}
+
 /* With a head in the right leg, the next one stands where it sees the upper leg. The area that neither sees then is
  * less than the ground and the ceiling within the cones that heads can't scan. */
 static void test_next(void **state)
 {
     (void)state;
     struct room r = room_open("");
-    struct web_body leg =
-        room_need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body leg = see_leg(&r);
     struct web_body none;
     char query[64];
     snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
@@ -49,8 +54,7 @@ static void test_next_in_section(void **state)
 {
     (void)state;
     struct room r = room_open("");
-    struct web_body leg =
-        room_need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body leg = see_leg(&r);
     const uint32_t beside = le_get32(leg.bytes + 8);
     char json[512], turned[512];
     next_within(&r, beside, "middle_x_m=5&middle_y_m=1&half_x_m=1&half_y_m=1&half_z_m=9", json);
@@ -73,8 +77,7 @@ static void test_reach(void **state)
     (void)state;
     struct room r = room_open("");
     struct web_body cells = room_need(&r, "/cells", "");
-    struct web_body leg =
-        room_need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body leg = see_leg(&r);
     char query[64];
     snprintf(query, sizeof query, "station=1&height_m=1.2&p1=%u", le_get32(leg.bytes + 8));
     struct web_body reach = room_need(&r, "/reach", query);
@@ -135,8 +138,7 @@ static void test_drag_beside_search(void **state)
     (void)state;
     enum { KEPT = 61, ROUNDS = 20 };
     struct room r = room_open("");
-    struct web_body leg =
-        room_need(&r, "/preview", "station=1&x_m=5&y_m=1&z_m=1.2&heading_deg=0&step_deg=0.5&points=0");
+    struct web_body leg = see_leg(&r);
     struct web_body body = {NULL, NULL, 0};
     char query[64];
     int n = 0;
