@@ -72,14 +72,24 @@ static void *next_of(const char *name)
     return f;
 }
 
+/* The replaced functions are found before main, since dlsym takes a lock for which the pacing thread would wait. What
+ * runs even earlier finds its own. */
+#define FINDS(name)                                            \
+    static void *next_##name;                                  \
+    __attribute__((constructor)) static void find_##name(void) \
+    {                                                          \
+        if (next_##name == NULL) next_##name = next_of(#name); \
+    }
 /* A function that notes its caller and then does its work. */
 #define LOOKED_AT(type, name, params, args) \
+    FINDS(name)                             \
     type name params;                       \
     type name params                        \
     {                                       \
         note(#name);                        \
+        find_##name();                      \
         type(*next) params;                 \
-        *(void **)&next = next_of(#name);   \
+        *(void **)&next = next_##name;      \
         return next args;                   \
     }
 /* dlsym itself allocates. */
@@ -130,13 +140,15 @@ LOOKED_AT(int, vsnprintf, (char *text, size_t n, const char *format, va_list arg
 LOOKED_AT(struct tm *, localtime_r, (const time_t *t, struct tm *tm), (t, tm))
 LOOKED_AT(char *, getenv, (const char *name), (name))
 
+FINDS(pthread_mutex_lock)
 int pthread_mutex_lock(pthread_mutex_t *m)
 {
     const struct timespec t = {.tv_nsec = atomic_load(&slow_ns)};
     note("pthread_mutex_lock");
     if (t.tv_nsec != 0 && !is_pacer) syscall(SYS_clock_nanosleep, CLOCK_MONOTONIC, 0, &t, NULL);
+    find_pthread_mutex_lock();
     int (*next)(pthread_mutex_t *);
-    *(void **)&next = next_of("pthread_mutex_lock");
+    *(void **)&next = next_pthread_mutex_lock;
     return next(m);
 }
 
