@@ -125,52 +125,49 @@ VEC_CLONES static void fold_longitudes(double *y, int n)
     }
 }
 
-/* WGS 84, NIMA TR8350.2: geodetic to geocentric. */
-static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
+/* WGS 84, NIMA TR8350.2: geodetic to geocentric, from the polar axis and from the plane of the equator. */
+VEC_INLINE void geocentric(double lat_deg, double h, double *from_axis, double *from_equator)
 {
-    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), rad = NATIVE_RAD_PER_DEG;
-    double s = sin(lat_deg * rad), c = cos(lat_deg * rad), n = a / sqrt(1 - e2 * s * s);
-    p[0] = (n + h) * c * cos(lon_deg * rad);
-    p[1] = (n + h) * c * sin(lon_deg * rad);
-    p[2] = (n * (1 - e2) + h) * s;
+    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f);
+    double s, c;
+    vec_sincos_turn(lat_deg / 360, &s, &c);
+    const double n = a / sqrt(1 - e2 * s * s);
+    *from_axis = (n + h) * c;
+    *from_equator = (n * (1 - e2) + h) * s;
 }
 
-/* Ranges go from the anchor straight through space. */
-static void set_geodetic_ranges(const double anchor[3], const struct block *b, int n, const struct scanhead_columns *to)
+/* Ranges go from the anchor straight through space. The anchor's meridian is the first. */
+VEC_CLONES static void set_geodetic_ranges(const struct block *restrict b, int n, const double anchor[3],
+                                           const double scale[3], double *restrict range_m)
 {
-    double from[3], at[3];
-    geocentric(anchor[0], anchor[1], anchor[2], from);
+    const double lat = anchor[0], h = anchor[2], per_lat = scale[0], per_lon = scale[1] / 360, per_h = scale[2];
+    double axis0, equator0;
+    geocentric(lat, h, &axis0, &equator0);
     for (int i = 0; i < n; i++) {
-        to->range_m[i] = NAN;
-        if (is_empty(b->tail[i])) continue;
-        geocentric(to->x[i], to->y[i], to->z[i], at);
-        const double dx = at[0] - from[0], dy = at[1] - from[1], dz = at[2] - from[2];
-        to->range_m[i] = sqrt(dx * dx + dy * dy + dz * dz);
+        double axis, equator, s, c;
+        geocentric(lat + per_lat * (int32_t)b->a[i], h + per_h * (int32_t)b->c[i], &axis, &equator);
+        vec_sincos_turn(per_lon * (int32_t)b->b[i], &s, &c);
+        const double dx = axis * c - axis0, dy = axis * s, dz = equator - equator0;
+        range_m[i] = is_empty(b->tail[i]) ? (double)NAN : sqrt(dx * dx + dy * dy + dz * dz);
     }
 }
 
-static void columns_geo(const struct scanhead *sh, struct block *b, int n, const struct scanhead_columns *wanted)
+static void columns_geo(const struct scanhead *sh, const struct block *b, int n, const struct scanhead_columns *to)
 {
     const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
     const int geodetic = sh->anchor.crs == NATIVE_CRS_GEODETIC;
-    struct scanhead_columns to = *wanted;
-    if (geodetic && to.range_m != NULL) { /* ranges are computed from all three */
-        if (to.x == NULL) to.x = b->x;
-        if (to.y == NULL) to.y = b->y;
-        if (to.z == NULL) to.z = b->z;
-    }
-    if (to.x != NULL) set_places(b->a, b->tail, n, anchor[0], scale[0], to.x);
-    if (to.y != NULL) set_places(b->b, b->tail, n, anchor[1], scale[1], to.y);
-    if (to.z != NULL) set_places(b->c, b->tail, n, anchor[2], scale[2], to.z);
-    if (geodetic && to.y != NULL) fold_longitudes(to.y, n);
-    if (to.range_m != NULL && geodetic)
-        set_geodetic_ranges(anchor, b, n, &to);
-    else if (to.range_m != NULL && sh->anchor.moving & NATIVE_MOVING)
-        set_all(to.range_m, n, NAN);
-    else if (to.range_m != NULL)
-        set_distances(b, n, scale, to.range_m);
-    if (to.mirror_rad != NULL) set_all(to.mirror_rad, n, NAN);
-    if (to.pan_rad != NULL) set_all(to.pan_rad, n, NAN);
+    if (to->x != NULL) set_places(b->a, b->tail, n, anchor[0], scale[0], to->x);
+    if (to->y != NULL) set_places(b->b, b->tail, n, anchor[1], scale[1], to->y);
+    if (to->z != NULL) set_places(b->c, b->tail, n, anchor[2], scale[2], to->z);
+    if (geodetic && to->y != NULL) fold_longitudes(to->y, n);
+    if (to->range_m != NULL && geodetic)
+        set_geodetic_ranges(b, n, anchor, scale, to->range_m);
+    else if (to->range_m != NULL && sh->anchor.moving & NATIVE_MOVING)
+        set_all(to->range_m, n, NAN);
+    else if (to->range_m != NULL)
+        set_distances(b, n, scale, to->range_m);
+    if (to->mirror_rad != NULL) set_all(to->mirror_rad, n, NAN);
+    if (to->pan_rad != NULL) set_all(to->pan_rad, n, NAN);
 }
 
 /* ---- polar */
