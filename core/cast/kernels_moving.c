@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses of a moving head are turned and placed by the pose of their own time, as pose_between has it. */
-
 #include "core/cast/kernels_moving.h"
+
+#include "core/mat3.h"
 #include "core/vecmath.h"
 
 void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0_ns, struct kernel_leg *leg)
@@ -29,6 +30,12 @@ void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *restrict dt_n
     const double before = leg->before_ns, span = leg->span_ns;
     const struct vec3_in s = *from;
     const struct vec3_out d = *to;
+    if (turn == 0.0) { /* a straight way: the formula would add zeros */
+        double back[9];
+        mat3_transpose(m, back);
+        kernel_turn_back(from, back, n, to);
+        return;
+    }
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double sine, c, sx = s.x[i], sy = s.y[i], sz = s.z[i];
