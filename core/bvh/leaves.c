@@ -22,6 +22,12 @@ static int odd_corner(const uint32_t a[3], const uint32_t b[3])
     return n == 1 ? odd : 3;
 }
 
+/* fmax would be a call. */
+static double larger(double x, double y)
+{
+    return y > x ? y : x;
+}
+
 static float below(double x)
 {
     const float f = (float)x;
@@ -65,12 +71,15 @@ static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t 
 /* Setting the base's lowest bits moves it by up to 2^-17 of its distance. The size includes that. */
 static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
 {
-    double v[4][3], size_m = 0.0;
+    double v[4][3], size_m2 = 0.0;
     const uint32_t ahead = find_corners(bvh, first, second, v);
     for (int i = 0; i < 4; i++)
-        for (int j = 0; j < i; j++)
-            size_m = fmax(size_m, vec3_distance(v[i], v[j]));
-    size_m += 0x1p-16 * vec3_length(v[0]);
+        for (int j = 0; j < i; j++) {
+            double d[3];
+            vec3_sub(v[i], v[j], d);
+            size_m2 = larger(size_m2, vec3_dot(d, d));
+        }
+    const double size_m = sqrt(size_m2) + 0x1p-16 * vec3_length(v[0]);
     set_base(leaf, v[0], length_bits(size_m) << BVH_LEAF_AHEAD_BITS | ahead);
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 3; j++)
@@ -272,16 +281,12 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
     const struct bvh *bvh = args->geometryUserPtr;
     const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
     const uint32_t ahead = bvh_leaf_ahead(bvh_leaf_rest(leaf));
-    double lo[3], hi[3], v[4][3], far_m = 0.0;
+    double lo[3], hi[3], v[4][3], far_m2 = 0.0;
     find_corners(bvh, leaf->triangle, ahead != 0 ? leaf->triangle + ahead : (uint32_t)BVH_NO_TRIANGLE, v);
-    memcpy(lo, v[0], sizeof lo);
-    memcpy(hi, v[0], sizeof hi);
+    vec3_bound_nothing(lo, hi);
     for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < 3; j++) {
-            lo[j] = fmin(lo[j], v[i][j]);
-            hi[j] = fmax(hi[j], v[i][j]);
-        }
-        far_m = fmax(far_m, vec3_length(v[i]));
+        vec3_bound(lo, hi, v[i]);
+        far_m2 = larger(far_m2, vec3_dot(v[i], v[i]));
     }
-    bvh_pad_box(bvh, lo, hi, far_m, args->bounds_o);
+    bvh_pad_box(bvh, lo, hi, sqrt(far_m2), args->bounds_o);
 }

@@ -47,12 +47,12 @@ static int lose_vertex(struct ply *y, const double v[3], struct sh_err *err)
     if (!grow(&y->lost, &y->cap_lost, y->n_lost + 1, sizeof *y->lost))
         return build_fail(y->b, SH_ENOMEM, err, "no memory for vertices that are not finite");
     y->lost[y->n_lost++] = (struct ply_lost){(uint32_t)y->r.row, y->b->line, {v[0], v[1], v[2]}};
-    if (y->weld.number != NULL) {
-        y->weld.number[y->weld.n++] = y->b->vertex0;
-        y->b->n_welded++;
-        return SH_OK;
-    }
-    return build_vertex(y->b, nowhere, err);
+    if (y->weld.number == NULL) return build_vertex(y->b, nowhere, err);
+    const int rc = build_weld_flush(y->b, &y->weld, err);
+    if (rc != SH_OK) return rc;
+    y->weld.number[y->weld.n++] = y->b->vertex0;
+    y->b->n_welded++;
+    return SH_OK;
 }
 
 /* Gives vertices that are not finite a harmless place: they must not widen the scene's bounds. */
@@ -73,7 +73,7 @@ static int take_vertex(struct ply *y, struct sh_err *err)
     int rc = ply_keep_vertex_colour(y, err);
     if (rc != SH_OK) return rc;
     if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2])) return lose_vertex(y, v, err);
-    return y->weld.number != NULL ? build_weld_vertex(y->b, &y->weld, v, err) : build_vertex(y->b, v, err);
+    return y->weld.number != NULL ? build_weld_later(y->b, &y->weld, v, err) : build_vertex(y->b, v, err);
 }
 
 /* ---- faces */
@@ -180,6 +180,8 @@ static int begin_element(void *ply, struct sh_err *err)
     const struct ply_element *e = y->r.element;
     y->b->line = 0;
     ply_begin_colours(y);
+    const int rc = build_weld_flush(y->b, &y->weld, err);
+    if (rc != SH_OK) return rc;
     if (e->kind == PLY_VERTEX && is_torn(y, e->count)) return build_weld_begin(y->b, &y->weld, e->count, err);
     return build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
 }
@@ -190,6 +192,7 @@ static int read_body(struct ply *y, struct sh_err *err)
     int rc = ply_begin_textures(y, err);
     if (rc == SH_OK) rc = ply_walk(&y->r, &user, err);
     y->b->line = 0;
+    if (rc == SH_OK) rc = build_weld_flush(y->b, &y->weld, err);
     if (rc == SH_OK) put_away_lost(y);
     if (rc == SH_OK && y->r.is_single) rc = note_rounding(y, err);
     if (rc == SH_OK && y->n_empty > 0)

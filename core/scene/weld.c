@@ -36,6 +36,11 @@ static uint32_t *weld_find(const struct scene_build *b, const struct build_weld 
     return &w->slot[at];
 }
 
+static uint32_t *weld_recent(struct build_weld *w, uint64_t key)
+{
+    return &w->recent[key >> 32 & (BUILD_RECENT - 1)];
+}
+
 /* A table of so many slots, with what the old one holds. */
 static int make_table(struct scene_build *b, struct build_weld *w, size_t size, struct sh_err *err)
 {
@@ -66,29 +71,78 @@ int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t verti
     return make_table(b, w, size, err);
 }
 
-int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err)
+/* The number of the scene's last vertex. Where there was one at the same place, it goes again. */
+static uint32_t weld_last(struct scene_build *b, struct build_weld *w, uint64_t key)
 {
-    /* It is at most half full, so that a free slot is near. */
-    int rc = 2 * (w->used + 1) > w->size ? make_table(b, w, 2 * w->size, err) : SH_OK;
-    if (rc == SH_OK) rc = build_vertex(b, v, err);
-    if (rc != SH_OK) return rc;
-    uint32_t number = b->scene->n_vertices - 1;
-    const double *p = b->scene->vertex_m[number];
-    const uint64_t key = key_of(p);
-    uint32_t *recent = &w->recent[key >> 32 & (BUILD_RECENT - 1)];
-    const int is_recent = *recent != 0 && weld_is_same(b, *recent - 1, p);
-    uint32_t *slot = is_recent ? NULL : weld_find(b, w, key, p);
-    if (slot != NULL && *slot == NONE) {
-        *slot = number;
-        w->used++;
+    const uint32_t last = b->scene->n_vertices - 1;
+    const double *p = b->scene->vertex_m[last];
+    uint32_t *recent = weld_recent(w, key), number = last;
+    if (*recent != 0 && weld_is_same(b, *recent - 1, p)) {
+        number = *recent - 1;
     } else {
-        number = is_recent ? *recent - 1 : *slot;
+        uint32_t *slot = weld_find(b, w, key, p);
+        if (*slot != NONE)
+            number = *slot;
+        else
+            w->used++;
+        *slot = number;
+    }
+    if (number != last) {
         b->scene->n_vertices--;
         b->n_welded++;
     }
     *recent = number + 1;
-    w->number[w->n++] = number;
+    return number;
+}
+
+/* Places in the table, and the vertices that they name, are fetched into the cache before they are needed: waiting for
+ * them one by one would take most of the time. */
+static void fetch_slot(const struct build_weld *w, uint64_t key)
+{
+    __builtin_prefetch(&w->slot[key & (w->size - 1)]);
+}
+
+static void fetch_vertex(const struct scene_build *b, struct build_weld *w, uint64_t key)
+{
+    const uint32_t recent = *weld_recent(w, key), slot = w->slot[key & (w->size - 1)];
+    if (recent != 0) __builtin_prefetch(b->scene->vertex_m[recent - 1]);
+    if (slot != NONE) __builtin_prefetch(b->scene->vertex_m[slot]);
+}
+
+int build_weld_flush(struct scene_build *b, struct build_weld *w, struct sh_err *err)
+{
+    enum { NEAR = 8, FAR = 16 };
+    const uint32_t n = w->waiting, first = b->scene->n_vertices - n;
+    uint64_t key[BUILD_TOGETHER];
+    size_t size = w->size;
+    while (2 * (w->used + n) > size) /* it is at most half full, so that a free slot is near */
+        size *= 2;
+    int rc = size > w->size ? make_table(b, w, size, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    for (uint32_t i = 0; i < n; i++)
+        key[i] = key_of(b->scene->vertex_m[first + i]);
+    b->scene->n_vertices = first;
+    for (uint32_t i = 0; i < n; i++) {
+        if (i + FAR < n) fetch_slot(w, key[i + FAR]);
+        if (i + NEAR < n) fetch_vertex(b, w, key[i + NEAR]);
+        memmove(b->scene->vertex_m[b->scene->n_vertices++], b->scene->vertex_m[first + i], sizeof *b->scene->vertex_m);
+        w->number[w->n++] = weld_last(b, w, key[i]);
+    }
+    w->waiting = 0;
     return SH_OK;
+}
+
+int build_weld_later(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err)
+{
+    int rc = build_vertex(b, v, err);
+    if (rc != SH_OK) return rc;
+    return ++w->waiting == BUILD_TOGETHER ? build_weld_flush(b, w, err) : SH_OK;
+}
+
+int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err)
+{
+    int rc = build_weld_later(b, w, v, err);
+    return rc == SH_OK ? build_weld_flush(b, w, err) : rc;
 }
 
 void build_weld_free(struct build_weld *w)

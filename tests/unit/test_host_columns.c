@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: columns of points, and points, beside the plain formula of one point, bit for bit but for geodetic ranges. */
+/* libscanhead: columns of points, and points, beside the plain formula of one point, bit for bit but for geodetic
+ * ranges. */
 #include <math.h>
 
 #include "core/vecmath.h"
