@@ -66,47 +66,61 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
 
 enum { LANES = 16 };
 
-/* Each lane keeps the largest squared length of its vectors so far. */
-VEC_INLINE void keep_most(const double *restrict px, const double *restrict py, const double *restrict pz,
-                          double *restrict most2)
+/* In lanes: the largest squared distances so far, from the BVH's origin and from the chunk's first ray. */
+struct most {
+    double far2[LANES], apart2[LANES];
+};
+
+/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. */
+VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const double origin_m[3],
+                           const double first_m[3], uint32_t at, uint32_t n, struct most *most)
 {
-    for (int k = 0; k < LANES; k++) {
-        const double here2 = px[k] * px[k] + py[k] * py[k] + pz[k] * pz[k];
-        most2[k] = here2 > most2[k] ? here2 : most2[k];
+    const double *px = p->x + at, *py = p->y + at, *pz = p->z + at;
+    double *x = w->own.x + at, *y = w->own.y + at, *z = w->own.z + at;
+    float *fx = w->org.x + at, *fy = w->org.y + at, *fz = w->org.z + at;
+    const double ox = origin_m[0], oy = origin_m[1], oz = origin_m[2];
+    const double ax = first_m[0], ay = first_m[1], az = first_m[2];
+    VEC_LOOP
+    for (uint32_t k = 0; k < n; k++) {
+        const double lx = px[k] - ox, ly = py[k] - oy, lz = pz[k] - oz, dx = lx - ax, dy = ly - ay, dz = lz - az;
+        const double far2 = lx * lx + ly * ly + lz * lz, apart2 = dx * dx + dy * dy + dz * dz;
+        x[k] = lx;
+        y[k] = ly;
+        z[k] = lz;
+        fx[k] = (float)lx;
+        fy[k] = (float)ly;
+        fz[k] = (float)lz;
+        most->far2[k] = far2 > most->far2[k] ? far2 : most->far2[k];
+        most->apart2[k] = apart2 > most->apart2[k] ? apart2 : most->apart2[k];
     }
 }
 
-/* Returns the largest length of n vectors. */
-VEC_INLINE double most_of(const double *px, const double *py, const double *pz, uint32_t n)
+static double length_of_most(const double most2[LANES])
 {
-    double most2[LANES] = {0.0};
-    uint32_t i = 0;
-    for (; i + LANES <= n; i += LANES)
-        keep_most(px + i, py + i, pz + i, most2);
-    for (; i < n; i++) {
-        const double here2 = px[i] * px[i] + py[i] * py[i] + pz[i] * pz[i];
-        most2[0] = here2 > most2[0] ? here2 : most2[0];
-    }
-    for (int k = 1; k < LANES; k++)
-        most2[0] = most2[k] > most2[0] ? most2[k] : most2[0];
-    return sqrt(most2[0]);
+    double all2 = 0.0;
+    for (int k = 0; k < LANES; k++)
+        all2 = most2[k] > all2 ? most2[k] : all2;
+    return sqrt(all2);
 }
 
-/* Takes the rays' own origins into the local frame, and finds the largest distance from its origin. */
+/* Takes the rays' own origins into the local frame, also as Embree gets them, and finds how far they lie from its
+ * origin, and from each other. */
 VEC_CLONES
 static void take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     const struct vec3_in p = rays->from.own;
-    const struct vec3_out o = VEC3_OUT(w->own, 0);
-    const double x = bvh->origin_m[0], y = bvh->origin_m[1], z = bvh->origin_m[2];
-    VEC_LOOP
-    for (uint32_t i = 0; i < rays->n; i++) {
-        o.x[i] = p.x[i] - x;
-        o.y[i] = p.y[i] - y;
-        o.z[i] = p.z[i] - z;
-    }
+    const double at[3] = VEC3_AT(p, 0);
+    double first_m[3];
+    struct most most = {.far2 = {0.0}};
+    uint32_t i = 0;
+    vec3_sub(at, bvh->origin_m, first_m);
+    for (; i + LANES <= rays->n; i += LANES)
+        take_lanes(w, &p, bvh->origin_m, first_m, i, LANES, &most);
+    take_lanes(w, &p, bvh->origin_m, first_m, i, rays->n - i, &most);
     batch->local = VEC3_IN(w->own, 0);
-    batch->far_m = most_of(o.x, o.y, o.z, rays->n);
+    batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
+    batch->far_m = length_of_most(most.far2);
+    batch->apart_m = 2.0 * length_of_most(most.apart2);
 }
 
 /* Rays that begin outside of the scene's radius enter it before they hit anything: the float ray begins there. */
@@ -133,12 +147,7 @@ static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct 
     vec3_sub(rays->from.at_m, bvh->origin_m, batch->at_local);
     batch->far_m = vec3_length(batch->at_local);
     if (rays->from.own.x != NULL) take_own(w, bvh, rays, batch);
-    if (batch->far_m > bvh->radius_m) {
-        take_along(w, bvh, rays, batch);
-    } else if (rays->from.own.x != NULL) {
-        bvh_to_float(&batch->local, rays->n, w->org.x, w->org.y, w->org.z);
-        batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
-    }
+    if (batch->far_m > bvh->radius_m) take_along(w, bvh, rays, batch);
 }
 
 /* Ray i of a chunk has hit nothing in its first stretch: casts the next ones, until the ray has left the

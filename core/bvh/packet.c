@@ -146,7 +146,7 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = bvh_field(&packet->at, width, dir_x);
-    if (query->has_own) bvh_turn_origins(query, n);
+    if (query->has_own) bvh_turn_origins(query);
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
     if (query->unsure != 0) packet_settle(query, packet, width);
     if (query->decided != decided) take_near(query, n);
@@ -176,7 +176,7 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
     query->most_m = batch->most_m;
-    query->apart_m = 0.0;
+    query->apart_m = batch->apart_m;
     query->decided = query->leaves = 0;
     memcpy(query->at, rays->from.at_m, sizeof query->at);
     memcpy(query->at_local, batch->at_local, sizeof query->at_local);

@@ -39,7 +39,7 @@ struct bvh_query {
     const float *dir_float;    /* [3][width] the same for Embree; may be read on to BVH_PACKET */
     double org[3][BVH_PACKET], local[3][BVH_PACKET];
     float turned[3][BVH_PACKET];   /* of own points: (local - at_local) x dir */
-    double apart_m;                /* no local - at_local is longer; 0 where all begin at one point */
+    double apart_m;                /* no local - at_local is longer */
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
     double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
@@ -76,25 +76,19 @@ static inline void bvh_forget_near(struct bvh_query *query)
     }
 }
 
-/* Sets at_local, turned and apart_m of a packet whose first n lanes have rays with points of their own. */
-VEC_INLINE void bvh_turn_origins(struct bvh_query *query, uint32_t n)
+/* Sets at_local and turned of a packet whose rays have points of their own. */
+VEC_INLINE void bvh_turn_origins(struct bvh_query *query)
 {
     const double *px = query->local[0], *py = query->local[1], *pz = query->local[2];
     const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
     const double ax = px[0], ay = py[0], az = pz[0];
-    double apart2[BVH_PACKET];
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        const double x = px[i] - ax, y = py[i] - ay, z = pz[i] - az, here2 = x * x + y * y + z * z;
+        const double x = px[i] - ax, y = py[i] - ay, z = pz[i] - az;
         query->turned[0][i] = (float)(y * dz[i] - z * dy[i]);
         query->turned[1][i] = (float)(z * dx[i] - x * dz[i]);
         query->turned[2][i] = (float)(x * dy[i] - y * dx[i]);
-        apart2[i] = i < n ? here2 : 0.0;
     }
-    for (uint32_t half = BVH_PACKET / 2; half > 0; half /= 2)
-        for (uint32_t i = 0; i < half; i++)
-            apart2[i] = apart2[i] > apart2[i + half] ? apart2[i] : apart2[i + half];
-    query->apart_m = sqrt(apart2[0]);
     query->at_local[0] = ax;
     query->at_local[1] = ay;
     query->at_local[2] = az;
@@ -107,7 +101,8 @@ struct bvh_batch {
     const double *start_m;       /* NULL: 0 */
     struct vec3_in local;        /* origins from the BVH's origin; x NULL: all at at_local */
     double at_local[3];
-    double far_m; /* no ray begins further from the BVH's origin */
+    double far_m;   /* no ray begins further from the BVH's origin */
+    double apart_m; /* no two rays begin further from each other; 0: all at one point */
     float t_max;
     double most_m;                 /* of a float ray; INFINITY: what is further than t_max may or may not be met */
     struct bvh_counters *counters; /* counted up */

@@ -35,8 +35,9 @@ static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_n
 {
     for (uint32_t i = 0, k = (uint32_t)pose_find_knot(s->knot, s->n_knots, t0_ns + dt_ns[0]); i < n; k++) {
         int last = k + 1 >= s->n_knots, before = s->knot[k].t_ns > t0_ns + (int64_t)dt_ns[i];
-        uint32_t end = i;
-        while (end < n && (last || t0_ns + (int64_t)dt_ns[end] < s->knot[before ? k : k + 1].t_ns))
+        const int64_t most_ns = last ? INT64_MAX : s->knot[before ? k : k + 1].t_ns - t0_ns;
+        uint32_t end = most_ns > (int64_t)dt_ns[n - 1] ? n : i;
+        while (end < n && (int64_t)dt_ns[end] < most_ns)
             end++;
         struct kernel_leg leg;
         kernel_leg(&s->knot[k], &s->knot[last || before ? k : k + 1], t0_ns, &leg);
