@@ -64,9 +64,9 @@ static void turn_directions(const struct bvh_query *query, const struct scene_co
     const double *x = query->dir[0], *y = query->dir[1], *z = query->dir[2], c = copy->cosine, s = copy->sine;
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
-        in->dir[0][i] = c * x[i] - s * y[i];
-        in->dir[1][i] = c * y[i] + s * x[i];
-        in->dir[2][i] = z[i];
+        in->room[0][i] = c * x[i] - s * y[i];
+        in->room[1][i] = c * y[i] + s * x[i];
+        in->room[2][i] = z[i];
     }
 }
 
@@ -92,12 +92,12 @@ static void find_origins(const struct bvh_query *query, const struct bvh_copy *c
         const double vx = x[i] - ax, vy = y[i] - ay, vz = z[i] - az;
         const double px = (c * vx - s * vy) / scale, py = (c * vy + s * vx) / scale, pz = vz / scale;
         const double lx = px - ox, ly = py - oy, lz = pz - oz;
-        in->org[0][i] = px;
-        in->org[1][i] = py;
-        in->org[2][i] = pz;
-        in->local[0][i] = lx;
-        in->local[1][i] = ly;
-        in->local[2][i] = lz;
+        in->room[3][i] = px;
+        in->room[4][i] = py;
+        in->room[5][i] = pz;
+        in->room[6][i] = lx;
+        in->room[7][i] = ly;
+        in->room[8][i] = lz;
         const double start_m = sqrt(lx * lx + ly * ly + lz * lz) - radius_m;
         in->start_m[i] = start_m > 0.0 ? start_m : 0.0;
     }
@@ -157,6 +157,11 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
     in->has_own = query->has_own;
     in->at_origin_m = query->at_origin_m / copy->at->scale;
     in->decided = in->leaves = 0;
+    for (int j = 0; j < 3; j++) {
+        in->dir[j] = in->room[j];
+        in->org[j] = in->room[3 + j];
+        in->local[j] = in->room[6 + j];
+    }
     turn_directions(query, copy->at, in);
     if (query->has_own)
         find_origins(query, copy, in);

@@ -86,6 +86,14 @@ VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch,
         packet->valid[i] = i < n ? -1 : 0;
 }
 
+/* Returns n numbers of a packet's rays where those of a whole packet may be read. */
+VEC_INLINE const double *whole_packet(const double *from, uint32_t n, double room[BVH_PACKET])
+{
+    if (n == BVH_PACKET) return from;
+    memcpy(room, from, n * sizeof *room);
+    return room;
+}
+
 VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *batch, uint32_t first, uint32_t n)
 {
     const struct bvh_rays *rays = batch->rays;
@@ -104,10 +112,10 @@ VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *bat
     query->unsure = 0;
     if (batch->start_m != NULL) memcpy(query->start_m, batch->start_m + first, n * sizeof(double));
     for (int j = 0; j < 3; j++) {
-        memcpy(query->dir[j], dir[j] + first, n * sizeof(double));
+        query->dir[j] = whole_packet(dir[j] + first, n, query->room[j]);
         if (!query->has_own) continue;
-        memcpy(query->org[j], own[j] + first, n * sizeof(double));
-        memcpy(query->local[j], local[j] + first, n * sizeof(double));
+        query->org[j] = whole_packet(own[j] + first, n, query->room[3 + j]);
+        query->local[j] = whole_packet(local[j] + first, n, query->room[6 + j]);
     }
 }
 

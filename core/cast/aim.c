@@ -30,22 +30,32 @@ struct move {
     struct vec3_out to_d, to_r, place;
 };
 
-/* Stretch by stretch between two poses; times don't fall. */
-static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n, const struct move *m)
+/* Finds the leg of pulse i, and returns the first of the n pulses after it; times don't fall. */
+static uint32_t find_leg(const struct cast_setup *s, const struct chunk *k, const uint32_t *dt_ns, uint32_t i,
+                         uint32_t n, struct kernel_leg *leg)
 {
-    for (uint32_t i = 0, k = (uint32_t)pose_find_knot(s->knot, s->n_knots, t0_ns + dt_ns[0]); i < n; k++) {
-        int last = k + 1 >= s->n_knots, before = s->knot[k].t_ns > t0_ns + (int64_t)dt_ns[i];
-        const int64_t most_ns = last ? INT64_MAX : s->knot[before ? k : k + 1].t_ns - t0_ns;
-        uint32_t end = most_ns > (int64_t)dt_ns[n - 1] ? n : i;
-        while (end < n && (int64_t)dt_ns[end] < most_ns)
-            end++;
-        struct kernel_leg leg;
-        kernel_leg(&s->knot[k], &s->knot[last || before ? k : k + 1], t0_ns, &leg);
+    const int64_t t0_ns = k->run->t0_ns;
+    const size_t at = pose_find_knot(s->knot, s->n_knots, t0_ns + dt_ns[i]);
+    const int last = at + 1 >= s->n_knots, before = s->knot[at].t_ns > t0_ns + (int64_t)dt_ns[i];
+    const struct pose_knot *from = &s->knot[at], *to = last || before ? from : from + 1;
+    kernel_leg(from, to, t0_ns, leg);
+    if (last && !before) return n;
+    const int64_t end_ns = (before ? from : to)->t_ns - t0_ns;
+    if ((int64_t)dt_ns[n - 1] < end_ns) return n;
+    while ((int64_t)dt_ns[i] < end_ns)
+        i++;
+    return i;
+}
+
+static void move(const struct cast_setup *s, const struct chunk *k, const uint32_t *dt_ns, uint32_t n,
+                 const struct move *m)
+{
+    struct kernel_leg leg;
+    for (uint32_t i = 0, end; i < n; i = end) {
+        end = find_leg(s, k, dt_ns, i, n, &leg);
         kernel_turn_leg(&leg, dt_ns + i, end - i, &VEC3_IN(m->d, i), &VEC3_OUT(m->to_d, i));
         if (m->r.x != NULL) kernel_turn_leg(&leg, dt_ns + i, end - i, &VEC3_IN(m->r, i), &VEC3_OUT(m->to_r, i));
         kernel_place_leg(&leg, dt_ns + i, end - i, &VEC3_OUT(m->place, i));
-        if (before) k--;
-        i = end;
     }
 }
 
@@ -65,15 +75,21 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const struct cast_setup *s = k->s;
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
     const int wobbles = s->disturbance != NULL && s->disturbance->n_wobbles != 0;
+    struct kernel_leg leg;
+    /* Where nothing turns the head on its way, beams are turned once, by the same arithmetic. */
+    const int straight = moves && find_leg(s, k, k->dt_ns, 0, k->n, &leg) == k->n && leg.turn == 0.0 &&
+                         (s->disturbance == NULL || s->disturbance->slip_turn == 0.0);
+    const int turns_later = moves && !straight;
+    const double *pose = straight ? leg.rotation : moves ? mat3_unit : s->rotation;
     double slipped[9];
-    const double *rotation = slipped_rotation(s, moves ? mat3_unit : s->rotation, slipped);
-    const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
+    const double *rotation = slipped_rotation(s, pose, slipped);
+    const struct vec3_out d = turns_later ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
     const struct kernel_pulses sweep = {k->run, k->first, *turns};
     const int even = !wobbles && kernel_sweep_steps(&c->steps, k->run);
     double to_crs[9];
     if (geo) k->linear = !moves && reading_rotation(s, to_crs);
-    const struct kernel_reading reading = {s, moves ? mat3_unit : to_crs,
-                                           moves ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0)};
+    const struct kernel_reading reading = {s, moves ? pose : to_crs,
+                                           turns_later ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0)};
     if (geo && even)
         kernel_sweep_read(&c->steps, &sweep, rotation, &d, &reading);
     else if (geo)
@@ -82,10 +98,11 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
         kernel_sweep(&c->steps, &sweep, rotation, &d);
     else
         kernel_directions(turns, rotation, &d);
-    if (!moves) return;
+    if (straight) kernel_place_leg(&leg, k->dt_ns, k->n, &VEC3_OUT(c->list.p, 0));
+    if (!turns_later) return;
     const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_in){0}, VEC3_OUT(c->d, 0),
                            VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};
-    move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
+    move(s, k, k->dt_ns, k->n, &m);
 }
 
 /* The same of directions and origins in socs. */
@@ -115,7 +132,7 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
     if (moves) {
         const struct move m = {VEC3_IN(c->socs, 0), around, VEC3_OUT(c->d, 0), VEC3_OUT(c->origin, 0),
                                VEC3_OUT(l->p, 0)};
-        move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
+        move(s, k, k->dt_ns, k->n, &m);
     } else {
         mat3_transpose(s->rotation, back);
         kernel_turn_back(&VEC3_IN(c->socs, 0), back, k->n, &VEC3_OUT(c->d, 0));
@@ -172,7 +189,7 @@ static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint
     }
     kernel_directions_read(&turns, mat3_unit, &socs, &(struct kernel_reading){s, mat3_unit, VEC3_OUT(c->read, 0)});
     const struct move m = {VEC3_IN(c->read, 0), {0}, e, {0}, VEC3_OUT(l->p, at)};
-    move(s, k->run->t0_ns, dt_ns, n, &m);
+    move(s, k, dt_ns, n, &m);
 }
 
 void caster_aim_read(struct caster *c, struct chunk *k)
