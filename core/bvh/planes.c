@@ -7,6 +7,7 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/copies.h"
+#include "core/bvh/leaves.h"
 #include "core/huge_pages.h"
 #include "core/vec3.h"
 #include "core/vecmath.h"
@@ -42,9 +43,10 @@ int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_e
     const uint32_t n = bvh->scene->n_triangles;
     bvh->plane = huge_pages_alloc(((size_t)n + 1) * sizeof *bvh->plane);
     if (bvh->plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < bvh->n_leaves; i++) {
         if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
-        bvh_set_plane(bvh, i, &bvh->plane[i]);
+        for (int which = 0; which < 2; which++)
+            bvh->plane[bvh_leaf_triangle(&bvh->leaf[i], which)] = bvh->leaf[i].plane[which];
     }
     bvh->plane[n] = (struct bvh_plane){.n = {NAN, NAN, NAN}, .d = NAN};
     return SH_OK;
