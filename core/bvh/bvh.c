@@ -67,13 +67,13 @@ static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err
     return check_device(bvh->device, err);
 }
 
-/* The planes are made after Embree has freed its memory for building, so that the peak is lower. */
+/* The places of planes are noted after Embree has freed its memory for building, so that the peak is lower. */
 static int build(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err)
 {
     int rc = bvh_make_leaves(bvh, report, err);
     if (rc == SH_OK) rc = bvh_make_copies(bvh, threads, report, err);
     if (rc == SH_OK) rc = commit(bvh, report, err);
-    if (rc == SH_OK) rc = bvh_make_planes(bvh, report, err);
+    if (rc == SH_OK) rc = bvh_find_planes(bvh, report, err);
     return rc;
 }
 
@@ -120,8 +120,8 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
     bvh->info.packet = embree_packet(bvh->device);
     bvh->info.build_s = 1e-9 * (double)(monotonic_ns() - start_ns);
     bvh->info.bytes += (uint64_t)__atomic_load_n(&bvh->bytes, __ATOMIC_RELAXED) +
-                       (uint64_t)scene->n_triangles * sizeof *bvh->plane + (uint64_t)bvh->n_leaves * sizeof *bvh->leaf +
-                       (uint64_t)scene->n_copies * sizeof *bvh->copy;
+                       (uint64_t)scene->n_triangles * sizeof *bvh->at_plane +
+                       (uint64_t)bvh->n_leaves * sizeof *bvh->leaf + (uint64_t)scene->n_copies * sizeof *bvh->copy;
     *out = bvh;
     return SH_OK;
 }
@@ -133,7 +133,7 @@ void bvh_free(struct bvh *bvh)
     rtcReleaseDevice(bvh->device);
     bvh_free_copies(bvh);
     free(bvh->leaf);
-    free(bvh->plane);
+    free(bvh->at_plane);
     free(bvh);
 }
 
@@ -155,9 +155,4 @@ void bvh_origin(const struct bvh *bvh, double origin_m[3])
 const struct scene *bvh_scene(const struct bvh *bvh)
 {
     return bvh->scene;
-}
-
-const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle)
-{
-    return &bvh->plane[triangle];
 }

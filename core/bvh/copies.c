@@ -219,12 +219,12 @@ void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *p
 {
     struct scene_part part;
     if (triangle < bvh->scene->n_triangles) {
-        *plane = bvh->plane[triangle];
+        *plane = *bvh_plane(bvh, triangle);
         return;
     }
     scene_find_part(bvh->scene, triangle, &part);
     const struct bvh *mesh = bvh->mesh[part.copied];
-    const struct bvh_plane *in = &mesh->plane[part.triangle];
+    const struct bvh_plane *in = bvh_plane(mesh, part.triangle);
     const double s = part.copy->scale, above = in->d + vec3_dot(in->n, mesh->origin_m);
     double off[3];
     scene_copy_turn(part.copy, in->n, plane->n);

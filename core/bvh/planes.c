@@ -38,18 +38,35 @@ void bvh_set_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *p
     plane->d = vec3_dot(plane->n, centre);
 }
 
-int bvh_make_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+int bvh_find_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
-    const uint32_t n = bvh->scene->n_triangles;
-    bvh->plane = huge_pages_alloc(((size_t)n + 1) * sizeof *bvh->plane);
-    if (bvh->plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
-    for (uint32_t i = 0; i < bvh->n_leaves; i++) {
+    const uint32_t n = bvh->scene->n_triangles, n_leaves = bvh->n_leaves;
+    if (n_leaves > INT32_MAX) return sh_fail(err, SH_EINPUT, "bvh: %u leaves; allowed are %d", n_leaves, INT32_MAX);
+    bvh->at_plane = huge_pages_alloc(((size_t)n + 1) * sizeof *bvh->at_plane);
+    if (bvh->at_plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
+    for (uint32_t i = 0; i < n_leaves; i++) {
         if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
-        for (int which = 0; which < 2; which++)
-            bvh->plane[bvh_leaf_triangle(&bvh->leaf[i], which)] = bvh->leaf[i].plane[which];
+        for (uint32_t which = 2; which-- > 0;) /* a triangle that is alone is the first */
+            bvh->at_plane[bvh_leaf_triangle(&bvh->leaf[i], (int)which)] = 2 * i + which;
     }
-    bvh->plane[n] = (struct bvh_plane){.n = {NAN, NAN, NAN}, .d = NAN};
+    bvh->at_plane[n] = 2 * n_leaves;
+    bvh->leaf[n_leaves].plane[0] = (struct bvh_plane){.n = {NAN, NAN, NAN}, .d = NAN};
     return SH_OK;
+}
+
+const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle)
+{
+    const uint32_t at = bvh->at_plane[triangle];
+    return &bvh->leaf[at / 2].plane[at % 2];
+}
+
+/* Where a triangle's plane begins in the leaves, as an array of doubles. */
+VEC_INLINE int64_t doubles_before(const uint32_t *at_plane, uint32_t triangle, uint32_t n_triangles)
+{
+    _Static_assert(sizeof(struct bvh_leaf) == 16 * sizeof(double), "four planes");
+    _Static_assert(offsetof(struct bvh_leaf, plane) == 8 * sizeof(double), "the last two are the planes");
+    const int64_t at = at_plane[triangle < n_triangles ? triangle : n_triangles];
+    return 16 * (at / 2) + 8 + 4 * (at % 2);
 }
 
 VEC_CLONES
@@ -79,12 +96,13 @@ static void find_labels(const struct bvh *bvh, const struct bvh_rays *rays)
 VEC_CLONES
 static void find_steepness(const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    const double *tri = (const double *)bvh->plane, *dx = rays->dir.x, *dy = rays->dir.y, *dz = rays->dir.z;
-    const uint32_t n_triangles = bvh->scene->n_triangles, n = rays->n, *prim = rays->triangle;
+    const double *tri = (const double *)bvh->leaf, *dx = rays->dir.x, *dy = rays->dir.y, *dz = rays->dir.z;
+    const uint32_t n_triangles = bvh->scene->n_triangles, n = rays->n, *prim = rays->triangle,
+                   *at_plane = bvh->at_plane;
     float *steep = rays->steep;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        const int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
+        const int64_t at = doubles_before(at_plane, prim[i], n_triangles);
         const double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
         const double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
@@ -162,7 +180,7 @@ static void say_nothing(const struct bvh_rays *rays, uint32_t from, uint32_t to)
 
 VEC_INLINE void set_one(struct one_plane *p, const struct bvh *bvh, uint32_t triangle, const double o[3])
 {
-    const struct bvh_plane *tri = &bvh->plane[triangle];
+    const struct bvh_plane *tri = bvh_plane(bvh, triangle);
     *p = (struct one_plane){.nx = tri->n[0],
                             .ny = tri->n[1],
                             .nz = tri->n[2],
@@ -210,11 +228,11 @@ VEC_CLONES
 static void find_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_in *dir,
                          uint32_t n, double *restrict cosine)
 {
-    const double *tri = (const double *)bvh->plane, *dx = dir->x, *dy = dir->y, *dz = dir->z;
-    const uint32_t n_triangles = bvh->scene->n_triangles;
+    const double *tri = (const double *)bvh->leaf, *dx = dir->x, *dy = dir->y, *dz = dir->z;
+    const uint32_t n_triangles = bvh->scene->n_triangles, *at_plane = bvh->at_plane;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        int64_t at = (int64_t)(triangle[i] < n_triangles ? triangle[i] : n_triangles) * 4;
+        const int64_t at = doubles_before(at_plane, triangle[i], n_triangles);
         double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
         double c = fabs(nx * dx[i] + ny * dy[i] + nz * dz[i]) / sqrt(nx * nx + ny * ny + nz * nz);
         cosine[i] = c > 1.0 ? 1.0 : c;
