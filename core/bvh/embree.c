@@ -8,7 +8,7 @@
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err)
 {
     if (code == RTC_ERROR_OUT_OF_MEMORY)
-        return sh_fail(err, SH_ENOMEM, "%s: no memory; mesh and BVH take 140 to 310 bytes for each triangle", what);
+        return sh_fail(err, SH_ENOMEM, "%s: no memory; mesh and BVH take 120 to 300 bytes for each triangle", what);
     if (code == RTC_ERROR_UNSUPPORTED_CPU)
         return sh_fail(err, SH_EIO, "%s: this build of Embree doesn't support this processor", what);
     return sh_fail(err, SH_EIO, "%s: Embree failed (RTCError %d)", what, (int)code);

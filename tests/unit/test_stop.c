@@ -164,7 +164,7 @@ static void errors_of_embree(void **state)
     assert_non_null(strstr(err.text, "RTCError 3"));
 }
 
-/* The memory is enough for the planes and for Embree's buffers (80 bytes a triangle), but not for its BVH. */
+/* The memory is enough for the leaves and for some of Embree's buffers (80 bytes a triangle), but not for its BVH. */
 static void no_memory_is_said(void **state)
 {
     (void)state;
