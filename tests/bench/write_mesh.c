@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/* Writes a scene of the bench into a mesh file, and prints where its station stands:
+ *   build/tests/bench/write_mesh NAME FILE */
+#include <stdio.h>
+
+#include "core/studio/mesh.h"
+#include "tests/bench/bench.h"
+#include "tests/bench/options.h"
+
+int main(int argc, char **argv)
+{
+    struct bench_target target = {0};
+    struct sh_err err;
+    if (argc != 3) {
+        fprintf(stderr,
+                "write_mesh NAME FILE: NAME as in bench --scenes; FILE ends in .obj, .ply, .glb, .gltf or .fbx\n");
+        return BENCH_USAGE;
+    }
+    int rc = bench_target_load(argv[1], BENCH_HOUSE_FILE, NULL, &target, &err);
+    if (rc == SH_OK) {
+        const struct mesh mesh = {.n_vertices = target.scene->n_vertices,
+                                  .n_faces = target.scene->n_triangles,
+                                  .xyz_m = (const double(*)[3])target.scene->vertex_m,
+                                  .face = (const uint32_t(*)[3])target.scene->triangle};
+        rc = mesh_write(argv[2], &mesh, NULL, &err);
+    }
+    if (rc == SH_OK)
+        printf("%.9g %.9g %.9g\n", target.station_m[0], target.station_m[1], target.station_m[2]);
+    else
+        fprintf(stderr, "write_mesh: %s\n", err.text);
+    bench_target_free(&target);
+    return rc == SH_OK ? BENCH_OK : BENCH_FAILED;
+}
