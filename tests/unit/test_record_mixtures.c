@@ -68,6 +68,32 @@ static void test_several_heads(void **state)
     }
 }
 
+static int count_of(const char *text, const char *what)
+{
+    int n = 0;
+    for (; (text = strstr(text, what)) != NULL; text++)
+        n++;
+    return n;
+}
+
+/* Two heads take turns at 130 stations. The header has some of these turns, and a note counts all others. */
+static void test_many_heads(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    int left_out = 0;
+    rig_begin();
+    for (uint32_t i = 1; i <= 130; i++) {
+        const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, i);
+        put_scan(i % 2 == 0 ? "Maker,Model,SN1,1" : "Maker,Model,SN2,1", "model", 1, &a);
+    }
+    assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, &err), 0);
+    char *text = read_of("a.ply");
+    assert_int_equal(sscanf(strstr(rig_notes, "a.ply: "), "a.ply: %d names of surfaces and heads", &left_out), 1);
+    assert_int_equal(count_of(text, " idn ") + left_out, 130);
+    free(text);
+}
+
 static void expect_refused(const struct native_anchor *a, const struct native_anchor *b, const char *why)
 {
     static const char *const name[] = {"a.ply", "a.las", "a.e57"};
@@ -249,9 +275,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_other_kinds),    cmocka_unit_test(test_ply_says),
-        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_poles),
-        cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_many_heads),
+        cmocka_unit_test(test_other_kinds),   cmocka_unit_test(test_ply_says),
+        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings),
+        cmocka_unit_test(test_poles),         cmocka_unit_test(test_sparse_labels),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
