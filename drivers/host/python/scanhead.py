@@ -56,7 +56,7 @@ _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
 _FRAME_BYTES = 512  # memory of a kept frame beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
-_ANSWERS_S = 0.2  # how long further answers to questions that were given up may take
+_ANSWERS_S = 0.2  # after one answer to *IDN?, how long the others may take
 _SCANNING, _SPIN_DOWN = 4, 5  # states of the head
 _NAN = math.nan
 
