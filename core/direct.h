@@ -13,8 +13,8 @@ enum {
     DIRECT_FROM = 8 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
-/* Switches it on or off for the writes that follow. *is_on is 0 at first; it becomes -1 where the file system or an older
- * kernel can't do it, and then stays so. */
+/* Switches it on or off for the writes that follow. *is_on is 0 at first; it becomes -1 where the file system or an
+ * older kernel can't do it, and then stays so. */
 static inline void direct_set(int fd, int *is_on, int on)
 {
     if (*is_on < 0 || *is_on == on) return;
@@ -23,8 +23,8 @@ static inline void direct_set(int fd, int *is_on, int on)
     *is_on = is_set ? on : -1;
 }
 
-/* pwrite(), again after a signal. Where the file system refuses a direct write after all, or wants larger blocks, direct
- * writing is over, and the bytes are written without it. Returns how many were written, or -1 with errno. */
+/* pwrite(), again after a signal. Where the file system refuses a direct write after all, or wants larger blocks,
+ * direct writing is over, and the bytes are written without it. Returns how many were written, or -1 with errno. */
 static inline ssize_t direct_pwrite(int fd, int *is_on, const void *data, size_t len, off_t at)
 {
     for (;;) {

@@ -10,7 +10,7 @@
 
 /* ---- coordinates */
 
-/* Rounds as rint does. Numbers that are too far stay too far; then it returns 0. */
+/* Rounds as rint does. Returns 0 where a number is too far for 32 bits; vec_round keeps such numbers too far. */
 VEC_CLONES static int counts_fit(const double *restrict at, int n, double offset, double scale, int32_t *restrict to)
 {
     uint64_t any_beyond = 0;
@@ -34,18 +34,13 @@ int las_set_counts(const double *at, int n, double offset, double scale, int32_t
 
 /* ---- intensities */
 
-VEC_CLONES static void set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to)
+VEC_CLONES void las_set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to)
 {
     for (int i = 0; i < n; i++) {
         uint64_t bits;
         vec_round(reflectance_db[i] * 100, &bits);
         to[i] = (uint16_t)(isnan(reflectance_db[i]) ? 0 : bits + 32768);
     }
-}
-
-void las_set_intensities(const double *reflectance_db, int n, uint16_t *to)
-{
-    set_intensities(reflectance_db, n, to);
 }
 
 /* ---- scan angles */

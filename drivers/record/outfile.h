@@ -51,7 +51,7 @@ void outfile_yield(struct outfile *file);
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
 /* Reserves len bytes on the disk for the end of the file, so that the end, or a repair, can be written when the disk is
- * full. The reserved room lies far behind the end, and does not count as length. Nothing is reserved where the file
+ * full. The reserved room lies far beyond the end, and does not count as length. Nothing is reserved where the file
  * system can't do that, or files have a limit. SH_EIO: the disk is full. */
 int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err);
 /* Frees the reserved room, for what is written next. */
