@@ -68,14 +68,6 @@ static void test_several_heads(void **state)
     }
 }
 
-static int count_of(const char *text, const char *what)
-{
-    int n = 0;
-    for (; (text = strstr(text, what)) != NULL; text++)
-        n++;
-    return n;
-}
-
 /* Two heads take turns at 130 stations. The header has some of these turns, and a note counts all others. */
 static void test_many_heads(void **state)
 {
@@ -90,7 +82,7 @@ static void test_many_heads(void **state)
     assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, &err), 0);
     char *text = read_of("a.ply");
     assert_int_equal(sscanf(strstr(rig_notes, "a.ply: "), "a.ply: %d names of surfaces and heads", &left_out), 1);
-    assert_int_equal(count_of(text, " idn ") + left_out, 130);
+    assert_int_equal(rig_count(text, " idn ") + left_out, 130);
     free(text);
 }
 

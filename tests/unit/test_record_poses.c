@@ -73,14 +73,6 @@ static void test_stops(void **state)
     assert_non_null(strstr(at, ",12.5\n"));
 }
 
-static int count(const char *in, const char *what)
-{
-    int n = 0;
-    for (; (in = strstr(in, what)) != NULL; in++)
-        n++;
-    return n;
-}
-
 /* Frames share a pose where none was lost. In the next scan times begin again. */
 static void test_moving(void **state)
 {
@@ -147,7 +139,7 @@ static void test_same_numbers(void **state)
                  i, i, i);
         assert_non_null(strstr(text, rows));
     }
-    assert_int_equal(count(text, "\n"), 1 + 4 * 3);
+    assert_int_equal(rig_count(text, "\n"), 1 + 4 * 3);
 }
 
 static void test_link(void **state)
@@ -162,7 +154,7 @@ static void test_link(void **state)
         put_scan(1, 1, &a);
         put_poses(0, 100, 5);
         const char *at = record();
-        assert_int_equal(count(at, "\n#"), i == 0 ? 0 : 3);
+        assert_int_equal(rig_count(at, "\n#"), i == 0 ? 0 : 3);
         if (i == 0) continue;
         assert_non_null(strstr(at, axes[i]));
         assert_non_null(strstr(at, "ellipsoidal height_m: 10,20,30: 45,9,400.125\n"));
