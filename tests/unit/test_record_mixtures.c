@@ -68,21 +68,20 @@ static void test_several_heads(void **state)
     }
 }
 
-/* Two heads take turns at 130 stations. The header has some of these turns, and a note counts all others. */
+/* Two heads take turns at 130 stations. The header names 128 of these turns, and a note counts the others. */
 static void test_many_heads(void **state)
 {
     (void)state;
     struct sh_err err = {0};
-    int left_out = 0;
     rig_begin();
     for (uint32_t i = 1; i <= 130; i++) {
         const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, i);
         put_scan(i % 2 == 0 ? "Maker,Model,SN1,1" : "Maker,Model,SN2,1", "model", 1, &a);
     }
-    assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, &err), 0);
+    assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 130}, &err), 0);
     char *text = read_of("a.ply");
-    assert_int_equal(sscanf(strstr(rig_notes, "a.ply: "), "a.ply: %d names of surfaces and heads", &left_out), 1);
-    assert_int_equal(rig_count(text, " idn ") + left_out, 130);
+    assert_int_equal(rig_count(text, " idn "), 128);
+    assert_non_null(strstr(rig_notes, "a.ply: 2 names of surfaces and heads left out"));
     free(text);
 }
 
