@@ -292,6 +292,7 @@ def misuse(path):
         late_replies(lines)
     late_answer()
     dropped_frames()
+    whole_frame()
     print("refused")
 
 
@@ -325,6 +326,14 @@ def late_answer():
 
     threading.Thread(target=answer, daemon=True).start()
     assert head.query("HEAD:LINes?") == "2"
+
+
+def whole_frame():
+    """A frame that needs two reads has come all the same."""
+    head, theirs = pair()
+    theirs.sendall(framed(200, scanhead.LOCAL, 65536, bytes(65536)))
+    assert len(head.next_frame(0).payload) == 65536
+    refused(head.next_frame, 0)
 
 
 def dropped_frames():

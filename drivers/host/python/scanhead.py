@@ -59,6 +59,7 @@ _POLL_MS = 2**31 - 1  # the longest that poll() waits
 _ANSWERS_S = 0.2  # after one answer to *IDN?, how long the others may take
 _SCANNING, _SPIN_DOWN = 4, 5  # states of the head
 _NAN = math.nan
+_NO_WAIT = -math.inf  # a deadline: bytes that are there are taken, all of them
 
 
 class ScanheadError(Exception):
@@ -1295,7 +1296,7 @@ class Head:
 
     def _check(self, deadline_s: Optional[float]) -> None:
         """Raises Timeout after the deadline. A head could keep a loop busy with bytes that nobody waits for."""
-        if deadline_s is not None and time.monotonic() > deadline_s:
+        if deadline_s is not None and _NO_WAIT < deadline_s < time.monotonic():
             raise Timeout(f"{self._source.name}: what was waited for did not come in time")
 
     def _wait_writable(self, deadline_s: float) -> None:
@@ -1352,8 +1353,9 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them."""
-        deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
+        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them. timeout_s 0: a
+        frame that has come, in however many pieces."""
+        deadline_s = None if timeout_s is None else _NO_WAIT if timeout_s <= 0 else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
             frame = self._unqueue()
