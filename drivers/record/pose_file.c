@@ -27,7 +27,7 @@ struct pose_file {
     int titled;
     /* of a head that moves */
     uint32_t n_scans;
-    int is_due;                /* a descriptor that is no repetition came: a scan begins */
+    int is_due;                /* the event SCAN_START came, and no pose after it */
     const struct scanhead *sh; /* of the present scan */
     uint32_t scan, station;    /* of the present scan, as its head numbers them */
     int64_t last_ns;           /* written last */
@@ -102,7 +102,8 @@ static int put_link(struct pose_file *file, const struct scanhead_info *info, st
     return outfile_write(&file->base.file, text, (size_t)n, err);
 }
 
-/* The number alone does not say it: another head, or one that has started again, numbers its scans from 1 on. */
+/* The number alone does not say it: another head, or one that has started again, numbers its scans from 1 on. A new
+ * descriptor does not say it either: settings may change within a scan, whose poses go on then. */
 static int is_new_scan(const struct pose_file *file, const struct scanhead *sh, const struct scanhead_info *info)
 {
     return file->n_scans == 0 || file->is_due || sh != file->sh || info->scan != file->scan ||
@@ -143,7 +144,7 @@ static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead
 {
     struct pose_file *file = rec;
     if (frame->type == SCANHEAD_POSES) return put_poses(file, sh, frame, err);
-    file->is_due |= frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0;
+    file->is_due |= frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_START;
     return track_frame(&file->base.track, sh, frame, err);
 }
 

@@ -99,6 +99,31 @@ static void test_moving(void **state)
     assert_string_equal(at, want);
 }
 
+static void put_scan_start(uint32_t scan)
+{
+    static uint8_t out[256];
+    const struct native_event e = {.code = NATIVE_EV_SCAN_START, .a = scan};
+    rig_put(out, native_encode_event(out, sizeof out, &e, 0, 0));
+}
+
+/* Settings that change within a scan give another descriptor. The poses go on, and their times still rise. */
+static void test_other_settings(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    put_scan_start(1);
+    put_scan(0, 1, &a);
+    put_poses(0, 100, 5);
+    put_scan(0, 1, &a);
+    put_poses(100, 200, 6);
+    const char *at = record();
+    assert_non_null(strstr(at, "\n1,0.000000000,0,5,0,1,0,0,0,0,0\n1,0.100000000,0,6,0,1,0,0,0,0,0\n"
+                               "1,0.200000000,0,7,0,1,0,0,0,0,0\n"));
+    assert_int_equal(rig_count(at, "\n"), 4);
+}
+
 /* Two heads start again, so that each calls both of its scans 5. In the file they are 1 to 4, and no pose is left out. */
 static void test_same_numbers(void **state)
 {
@@ -113,6 +138,7 @@ static void test_same_numbers(void **state)
     a.moving = NATIVE_MOVING;
     rig_begin();
     for (int i = 0; i < 2; i++) {
+        put_scan_start(5);
         put_scan(0, 5, &a);
         put_poses(0, 100, 5);
         put_poses(100, 200, 6);
@@ -170,8 +196,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stations),     cmocka_unit_test(test_stops), cmocka_unit_test(test_moving),
-        cmocka_unit_test(test_same_numbers), cmocka_unit_test(test_link),
+        cmocka_unit_test(test_stations),       cmocka_unit_test(test_stops),        cmocka_unit_test(test_moving),
+        cmocka_unit_test(test_other_settings), cmocka_unit_test(test_same_numbers), cmocka_unit_test(test_link),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
