@@ -92,8 +92,9 @@ static void set_pose(struct track *t)
         station_pose_of(&t->info, &t->pose);
 }
 
-/* A scan begins with a descriptor that is no repetition, pulses that go back, or another station or scan. Any of these
- * will do, since frames may be lost. */
+/* A scan of the file begins with a descriptor that is no repetition, pulses that go back, or another station or scan.
+ * Any of these will do, since frames may be lost. Such a descriptor also comes when settings change within a scan:
+ * rows and columns stand for other angles then, and scales may be others. */
 static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
 {
     return t->n_scans == 0 || t->state.new_scan || frame->pulse0 < t->state.last_pulse0 ||
