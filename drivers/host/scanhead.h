@@ -96,12 +96,12 @@ struct scanhead_usb_head {
  * NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
-/* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive
- * meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops
- * the oldest and counts them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the
- * command was answered. Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all
- * reply lines up to the answer to *IDN?. Before it was in raw mode, the terminal may have echoed the head's own
- * bytes to the head. It does the same after SCANHEAD_ETIMEOUT, since the reply may still come. */
+/* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
+ * are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops the oldest and counts
+ * them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
+ * the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to *IDN?.
+ * Before it was in raw mode, the terminal may have echoed the head's own bytes to the head. It does the same after a
+ * command that ended without its reply, since that may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
