@@ -103,8 +103,10 @@ static int patch_page(struct e57_pages *pages, uint64_t logical, const uint8_t *
     }
     int rc = outfile_flush(pages->file, err);
     if (rc != 0) return rc;
-    if (pread(pages->file->fd, page, E57_PAGE, (off_t)(number * E57_PAGE)) != E57_PAGE)
-        return sh_fail(err, SH_EIO, "%s: cannot read back: %s", pages->file->part, strerror(errno));
+    const ssize_t n_read = pread(pages->file->fd, page, E57_PAGE, (off_t)(number * E57_PAGE));
+    if (n_read != E57_PAGE)
+        return sh_fail(err, SH_EIO, "%s: cannot be read back: %s", pages->file->part,
+                       n_read < 0 ? strerror(errno) : "it became shorter");
     memcpy(page + first, p, n);
     put_crc(page);
     return outfile_patch(pages->file, number * E57_PAGE, page, E57_PAGE, err);

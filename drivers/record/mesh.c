@@ -40,7 +40,7 @@ static int check_points(const char *path, double n, struct sh_err *err)
     if (there > 0 && bytes > there)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and %.1f GiB are available: scan fewer "
+            "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and this machine has %.1f GiB: scan fewer "
             "stations, more coarsely, or with --split",
             path, n, bytes / GIB, there / GIB);
     return SH_OK;
