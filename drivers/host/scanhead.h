@@ -23,8 +23,7 @@
  *
  * Threads: a handle belongs to one thread at a time. Different handles are independent.
  *
- * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no
- * value. */
+ * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no value. */
 #ifndef SCANHEAD_H
 #define SCANHEAD_H
 
@@ -327,8 +326,7 @@ struct scanhead_line_end {
     uint32_t n_faint;   /* hits that the head did not detect */
     uint32_t n_unfit;   /* echoes too far for the stream's integers: sent as empty shots */
 };
-/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong
- * payload. */
+/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
 /* Descriptor and anchor say this about the stream. Strings are the handle's, until its next call. */
@@ -401,8 +399,8 @@ enum scanhead_pose_flags {
 /* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
  * SCANHEAD_ESTATE where the stream has not said it, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
-/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index
- * `first`. Returns how many. */
+/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
+ * Returns how many. */
 int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
                    uint32_t max);
 /* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the
@@ -423,8 +421,7 @@ int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 
-/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come
- * yet. */
+/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
 struct scanhead_stats {
