@@ -12,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/bytes.h"
 #include "core/grow.h"
 #include "core/vecmath.h"
 #include "drivers/protocol/native.h"

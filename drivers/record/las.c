@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "drivers/protocol/native.h"
 #include "drivers/record/las_inside.h"
 #include "drivers/record/las_repair.h"
 

@@ -45,7 +45,10 @@ VEC_CLONES void las_set_intensities(const double *restrict reflectance_db, int n
 
 /* ---- scan angles */
 
-uint16_t las_scan_angle(double x, double y, double z)
+enum { SCAN_ANGLE_NONE = UINT16_MAX };
+
+/* The formula for one point. It gives SCAN_ANGLE_NONE where the angle is NaN. */
+static uint16_t scan_angle(double x, double y, double z)
 {
     const float flat = sqrtf((float)(x * x + y * y)), up = atan2f(flat, (float)-z);
     return isnan(up) ? SCAN_ANGLE_NONE : (uint16_t)lrintf(up * SCAN_ANGLE_COUNTS_PER_RAD);
@@ -91,7 +94,7 @@ uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, 
     near_scan_angles(x, y, z, n, to);
     for (int i = 0; i < n; i++) {
         if (to[i] != SCAN_ANGLE_NONE) continue;
-        to[i] = las_scan_angle(x[i], y[i], z[i]);
+        to[i] = scan_angle(x[i], y[i], z[i]);
         if (to[i] != SCAN_ANGLE_NONE) continue;
         to[i] = 0;
         n_none++;

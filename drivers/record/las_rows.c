@@ -2,8 +2,6 @@
 /* Rows of a LAS file, and the counts of its header. */
 #include "drivers/record/las_columns.h"
 
-#include <string.h>
-
 #include "core/bytes.h"
 #include "core/vecmath.h"
 

@@ -7,7 +7,6 @@
  *
  * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
  * the file) by itself. So is each sweep of the pan. Where lines go back, another part begins, too. */
-#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +16,6 @@
 #include "core/grow.h"
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
-#include "drivers/protocol/native.h"
 #include "drivers/record/mesh_recorder.h"
 #include "drivers/record/mesh_texture.h"
 #include "drivers/record/obj_repair.h"

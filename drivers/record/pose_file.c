@@ -10,7 +10,6 @@
  * how the scene frame lies in the CRS of the geo layout.
  *
  * Scans are numbered from 1 on in the file, as in .waves.csv and .e57. */
-#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
