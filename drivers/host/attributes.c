@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* These stream frames follow the points: attributes and colour of each point, sums of each line. waves.c has
+/* Decodes the stream frames that follow the points: attributes and colour of each point, sums of each line. waves.c has
  * waveforms. */
 #include <math.h>
 #include <string.h>
@@ -29,20 +29,22 @@ int scanhead_has_deviations(const struct scanhead *sh)
     return host_has_content(sh, NATIVE_HAS_DEVIATIONS);
 }
 
-/* Whether the frame is number `after` behind the last points frame, and belongs to the same points. */
+/* Returns whether the frame comes `after` numbers after the last points frame, and belongs to the same points. */
 static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t after)
 {
     return sh->have_points && frame->seq == sh->points_seq + after && frame->pulse0 == sh->of_points.pulse0 &&
            frame->scan_line == sh->of_points.line && frame->n_points == sh->of_points.n_points;
 }
 
-/* How many there are from `first` on, at most max; or an error. */
-static int attributes_from(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, uint32_t max)
+/* Returns how many attributes, or colours, there are from `first` on, at most max; or an error. */
+static int beside_from(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type,
+                       uint32_t first, uint32_t max)
 {
-    int rc = host_check_last(sh, frame, SCANHEAD_ATTRIBUTES);
+    const int is_colours = type == SCANHEAD_COLOURS, rc = host_check_last(sh, frame, type);
     if (rc != 0) return rc;
-    if (!is_of_points(sh, frame, 1))
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the points of these attributes were lost", sh->source.name);
+    if (!is_of_points(sh, frame, is_colours && scanhead_has_attributes(sh) == 1 ? 2 : 1))
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the points of these %s were lost", sh->source.name,
+                       is_colours ? "colours" : "attributes");
     const uint32_t n = first < frame->n_points ? frame->n_points - first : 0;
     return (int)(n < max ? n : max);
 }
@@ -72,7 +74,7 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 {
     if (scanhead_has_deviations(sh) != 1)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the head's attributes have no deviations", sh->source.name);
-    const int n = attributes_from(sh, frame, first, max);
+    const int n = beside_from(sh, frame, SCANHEAD_ATTRIBUTES, first, max);
     if (n > 0)
         set_deviations(frame->payload + (size_t)first * NATIVE_DEVIATION_LEN, frame->n_points, (uint32_t)n, deviation);
     return n;
@@ -81,7 +83,7 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max)
 {
-    const int n = attributes_from(sh, frame, first, max);
+    const int n = beside_from(sh, frame, SCANHEAD_ATTRIBUTES, first, max);
     if (n > 0) set_attributes(frame->payload + (size_t)first * NATIVE_ATTRIBUTE_LEN, (uint32_t)n, attributes);
     return n;
 }
@@ -89,16 +91,12 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      struct scanhead_colour *colours, uint32_t max)
 {
-    int rc = host_check_last(sh, frame, SCANHEAD_COLOURS);
-    if (rc != 0) return rc;
-    if (!is_of_points(sh, frame, scanhead_has_attributes(sh) == 1 ? 2 : 1))
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the points of these colours were lost", sh->source.name);
-    if (first >= frame->n_points) return 0;
-    uint32_t n = frame->n_points - first;
-    if (n > max) n = max;
+    const int n = beside_from(sh, frame, SCANHEAD_COLOURS, first, max);
     _Static_assert(sizeof *colours == NATIVE_COLOUR_LEN, "a colour is as on the wire");
-    memcpy(colours, frame->payload + NATIVE_COLOURS_HEAD_LEN + (size_t)first * NATIVE_COLOUR_LEN, n * sizeof *colours);
-    return (int)n;
+    if (n > 0)
+        memcpy(colours, frame->payload + NATIVE_COLOURS_HEAD_LEN + (size_t)first * NATIVE_COLOUR_LEN,
+               (size_t)n * sizeof *colours);
+    return n;
 }
 
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end)

@@ -14,10 +14,10 @@
 
 struct host_capture {
     struct pcapng_reader reader;
-    size_t start, end; /* of what was read and not taken */
+    size_t start, end; /* of the bytes in buf that were not taken */
     const uint8_t *data;
-    size_t data_len; /* of a packet: what was not handed on yet */
-    int is_raw;      /* no blocks any more */
+    size_t data_len; /* of a packet's bytes that were not handed on yet */
+    int is_raw;      /* 1: the rest of the file is handed on as it is, not block by block */
     uint8_t buf[4 * NATIVE_MAX_FRAME];
 };
 
@@ -28,7 +28,7 @@ static size_t capture_take(const uint8_t *from, size_t have, void *to, size_t ro
     return n;
 }
 
-/* More of the file into the buffer. Returns as read(). */
+/* Reads more of the file into the buffer. Returns as read() does. */
 static ssize_t capture_fill(struct host_source *source)
 {
     struct host_capture *c = source->capture;
@@ -40,7 +40,8 @@ static ssize_t capture_fill(struct host_source *source)
     return n;
 }
 
-/* Goes on to the next packet of frames. 1: there is one, or the blocks have ended; 0: the end of the file; -1: errno. */
+/* Goes on to the next packet of frames. Returns 1 if there is one or no block can follow, 0 at the file's end, -1 with
+ * errno. */
 static int next_packet(struct host_source *source)
 {
     struct host_capture *c = source->capture;
@@ -98,13 +99,7 @@ static int capture_wait(struct host_source *source, short events, int64_t deadli
     return 1;
 }
 
-static ssize_t capture_write(struct host_source *source, const void *data, size_t len)
-{
-    return host_fd_ops.write(source, data, len);
-}
-
-static const struct host_source_ops capture_ops = {
-    .read = capture_read, .write = capture_write, .wait = capture_wait, .close = capture_close};
+static const struct host_source_ops capture_ops = {.read = capture_read, .wait = capture_wait, .close = capture_close};
 
 /* The first interface says what the packets are. */
 static int check_front(struct host_source *source, struct sh_err *err)

@@ -9,7 +9,7 @@
 
 enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200, ASK_AGAIN_MS = 1000 };
 
-/* Keeps the frames that are in the parser. 1: the parser is at a text. */
+/* Keeps the frames that are in the parser. Returns 1 if the parser is at a line, 0 if it needs more bytes. */
 static int take_items(struct scanhead *sh)
 {
     for (;;) {
@@ -21,7 +21,7 @@ static int take_items(struct scanhead *sh)
     }
 }
 
-/* Whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
+/* Returns whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
  * quotes. */
 static int is_identity(const char *text)
 {
@@ -36,7 +36,7 @@ static int asks_identity(const char *command)
     return strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
 }
 
-/* The late answer to a question of settle() gives no notice. */
+/* The late answer to a question of exchange_settle() gives no notice. */
 void host_stray_line(struct scanhead *sh)
 {
     if (sh->source.asked > 0 && is_identity(sh->parser.text)) {
@@ -47,7 +47,7 @@ void host_stray_line(struct scanhead *sh)
     host_note_line(sh, 0);
 }
 
-/* 1: the line at hand is what was just sent, come back. */
+/* Returns 1 if the line at hand is an echo of the command that was just sent. */
 static int is_echo(struct scanhead *sh, const char *command)
 {
     if (strcmp(sh->parser.text, command) != 0) return 0;
@@ -95,7 +95,7 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
     return rc == 0 && sh->ended ? host_over(sh) : rc;
 }
 
-/* The head is gone, but what came before can still be read. */
+/* The head is gone, but frames that came before can still be read. */
 static int gone_while_writing(struct scanhead *sh, int error)
 {
     host_note_loss(sh, error);
@@ -167,14 +167,15 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
         if (rc == 1) continue;
         if (rc == 0 && sh->ended) return host_over(sh);
         if (rc == 0) rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
-        if (rc == SH_ETIMEOUT && answered) break; /* is_late knows the others, should they come yet */
+        if (rc == SH_ETIMEOUT && answered) break; /* is_late finds the others, if they come after all */
         if (rc != 0) return rc;
     }
     sh->source.unsettled = 0;
     return 0;
 }
 
-/* Whether a line is the answer to a question of settle() that comes after all, instead of the reply to this command. */
+/* Returns whether a line is the answer to a question of exchange_settle() that comes after all, instead of the reply to
+ * this command. */
 static int is_late(struct scanhead *sh, const char *command)
 {
     if (sh->source.asked == 0 || asks_identity(command) || !is_identity(sh->parser.text)) return 0;
@@ -199,7 +200,7 @@ static int exchange_settle(struct scanhead *sh, int64_t deadline_ns)
     }
 }
 
-/* The reply may still come, and must not count as that of the next command: so settle() comes before that. */
+/* The reply may still come, and must not count as that of the next command: so exchange_settle() comes before that. */
 static void give_up(struct scanhead *sh, const char *command)
 {
     const int asks = asks_identity(command);
@@ -222,6 +223,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     rc = discard_stale(sh);
     if (rc == 0 && sh->source.unsettled && !sh->ended) rc = exchange_settle(sh, deadline_ns);
     if (rc == 0) rc = sh->ended ? host_gone(sh) : send_all(sh, line, len + 1, deadline_ns);
+    const int is_sent = rc == 0;
     while (rc == 0) {
         rc = take_items(sh);
         if (rc == 1 && (is_echo(sh, command) || is_late(sh, command))) {
@@ -233,10 +235,8 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
         if (sh->ended) return host_over(sh);
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
-    if (rc == SH_ETIMEOUT) {
-        give_up(sh, command);
-        return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
-                       timeout_ms);
-    }
-    return rc;
+    if (is_sent) give_up(sh, command); /* also where a frame that came meanwhile was wrong */
+    if (rc != SH_ETIMEOUT) return rc;
+    return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
+                   timeout_ms);
 }

@@ -28,7 +28,7 @@ struct host_surface {
 
 /* Frames that wait while a command waits for its reply. */
 struct host_kept {
-    struct host_node *first, *last, *current; /* current: the one that was handed out */
+    struct host_node *first, *last, *current; /* current was handed out last, and is not in the list any more */
     size_t bytes;
 };
 
@@ -64,7 +64,7 @@ struct scanhead {
     struct native_attributes of_points; /* how its attributes must begin */
     int64_t points_t_ns, points_t0_ns;  /* device time and time in the scan of its first pulse */
 
-    /* what the stream has said, as of the frame handed out last */
+    /* state that the stream has reported, up to the frame that was handed out last */
     int have_descriptor, have_anchor, have_pulse;
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
@@ -85,15 +85,15 @@ struct scanhead {
     struct host_turn_part turn_part[HOST_TURN_PARTS]; /* sines and cosines of whole 1/256 turns */
 };
 
-/* notices.c: hands on what the parser notices. Called once, after native_parser_init. */
+/* notices.c: hands on the parser's notices. It is called once, after native_parser_init. */
 void host_listen(struct scanhead *sh);
 /* Gives the notice for the parser's present line: nobody waits for it, or it echoes what was just sent. */
 void host_note_line(struct scanhead *sh, int is_echo);
-/* The connection is over, and the parser has given all of it. Once for each connection. */
+/* Gives the notice that the connection is over, once for each connection. The parser has given all items by then. */
 void host_note_closed(struct scanhead *sh);
 void host_note_reattached(struct scanhead *sh);
 
-/* Takes a frame into the state: descriptor, anchor, names, counters, hash. Called once per frame, in stream
+/* Takes a frame into the state: descriptor, anchor, names, counters, hash. It is called once per frame, in stream
  * order. */
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload);
 
@@ -103,7 +103,7 @@ int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enu
 /* attributes.c: returns whether the descriptor says that the stream has this; SCANHEAD_ESTATE before it has come. */
 int host_has_content(const struct scanhead *sh, enum native_content content);
 
-/* poses.c: takes a poses frame in; forgets all (another scan). */
+/* poses.c: the first takes a poses frame in. The second forgets all poses, as another scan begins. */
 int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);
 void host_forget_poses(struct scanhead *sh);
 
@@ -112,6 +112,6 @@ void host_forget_poses(struct scanhead *sh);
 void host_turn_table(struct scanhead *sh);
 void host_sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c);
 /* Sets rad to the angles of u turns in radians, folded into [lo, lo + 1) turns. */
-void host_fold_turns(const double *u, int n, double lo, double *rad);
+void host_fold_turns(const double *restrict u, int n, double lo, double *restrict rad);
 
 #endif

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are
- * descriptors. */
+/* Waiting and reading, with deadlines on the monotonic clock; and the sources that are descriptors. */
 #include <errno.h>
 #include <poll.h>
 #include <string.h>

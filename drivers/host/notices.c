@@ -73,7 +73,7 @@ void host_note_closed(struct scanhead *sh)
 void host_note_reattached(struct scanhead *sh)
 {
     sh->notices.close_told = 0;
-    sh->notices.given_up = 0; /* replies of another connection don't come any more */
+    sh->notices.given_up = sh->notices.identities = 0; /* replies of another connection don't come any more */
     sh->notices.reattached++;
     note_connection(sh, SCANHEAD_NOTICE_REATTACHED, 1);
 }

@@ -17,7 +17,7 @@ struct host_poses {
     uint64_t n; /* that came; the last KEEP are there, number i at i % KEEP */
     struct {
         struct native_pose pose;
-        int begins; /* first of its frame: nothing is known between this and the one before */
+        int begins; /* 1: first of its stream frame. The way from the pose before is not known */
     } at[KEEP];
 };
 
@@ -111,7 +111,7 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
     return (int)i;
 }
 
-/* v, in the head's frame, becomes the point. */
+/* Puts the point to the place of v, which is in the head's frame. */
 static void place(const double rotation[9], const double at[3], const double v[3], struct scanhead_point *p)
 {
     double turned[3];
@@ -121,7 +121,7 @@ static void place(const double rotation[9], const double at[3], const double v[3
     p->z = at[2] + turned[2];
 }
 
-/* Rodrigues' formula in the head's frame, then the rotation at the leg's begin. */
+/* The point turns by Rodrigues' formula in the head's frame, then by the rotation at the leg's begin. */
 static void place_moving(const struct leg *leg, double f, struct scanhead_point *p)
 {
     const double angle = f * leg->angle_rad, s = sin(angle), versine = 1 - cos(angle);
@@ -148,7 +148,7 @@ static int to_scene_moving(struct scanhead *sh, struct scanhead_point *points, u
         }
         if (leg.a == NULL) {
             p->x = p->y = p->z = NAN;
-            if (frame != NULL) frame[i] = 0;
+            if (frame != NULL) frame[i] = NAN;
             lost++;
             continue;
         }

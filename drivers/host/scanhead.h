@@ -15,16 +15,15 @@
  *             n = scanhead_points(sh, &frame, 0, point, 256);
  *     scanhead_close(sh);
  *
- * Results: functions return 0, or a count, or a negative SCANHEAD_E; scanhead_error() then has a line of
- * text.
+ * Results: functions return 0, or a count, or a negative SCANHEAD_E. After an error scanhead_error() has a line of
+ * text. Functions that take a const handle leave that text as it was.
  *
- * Ownership: what a function returns by value or writes into the caller's memory is the caller's. Strings and
- * payloads are the handle's; how long they live is said with each.
+ * Ownership: a value that a function returns, or writes into the caller's memory, is the caller's. Strings and
+ * payloads are the handle's; the comment of each says how long they live.
  *
  * Threads: a handle belongs to one thread at a time. Different handles are independent.
  *
- * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no
- * value. */
+ * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no value. */
 #ifndef SCANHEAD_H
 #define SCANHEAD_H
 
@@ -68,7 +67,8 @@ struct scanhead;
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
 /* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in,
  * a device node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events wake
- * it. A wrong source ends it at once, a signal ends it early. err gets the reason of the last try. */
+ * it. A wrong source ends it at once, a signal ends it early. A try to connect by TCP may take 10 s, also beyond
+ * timeout_ms or after a signal. err gets the reason of the last try. */
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 /* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
@@ -95,12 +95,12 @@ struct scanhead_usb_head {
  * NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
-/* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive
- * meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops
- * the oldest and counts them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the
- * command was answered. Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all
- * reply lines up to the answer to *IDN?. For before raw mode the terminal may have echoed to the head what the
- * head sent. It does the same after SCANHEAD_ETIMEOUT, since the reply may still come. */
+/* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
+ * are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops the oldest and counts
+ * them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
+ * the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to *IDN?.
+ * Before it was in raw mode, the terminal may have echoed the head's own bytes to the head. It does the same after a
+ * command that ended without its reply, since that may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -205,9 +205,9 @@ enum scanhead_notice_kind {
 
 struct scanhead_notice {
     enum scanhead_notice_kind kind;
-    uint32_t seq;     /* 0 where no number is named above */
+    uint32_t seq;     /* of the frame that the kind names; else 0 */
     uint64_t at_byte; /* where it begins, in all bytes that this handle has received, over all its connections */
-    uint64_t n;       /* as above; 1 for one frame */
+    uint64_t n;       /* as the kind says; 1 for one frame */
     int64_t t_ns; /* device time of the frame concerned. For bytes, lines and connections: that of the last whole frame
                    * before, or SCANHEAD_NO_TIME */
 };
@@ -319,15 +319,14 @@ struct scanhead_line_end {
     uint64_t pulse0;          /* the line's first pulse in the scan */
     int64_t t0_ns, t1_ns;     /* since the scan's start: this line's first pulse, the next one's */
     uint32_t n_fired, n_cast; /* pulses of the whole sweep; those outside its blind part */
-    uint32_t n_echoes;        /* echoes sent; this and the last three are also 0 where parts were lost */
+    uint32_t n_echoes;        /* echoes sent; this, n_crowded, n_faint and n_unfit are 0 where parts were lost */
     uint32_t mirror_count, pan_count,
         status;         /* encoders at its last pulse; bit 0: last of the frame, bit 1: stopped within */
     uint32_t n_crowded; /* echoes left out, the weakest: a pulse had more than the head sends */
     uint32_t n_faint;   /* hits that the head did not detect */
     uint32_t n_unfit;   /* echoes too far for the stream's integers: sent as empty shots */
 };
-/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong
- * payload. */
+/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
 /* Descriptor and anchor say this about the stream. Strings are the handle's, until its next call. */
@@ -373,7 +372,7 @@ struct scanhead_emitter {
     int turn;                                  /* +1: clockwise seen from above, -1: the other way */
     uint32_t rings;                            /* sphere: of a frame; the elevation of ring i is */
     double first_ring_deg, ring_step_deg;      /* first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
-    int echoes;                                /* which of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
+    int echoes;                                /* the head sends of each pulse: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
@@ -400,14 +399,14 @@ enum scanhead_pose_flags {
 /* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
  * SCANHEAD_ESTATE where the stream has not said it, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
-/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index
- * `first`. Returns how many. */
+/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
+ * Returns how many. */
 int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
                    uint32_t max);
 /* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the
  * head moves, each point goes with the pose of its own time. frame (may be NULL) gets the frame scalar of
  * each; where the head stands at a stop, that of the stop. Returns how many points had no pose, because
- * frames were lost; their coordinates are NaN. SCANHEAD_ESTATE for another layout. */
+ * frames were lost; their coordinates and frame scalars are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
 /* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
@@ -422,8 +421,7 @@ int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 
-/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come
- * yet. */
+/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
 struct scanhead_stats {

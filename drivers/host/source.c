@@ -105,7 +105,7 @@ static int wait_connected(int fd, int64_t deadline_ns)
     }
 }
 
-/* A connected socket, or -1 with errno. */
+/* Returns a connected socket, or -1 with errno. */
 static int connect_one(const struct addrinfo *ai, int64_t deadline_ns)
 {
     int fd = socket(ai->ai_family, ai->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, ai->ai_protocol);
@@ -156,7 +156,7 @@ static int open_fd(const char *number, struct host_source *out, struct sh_err *e
     return 0;
 }
 
-/* A regular file: a FIFO would wait for its writer (fd:N takes one), a device may have no end. */
+/* Opens a regular file only: a FIFO would wait for its writer (fd:N takes one), a device may have no end. */
 static int open_file(const char *path, struct host_source *out, struct sh_err *err)
 {
     out->fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);

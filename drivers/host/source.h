@@ -16,11 +16,13 @@
 struct host_source;
 struct scanhead;
 struct host_source_ops {
-    /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
+    /* These return the bytes moved, or -1 with errno, which is EAGAIN when none can be moved now. read returns 0 at the
+     * end. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
     /* In place of read: sets *bytes to whole items, as native_parser_lend() needs them. NULL: there is only read.
      * Returns as read does. The bytes stay until the next call of wait or close. */
     ssize_t (*lend)(struct host_source *source, const uint8_t **bytes);
+    /* NULL where the source is a file: nothing is written to it. */
     ssize_t (*write)(struct host_source *source, const void *data, size_t len);
     /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with
      * errno. */
@@ -51,7 +53,7 @@ int host_source_is_usb(const char *source);
 /* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
-/* capture.c: source is an open file of that kind. Where it fails, the descriptor is still the caller's. */
+/* capture.c: source is an open .pcapng file. Where it fails, the descriptor is still the caller's. */
 int host_capture_open(struct host_source *source, struct sh_err *err);
 
 /* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the

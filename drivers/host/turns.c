@@ -64,15 +64,10 @@ void host_sincos_turns(const struct host_turn_part *table, const double *u, int 
     add_rests(part, rest_rad, n, s, c);
 }
 
-VEC_CLONES static void fold(const double *restrict u, int n, double lo, double *restrict rad)
+VEC_CLONES void host_fold_turns(const double *restrict u, int n, double lo, double *restrict rad)
 {
     for (int i = 0; i < n; i++) {
         uint64_t unused;
         rad[i] = TWO_PI * (u[i] - floor_of(u[i] - lo, &unused));
     }
-}
-
-void host_fold_turns(const double *u, int n, double lo, double *rad)
-{
-    fold(u, n, lo, rad);
 }

@@ -11,7 +11,8 @@
     "no permission; a udev rule gives it: run `sudo make install`, or copy drivers/host/70-scanhead.rules to " \
     "/etc/udev/rules.d; then `sudo udevadm control --reload`, and plug the head in again"
 
-/* "1209:" or "1209" -> number; NULL when it isn't one to four hexadecimal digits. */
+/* Reads the number of "1209:" or "1209", and returns where it ends; NULL when it isn't one to four hexadecimal digits.
+ * */
 static const char *parse_id(const char *text, int *id)
 {
     size_t digits = strspn(text, "0123456789abcdefABCDEF");
@@ -73,7 +74,7 @@ static int is_wanted_id(const struct usb_wanted *wanted, const struct libusb_dev
 }
 
 /* A device may call itself anything. Texts for terminals and logs must be printable, yet differ between two devices:
- * other characters, and backslashes, are written as \xNN. What does not fit is left out. */
+ * other characters, and backslashes, are written as \xNN. A text that is too long is cut. */
 static void read_string(libusb_device_handle *handle, uint8_t index, char *text, size_t len)
 {
     unsigned char ascii[128];
@@ -90,7 +91,7 @@ static void read_string(libusb_device_handle *handle, uint8_t index, char *text,
 struct search {
     const struct usb_wanted *wanted;
     struct usb_found *found; /* the first that is wanted */
-    int n, error;            /* how many are wanted; why one could not be opened */
+    int n, error;            /* how many were found; why one could not be opened */
     char others[256];
     char refused[64];
 };

@@ -14,8 +14,8 @@
 #include <string.h>
 #include <time.h>
 
-/* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room
- * for. */
+/* A read is a multiple of every packet size (64, 512, 1024 bytes). So no packet is longer than the room that is left.
+ * */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
 /* How long a bus may fail with the device still on it, as it does until the hub notices an unplugged device. */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
@@ -29,8 +29,8 @@ struct in_transfer {
 
 struct failing {
     int n;              /* failures since something got through, or since RELAPSE_MS without one */
-    int64_t give_up_ns; /* the first of them, and FAILING_MS */
-    int64_t relapse_ns; /* the last of them, and RELAPSE_MS */
+    int64_t give_up_ns; /* FAILING_MS after the first of them */
+    int64_t relapse_ns; /* RELAPSE_MS after the last of them */
 };
 
 struct host_usb {
@@ -79,7 +79,7 @@ static int errno_of_rc(int rc)
     return rc == 0 ? 0 : rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EPROTO;
 }
 
-/* Takes in what has happened, waiting for at most timeout. */
+/* Takes in the transfers that have ended, waiting for at most timeout_ns. */
 static int handle_events(struct host_usb *usb, int64_t timeout_ns)
 {
     struct timeval wait = {.tv_sec = timeout_ns / 1000000000, .tv_usec = timeout_ns % 1000000000 / 1000};
@@ -97,7 +97,7 @@ static int count_reads(const struct host_usb *usb)
     return n;
 }
 
-/* Takes back the reads that are under way; what came in until then stays to be read. */
+/* Takes back the reads that are under way. Bytes that came in until then can still be read. */
 static void cancel_reads(struct host_usb *usb)
 {
     for (int i = 0; i < usb->n_in; i++)

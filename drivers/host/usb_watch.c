@@ -23,7 +23,7 @@ static int LIBUSB_CALL on_arrival(libusb_context *ctx, libusb_device *device, li
     return 0;
 }
 
-/* Whether udev runs. libusb gets events of devices from udev, after udev's rules. Without udev (a container, a
+/* Returns whether udev runs. libusb gets events of devices from udev, after udev's rules. Without udev (a container, a
  * small guest) it gets none, and does not know that. */
 static int has_events(void)
 {
@@ -60,7 +60,7 @@ static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
     return a_ns < b_ns ? a_ns : b_ns;
 }
 
-/* Less than a second. */
+/* Sleeps until then, which is less than a second from now. Returns -1 if a signal comes. */
 static int sleep_until(int64_t until_ns)
 {
     const int64_t left_ns = until_ns - host_deadline_ns(0);

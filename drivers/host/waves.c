@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waveforms of pulses, in stream frames that follow their points. */
+/* Windows of pulses' waveforms, from stream frames that follow their points. */
 #include <math.h>
 
 #include "drivers/host/host.h"

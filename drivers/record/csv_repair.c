@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char INCOMPLETE[] = "# incomplete: the recording was not completed; data may be missing after this\n";
+static const char INCOMPLETE[] = "# " REPAIR_INCOMPLETE "\n";
 
 struct rows {
     const struct csv_format *format;
@@ -33,7 +33,6 @@ static int take_title(struct rows *rows, const char *line, size_t len)
 static int take_row(void *ctx, const char *line, size_t len)
 {
     struct rows *rows = ctx;
-    if (strlen(line) != len) return 0;
     if (!rows->titled) return take_title(rows, line, len);
     rows->is_marked = len == sizeof INCOMPLETE - 2 && memcmp(line, INCOMPLETE, len) == 0;
     if (line[0] == '#') return 1;

@@ -12,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/bytes.h"
 #include "core/grow.h"
 #include "core/vecmath.h"
 #include "drivers/protocol/native.h"
@@ -43,7 +42,7 @@ static int e57_begin(void *rec, struct sh_err *err)
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
-/* The first n of the records gathered so far. */
+/* Writes the first n of the records gathered so far as a packet. */
 static int put_packet(struct e57 *e, unsigned n, struct sh_err *err)
 {
     size_t len;
@@ -67,7 +66,7 @@ static void set_start(struct e57 *e)
     e->scan->have_start = track_start_gps(&e->base.track, &e->scan->start_gps_s);
 }
 
-/* The note, and the place of the section's header. */
+/* Writes the note, and keeps the place of the section's header. */
 static int put_begin(struct e57 *e, struct sh_err *err)
 {
     static const uint8_t blank[E57_NOTE_LEN], section[E57_SECTION_HEADER_LEN] = {1}; /* a compressed vector */
@@ -112,7 +111,7 @@ static int begin_scan(void *rec, struct sh_err *err)
     return put_begin(e, err);
 }
 
-/* The time may come late. */
+/* The time may come after the scan's first points. The note is then written again. */
 static int find_start(struct e57 *e, struct sh_err *err)
 {
     uint8_t note[E57_NOTE_LEN];

@@ -24,11 +24,9 @@ static int patch_sections(struct e57_pages *pages, const struct e57_facts *facts
     for (uint32_t i = 0; rc == 0 && i < facts->n_scans; i++) {
         uint8_t section[E57_SECTION_HEADER_LEN];
         const struct e57_scan *s = &facts->scan[i];
-        if (sh_stopped(report)) /* a page is read and written for each */
-            return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written",
-                           pages->file->path);
         e57_section_header(s->section, s->section_len, section);
-        rc = e57_patch(pages, s->section, section, sizeof section, err);
+        rc = outfile_check_stop(pages->file, report, err); /* a page is read and written for each scan */
+        if (rc == 0) rc = e57_patch(pages, s->section, section, sizeof section, err);
     }
     return rc;
 }

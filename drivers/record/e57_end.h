@@ -10,9 +10,9 @@
 enum {
     E57_XML_ROOM = 16384,
     E57_XML_ROOM_SCAN = 8192
-}; /* bytes that suffice for the XML section, and for each scan in it */
+}; /* bytes that are enough for the XML section, and for each scan in it */
 
-/* Writes the XML section, cuts what is behind it, then writes the headers of the scans. The file's own header comes
+/* Writes the XML section, cuts the file after it, then writes the headers of the scans. The file's own header comes
  * last, once all that is on the disk. report: its stop gives up; may be NULL. */
 int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct sh_report *report, struct sh_err *err);
 

@@ -5,8 +5,8 @@
  *
  *   0   blob's header: type 0, zeros   8 bytes; length of the section   uint64
  *  16   "scanhead e57 1"   16 bytes
- *  32   number and station of the scan, EPSG code, bits: 1 heights above the geoid, 2 shots without echo, 4 colours, 8 the
- *       start is known   4 x uint32
+ *  32   number and station of the scan, EPSG code, bits: 1 heights above the geoid, 2 shots without echo, 4 colours,
+ *       8 the start is known   4 x uint32
  *  48   step of coordinates, m; start, GPS s   2 x double
  *  64   pose: shift, m; rotation, row by row   12 x double
  * 160   identity   96 bytes; profile   32 bytes; each with zeros up to its end
@@ -20,8 +20,8 @@
 
 enum { E57_BLOB_HEADER_LEN = 16, E57_NOTE_LEN = 288 }; /* of the section, with the blob's header */
 
-/* Place of the next note when the file has got to `logical`: there or, so that it fits into a page, in the next
- * page. */
+/* Returns the place of the next note in a file that ends at `logical`: there or, where the note would not fit into the
+ * page, in the next page. */
 static inline uint64_t e57_note_place(uint64_t logical)
 {
     const uint64_t used = logical % E57_PAGE_CONTENT;

@@ -134,29 +134,21 @@ static int find_streams(const uint8_t *packet, size_t len, const struct e57_fact
     return len - at < 4 ? (int)n : -1;
 }
 
-VEC_CLONES static void find_limits32(const uint8_t *restrict v, unsigned n, uint32_t limit[2])
-{
-    uint32_t low = limit[0], high = limit[1];
-    for (size_t i = 0; i < n; i++) {
-        const uint32_t x = le_get32(v + 4 * i);
-        low = x < low ? x : low;
-        high = x > high ? x : high;
+/* NAME widens limit[0] to limit[1] by n records of TYPE, which GET reads. */
+#define FIND_LIMITS(NAME, TYPE, GET)                                                  \
+    VEC_CLONES static void NAME(const uint8_t *restrict v, unsigned n, TYPE limit[2]) \
+    {                                                                                 \
+        TYPE low = limit[0], high = limit[1];                                         \
+        for (size_t i = 0; i < n; i++) {                                              \
+            const TYPE x = GET(v + sizeof x * i);                                     \
+            low = x < low ? x : low;                                                  \
+            high = x > high ? x : high;                                               \
+        }                                                                             \
+        limit[0] = low;                                                               \
+        limit[1] = high;                                                              \
     }
-    limit[0] = low;
-    limit[1] = high;
-}
-
-VEC_CLONES static void find_limits16(const uint8_t *restrict v, unsigned n, uint16_t limit[2])
-{
-    uint16_t low = limit[0], high = limit[1];
-    for (size_t i = 0; i < n; i++) {
-        const uint16_t x = le_get16(v + 2 * i);
-        low = x < low ? x : low;
-        high = x > high ? x : high;
-    }
-    limit[0] = low;
-    limit[1] = high;
-}
+FIND_LIMITS(find_limits32, uint32_t, le_get32)
+FIND_LIMITS(find_limits16, uint16_t, le_get16)
 
 /* A byte has two records; the last byte may have one and a 0. */
 VEC_CLONES static unsigned find_most4(const uint8_t *restrict v, size_t n_bytes)

@@ -43,7 +43,7 @@ enum e57_stream {
  * therefore needs no copy. Streams of bits have a byte a record until the packet is made. */
 struct e57_packet {
     unsigned n, most;               /* records in the streams, and in a full packet */
-    uint8_t *stream[E57_N_STREAMS]; /* of a field that the file lacks: nothing may be put there */
+    uint8_t *stream[E57_N_STREAMS]; /* nothing may be put into the stream of a field that the file lacks */
     uint8_t bits[4][E57_PACKET_RECORDS + 8];
     uint8_t full[E57_PACKET_MAX], part[E57_PACKET_MAX];
 };

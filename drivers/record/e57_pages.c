@@ -23,7 +23,7 @@ static void crc_of(const uint8_t *page, uint8_t out[4])
     be_put32(out, crc32c(0, page, E57_PAGE_CONTENT));
 }
 
-static void seal(uint8_t *page)
+static void put_crc(uint8_t *page)
 {
     crc_of(page, page + E57_PAGE_CONTENT);
 }
@@ -37,7 +37,7 @@ int e57_page_is_right(const uint8_t page[E57_PAGE])
 
 static int put_page(struct e57_pages *pages, struct sh_err *err)
 {
-    seal(pages->page);
+    put_crc(pages->page);
     pages->used = 0;
     pages->n_full++;
     return outfile_write(pages->file, pages->page, E57_PAGE, err);
@@ -49,7 +49,7 @@ static int put_whole_page(struct e57_pages *pages, const uint8_t *content, struc
     uint8_t *to = outfile_room(pages->file, E57_PAGE, err);
     if (to == NULL) return SH_EIO;
     memcpy(to, content, E57_PAGE_CONTENT);
-    seal(to);
+    put_crc(to);
     outfile_used(pages->file, E57_PAGE);
     pages->n_full++;
     return 0;
@@ -87,11 +87,11 @@ int e57_keep_page(struct e57_pages *pages, struct sh_err *err)
     int rc = outfile_flush(pages->file, err); /* before the page, so that there is never a gap */
     if (rc != 0 || pages->used == 0) return rc;
     memcpy(page, pages->page, pages->used);
-    seal(page);
+    put_crc(page);
     return outfile_patch(pages->file, pages->n_full * E57_PAGE, page, sizeof page, err);
 }
 
-/* n bytes within one page. */
+/* Overwrites n bytes within one page. */
 static int patch_page(struct e57_pages *pages, uint64_t logical, const uint8_t *p, size_t n, struct sh_err *err)
 {
     uint8_t page[E57_PAGE];
@@ -103,10 +103,12 @@ static int patch_page(struct e57_pages *pages, uint64_t logical, const uint8_t *
     }
     int rc = outfile_flush(pages->file, err);
     if (rc != 0) return rc;
-    if (pread(pages->file->fd, page, E57_PAGE, (off_t)(number * E57_PAGE)) != E57_PAGE)
-        return sh_fail(err, SH_EIO, "%s: cannot read back: %s", pages->file->part, strerror(errno));
+    const ssize_t n_read = pread(pages->file->fd, page, E57_PAGE, (off_t)(number * E57_PAGE));
+    if (n_read != E57_PAGE)
+        return sh_fail(err, SH_EIO, "%s: cannot be read back: %s", pages->file->part,
+                       n_read < 0 ? strerror(errno) : "it became shorter");
     memcpy(page + first, p, n);
-    seal(page);
+    put_crc(page);
     return outfile_patch(pages->file, number * E57_PAGE, page, E57_PAGE, err);
 }
 

@@ -7,7 +7,7 @@
 #include "core/bytes.h"
 #include "core/vecmath.h"
 
-/* Coordinates of a run of points: those of the track, or of `own`, where they had to be changed. */
+/* Coordinates of a run of points. They are the track's or, where they had to be changed, those in `own`. */
 struct run {
     const double *p[3];
     double own[3][TRACK_BATCH];
@@ -42,7 +42,7 @@ VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n
     return n_bad == 0;
 }
 
-/* Returns how many points come before the first of them, by the plain formula, and where that one is. */
+/* Returns how many points come before the first one that has no room, by the plain formula; far_m is its place. */
 static int find_far(const struct run *run, double scale_m, int n, double far_m[3])
 {
     int i = 0;

@@ -57,7 +57,7 @@ static int count_pages(struct left *l, struct sh_err *err)
     return rc < 0 ? rc : SH_OK;
 }
 
-/* 1, or 0 where that is not in whole pages. */
+/* Reads content. Returns 1, or 0 where not all of it is in whole pages. */
 static int get(struct left *l, uint64_t logical, void *to, size_t len, struct sh_err *err)
 {
     uint8_t *p = to;
@@ -85,13 +85,14 @@ static int fail_damaged(const struct left *l, struct sh_err *err)
 
 /* ---- the way through what is there */
 
-/* The scan that begins at the end of what is kept: 1, or 0 where there is none, or not all of its beginning. */
+/* Takes the scan that begins at the end of what is kept. Returns 1, or 0 where there is none, or not all of its
+ * beginning. */
 static int take_scan(struct left *l, struct sh_err *err)
 {
     uint8_t note[E57_NOTE_LEN + E57_SECTION_HEADER_LEN];
     struct e57_facts facts = {0};
     struct e57_scan scan;
-    memset(&scan, 0, sizeof scan); /* also what is between its members: the guid is made of all of it */
+    memset(&scan, 0, sizeof scan); /* also the bytes between its members: the guid is made from all of it */
     scan.note = e57_note_place(l->end);
     scan.section = scan.note + E57_NOTE_LEN;
     const int rc = get(l, scan.note, note, sizeof note, err);
@@ -111,7 +112,7 @@ static int take_scan(struct left *l, struct sh_err *err)
     return 1;
 }
 
-/* The packet at the end of what is kept: 1, or 0 where there is none, or not all of it. */
+/* Takes the packet at the end of what is kept. Returns 1, or 0 where there is none, or not all of it. */
 static int take_packet(struct left *l, struct sh_err *err)
 {
     struct e57_scan *scan = &l->facts.scan[l->facts.n_scans - 1];
@@ -140,8 +141,8 @@ static int take_scans(struct left *l, struct sh_err *err)
     return rc;
 }
 
-/* Checks what is behind the part that is kept: the beginning of a packet or of a scan, zeros that fill its page, or the
- * XML section. */
+/* Checks the bytes after the part that is kept: the beginning of a packet or of a scan, zeros that fill its page, or
+ * the XML section. */
 static int look_behind(struct left *l, struct sh_err *err)
 {
     uint8_t tail[E57_PAGE_CONTENT + E57_NOTE_LEN + E57_SECTION_HEADER_LEN] = {0}; /* more than a scan's beginning */
@@ -172,14 +173,14 @@ static int is_whole(struct left *l, struct sh_err *err)
            l->n_pages * E57_PAGE == l->repair->len;
 }
 
-/* Until the file is whole it has none. */
+/* Takes the file's header away, since a file with a header counts as whole. */
 static int blank_header(struct e57_pages *pages, struct sh_err *err)
 {
     static const uint8_t blank[E57_FILE_HEADER_LEN];
     return e57_patch(pages, 0, blank, sizeof blank, err);
 }
 
-/* A scan of which no packet came gets an empty one, as from its recorder. */
+/* A scan without any packet gets an empty one, as its recorder would have written. */
 static int put_empty_packet(struct left *l, struct e57_pages *pages, struct sh_err *err)
 {
     struct e57_scan *last = &l->facts.scan[l->facts.n_scans - 1];

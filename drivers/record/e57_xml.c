@@ -9,7 +9,7 @@
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/e57_note.h"
 
-/* Names from the stream may hold anything; what XML 1.0 has no place for becomes '?'. */
+/* Names from the stream may hold anything. Characters that are not printable ASCII become '?'. */
 static void put_string(FILE *out, const char *tag, const char *text)
 {
     fprintf(out, "<%s type=\"String\">", tag);
@@ -38,7 +38,8 @@ static void open_structure(FILE *out, const char *tag)
     fprintf(out, "<%s type=\"Structure\">\n", tag);
 }
 
-/* From what is in the scan, so that the same stream gives the same file; UUID version 8 (RFC 9562). */
+/* The guid is made from the scan's facts, so that the same stream gives the same file. It is a UUID of version 8 (RFC
+ * 9562). */
 static void put_guid(FILE *out, const void *content, size_t len)
 {
     struct sha256_ctx sha256;

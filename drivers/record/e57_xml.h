@@ -12,7 +12,7 @@
 
 /* One scan: an entry of data3D. Coordinates in the head's frame. */
 struct e57_scan {
-    uint64_t note;        /* logical offset of what stands before it (e57_note.h) */
+    uint64_t note;        /* logical offset of the note before it (e57_note.h) */
     uint64_t section;     /* of its binary section */
     uint64_t section_len; /* logical */
     uint64_t n_records, n_points;

@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "drivers/protocol/native.h"
 #include "drivers/record/las_inside.h"
 #include "drivers/record/las_repair.h"
 
@@ -136,7 +135,7 @@ static void report_waves(struct las *las)
 static int las_finish(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    int rc = outfile_check(&las->base.file, err); /* then the header goes on saying that the file is incomplete */
+    int rc = outfile_check(&las->base.file, err); /* after a failure the header still says "its end is missing" */
     if (rc == 0 && !las->begun) rc = put_front(las, err);
     las->facts.is_growing = 0;
     if (rc == 0 && las->facts.has_waves) rc = end_waves(las, err);

@@ -10,7 +10,7 @@
 
 /* ---- coordinates */
 
-/* Rounds as rint does. Numbers that are too far stay too far; then it returns 0. */
+/* Rounds as rint does. Returns 0 where a number is too far for 32 bits; vec_round keeps such numbers too far. */
 VEC_CLONES static int counts_fit(const double *restrict at, int n, double offset, double scale, int32_t *restrict to)
 {
     uint64_t any_beyond = 0;
@@ -34,7 +34,7 @@ int las_set_counts(const double *at, int n, double offset, double scale, int32_t
 
 /* ---- intensities */
 
-VEC_CLONES static void set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to)
+VEC_CLONES void las_set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to)
 {
     for (int i = 0; i < n; i++) {
         uint64_t bits;
@@ -43,14 +43,12 @@ VEC_CLONES static void set_intensities(const double *restrict reflectance_db, in
     }
 }
 
-void las_set_intensities(const double *reflectance_db, int n, uint16_t *to)
-{
-    set_intensities(reflectance_db, n, to);
-}
-
 /* ---- scan angles */
 
-uint16_t las_scan_angle(double x, double y, double z)
+enum { SCAN_ANGLE_NONE = UINT16_MAX };
+
+/* The formula for one point. It gives SCAN_ANGLE_NONE where the angle is NaN. */
+static uint16_t scan_angle(double x, double y, double z)
 {
     const float flat = sqrtf((float)(x * x + y * y)), up = atan2f(flat, (float)-z);
     return isnan(up) ? SCAN_ANGLE_NONE : (uint16_t)lrintf(up * SCAN_ANGLE_COUNTS_PER_RAD);
@@ -96,7 +94,7 @@ uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, 
     near_scan_angles(x, y, z, n, to);
     for (int i = 0; i < n; i++) {
         if (to[i] != SCAN_ANGLE_NONE) continue;
-        to[i] = las_scan_angle(x[i], y[i], z[i]);
+        to[i] = scan_angle(x[i], y[i], z[i]);
         if (to[i] != SCAN_ANGLE_NONE) continue;
         to[i] = 0;
         n_none++;

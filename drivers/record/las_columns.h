@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Points of a batch as a LAS file has them: figures in columns, and the rows that are written of them. The loops are
- * vectors; the figures are those of the formulas beside them, to the last count. Pure. */
+/* Points of a batch as a LAS file has them: figures in columns, and the rows that are written from them. The loops are
+ * made for vectors. They give the figures of the plain formulas, to the last count. Pure. */
 #ifndef DRIVERS_RECORD_LAS_COLUMNS_H
 #define DRIVERS_RECORD_LAS_COLUMNS_H
 
@@ -22,13 +22,10 @@ struct las_columns {
  * that is too far for 32 bits, or NaN. */
 int las_set_counts(const double *at, int n, double offset, double scale, int32_t *to);
 /* Sets 32768 + 100 times the reflectance; 0 where it is not modelled. */
-void las_set_intensities(const double *reflectance_db, int n, uint16_t *to);
-/* Sets las_scan_angle of each point in the head's frame: the angle from straight down, in steps of 0.006 degrees.
+void las_set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to);
+/* Sets the scan angle of each point in the head's frame: the angle from straight down, in steps of 0.006 degrees.
  * Returns how many points have none; theirs is 0. */
 uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, int n, uint16_t *to);
-/* This is the formula. It gives SCAN_ANGLE_NONE where the angle is NaN. */
-enum { SCAN_ANGLE_NONE = UINT16_MAX };
-uint16_t las_scan_angle(double x, double y, double z);
 
 /* Writes n rows of las_point_len(). The track's labels, station and colours are those of the points. */
 void las_put_rows(const struct las_facts *facts, const struct las_columns *columns, int n, uint8_t *to);

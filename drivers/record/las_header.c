@@ -129,7 +129,7 @@ static uint8_t *put_keys_vlr(uint8_t *to, int epsg, int geoid)
     return at;
 }
 
-/* Their room is always the same; unused room lies between the records and the points. */
+/* Puts the descriptors of packets. Their room is always the same; unused room lies between them and the points. */
 static uint8_t *put_kinds(uint8_t *to, const struct las_waves *waves)
 {
     memset(to, 0, LAS_KINDS * LAS_KIND_LEN);
@@ -146,7 +146,8 @@ static uint8_t *put_kinds(uint8_t *to, const struct las_waves *waves)
     return to + LAS_KINDS * LAS_KIND_LEN;
 }
 
-/* Day of the year and year, in GPS time: leap seconds don't matter to a day but for seconds. */
+/* Puts day of the year and year, in GPS time. That differs from UTC by some seconds, so a day may begin that much
+ * early. */
 static void put_date(uint8_t *to, const struct las_facts *f)
 {
     struct tm day;
@@ -251,10 +252,15 @@ size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
     return (size_t)(end - to);
 }
 
+size_t las_format_len(int format)
+{
+    static const uint8_t own[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+    return own[format];
+}
+
 size_t las_own_len(const struct las_facts *f)
 {
-    static const uint8_t own[11] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67}; /* by format */
-    return own[format_of(f)];
+    return las_format_len(format_of(f));
 }
 
 size_t las_point_len(const struct las_facts *f)

@@ -32,7 +32,7 @@ enum {
     /* the header's places for waveforms */
     LAS_ENCODING_AT = 6,
     LAS_WAVES_AT = 227,  /* where the record of packets begins in the file; 0: in a .wdp */
-    LAS_EVLRS_AT = 235,  /* where records behind the points begin, u64, and how many they are, u32 */
+    LAS_EVLRS_AT = 235,  /* where records after the points begin, u64, and how many they are, u32 */
     LAS_POINTS_AT = 247, /* number of points */
     LAS_WAVES_INSIDE = 1 << 1,
     LAS_WAVES_OUTSIDE = 1 << 2,
@@ -60,6 +60,8 @@ struct las_facts {
 
 /* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
 size_t las_point_len(const struct las_facts *facts);
+/* How many bytes a point of format 0 to 10 takes without extra bytes. */
+size_t las_format_len(int format);
 /* The first returns how many of these bytes are the format's own; extra bytes follow them. The second is where the time
  * begins; a colour may follow it. */
 size_t las_own_len(const struct las_facts *facts);

@@ -16,7 +16,7 @@ struct las {
     uint64_t n_beyond_returns, n_returns_cut, n_waves_left_out; /* LAS 1.2 */
     struct las_waves waves;
     struct las_columns columns;   /* of the batch */
-    double place[3][TRACK_BATCH]; /* likewise, on the way to counts or angles */
+    double place[3][TRACK_BATCH]; /* the batch's coordinates, from which counts or angles are made */
 };
 
 /* Geodetic coordinates are longitude, latitude in LAS, as GIS software draws x and y. */

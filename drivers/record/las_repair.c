@@ -9,9 +9,9 @@
 #include "drivers/record/scan_count.h"
 
 struct records {
-    struct las_facts facts; /* of all but zeros at the end */
+    struct las_facts facts; /* counts of all records but those of zeros at the end */
     size_t len, time_at, station_at;
-    uint64_t n_zero; /* at the end, of zeros alone */
+    uint64_t n_zero; /* records at the end that hold zeros alone */
     struct point_scans scans;
     int has_waves;
     struct las_packets packets; /* with waveforms */
@@ -42,15 +42,14 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
     const int is_las = len >= LAS_HEADER_12_LEN && memcmp(header, "LASF", 4) == 0 && header[24] == 1 &&
                        strncmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE, sizeof LAS_SOFTWARE - 1) == 0;
     if (!is_las) return repair_fail_none(repair, "LAS file of scanhead", err);
-    static const uint8_t own_14[] = {30, 36, 38, 59, 67}; /* of formats 6 to 10 */
     const int format = header[104];
     f->minor = header[25];
     const size_t header_len = f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
     r->len = le_get16(header + 105);
     *front_len = le_get32(header + 96);
-    const int known = f->minor == 2 ? (format == 1 && r->len == 28) || (format == 3 && r->len == 34)
+    const int known = f->minor == 2 ? (format == 1 || format == 3) && r->len == las_format_len(format)
                                     : f->minor == 4 && format >= 6 && format <= 10 && format != 8 &&
-                                          r->len >= own_14[format - 6] && r->len <= LAS_POINT_LEN_MAX;
+                                          r->len >= las_format_len(format) && r->len <= LAS_POINT_LEN_MAX;
     if (!known || len < header_len || *front_len < header_len || *front_len > LAS_FRONT_MAX || *front_len > repair->len)
         return repair_fail_none(repair, "LAS file of scanhead", err);
     r->has_waves = f->minor == 4 && format >= 9;

@@ -2,14 +2,12 @@
 /* Rows of a LAS file, and the counts of its header. */
 #include "drivers/record/las_columns.h"
 
-#include <string.h>
-
 #include "core/bytes.h"
 #include "core/vecmath.h"
 
 /* All formats begin with x, y, z, intensity and returns. Then come classification, flags and user data, which are 0,
- * scan angle (not in LAS 1.2), station and time. A store may reach into the next figure's place, which is written
- * later. */
+ * scan angle (0 in LAS 1.2), station and time. The store of 8 bytes at 16 reaches into the time's place, so the time is
+ * written after it. */
 static void put_common(const struct las_facts *f, const struct las_columns *c, int n, uint8_t *to)
 {
     const size_t len = las_point_len(f), time_at = las_time_at(f);

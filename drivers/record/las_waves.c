@@ -175,8 +175,8 @@ int las_waves_copy(const struct las_waves *w, struct outfile *to, const struct s
         outfile_used(to, (size_t)n);
         at += (uint64_t)n;
         sh_progress(report, "copying the waveforms", (double)at / (double)len);
-        if (sh_stopped(report))
-            return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written", to->path);
+        const int rc = outfile_check_stop(to, report, err);
+        if (rc != SH_OK) return rc;
     }
     return SH_OK;
 }

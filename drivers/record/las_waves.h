@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A LAS 1.4 file may have waveforms (ASPRS LAS 1.4 R15). Windows of samples go in, packets come out in a file of their
- * own, X.wdp beside X.las. The packets of an internal record are copied behind the points at the end.
+ * own, X.wdp beside X.las. Without --wdp they are copied to the end of X.las when all points are there.
  *
  * A packet has as many samples as its descriptor says, and there are 255 descriptors. The first lengths each get one
  * of their own. Later lengths are rounded up. Their packets are filled up with samples without light, which are
@@ -48,9 +48,10 @@ struct las_waves {
     struct las_packet last;
 };
 
-/* Checks before the first scan whether X.wdp of a recording at `path` can be written. Errors as of newfile_check. */
+/* Checks before the first scan whether X.wdp of a recording at `path` can be written. Errors are those of
+ * newfile_check. */
 int las_waves_check(const char *path, struct sh_err *err);
-/* A recording at `path` makes its file of packets; 1 in is_open. Errors as of outfile_open. */
+/* Opens the file of packets of a recording at `path`, and sets is_open. Errors are those of outfile_open. */
 int las_waves_open(struct las_waves *waves, const char *path, struct sh_err *err);
 /* The file has to be flushed before points that refer to its packets. */
 int las_waves_flush(struct las_waves *waves, struct sh_err *err);

@@ -41,7 +41,7 @@ static int read_len(struct las_packets *p, struct sh_err *err)
     return rc;
 }
 
-/* The name of the .las without .part, where that name is free: it will be renamed. */
+/* Cuts .part from the .las's name. Returns 1 where the name that is left is free: the file will get it. */
 static int will_be_renamed(const struct repair *r, char *las)
 {
     if (!repair_is_part(r)) return 0;
@@ -79,7 +79,8 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
     return rc == SH_OK ? read_len(p, err) : rc;
 }
 
-/* Inside, the record begins where a point ends. A repair leaves a header that says neither: there are no packets. */
+/* A record inside begins where a point ends. A header may also say neither inside nor outside: a repair writes that
+ * where there are no packets. */
 static int check_place(const struct repair *r, const uint8_t *header, struct sh_err *err)
 {
     const uint64_t begin = le_get64(header + LAS_WAVES_AT), front = le_get32(header + 96);

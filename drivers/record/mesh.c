@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Meshes of scans: .obj, .gltf, .glb and .fbx, and .ply with --mesh; points spread over the mesh: .ply with --sparse.
  *
- * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of it. A mesh
- * is made when its scan is over, and the file when all scans are. All points are held until then, with about 110 bytes
- * each, and triangles with 12, two a point.
+ * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of
+ * it. A mesh is made when its scan is over, and the file when all scans are. All points are held until then, with
+ * about 110 bytes each, and triangles with 12, two a point.
  *
- * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of the
- * file) by itself; sweeps of the pan, and what follows lines that went back, are parts, too. */
-#include <inttypes.h>
+ * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
+ * the file) by itself. So is each sweep of the pan. Where lines go back, another part begins, too. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,11 +16,10 @@
 #include "core/grow.h"
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
-#include "drivers/protocol/native.h"
-#include "drivers/record/mesh_ply_repair.h"
 #include "drivers/record/mesh_recorder.h"
 #include "drivers/record/mesh_texture.h"
 #include "drivers/record/obj_repair.h"
+#include "drivers/record/ply_repair.h"
 
 static const double GIB = 1073741824.0;
 /* Bytes per point, with its grid and triangles, also while arrays grow; what the exporter takes besides (measured with
@@ -40,7 +38,7 @@ static int check_points(const char *path, double n, struct sh_err *err)
     if (there > 0 && bytes > there)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and %.1f GiB are available: scan fewer "
+            "%s: a mesh of up to %.0f points takes %.1f GiB of memory, and this machine has %.1f GiB: scan fewer "
             "stations, more coarsely, or with --split",
             path, n, bytes / GIB, there / GIB);
     return SH_OK;
@@ -54,7 +52,7 @@ static int check_size(const struct mesh_recorder *m, struct sh_err *err)
     return check_points(t->path, m->points.n + t->cast_share * t->max_lines * (double)t->max_pulses, err);
 }
 
-/* Whether the format's numbers can hold what lies within the head's range. */
+/* Checks that the format's numbers can hold the places within the head's range. */
 static int check_place(const char *path, int moves, const double place_m[3], double range_max_m, struct sh_err *err)
 {
     double low[3], high[3];
@@ -94,7 +92,7 @@ static int add_faces(struct mesh_recorder *m, const struct scan_faces *faces, st
     return SH_OK;
 }
 
-/* Points that no triangle uses go; what is left keeps its order. */
+/* Leaves out the points that no triangle uses. The others keep their order. */
 static int drop_loose(struct mesh_recorder *m, struct scan_faces *faces, struct sh_err *err)
 {
     struct mesh_grid *g = &m->grid;
@@ -179,17 +177,11 @@ static int try_sidecar(const struct mesh_recorder *m, const char *ending, struct
 {
     const char *path = m->base.file.path;
     const int stem = (int)(strlen(path) - strlen(m->base.ops->ending));
-    char *to = NULL, *part = NULL;
-    int fd, rc = SH_OK;
-    if (asprintf(&to, "%.*s%s", stem, path, ending) < 0) to = NULL;
-    if (to == NULL || asprintf(&part, "%s.part", to) < 0) part = NULL;
-    if (part == NULL)
-        rc = sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    else
-        rc = newfile_part(to, part, &fd, err);
-    if (rc == SH_OK) newfile_drop(part, fd);
+    char *to;
+    if (asprintf(&to, "%.*s%s", stem, path, ending) < 0)
+        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    const int rc = newfile_check(to, err);
     free(to);
-    free(part);
     return rc;
 }
 
@@ -332,7 +324,7 @@ static void mesh_release(void *rec)
     mesh_grid_free(&m->grid);
 }
 
-/* The others are written by an exporter in one piece at the end: what a kill leaves is no mesh. */
+/* Without REPAIR: an exporter writes the file in one piece at its end, so a kill leaves no mesh. */
 #define MESH_OPS(ENDING, REPAIR)                                                                                 \
     {                                                                                                            \
         .ending = ENDING, .is_mesh = 1, .size = sizeof(struct mesh_recorder),                                    \
@@ -340,6 +332,6 @@ static void mesh_release(void *rec)
         .fits = mesh_fits, .begin = mesh_begin, .finish = mesh_finish, .release = mesh_release, .repair = REPAIR \
     }
 
-const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", mesh_ply_repair),
-                          recorder_obj = MESH_OPS(".obj", obj_repair), recorder_gltf = MESH_OPS(".gltf", NULL),
-                          recorder_glb = MESH_OPS(".glb", NULL), recorder_fbx = MESH_OPS(".fbx", NULL);
+const struct recorder_ops recorder_mesh_ply = MESH_OPS(".ply", ply_repair), recorder_obj = MESH_OPS(".obj", obj_repair),
+                          recorder_gltf = MESH_OPS(".gltf", NULL), recorder_glb = MESH_OPS(".glb", NULL),
+                          recorder_fbx = MESH_OPS(".fbx", NULL);

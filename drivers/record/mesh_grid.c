@@ -62,8 +62,8 @@ void mesh_grid_begin(struct mesh_grid *g, const struct track *t, uint32_t first)
                             : 0;
 }
 
-/* Frames of the stream's schedule that are grids of their own: a planar head's are lines, and so are those of a circle and
- * of a head that does not pan. */
+/* Returns whether each sweep is a grid of its own. A planar head, a circle and a head that does not pan have sweeps of
+ * one line, which are lines of one grid. */
 static int has_sweeps(const struct mesh_grid *g, const struct track *t)
 {
     return (g->kind == SCANHEAD_EMIT_SPHERE && g->rings > 1) ||

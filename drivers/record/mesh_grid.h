@@ -30,13 +30,15 @@ int mesh_grid_check(const struct track *track, struct sh_err *err);
 
 /* Empties it, for the scan and the sweep of the track's present batch; `first` is the number of points so far. */
 void mesh_grid_begin(struct mesh_grid *grid, const struct track *track, uint32_t first);
-/* Whether point i of the batch has a place: 0 where its line or row went back, or another sweep began. */
+/* Returns 1 if point i of the batch has a place in the grid, 0 where its line or row went back or another sweep began.
+ * */
 int mesh_grid_takes(const struct mesh_grid *grid, const struct track *track, int i);
-/* 1: taken, at xyz_m in the recording's frame. 0: the head's pose there is not known. SH_ENOMEM. */
+/* Takes point i, which is at xyz_m in the recording's frame. Returns 1, or 0 where the head's pose is not known, or
+ * SH_ENOMEM. */
 int mesh_grid_add(struct mesh_grid *grid, struct track *track, int i, const double xyz_m[3], struct sh_err *err);
-/* xyz_m: of all points of the recording. */
+/* Returns the grid for scan_faces_make. xyz_m holds all points of the recording. */
 struct scan_grid mesh_grid_of(const struct mesh_grid *grid, const double (*xyz_m)[3], double long_edge);
-/* 1: all shots of this line go one way. */
+/* Returns 1 if all shots of this line have the same direction. */
 int mesh_grid_is_pole(const struct mesh_grid *grid, uint32_t line);
 void mesh_grid_free(struct mesh_grid *grid);
 

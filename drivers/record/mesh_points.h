@@ -34,7 +34,7 @@ struct mesh_point {
 /* SH_ENOMEM; SH_EINPUT beyond what files of meshes hold. Both with figures, and without a path. */
 int mesh_points_add(struct mesh_points *points, const struct mesh_point *point, struct sh_err *err);
 void mesh_points_get(const struct mesh_points *points, uint32_t i, struct mesh_point *point);
-/* Point i becomes what point `from` is. */
+/* Copies point `from` over point `to`. */
 void mesh_points_move(struct mesh_points *points, uint32_t from, uint32_t to);
 void mesh_points_free(struct mesh_points *points);
 

@@ -72,8 +72,8 @@ static int add_seam_copy(struct unwrap *w, uint32_t point, float du, float dv, u
     return mesh_points_add(w->points, &copy, err);
 }
 
-/* Moves corners on the near side of the seam beyond it, if the other corners are more than half a turn away. place:
- * line or row of a point, from 0 on. by: the step of uv beyond it. */
+/* Moves corners beyond the seam, if the other corners are more than half a turn away. place has line or row of each
+ * corner, from 0 on. A corner that is moved gets uv coordinates that are larger by `by`. */
 static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3], uint32_t turn, const float by[2],
                       struct sh_err *err)
 {

@@ -2,9 +2,10 @@
 /* The image of a scan's grid as the texture of its mesh: one column per line, one row per shot, the first row at the
  * bottom.
  *
- * A point's texture coordinate is the middle of its texel, so that colours between points are those between texels. Where
- * the mesh closes behind its last line or row, and at poles, a point needs two texture coordinates, so it is doubled.
- * Images have up to MESH_TEXTURE_SIDE texels a side; a larger grid has only each n-th line and row in the image. */
+ * A point's texture coordinate is the middle of its texel, so that colours between points are those between texels.
+ * Where the mesh closes after its last line or row, and at poles, a point needs two texture coordinates, so it is
+ * doubled. Images have up to MESH_TEXTURE_SIDE texels a side; a larger grid has only each n-th line and row in the
+ * image. */
 #ifndef DRIVERS_RECORD_MESH_TEXTURE_H
 #define DRIVERS_RECORD_MESH_TEXTURE_H
 

@@ -30,7 +30,7 @@ static void name_parts(struct mesh_recorder *m)
     }
 }
 
-/* The lines of a header. */
+/* Puts the facts that a header has, a line each. */
 static void put_facts(const struct mesh_recorder *m, uint32_t n_sparse, FILE *out)
 {
     const struct recorder_options *o = &m->base.options;
@@ -49,14 +49,17 @@ static void put_facts(const struct mesh_recorder *m, uint32_t n_sparse, FILE *ou
     ply_put_names(out, "", t->named != NULL ? t->named : t->sh);
 }
 
-/* Cuts text into its lines. */
+/* Cuts text, which is not empty, into its lines. NULL: no memory. */
 static const char **lines_of(char *text, uint32_t *n)
 {
     size_t room = 0;
     const char **line = NULL;
     *n = 0;
     for (char *rest, *p = strtok_r(text, "\n", &rest); p != NULL; p = strtok_r(NULL, "\n", &rest)) {
-        if (!grow(&line, &room, *n + 1, sizeof *line)) break;
+        if (!grow(&line, &room, *n + 1, sizeof *line)) {
+            free(line);
+            return NULL;
+        }
         line[(*n)++] = p;
     }
     return line;
@@ -96,13 +99,15 @@ static int write_mesh(const struct mesh_recorder *m, const struct mesh_points *p
                         .ascii = m->base.options.ascii,
                         .part = part,
                         .n_parts = part != NULL ? (uint32_t)m->n_parts : 0};
-    char *text;
+    char *text = NULL;
     size_t len;
     FILE *out = open_memstream(&text, &len);
-    if (out == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for its header", m->base.track.path);
-    put_facts(m, points->n, out);
-    fclose(out);
-    mesh.comment = lines_of(text, &mesh.n_comments);
+    if (out != NULL) put_facts(m, points->n, out);
+    if (out != NULL && fclose(out) == 0) mesh.comment = lines_of(text, &mesh.n_comments);
+    if (mesh.comment == NULL) {
+        free(text);
+        return sh_fail(err, SH_ENOMEM, "%s: no memory for its header", m->base.track.path);
+    }
     if (has_faces) {
         mesh.normal = (const float(*)[3])points->normal;
         mesh.n_faces = (uint32_t)m->n_faces;

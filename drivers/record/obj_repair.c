@@ -8,7 +8,7 @@
 #include <string.h>
 
 enum { LINE_MOST = 512 };
-static const char INCOMPLETE[] = "# incomplete: the recording was not completed; data may be missing after this\n";
+static const char INCOMPLETE[] = "# " REPAIR_INCOMPLETE "\n";
 
 struct obj_lines {
     uint64_t n_vertices, n_objects;
@@ -43,7 +43,7 @@ static int begins(const char *line, const char *key)
 static int obj_repair_take_line(void *ctx, const char *line, size_t len)
 {
     struct obj_lines *o = ctx;
-    if (strlen(line) != len || len >= LINE_MOST) return 0;
+    if (len >= LINE_MOST) return 0;
     o->is_marked = len == sizeof INCOMPLETE - 2 && memcmp(line, INCOMPLETE, len) == 0;
     if (begins(line, "v ")) {
         if (!are_numbers(line + 2)) return 0;

@@ -15,7 +15,7 @@
 static const uint64_t OUTFILE_RESERVE_AT = (uint64_t)1 << 40; /* beyond any recording, and within what ext4 counts */
 enum { OUTFILE_RESERVE_MOST = 1 << 30 };
 
-static void release(struct outfile *file)
+void outfile_leave(struct outfile *file)
 {
     free(file->path);
     free(file->part);
@@ -32,25 +32,15 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     file->buf = aligned_alloc(DIRECT_BLOCK, OUTFILE_BUFFER);
     if (file->path == NULL || file->buf == NULL || asprintf(&file->part, "%s.part", path) < 0) {
         file->part = NULL;
-        release(file);
+        outfile_leave(file);
         return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
     }
     int rc = newfile_part(file->path, file->part, &file->fd, err);
     if (rc != 0) {
         file->fd = -1;
-        release(file);
+        outfile_leave(file);
     }
     return rc;
-}
-
-/* Where the file system or an older kernel can't do it, the descriptor stays as it was. */
-static void set_direct(struct outfile *file, int on)
-{
-    if (file->is_direct == on) return;
-    if (direct_set(file->fd, on) == 0)
-        file->is_direct = on;
-    else
-        file->may_be_direct = 0;
 }
 
 static int fail_write(struct outfile *file, int error, struct sh_err *err)
@@ -65,19 +55,12 @@ int outfile_check(const struct outfile *file, struct sh_err *err)
     return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(file->error));
 }
 
-/* *at is moved on by what was written, also before a failure. */
+/* Moves *at on by the bytes that were written, also before a failure. */
 static int write_at(struct outfile *file, uint64_t *at, const uint8_t *data, size_t len, struct sh_err *err)
 {
     while (len > 0) {
-        ssize_t n = pwrite(file->fd, data, len, (off_t)*at);
-        if (n < 0 && errno == EINTR) continue;
-        if (n < 0 && errno == EINVAL && file->is_direct) { /* it can't after all, or wants larger blocks */
-            file->may_be_direct = 0;
-            set_direct(file, 0);
-            if (!file->is_direct) continue;
-            errno = EINVAL;
-        }
-        if (n <= 0) return fail_write(file, n < 0 ? errno : ENOSPC, err);
+        const ssize_t n = direct_pwrite(file->fd, &file->is_direct, data, len, (off_t)*at);
+        if (n < 0) return fail_write(file, errno, err);
         data += n;
         len -= (size_t)n;
         *at += (uint64_t)n;
@@ -85,7 +68,8 @@ static int write_at(struct outfile *file, uint64_t *at, const uint8_t *data, siz
     return 0;
 }
 
-/* The first len bytes of the buffer. After a failure the rest stays, so that a later attempt writes no byte twice. */
+/* Writes the first len bytes of the buffer. After a failure the rest stays, so that a later attempt writes no byte
+ * twice. */
 static int write_buffered(struct outfile *file, size_t len, struct sh_err *err)
 {
     uint64_t before = file->written;
@@ -98,7 +82,7 @@ static int write_buffered(struct outfile *file, size_t len, struct sh_err *err)
 
 int outfile_flush(struct outfile *file, struct sh_err *err)
 {
-    set_direct(file, 0); /* the end is no whole block */
+    direct_set(file->fd, &file->is_direct, 0); /* the end is no whole block */
     return write_buffered(file, file->len, err);
 }
 
@@ -109,13 +93,14 @@ int outfile_save(struct outfile *file, struct sh_err *err)
     return rc;
 }
 
-/* Makes room in the middle of a file. Direct, only whole blocks go. */
+/* Makes room in the middle of a file. Only whole blocks can be written past the cache; the rest stays in the buffer. */
 static int outfile_make_room(struct outfile *file, struct sh_err *err)
 {
-    if (!file->may_be_direct || file->written < DIRECT_FROM) return write_buffered(file, file->len, err);
+    if (!file->may_be_direct || file->is_direct < 0 || file->written < DIRECT_FROM)
+        return write_buffered(file, file->len, err);
     const size_t rest = (size_t)((file->written + file->len) % DIRECT_BLOCK);
     if (rest >= file->len) return SH_OK;
-    set_direct(file, file->written % DIRECT_BLOCK == 0);
+    direct_set(file->fd, &file->is_direct, file->written % DIRECT_BLOCK == 0);
     return write_buffered(file, file->len - rest, err);
 }
 
@@ -123,7 +108,7 @@ uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err)
 {
     if (OUTFILE_BUFFER - file->len < n && outfile_make_room(file, err) != 0) return NULL;
     if (OUTFILE_BUFFER - file->len < n && outfile_flush(file, err) != 0)
-        return NULL; /* almost all of it is asked for */
+        return NULL; /* almost the whole buffer is asked for, so the rest has to go, too */
     return file->buf + file->len;
 }
 
@@ -147,7 +132,7 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err)
 {
-    set_direct(file, 0);
+    direct_set(file->fd, &file->is_direct, 0);
     return write_at(file, &at, data, len, err);
 }
 
@@ -157,7 +142,7 @@ void outfile_yield(struct outfile *file)
     file->fd = -1;
 }
 
-/* 1: what is on the disk stays as PATH.part. */
+/* Returns 1 if PATH.part stays, with what is on the disk. */
 static int leave(struct outfile *file)
 {
     struct stat st;
@@ -169,7 +154,7 @@ static int leave(struct outfile *file)
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err)
 {
     if (file->fd < 0) {
-        release(file);
+        outfile_leave(file);
         return 0;
     }
     int rc = how != OUTFILE_DROP ? outfile_flush(file, how == OUTFILE_LEAVE ? NULL : err) : 0, closed = 0;
@@ -179,7 +164,7 @@ int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err
         closed = rc == 0;
     }
     if (!closed && !(stays && leave(file))) newfile_drop(file->part, file->fd);
-    release(file);
+    outfile_leave(file);
     return how == OUTFILE_LEAVE ? 0 : rc;
 }
 
@@ -212,11 +197,18 @@ int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, st
     *file = (struct outfile){.fd = fd, .written = at, .path = strdup(path), .part = strdup(path)};
     file->buf = aligned_alloc(DIRECT_BLOCK, OUTFILE_BUFFER);
     if (file->path != NULL && file->part != NULL && file->buf != NULL) return 0;
-    release(file);
+    outfile_leave(file);
     return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
 }
 
-void outfile_leave(struct outfile *file)
+int outfile_check_stop(const struct outfile *file, const struct sh_report *report, struct sh_err *err)
 {
-    release(file);
+    if (!sh_stopped(report)) return SH_OK;
+    return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written", file->path);
+}
+
+int outfile_fail_huge(const struct outfile *file, const double p[3], struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format allows: %g %g %g", file->path,
+                   p[0], p[1], p[2]);
 }

@@ -19,12 +19,12 @@ struct outfile {
     size_t len;       /* bytes in buf */
     uint64_t written; /* bytes of the file that are before buf */
     int error;        /* errno of the first write that failed: something of the file may be missing; 0: none */
-    uint64_t saved;   /* of these, when outfile_save was called last */
+    uint64_t saved;   /* `written` when outfile_save was called last */
     /* 1: what goes beyond DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
      * do that. It saves copying, which is most of the cost of a long recording, but each write then waits for the disk:
      * for writers that may wait. Set after opening. */
     int may_be_direct;
-    int is_direct; /* the descriptor is, just now */
+    int is_direct; /* 1: the descriptor writes so, just now; -1: the file system can't do that (direct.h) */
 };
 
 /* Errors name the path; SH_EPERM, SH_EINPUT (no such folder, a link, a device), SH_EIO, SH_ENOMEM. */
@@ -45,19 +45,23 @@ int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t le
 /* Removes PATH.part, so that something else can be written as PATH. Only outfile_close may follow, which then only
  * frees. */
 void outfile_yield(struct outfile *file);
-/* OUTFILE_KEEP: flush, sync, rename; where that fails, PATH.part is removed. OUTFILE_KEEP_PART: it then stays, unless it is
- * empty. OUTFILE_LEAVE: it stays, with all that can be flushed, and is not renamed. OUTFILE_DROP: it is removed. Frees
- * everything in any case. */
+/* OUTFILE_KEEP: flushes, syncs and renames; where that fails, PATH.part is removed. OUTFILE_KEEP_PART: does the same,
+ * but after a failure PATH.part stays, unless it is empty. OUTFILE_LEAVE: flushes what it can; PATH.part stays and is
+ * not renamed. OUTFILE_DROP: PATH.part is removed. Everything is freed in any case. */
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
 /* Reserves len bytes on the disk for the end of the file, so that the end, or a repair, can be written when the disk is
- * full. The reserved room lies far behind the end, and does not count as length. Nothing is reserved where the file
+ * full. The reserved room lies far beyond the end, and does not count as length. Nothing is reserved where the file
  * system can't do that, or files have a limit. SH_EIO: the disk is full. */
 int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err);
 /* Frees the reserved room, for what is written next. */
 void outfile_release(struct outfile *file);
-/* Writes over an open file from `at` on; path is for messages. SH_ENOMEM. Only outfile_leave ends it: it flushes nothing,
- * and leaves fd open. */
+/* SH_ESTOPPED where the report's stop says so: the file is given up while it is being completed. report may be NULL. */
+int outfile_check_stop(const struct outfile *file, const struct sh_report *report, struct sh_err *err);
+/* SH_EFORMAT, for a coordinate that is too long to be written as text. */
+int outfile_fail_huge(const struct outfile *file, const double p[3], struct sh_err *err);
+/* Writes over an open file from `at` on; path is for messages. SH_ENOMEM. Only outfile_leave ends it: that flushes
+ * nothing, and leaves fd open. */
 int outfile_over(struct outfile *file, int fd, const char *path, uint64_t at, struct sh_err *err);
 void outfile_leave(struct outfile *file);
 

@@ -49,9 +49,9 @@ static void count_packet(struct packets *p, const struct pcapng_packet *packet)
         scan_count_frame(&p->scans, packet->data[1], packet->data[3]);
 }
 
-/* A block of statistics of the first interface, without any: only with a comment. */
+/* The note is a block of statistics of the first interface, which holds a comment and no figure. */
 enum { BLOCK_STATISTICS = 5, OPTION_COMMENT = 1, NOTE_HEAD = 20 };
-static const char NOTE[] = "incomplete: the recording was not completed; data may be missing after this";
+static const char NOTE[] = REPAIR_INCOMPLETE;
 enum { NOTE_TEXT = sizeof NOTE - 1, NOTE_LEN = NOTE_HEAD + 4 + (NOTE_TEXT + 3) / 4 * 4 + 4 + 4 };
 
 static void put_note(uint8_t note[NOTE_LEN])
@@ -78,7 +78,7 @@ static int is_own_section(const uint8_t *block, size_t len)
     return len == pcapng_put_section(own, "scanhead") && memcmp(block, own, len) == 0;
 }
 
-/* All whole blocks of what is held. 1: no block follows. */
+/* Takes all whole blocks of the bytes that are held. Returns 1 if no block can follow. */
 static int take_blocks(struct packets *p)
 {
     struct pcapng_packet packet;
@@ -109,7 +109,7 @@ static int read_packets(const struct repair *r, struct packets *p, struct sh_err
     return rc;
 }
 
-/* A file that ends with a whole block was not cut: 1, 0 or SH_E. */
+/* Returns 1 if the file ends with a whole block, so that it was not cut; else 0, or SH_E. */
 static int ends_with_block(const struct repair *r, uint64_t from, struct sh_err *err)
 {
     enum { LEAST = 12 };
@@ -134,7 +134,7 @@ static int check_behind(const struct repair *r, const struct packets *p, struct 
     return rc > 0 || rc == SH_EFORMAT ? repair_fail_damaged(r, end, err) : rc;
 }
 
-/* Cut behind the last whole block; then a note. */
+/* Cuts the file after the last whole block; then puts a note. */
 static int pcapng_repair(struct repair *r, struct sh_err *err)
 {
     struct packets *p = malloc(sizeof *p);

@@ -26,6 +26,8 @@ struct ply {
     struct ply_facts facts;
     int begun;                                      /* room for the header is made */
     size_t header_len;                              /* bytes of that room */
+    struct ply_head last;                           /* of the present scan */
+    uint64_t n_heads_beyond;                        /* that the facts have no room for */
     double time_s[TRACK_BATCH], frame[TRACK_BATCH]; /* of the batch, where they are columns */
 };
 
@@ -50,7 +52,7 @@ static int make_header(struct ply *ply, int incomplete, char **text, size_t *len
     ply->facts.incomplete = incomplete;
     const int rc = ply_header_make(&ply->facts, ply->header_len, text, len, &n_left_out, err);
     if (rc == 0 && !incomplete)
-        recorder_report(&ply->base, n_left_out,
+        recorder_report(&ply->base, n_left_out + ply->n_heads_beyond,
                         "names of surfaces and heads left out; the header has no room for them");
     return rc;
 }
@@ -239,14 +241,15 @@ static int put_text_rows(struct ply *ply, int n, uint8_t **to, struct sh_err *er
     const struct track_points *p = &ply->base.track.points;
     for (int i = 0; i < n; i++) {
         uint8_t *end = put_ascii(*to, ply, i);
-        if (end == NULL) return recorder_fail_huge(&ply->base, (const double[3]){p->x[i], p->y[i], p->z[i]}, err);
+        if (end == NULL) return outfile_fail_huge(&ply->base.file, (const double[3]){p->x[i], p->y[i], p->z[i]}, err);
         *to = end;
         ply->facts.n_vertices++;
     }
     return SH_OK;
 }
 
-/* The time may come late. 1: now. */
+/* Takes the GPS time of the first scan's start, which may come after its first points. Returns 1 when it has just
+ * come. */
 static int set_gps(struct ply *ply)
 {
     struct ply_facts *facts = &ply->facts;
@@ -255,7 +258,8 @@ static int set_gps(struct ply *ply)
     return facts->have_gps;
 }
 
-/* A float steps by 6e-8 of a number: enough about the origin of a scene, and metres on the Earth. */
+/* A float is rounded by up to 2^-24 of a number: 0.06 mm at 1 km from the origin of a scene, but 0.3 m at a northing of
+ * UTM. */
 static const double FLOAT_MOST_M = 1000, FLOAT_PART = 0x1p-24;
 
 static int fail_float(const char *path, double most, struct sh_err *err)
@@ -283,13 +287,14 @@ static int check_float(const char *path, unsigned columns, int in_degrees, const
 static int ply_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                     const struct recorder_scan *scan, struct sh_err *err)
 {
-    static const double way[3] = {0, 0, 0}; /* a moving head's places in the scene frame are known at the end */
+    static const double way[3] = {0, 0, 0}; /* a moving head's places in the scene frame are checked as they come */
     (void)first;
     return check_float(path, options->columns, scan->in_degrees, scan->moves && !scan->is_geo ? way : scan->place_m,
                        err);
 }
 
-/* The places of a moving head are not known before. Its points may be as far from it as those of a station. */
+/* The places of a moving head are not known before the scan. So its points are checked: they may be as far from the
+ * origin as those of a station that is allowed. */
 static int check_floats_on_the_way(const struct ply *ply, int n, struct sh_err *err)
 {
     const struct track *t = &ply->base.track;
@@ -306,6 +311,25 @@ static unsigned columns_spared(unsigned columns)
            ((columns & PLY_TIME) != 0 ? 0 : TRACK_TIME) | ((columns & PLY_LABEL) != 0 ? 0 : TRACK_LABEL);
 }
 
+/* Notes the scan's head, unless it is that of the scan before. Returns 1 if the header has another one now. */
+static int add_head(struct ply *ply)
+{
+    const struct scanhead_info *info = &ply->base.track.info;
+    struct ply_facts *facts = &ply->facts;
+    const struct ply_head before = ply->last;
+    ply->last.station = info->station;
+    snprintf(ply->last.idn, sizeof ply->last.idn, "%s", info->idn);
+    snprintf(ply->last.profile, sizeof ply->last.profile, "%s", info->profile);
+    if (facts->n_heads > 0 && strcmp(before.idn, ply->last.idn) == 0 && strcmp(before.profile, ply->last.profile) == 0)
+        return 0;
+    if (facts->n_heads == PLY_MAX_HEADS) {
+        ply->n_heads_beyond++;
+        return 0;
+    }
+    facts->head[facts->n_heads++] = ply->last;
+    return 1;
+}
+
 /* Room for the header is made when the number of surfaces is known. */
 static int ply_scan(void *rec, struct sh_err *err)
 {
@@ -314,13 +338,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     struct ply_facts *facts = &ply->facts;
     facts->columns = ply_columns_there(&ply->base.track, ply->base.options.columns);
     ply->base.track.spared = columns_spared(facts->columns);
-    struct ply_head head = {.station = info->station};
-    snprintf(head.idn, sizeof head.idn, "%s", info->idn);
-    snprintf(head.profile, sizeof head.profile, "%s", info->profile);
-    const struct ply_head *last = facts->n_heads > 0 ? &facts->head[facts->n_heads - 1] : NULL;
-    const int same = last != NULL && strcmp(last->idn, head.idn) == 0 && strcmp(last->profile, head.profile) == 0;
-    const int is_new = !same && facts->n_heads < PLY_MAX_HEADS;
-    if (is_new) facts->head[facts->n_heads++] = head;
+    const int is_new = add_head(ply);
     int rc = check_float(ply->base.file.path, facts->columns, ply->base.track.crs == NATIVE_CRS_GEODETIC,
                          ply->base.track.pose.shift_m, err);
     set_gps(ply);
@@ -381,7 +399,7 @@ static int ply_finish(void *rec, struct sh_err *err)
     ply->facts.n_without_attributes = ply->base.track.missing.n_without_attributes;
     ply->facts.n_unplaced = ply->base.track.missing.n_unplaced;
     ply->facts.n_without_pose = ply->base.track.missing.n_without_pose;
-    const int rc = outfile_check(&ply->base.file, err); /* then the header goes on saying that the file is incomplete */
+    const int rc = outfile_check(&ply->base.file, err); /* after a failure the header still says "incomplete" */
     return rc != 0 ? rc : write_header(ply, 0, err);
 }
 

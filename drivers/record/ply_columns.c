@@ -38,7 +38,7 @@ const char *ply_crs_text(const struct track *t)
     return t->geoid_heights && t->crs >= 2 ? on_geoid[t->crs - 2] : text[t->crs];
 }
 
-/* Those that fit in `room` bytes; how many do not. */
+/* Puts the names that fit into `room` bytes. Returns how many do not. */
 static uint64_t put_names(FILE *out, const char *before, const struct scanhead *sh, size_t room)
 {
     const char *object, *material;
@@ -219,14 +219,14 @@ size_t ply_row_len(unsigned asked)
     return len;
 }
 
-/* CloudCompare shows columns of other names than these only where it is told to. */
+/* CloudCompare shows plain columns, and those called scalar_NAME. It shows others only where it is told to. */
 static void put_column(FILE *out, const struct ply_facts *facts, const struct column *c)
 {
     const char *type = is_as_float(facts->columns, c) ? "float" : c->type;
     fprintf(out, "property %s %s%s\n", type, facts->scalar_names && !c->plain ? "scalar_" : "", c->name);
 }
 
-/* How much of the names and of the padding goes into the header. */
+/* How many bytes of names and of padding go into the header, and how many names do not. */
 struct filling {
     size_t names, padding; /* bytes */
     uint64_t n_left_out;
@@ -255,7 +255,7 @@ static int make(const struct ply_facts *facts, struct filling *fill, char **text
     return sh_fail(err, SH_ENOMEM, "no memory for the header");
 }
 
-/* How many bytes names may take, after as many heads as fit. */
+/* Leaves out heads until the header has room for the rest. Sets how many bytes are then left for names. */
 static int fit(struct ply_facts *facts, size_t size, size_t *names, uint64_t *n_left_out, struct sh_err *err)
 {
     char *text;

@@ -13,8 +13,8 @@
 #include "drivers/record/track.h"
 
 enum { PLY_MAX_HEADS = 128, PLY_PAD_MIN = 8 /* "comment\n" */ };
-/* The line of a header that was written before the recording had its end. */
-#define PLY_CRS        "comment crs " /* the first line of comment, which shows that this program wrote the file */
+/* Lines of the header. The second stands there until the recording has its end. */
+#define PLY_CRS        "comment crs " /* the first comment but for that; it shows that this program wrote the file */
 #define PLY_INCOMPLETE "comment incomplete: its end is missing, and losses were not counted\n"
 
 struct ply_facts {
@@ -27,7 +27,7 @@ struct ply_facts {
     int incomplete;                  /* the recording goes on: its losses are not known */
     int have_gps;
     double gps_s; /* GPS time of the first scan's start */
-    /* The heads: of the first scan, then wherever another one begins. */
+    /* The head of the first scan, then each head that is not that of the scan before. */
     struct ply_head {
         uint32_t station;
         char idn[96], profile[32];

@@ -8,27 +8,25 @@
 
 #include "core/bytes.h"
 #include "drivers/record/ply_columns.h"
-#include "drivers/record/recorder.h"
 #include "drivers/record/scan_count.h"
 
-extern const struct recorder_ops recorder_mesh_ply;
-
 enum { HEADER_BEGIN = 1 << 16, HEADER_MOST = 64 << 20, WORD = 32, NO_COLUMN = -1 };
+enum { FACE_LEN = 13 }; /* of a mesh in binary: three corners: a count of 8 bits, three indices of 32 */
 
 /* A header that was read. */
 struct ply_header {
     char *text; /* NUL at its end */
     size_t len;
-    uint64_t n_vertices;
+    uint64_t n_vertices, n_faces;
     int has_vertices, is_ascii, is_mesh, is_incomplete, is_ours;
     unsigned n_columns;
     size_t row_len;          /* binary */
-    int station_at, time_at; /* byte in a binary row, number of the column in text; NO_COLUMN */
+    int station_at, time_at; /* byte in a binary row, or number of the column in text; NO_COLUMN: there is none */
 };
 
 /* ---- the header */
 
-/* All up to "end_header". */
+/* Reads all up to "end_header". */
 static int read_header(const struct repair *r, struct ply_header *h, struct sh_err *err)
 {
     static const char last[] = "\nend_header\n";
@@ -50,7 +48,7 @@ static int read_header(const struct repair *r, struct ply_header *h, struct sh_e
     return strlen(h->text) == h->len ? SH_OK : repair_fail_none(r, "PLY file of points", err);
 }
 
-/* 0: no type of one number. */
+/* Returns the bytes of a number of this type; 0: it is no type of one number. */
 static size_t size_of_type(const char *type)
 {
     static const struct {
@@ -63,7 +61,7 @@ static size_t size_of_type(const char *type)
     return 0;
 }
 
-/* 1, or 0: it is of no use here. */
+/* Takes a line of a vertex's property. Returns 0 if such a column can't be repaired, else 1. */
 static int take_property(struct ply_header *h, const char *line)
 {
     char type[WORD], name[WORD];
@@ -78,7 +76,8 @@ static int take_property(struct ply_header *h, const char *line)
     return 1;
 }
 
-int ply_repair_count(const char *line, const char *head, uint64_t *count)
+/* Returns 1 if the line is `head` ("element vertex "), then a count and nothing else. 0: another line. */
+static int take_count(const char *line, const char *head, uint64_t *count)
 {
     const size_t n = strlen(head), digits = strncmp(line, head, n) == 0 ? strspn(line + n, "0123456789") : 0;
     if (digits == 0 || digits > 20 || line[n + digits] != '\0') return 0;
@@ -92,15 +91,16 @@ static int take_header_line(struct ply_header *h, const char *line)
 {
     if (strcmp(line, "format ascii 1.0") == 0) return h->is_ascii = 1;
     if (strncmp(line, "format ", 7) == 0) return strcmp(line, "format binary_little_endian 1.0") == 0;
-    if (strncmp(line, "property ", 9) == 0) return h->is_mesh || (h->has_vertices && take_property(h, line));
+    if (strncmp(line, "property ", 9) == 0)
+        return h->is_mesh ? strcmp(line, "property list uchar int vertex_indices") == 0
+                          : h->has_vertices && take_property(h, line);
     if (strncmp(line, "element ", 8) != 0) {
         if (strncmp(line, PLY_INCOMPLETE, sizeof PLY_INCOMPLETE - 2) == 0) h->is_incomplete = 1;
         if (strncmp(line, PLY_CRS, sizeof PLY_CRS - 1) == 0) h->is_ours = 1;
         return 1;
     }
-    if (strncmp(line, "element face ", 13) == 0) return h->is_mesh = 1;
-    if (h->has_vertices || !ply_repair_count(line, "element vertex ", &h->n_vertices)) return 0;
-    return h->has_vertices = 1;
+    if (h->has_vertices) return h->is_mesh = !h->is_mesh && take_count(line, "element face ", &h->n_faces);
+    return h->has_vertices = take_count(line, "element vertex ", &h->n_vertices);
 }
 
 static int parse_header(const struct repair *r, struct ply_header *h, struct sh_err *err)
@@ -114,8 +114,8 @@ static int parse_header(const struct repair *r, struct ply_header *h, struct sh_
         line[n] = '\0';
         good = take_header_line(h, line);
     }
-    if (good && h->has_vertices && (h->is_mesh || h->n_columns > 0)) return SH_OK;
-    return repair_fail_none(r, "PLY file of points", err);
+    if (good && h->has_vertices && h->n_columns > 0) return SH_OK;
+    return repair_fail_none(r, h->is_mesh ? "PLY mesh" : "PLY file of points", err);
 }
 
 /* Blank comments, and pieces of comments left when the recorder was killed while it overwrote the header. */
@@ -189,7 +189,7 @@ static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomple
 
 struct points {
     const struct ply_header *h;
-    uint64_t n, n_zero; /* n_zero: of zeros alone, at the end */
+    uint64_t n, n_zero; /* rows; those at the end that hold zeros alone */
     struct point_scans scans;
 };
 
@@ -207,11 +207,11 @@ static void take_binary(void *ctx, const uint8_t *row)
 static int take_text(void *ctx, const char *line, size_t len)
 {
     struct points *p = ctx;
+    (void)len;
     const struct ply_header *h = p->h;
     unsigned n = 0;
     long station = 0;
     double time_s = 0;
-    if (strlen(line) != len) return 0;
     for (const char *at = line + strspn(line, " "); *at != '\0'; n++) {
         const size_t word = strcspn(at, " ");
         if (strspn(at, "0123456789+-.einfa") < word) return 0;
@@ -226,7 +226,7 @@ static int take_text(void *ctx, const char *line, size_t len)
     return 1;
 }
 
-/* *end: behind the last whole row. */
+/* Sets *end to where the last whole row ends. */
 static int read_points(const struct repair *r, const struct ply_header *h, struct points *p, uint64_t *end,
                        struct sh_err *err)
 {
@@ -260,6 +260,34 @@ static int make_whole(struct repair *r, const struct ply_header *h, const struct
     return rc;
 }
 
+static int count_line(void *n_lines, const char *line, size_t len)
+{
+    (void)line;
+    (void)len;
+    ++*(uint64_t *)n_lines;
+    return 1;
+}
+
+/* A mesh is only checked: its recorder writes it in one piece. */
+static int check_mesh(struct repair *r, const struct ply_header *h, struct sh_err *err)
+{
+    uint64_t n_lines = 0, end = h->len;
+    if (h->n_vertices > UINT32_MAX || h->n_faces > UINT32_MAX) return repair_fail_none(r, "PLY mesh", err);
+    const int rc = h->is_ascii ? repair_lines(r, h->len, count_line, &n_lines, &end, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    const uint64_t len = h->len + h->n_vertices * h->row_len + h->n_faces * FACE_LEN;
+    const int is_all = h->is_ascii ? end == r->len && n_lines == h->n_vertices + h->n_faces : r->len == len;
+    if (!is_all)
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: is a mesh of %" PRIu64 " points and %" PRIu64
+                       " triangles, but some are missing; it is written in one piece, so nothing can be kept",
+                       r->path, h->n_vertices, h->n_faces);
+    r->unit = "points";
+    r->n_kept = h->n_vertices;
+    r->was_whole = 1;
+    return SH_OK;
+}
+
 int ply_repair(struct repair *r, struct sh_err *err)
 {
     struct ply_header h = {0};
@@ -268,10 +296,7 @@ int ply_repair(struct repair *r, struct sh_err *err)
     int rc = read_header(r, &h, err);
     if (rc == SH_OK) rc = parse_header(r, &h, err);
     if (rc == SH_OK && h.is_mesh) {
-        rc = recorder_mesh_ply.repair != NULL
-                 ? recorder_mesh_ply.repair(r, err)
-                 : sh_fail(err, SH_EFORMAT,
-                           "%s: a mesh is written in one piece at its end; nothing of this file can be kept", r->path);
+        rc = check_mesh(r, &h, err);
     } else if (rc == SH_OK) {
         rc = read_points(r, &h, &p, &end, err);
         r->unit = "points";

@@ -7,8 +7,9 @@
  *
  * A head that moves has one row per pose, each time once, in the scene frame, with times since the scan's
  * start. So the file is a trajectory file (core/pose.h). Lines of comment say where stream frames were lost, and
- * how the scene frame lies in the CRS of the geo layout. */
-#include <inttypes.h>
+ * how the scene frame lies in the CRS of the geo layout.
+ *
+ * Scans are numbered from 1 on in the file, as in .waves.csv and .e57. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -22,9 +23,13 @@ enum { BATCH = 64, LINE = 512 };
 
 struct pose_file {
     struct recorder base;
-    int titled, begun;
-    uint32_t scan;
-    int64_t last_ns; /* written last */
+    int titled;
+    /* of a head that moves */
+    uint32_t n_scans;
+    int is_due;                /* the event SCAN_START came, and no pose after it */
+    const struct scanhead *sh; /* of the present scan */
+    uint32_t scan, station;    /* of the present scan, as its head numbers them */
+    int64_t last_ns;           /* written last */
 };
 
 enum title { STATIONS, STOPS, MOVING };
@@ -65,7 +70,7 @@ static int put_station(void *rec, struct sh_err *err)
 
 static int pose_file_put(struct pose_file *file, const struct scanhead_pose *p, struct sh_err *err)
 {
-    char line[2 * LINE], *at = decimal_put_whole(line, file->scan);
+    char line[2 * LINE], *at = decimal_put_whole(line, file->n_scans);
     *at++ = ',';
     at = decimal_put_fixed(at, 1e-9 * (double)p->t_ns, 9);
     *at++ = ',';
@@ -96,17 +101,30 @@ static int put_link(struct pose_file *file, const struct scanhead_info *info, st
     return outfile_write(&file->base.file, text, (size_t)n, err);
 }
 
+/* The number alone does not say it: another head, or one that has started again, numbers its scans from 1 on. A new
+ * descriptor does not say it either: settings may change within a scan, whose poses go on then. */
+static int is_new_scan(const struct pose_file *file, const struct scanhead *sh, const struct scanhead_info *info)
+{
+    return file->n_scans == 0 || file->is_due || sh != file->sh || info->scan != file->scan ||
+           info->station != file->station;
+}
+
 static int put_poses(struct pose_file *file, struct scanhead *sh, const struct scanhead_frame *frame,
                      struct sh_err *err)
 {
     struct scanhead_pose pose[BATCH];
     struct scanhead_info info;
     int n, rc = put_title(file, MOVING, err);
-    if (scanhead_get_info(sh, &info) != SCANHEAD_OK) return SH_OK; /* whose scan it is isn't known yet */
-    if (!file->begun || info.scan != file->scan) file->last_ns = INT64_MIN;
-    if (rc == SH_OK && !file->begun) rc = put_link(file, &info, err);
-    file->begun = 1;
+    if (rc != SH_OK || scanhead_get_info(sh, &info) != SCANHEAD_OK) return rc; /* their scan is not known yet */
+    if (file->n_scans == 0) rc = put_link(file, &info, err);
+    if (is_new_scan(file, sh, &info)) {
+        file->n_scans++;
+        file->last_ns = INT64_MIN;
+    }
+    file->is_due = 0;
+    file->sh = sh;
     file->scan = info.scan;
+    file->station = info.station;
     for (uint32_t first = 0; (n = scanhead_poses(sh, frame, first, pose, BATCH)) > 0 && rc == SH_OK;
          first += (uint32_t)n) {
         static const char gap[] = "# poses are missing here\n";
@@ -125,6 +143,7 @@ static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead
 {
     struct pose_file *file = rec;
     if (frame->type == SCANHEAD_POSES) return put_poses(file, sh, frame, err);
+    file->is_due |= frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_START;
     return track_frame(&file->base.track, sh, frame, err);
 }
 

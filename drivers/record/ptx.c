@@ -31,7 +31,7 @@ enum {
     N_KNOWN = 1024, /* intensities that are kept, by the stream's steps of 0.01 dB */
 };
 
-/* An intensity that was computed before. Scans have few different reflectances, and a power takes long to compute. */
+/* An intensity that was computed before. Scans have few different reflectances, and pow() takes long. */
 struct known {
     double reflectance_db;
     float intensity;
@@ -76,14 +76,14 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     return rc == 0 ? ptx_grid_clear(g, err) : rc;
 }
 
-/* Do the n points of the present batch, which are of one line, belong into the grid as it is? */
+/* Returns whether the n points of the present batch, which are of one line, belong into the grid as it is. */
 static int has_room(const struct ptx *ptx, uint32_t n)
 {
     const struct ptx_grid *g = &ptx->grid;
     const struct track *t = &ptx->base.track;
     const uint32_t first = t->row[0], last = t->row[n - 1];
     if (g->n_shots == 0) return 1;
-    const uint32_t after = ptx->last_row + (t->points.echo[0] <= 1); /* further echoes belong to the last shot */
+    const uint32_t after = ptx->last_row + (t->points.echo[0] <= 1); /* later echoes belong to the last shot */
     if (t->line < ptx->last_line || (t->line == ptx->last_line && first < after)) return 0;
     const uint64_t columns = (uint64_t)t->line - g->column_min + 1;
     const uint64_t rows =
@@ -120,7 +120,7 @@ static float intensity(struct ptx *ptx, double reflectance_db)
     return known->intensity;
 }
 
-/* The cell of the batch's point i. 1, or 0: a shot without echo. */
+/* Makes the cell of the batch's point i. Returns 1, or 0 for a shot without echo. */
 static int make_cell(struct ptx *ptx, int i, struct ptx_cell *cell)
 {
     struct track *t = &ptx->base.track;
@@ -147,7 +147,7 @@ static int begin_grid(struct ptx *ptx, struct sh_err *err)
     return rc == 0 ? outfile_patch(file, file->written, text, sizeof text - 1, err) : rc;
 }
 
-/* Makes the cell of the batch's point i. Returns 0 where it has none, else 1. */
+/* Takes the batch's point i. Returns 1 if a cell was made of it, else 0. */
 static int take_shot(struct ptx *ptx, int i, struct ptx_cell *cell)
 {
     const struct track *t = &ptx->base.track;

@@ -19,6 +19,12 @@ static int fail_spool(const struct ptx_grid *grid, struct sh_err *err)
     return sh_fail(err, SH_EIO, "%s: cannot write: %s", grid->path, strerror(errno));
 }
 
+static int fail_read(const struct ptx_grid *grid, struct sh_err *err)
+{
+    return sh_fail(err, SH_EIO, "%s: cannot be read back: %s", grid->path,
+                   ferror(grid->spool) ? strerror(errno) : "it became shorter");
+}
+
 /* After a failure nothing more is written, so that what is there stays in one piece. */
 static int ptx_grid_put(struct ptx_grid *grid, const void *data, size_t len, struct sh_err *err)
 {
@@ -124,7 +130,7 @@ static const struct ptx_cell *look_at_cell(struct ptx_grid *grid, struct drain *
     d->at = 0;
     d->n = fread(d->cell, sizeof *d->cell, d->left < CELLS_AT_ONCE ? (size_t)d->left : CELLS_AT_ONCE, grid->spool);
     if (d->n > 0) return d->cell;
-    *rc = fail_spool(grid, err);
+    *rc = fail_read(grid, err);
     return NULL;
 }
 
@@ -190,7 +196,7 @@ int ptx_grid_find(struct ptx_grid *grid, struct ptx_head *head, uint64_t *cut, s
     *cut = 0;
     if (fread(head, sizeof *head, 1, grid->spool) != 1 || memcmp(head->magic, MAGIC, sizeof MAGIC) != 0 ||
         head->check != check_of_head(head))
-        return ferror(grid->spool) ? fail_spool(grid, err) : 0;
+        return ferror(grid->spool) ? fail_read(grid, err) : 0;
     for (; fread(&cell, sizeof cell, 1, grid->spool) == 1; n++) {
         const int right = cell.check == check_of_cell(&cell) && (n == 0 || cell.column >= last);
         if (right && grid->n_cells < n) return fail_damaged(grid, grid->n_cells, err);
@@ -199,8 +205,7 @@ int ptx_grid_find(struct ptx_grid *grid, struct ptx_head *head, uint64_t *cut, s
         last = cell.column;
         grid->n_cells++;
     }
-    if (ferror(grid->spool)) return fail_spool(grid, err);
-    if (fseeko(grid->spool, 0, SEEK_END) != 0) return fail_spool(grid, err);
+    if (ferror(grid->spool) || fseeko(grid->spool, 0, SEEK_END) != 0) return fail_read(grid, err);
     *cut = (uint64_t)ftello(grid->spool) - sizeof *head - grid->n_cells * sizeof cell;
     grid->n_shots = grid->n_cells;
     return grid->n_cells > 0;

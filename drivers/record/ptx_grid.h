@@ -18,7 +18,7 @@ struct ptx_cell {
     uint32_t column, row;
     float intensity; /* 0..1 */
     uint8_t rgb[3];
-    uint8_t check; /* checksum of the other bytes, by ptx_grid_cells. Cells have no gap, as they are written whole */
+    uint8_t check; /* checksum of the other bytes; ptx_grid_cells sets it. A cell has no gap, as it is written whole */
     double p_socs[3];
 };
 
@@ -45,8 +45,8 @@ void ptx_grid_close(struct ptx_grid *grid);
 /* Before the first shot of a grid. */
 int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station_pose *pose, int coloured,
                    struct sh_err *err);
-/* Takes a shot at this place; 1: it makes the grid larger. A cell is then given for each shot with an echo. Columns
- * never go back. */
+/* Takes a shot at this place. Returns 1 if it makes the grid larger. Each shot with an echo, and each that makes the
+ * grid larger, then gives a cell. Columns never go back. */
 int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row);
 /* Takes n cells; intensity -1: a shot without echo. */
 int ptx_grid_cells(struct ptx_grid *grid, struct ptx_cell *cell, int n, struct sh_err *err);

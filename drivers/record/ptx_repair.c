@@ -23,22 +23,23 @@ static const uint64_t MOST = UINT32_MAX; /* columns, rows */
 
 /* How far the text has been read, in grids. */
 struct place {
-    uint64_t at, grid_at;            /* bytes: behind the last line, and before the grid */
+    uint64_t at, grid_at;            /* bytes: where the last line ends, and where the grid begins */
     uint64_t columns, rows, n_lines; /* of the grid; lines that were there */
     uint64_t n_points;               /* of all */
     uint64_t n_grids;                /* that are whole */
     size_t columns_len;              /* of the grid's first line */
-    int header, coloured;            /* lines of the header that were there */
+    int header;                      /* lines of the grid's header that were there */
+    int coloured;                    /* the last point had a colour */
 };
 
-/* Numbers in a line; 0: there is something else. Spaces may follow them. */
+/* Counts the numbers in a line; 0: there is something else. Spaces may follow them. */
 static int count_numbers(const char *line, size_t len)
 {
     int n = 0;
     while (len > 0 && (line[len - 1] == ' ' || line[len - 1] == '\r'))
         len--;
     for (size_t i = 0; i < len; i++) {
-        if (strchr("0123456789+-.eE ", line[i]) == NULL || line[i] == 0) return 0;
+        if (strchr("0123456789+-.eE ", line[i]) == NULL) return 0;
         n += line[i] != ' ' && (i == 0 || line[i - 1] == ' ');
     }
     return n;
@@ -88,7 +89,7 @@ static int ptx_repair_take_line(void *ctx, const char *line, size_t len)
     return 1;
 }
 
-/* The first `len` bytes. */
+/* Reads the first `len` bytes. */
 static int read_text(const struct repair *r, uint64_t len, struct place *p, struct sh_err *err)
 {
     struct repair front = *r;
@@ -99,7 +100,7 @@ static int read_text(const struct repair *r, uint64_t len, struct place *p, stru
     return rc == SH_OK ? repair_check_rest(&front, end, LINE_MOST, err) : rc;
 }
 
-/* After the last write: the file ends there. rc: of the writes. */
+/* Ends the file after the last write. rc is that of the writes before. */
 static int end_file(const struct repair *r, struct outfile *file, int rc, struct sh_err *err)
 {
     if (rc == SH_OK) rc = outfile_flush(file, err);
@@ -215,7 +216,7 @@ static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, st
     return rc;
 }
 
-/* NULL, and SH_OK: there is none. */
+/* Opens FILE.grid. SH_OK also where there is none: spool is NULL then. */
 static int open_grid(const struct repair *r, struct ptx_grid *grid, struct sh_err *err)
 {
     memset(grid, 0, sizeof *grid);

@@ -14,23 +14,11 @@ enum {
     ROWS_BETWEEN_STOPS = 1 << 16,
 };
 
-static int fail_huge(const struct ptx_text *t, const double p[3], struct sh_err *err)
-{
-    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format allows: %g %g %g", t->file->path,
-                   p[0], p[1], p[2]);
-}
-
-static int check_stop(const struct ptx_text *t, struct sh_err *err)
-{
-    if (!sh_stopped(t->report)) return SH_OK;
-    return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written", t->file->path);
-}
-
 static int put_vector(struct ptx_text *t, int digits, const double v[3], const char *end, struct sh_err *err)
 {
     char text[LINE_MAX_LEN];
     int n = snprintf(text, sizeof text, "%.*f %.*f %.*f%s\n", digits, v[0], digits, v[1], digits, v[2], end);
-    if (n >= (int)sizeof text) return fail_huge(t, v, err);
+    if (n >= (int)sizeof text) return outfile_fail_huge(t->file, v, err);
     return outfile_write(t->file, text, (size_t)n, err);
 }
 
@@ -49,7 +37,7 @@ static int put_header(struct ptx_text *t, struct sh_err *err)
     return rc == 0 ? put_vector(t, 9, s, " 1", err) : rc;
 }
 
-/* A large grid takes long. */
+/* Reports progress, as a large grid takes long. */
 static void say_progress(struct ptx_text *t, uint32_t n_rows)
 {
     char what[LINE_MAX_LEN];
@@ -89,7 +77,7 @@ static int put_cells(struct ptx_text *t, const struct ptx_cell *cell, uint32_t n
     for (uint32_t i = 0; rc == 0 && i < n; i++) {
         char *end = put_cell(to, &cell[i], t->coloured);
         if (end - to >= LINE_MAX_LEN) {
-            rc = fail_huge(t, cell[i].p_socs, err);
+            rc = outfile_fail_huge(t->file, cell[i].p_socs, err);
             break;
         }
         to = end;
@@ -102,10 +90,10 @@ static int put_cells(struct ptx_text *t, const struct ptx_cell *cell, uint32_t n
 static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
 {
     struct ptx_text *t = ctx;
-    int rc = check_stop(t, err);
+    int rc = outfile_check_stop(t->file, t->report, err);
     say_progress(t, n_rows);
     for (uint32_t i = 0; rc == 0 && i < n_rows; i += ROWS_AT_ONCE) {
-        if (i > 0 && i % ROWS_BETWEEN_STOPS == 0) rc = check_stop(t, err);
+        if (i > 0 && i % ROWS_BETWEEN_STOPS == 0) rc = outfile_check_stop(t->file, t->report, err);
         if (rc == 0) rc = put_cells(t, column + i, n_rows - i < ROWS_AT_ONCE ? n_rows - i : ROWS_AT_ONCE, err);
     }
     return rc;

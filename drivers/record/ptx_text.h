@@ -25,7 +25,8 @@ struct ptx_text {
 /* Puts the grid, whose shots are then gone (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */
 int ptx_text_put(struct ptx_text *text, struct sh_err *err);
 
-/* recorder_ops.repair: keeps all whole grids, and the points of the last one; the rest of its last column is filled up. */
+/* recorder_ops.repair: keeps all whole grids, and the points of the last one. The rest of its last column is filled
+ * up. */
 int ptx_repair(struct repair *repair, struct sh_err *err);
 
 #endif

@@ -103,12 +103,6 @@ void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
     if (n > 0) sh_warn(rec->options.report, "%s: %" PRIu64 " %s", rec->file.path, n, what);
 }
 
-int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err)
-{
-    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format allows: %g %g %g",
-                   rec->file.path, p[0], p[1], p[2]);
-}
-
 static void report_waves(const struct recorder *rec)
 {
     const struct track_missing *m = &rec->track.missing;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Recorders: the frames of a stream go in, one file comes out. The file's ending decides its format.
+/* Recorders: stream frames go in, one file comes out. The file's ending decides its format.
  *
  * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in
  * recorder.c. Shared by all formats are the file that appears whole or not at all (outfile.h), the points and
@@ -37,13 +37,14 @@ enum ply_column {
     PLY_DEVIATION = 1 << 11, /* no word: with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
-/* Such words with commas between them; "xyz" stands for none. 0: one is not known, or comes twice. */
+/* Reads such words with commas between them; "xyz" stands for none. Returns 0 if a word is not known, or comes twice.
+ * */
 int ply_columns_read(const char *text, unsigned *columns);
 
 struct recorder_options {
     int ascii;                   /* PLY as text */
     int empty_shots;             /* keep shots without echo, where the format can */
-    struct colour_choice colour; /* of formats that hold one */
+    struct colour_choice colour; /* for formats that hold a colour */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
     uint32_t n_heads;            /* heads that scan one after the other in one scene; 0: one, as far as known */
@@ -78,11 +79,11 @@ struct recorder {
     int has_failed;     /* a write failed: the file is not completed */
 };
 
-/* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
+/* A format. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
  * in err. */
 struct recorder_ops {
     const char *ending;     /* ".ply" */
-    int is_mesh;            /* of the scan's grid, or points spread over it */
+    int is_mesh;            /* 1: the file is a mesh of the scan's grid, or has points spread over it */
     size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
     struct track_ops track; /* takes points in batches */
     /* Before the first scan: SH_EINPUT where the format can't hold a scan in one file with `first`. NULL: it holds
@@ -105,10 +106,10 @@ struct recorder_ops {
     int (*repair)(struct repair *repair, struct sh_err *err);
 };
 
-/* By the path's ending. NULL, and the list of known endings in err, where there is none. */
+/* Finds the format by the path's ending. NULL: there is none, and err has the list of known endings. */
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
 
-/* The format with these options: .ply may be a mesh. */
+/* Returns the format that these options make of it: a .ply may be a mesh. */
 const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const struct recorder_options *options);
 
 /* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file
@@ -117,7 +118,7 @@ int recorder_open(const struct recorder_ops *ops, const char *path, const struct
                   struct recorder **rec, struct sh_err *err);
 /* Sets other limits for its colours; to be called before its first frame. */
 void recorder_set_limits(struct recorder *rec, double low, double high);
-/* Each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
+/* Takes each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
  * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 /* To be called about once a second: writes what waits in memory to the disk. */
@@ -126,9 +127,7 @@ int recorder_save(struct recorder *rec, struct sh_err *err);
  * failure what reached the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
-/* For formats: reports "PATH: n what", unless n is 0. */
+/* For formats: reports "PATH: ", n and `what`, unless n is 0. */
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
-/* For formats: SH_EFORMAT, for a coordinate that is too long to be written as text. */
-int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err);
 
 #endif

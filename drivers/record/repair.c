@@ -74,7 +74,7 @@ int repair_cut(struct repair *r, uint64_t end, struct sh_err *err)
     return SH_OK;
 }
 
-/* Between blocks. */
+/* Is called between blocks: reports progress, and asks for a stop. */
 static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
 {
     sh_progress(r->report, "looking for complete data", (double)at / (double)(r->len + 1));
@@ -108,7 +108,7 @@ int repair_is_zero(const uint8_t *row, size_t len)
 struct lines {
     int (*fn)(void *ctx, const char *line, size_t len);
     void *ctx;
-    uint64_t end, bad_at; /* behind the last good line; of the first bad one */
+    uint64_t end, bad_at; /* where the last good line ends; where the first bad one begins */
     int has_bad;
 };
 
@@ -124,7 +124,7 @@ int repair_fail_damaged(const struct repair *r, uint64_t at, struct sh_err *err)
 static int repair_take_line(const struct repair *r, struct lines *l, const char *line, size_t len, uint64_t at,
                             struct sh_err *err)
 {
-    const int good = len < LINE_MOST && l->fn(l->ctx, line, len);
+    const int good = len < LINE_MOST && strlen(line) == len && l->fn(l->ctx, line, len);
     if (good && l->has_bad) return repair_fail_damaged(r, l->bad_at, err);
     if (good) l->end = at + len + 1;
     if (!good && !l->has_bad) l->bad_at = at;
@@ -159,7 +159,7 @@ int repair_lines(const struct repair *r, uint64_t from, int (*fn)(void *ctx, con
 }
 
 struct rest {
-    uint64_t n, n_piece; /* bytes; up to the last that is not zero */
+    uint64_t n, n_piece; /* bytes so far; those up to the last that is not 0 */
 };
 
 static void count_piece(void *ctx, const uint8_t *byte)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair: FILE.part, as a killed recorder or a full disk has left it, becomes a whole file of the same format.
  *
- * In: the bytes that reached the disk. Out: the same file, cut behind the last whole unit (a frame, a packet, a point,
+ * In: the bytes that reached the disk. Out: the same file, cut after the last whole unit (a frame, a packet, a point,
  * a shot), and with the header, the index or the end that the format needs. Nothing is invented: what the recorder
  * would have learnt from later frames keeps its first value, or is counted again from the data.
  *
@@ -29,13 +29,13 @@ struct repair {
     int was_whole;      /* there was nothing to repair, and nothing was changed */
 };
 
-/* The result of repair_file. Its path is that of the file or of FILE.part, as the user names it. A repaired FILE.part
+/* The result of repair_file. That function takes the name FILE or FILE.part, as the user gives it. A repaired FILE.part
  * is renamed to FILE, unless FILE exists: nothing is replaced. A FILE without a FILE.part beside it is checked, and
  * repaired if it needs that. */
 struct repaired {
     char *path, *part;                   /* FILE and FILE.part; repair_free frees them */
     int was_left;                        /* FILE.part was repaired */
-    int is_part;                         /* and keeps that name, since FILE exists */
+    int is_part;                         /* it keeps the name FILE.part, since FILE exists */
     uint64_t n_kept, n_scans, cut_bytes; /* as in struct repair */
     const char *unit;
     int was_whole;
@@ -47,33 +47,37 @@ void repair_free(struct repaired *repaired);
 
 /* ---- for formats. Errors name the path. */
 
-/* All len bytes; SH_EIO where there are fewer. */
+/* The words of a note at the end of a file that was not completed. */
+#define REPAIR_INCOMPLETE "incomplete: the recording was not completed; data may be missing after this"
+
+/* Reads len bytes; SH_EIO where there are fewer. */
 int repair_read(const struct repair *repair, uint64_t at, void *to, size_t len, struct sh_err *err);
-/* SH_EIO: also where the disk is full; overwriting bytes of the file needs no room. */
+/* SH_EIO also where the disk is full; overwriting bytes of the file needs no room. */
 int repair_write(const struct repair *repair, uint64_t at, const void *from, size_t len, struct sh_err *err);
-/* Whether it has the name FILE.part: its recorder did not complete it. */
+/* Returns whether the file has the name FILE.part: its recorder did not complete it. */
 int repair_is_part(const struct repair *repair);
-/* Cuts the file behind `end`, and counts what is cut. */
+/* Cuts the file at `end`, and counts the bytes that go. */
 int repair_cut(struct repair *repair, uint64_t end, struct sh_err *err);
-/* Rows of one length, one after the other. fn may not keep the pointer. */
+/* Rows of one length lie one after the other. repair_rows calls fn for each; fn may not keep the pointer. */
 struct repair_rows {
     uint64_t from, n;
     size_t len; /* of a row */
 };
 int repair_rows(const struct repair *repair, const struct repair_rows *rows, void (*fn)(void *ctx, const uint8_t *row),
                 void *ctx, struct sh_err *err);
-/* A power cut leaves zeros at a file's end. */
+/* Returns whether all bytes of a row are 0: a power cut leaves zeros at a file's end. */
 int repair_is_zero(const uint8_t *row, size_t len);
-/* Lines from `from` on, each with its newline but not given with it. fn returns 1: a line of this format, 0: none. *end is
- * behind the last good one. SH_EFORMAT: good lines follow a bad one, which no kill and no full disk does. */
+/* Calls fn for each line from `from` on that ends in a newline, without the newline. fn returns 1 for a line of this
+ * format, else 0. A line with a NUL, or of 64 KiB and more, is none of any format. *end is where the last good line
+ * ends. SH_EFORMAT: good lines follow a bad one, which no kill and no full disk causes. */
 int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx, const char *line, size_t len),
                  void *ctx, uint64_t *end, struct sh_err *err);
-/* Checks that only a piece of a unit, of at most `most` bytes, and then zeros (after a power cut) follow `end`. Else
- * SH_EFORMAT: no kill and no full disk causes that damage. */
+/* Checks that nothing follows `end` but a piece of a unit, of at most `most` bytes, and then zeros (after a power cut).
+ * Else SH_EFORMAT: no kill and no full disk causes that damage. */
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
-/* Puts a note at the end that the file may be incomplete. On a full disk there may be no room for it, which is reported. */
+/* Puts a note at the end that the file may be incomplete. Where a full disk has no room for it, that is reported. */
 void repair_append_note(const struct repair *repair, uint64_t end, const void *note, size_t len);
-/* SH_EFORMAT: damage at that byte, which no recorder leaves. */
+/* SH_EFORMAT: there is damage at that byte, which no recorder leaves. */
 int repair_fail_damaged(const struct repair *repair, uint64_t at, struct sh_err *err);
 /* SH_EFORMAT: the file is not whole, and another program wrote it. Such files are checked, but never changed: what
  * looks like damage may be a kind of line or block that only that program knows. */

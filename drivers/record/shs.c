@@ -16,7 +16,7 @@ static int shs_frame(void *rec, struct scanhead *sh, const struct scanhead_frame
 struct frames {
     struct native_parser parser;
     struct scan_count scans;
-    uint64_t n, end; /* behind the last whole item */
+    uint64_t n, end; /* frames; where the last whole item ends */
 };
 
 static void take_frames(struct frames *f)
@@ -47,7 +47,7 @@ static int read_frames(const struct repair *r, struct frames *f, struct sh_err *
     return rc;
 }
 
-/* Cuts the file behind the last whole frame. Damage before that stays: readers skip it. */
+/* Cuts the file after the last whole frame. Damage before that stays: readers skip it. */
 static int shs_repair(struct repair *r, struct sh_err *err)
 {
     struct frames *f = calloc(1, sizeof *f);

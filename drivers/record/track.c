@@ -92,22 +92,23 @@ static void set_pose(struct track *t)
         station_pose_of(&t->info, &t->pose);
 }
 
-/* A scan begins with a descriptor that is no repetition, pulses that go back, or another station or scan. Any of these
- * will do, since frames may be lost. */
+/* A scan of the file begins with a descriptor that is no repetition, pulses that go back, or another station or scan.
+ * Any of these will do, since frames may be lost. Such a descriptor also comes when settings change within a scan:
+ * rows and columns stand for other angles then, and scales may be others. */
 static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
 {
     return t->n_scans == 0 || t->state.new_scan || frame->pulse0 < t->state.last_pulse0 ||
            t->info.station != t->state.last_station || t->info.scan != t->state.last_scan;
 }
 
-/* The nearest whole number; UINT32_MAX for what is larger, also for what is no number. */
+/* Returns the nearest whole number; UINT32_MAX for larger figures, infinity and NaN. */
 static uint32_t whole_u32(double v)
 {
     return v <= 0 ? 0 : v < UINT32_MAX ? (uint32_t)llround(v) : UINT32_MAX;
 }
 
-/* A frame is one sweep of the pan and a whole number of lines; without a way to go, one line (core/schedule.h). Lines
- * are of equal length but for a pulse. */
+/* A pan sweep has a whole number of lines, and one line where the pan does not turn (core/schedule.h). Lines are of
+ * equal length but for a pulse. */
 static void set_limits(struct track *t, const struct native_descriptor *d)
 {
     const double lines_hz = 1e-6 * (double)d->lines_uhz, prr_hz = 1e-6 * (double)d->prr_uhz;
@@ -131,7 +132,8 @@ static void set_emitter_limits(struct track *t)
         t->max_lines = whole_u32((double)t->max_lines * e->rings);
 }
 
-/* Number in the scan of the beam that fires at t_ns: the last one whose time, in whole nanoseconds, is no later. */
+/* Returns the number in the scan of the beam that fires at t_ns: the last one whose time, in whole nanoseconds, is no
+ * later. */
 static uint64_t firing_at(const struct scanhead_emitter *e, uint64_t t_ns)
 {
     const u128 num = e->sequence_ns_num, den = e->sequence_ns_den, end = ((u128)t_ns + 1) * den;
@@ -224,7 +226,7 @@ static int begin_scan(struct track *t, struct sh_err *err)
     return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;
 }
 
-/* Takes all points of the frame. row: that of the first one. */
+/* Takes all points of the frame. row is that of the first one. */
 static int take_batches(struct track *t, const struct scanhead_frame *frame, uint64_t row, struct sh_err *err)
 {
     const struct scanhead_columns to = track_columns_to(t);

@@ -101,7 +101,7 @@ struct track {
     int geoid_heights, moving, stops;
     uint32_t n_scans; /* with points */
     struct track_missing missing;
-    /* What the descriptor says a scan can have at most: lines, and pulses in one of them; UINT32_MAX: no end. */
+    /* By the descriptor a scan has at most so many lines, and a line so many pulses; UINT32_MAX: there is no limit. */
     uint32_t max_lines, max_pulses;
     double cast_share;               /* of a line's pulses, 0..1: those in the blind part are not cast */
     struct scanhead_emitter emitter; /* of the last descriptor */
@@ -119,7 +119,7 @@ struct track {
     const struct scanhead_wave *wave[TRACK_BATCH]; /* the window that each point lies in; NULL: none. They are there as
                                                     * long as the batch is */
     double wave_at[TRACK_BATCH];                   /* the point's place in it, in samples from its first one */
-    int waited;                /* the points of the batch waited: later frames may have come, so gps_s holds */
+    int waited;                /* 1: the batch's points waited, so later frames may have come; gps_s is set then */
     double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
     /* inner state */
     uint32_t index[TRACK_BATCH]; /* of each point in its frame, where it may wait */
@@ -142,7 +142,7 @@ int track_leave_out(struct track *track, int n);
 /* Writes the times of the n points in seconds, as t_ns / 1e9. */
 void track_seconds(const struct track *track, int n, double *to);
 
-/* The same question for one point. 1: it is counted, and the caller leaves it out. */
+/* Returns 1 if the place of an echo is infinite or NaN. The echo is then counted, and the caller leaves it out. */
 static inline int track_is_nowhere(struct track *track, double x, double y, double z)
 {
     if ((x - x) + (y - y) + (z - z) == 0) return 0; /* a difference is NaN where one of them is not finite */

@@ -62,7 +62,7 @@ int track_give(struct track *t, int n, struct sh_err *err)
     return t->ops->points(t->rec, n, err);
 }
 
-/* Gives point n of the batch the window of waveforms that waiting point k lies in. */
+/* Gives point n of the batch the window of waveforms that waiting point p lies in. */
 static void take_wave(struct track *t, const struct waiting_point *p, int n)
 {
     const struct track_waiting *w = t->waiting;
@@ -91,7 +91,7 @@ static void take_along(struct track *t, uint32_t k, int n)
     t->missing.n_without_colours += (uint64_t)(is_echo && !w->have_colours);
 }
 
-static int hand_out(struct track *t, struct sh_err *err)
+int track_flush(struct track *t, struct sh_err *err)
 {
     struct track_waiting *w = t->waiting;
     int rc = 0, n = 0;
@@ -113,11 +113,6 @@ static int hand_out(struct track *t, struct sh_err *err)
     return rc;
 }
 
-int track_flush(struct track *t, struct sh_err *err)
-{
-    return hand_out(t, err);
-}
-
 void track_free(struct track *t)
 {
     free(t->waiting);
@@ -132,7 +127,7 @@ int track_attributes(struct track *t, const struct scanhead_frame *frame, struct
     if (scanhead_attributes(t->sh, frame, 0, w->attribute, NATIVE_MAX_POINTS) < 0) return 0;
     if (t->has_deviations && scanhead_deviations(t->sh, frame, 0, w->deviation, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_attributes = 1;
-    return waits_for_colours(t) || t->has_waves ? 0 : hand_out(t, err);
+    return waits_for_colours(t) || t->has_waves ? 0 : track_flush(t, err);
 }
 
 int track_colours(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
@@ -141,5 +136,5 @@ int track_colours(struct track *t, const struct scanhead_frame *frame, struct sh
     if (w == NULL || w->n == 0 || !waits_for_colours(t)) return 0;
     if (scanhead_colours(t->sh, frame, 0, w->colour, NATIVE_MAX_POINTS) < 0) return 0;
     w->have_colours = 1;
-    return t->has_waves ? 0 : hand_out(t, err);
+    return t->has_waves ? 0 : track_flush(t, err);
 }

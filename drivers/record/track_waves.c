@@ -21,7 +21,7 @@ struct kept_wave {
 
 struct track_waves {
     struct kept_wave *wave;
-    size_t n, room, at; /* at: no window before it is of the pulse that was asked for last, or of a later one */
+    size_t n, room, at; /* windows before `at` belong to pulses before the one that was asked for last */
     uint8_t *sample;
     size_t n_bytes, bytes_room;
 };

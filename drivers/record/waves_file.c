@@ -6,7 +6,6 @@
  * baseline) count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the head's
  * frame, in the geo layout the change of the CRS's coordinates along a metre of range. The last column has the
  * counts, with blanks between. */
-#include <stdio.h>
 #include <string.h>
 
 #include "core/bytes.h"

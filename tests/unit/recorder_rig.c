@@ -155,6 +155,14 @@ uint8_t *rig_read(const char *path, size_t *len)
     return data;
 }
 
+int rig_count(const char *text, const char *what)
+{
+    int n = 0;
+    for (; (text = strstr(text, what)) != NULL; text++)
+        n++;
+    return n;
+}
+
 uint64_t rig_uint(const uint8_t *p, int bytes)
 {
     uint64_t v = 0;

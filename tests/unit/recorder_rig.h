@@ -60,6 +60,9 @@ const char *rig_path(const char *name);
 /* Returns the whole file, NUL-terminated; free() it. */
 uint8_t *rig_read(const char *path, size_t *len);
 
+/* Returns how often `what` is in text. */
+int rig_count(const char *text, const char *what);
+
 uint64_t rig_uint(const uint8_t *p, int bytes);
 
 int32_t rig_int32(const uint8_t *p);

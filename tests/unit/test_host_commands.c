@@ -146,8 +146,16 @@ static void test_command_refused(void **state)
     scanhead_close(sh);
 }
 
+/* A correct frame with a wrong descriptor. */
+static void put_wrong_descriptor(int fd)
+{
+    memset(out, 0, NATIVE_HEADER_LEN);
+    memcpy(out, (uint8_t[]){NATIVE_SYNC, NATIVE_DESCRIPTOR, NATIVE_VERSION}, 3);
+    put_all(fd, out, native_finish_frame(out, rig_next_seq()));
+}
+
 /* There are more than 64 MiB before the reply. The oldest frames are dropped and counted, but their contents are not
- * forgotten. */
+ * forgotten. The first one is wrong, which ends the command: its reply does not count for the next one. */
 static void test_command_queue_bound(void **state)
 {
     (void)state;
@@ -158,14 +166,23 @@ static void test_command_queue_bound(void **state)
     struct scanhead_stats stats;
     char reply[32];
     memset(echo, 0x11, sizeof echo);
+    put_wrong_descriptor(head);
     put_descriptor(head, 1, 1, 0);
     put_anchor(head, 0);
-    struct script s = {.fd = head, .expect = "TIME?", .frames_before = 1100, .big = 1, .reply = "0\r\n"};
-    assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
+    /* a full frame is 65548 bytes and its entry a few more, so 64 MiB hold 1023 of them, and some small ones */
+    struct script s = {.fd = head, .expect = "TIME?", .frames_before = 1024, .big = 1, .reply = ""};
+    assert_int_equal(run_command(sh, &s, reply, sizeof reply), SCANHEAD_EFORMAT);
+    struct script next = {.fd = head,
+                          .expect = "HEAD:PRR?",
+                          .identity = "0\r\nMaker,Model,SN1,1.0\r\n",
+                          .frames_before = 1100 - 1024,
+                          .big = 1,
+                          .reply = "1\r\n"};
+    assert_int_equal(run_command(sh, &next, reply, sizeof reply), 0);
+    assert_string_equal(reply, "1");
     scanhead_get_stats(sh, &stats);
-    assert_int_equal(stats.frames, 1102);
-    /* a full frame is 65548 bytes and its entry a few more, so 64 MiB hold 1023 of them */
-    assert_int_equal(stats.dropped, 1102 - 1023);
+    assert_int_equal(stats.frames, 1103);
+    assert_int_equal(stats.dropped, 1103 - 1023);
     assert_int_equal(scanhead_get_info(sh, &info), 0);
     expect_frame(sh, SCANHEAD_POINTS, &f);
     assert_int_equal(f.pulse0, 1100 - 1023);

@@ -256,6 +256,28 @@ static void test_late_identity(void **state)
     scanhead_close(sh);
 }
 
+/* The head is silent, so the second command is never sent. Of the lines that come later, one answers the first command. */
+static void test_never_sent(void **state)
+{
+    (void)state;
+    int head;
+    char reply[64];
+    struct scanhead_frame f;
+    struct scanhead *sh = open_pair(&head);
+    listen_to(sh);
+    struct play p = {.fd = head, .turn = {{"TIME?", NULL, 0}}};
+    assert_int_equal(command(sh, &p, "TIME?", reply, 1), SCANHEAD_ETIMEOUT);
+    struct play q = {.fd = head, .turn = {{"", NULL, 0}, {"*IDN?", NULL, 0}}};
+    assert_int_equal(command(sh, &q, "PRR?", reply, 1), SCANHEAD_ETIMEOUT);
+    put_all(head, "77\r\n5\r\n", 7);
+    assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
+    assert_int_equal(n_noticed, 2);
+    expect(0, SCANHEAD_NOTICE_LATE_REPLY, 0, 0, 2);
+    expect(1, SCANHEAD_NOTICE_UNASKED, 4, 0, 1);
+    close(head);
+    scanhead_close(sh);
+}
+
 /* A late reply that is a list of five is no answer to *IDN?, which has four fields. */
 static void test_late_list(void **state)
 {
@@ -314,6 +336,31 @@ static void test_given_up_before(void **state)
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(n_noticed, 1);
     expect(0, SCANHEAD_NOTICE_UNASKED, noticed[0].at_byte, 0, 1);
+    close(head);
+    close(door);
+    scanhead_close(sh);
+}
+
+/* Neither does the answer to a *IDN? that was given up. The answer to the library's own question gives no notice. */
+static void test_identity_before(void **state)
+{
+    (void)state;
+    char reply[64];
+    int door;
+    struct scanhead *sh = open_tcp(&door);
+    int head = accept(door, NULL, NULL);
+    assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
+    close(head);
+    assert_int_equal(scanhead_reattach(sh, WAIT_MS), 0);
+    head = accept(door, NULL, NULL);
+    listen_to(sh);
+    struct play p = {.fd = head, .turn = {{"TIME?", NULL, 0}}};
+    assert_int_equal(command(sh, &p, "TIME?", reply, 1), SCANHEAD_ETIMEOUT);
+    struct play q = {.fd = head,
+                     .turn = {{"", NULL, 0}, {"*IDN?", SAYS("Maker,Model,SN1,1.0\r\n")}, {"X?", SAYS("9\r\n")}}};
+    assert_int_equal(command(sh, &q, "X?", reply, WAIT_MS), 0);
+    assert_string_equal(reply, "9");
+    assert_int_equal(n_noticed, 0);
     close(head);
     close(door);
     scanhead_close(sh);
@@ -401,6 +448,7 @@ int main(void)
         cmocka_unit_test(test_stream),          cmocka_unit_test(test_file),          cmocka_unit_test(test_echo),
         cmocka_unit_test(test_late_reply),      cmocka_unit_test(test_late_identity), cmocka_unit_test(test_late_list),
         cmocka_unit_test(test_given_up_before), cmocka_unit_test(test_reattach),      cmocka_unit_test(test_names),
+        cmocka_unit_test(test_identity_before), cmocka_unit_test(test_never_sent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -134,6 +134,24 @@ static void test_ply(void **state)
     }
 }
 
+/* The bytes of a binary mesh are no lines: more than 64 KiB of them may come without a newline (10). */
+static void test_ply_without_newlines(void **state)
+{
+    (void)state;
+    enum { N = 4000 };
+    static const double xyz_m[N][3];
+    static const uint32_t face[3][3] = {{0, 1, 2}, {10, 11, 12}, {10, 12, 13}};
+    const struct mesh mesh = {.n_vertices = N, .n_faces = 3, .xyz_m = xyz_m, .face = face};
+    struct repair r;
+    struct sh_err err = {0};
+    const char *path = rig_path("a.ply");
+    if (mesh_write(path, &mesh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+    if (killed_rig_repair(path, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(r.was_whole, 1);
+    assert_int_equal(r.n_kept, N);
+    unlink(path);
+}
+
 static int set_up(void **state)
 {
     const int rc = rig_set_up(state);
@@ -153,6 +171,7 @@ int main(void)
         cmocka_unit_test(test_cuts),
         cmocka_unit_test(test_refused),
         cmocka_unit_test(test_ply),
+        cmocka_unit_test(test_ply_without_newlines),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

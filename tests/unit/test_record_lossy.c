@@ -24,14 +24,6 @@ static void put_anchor(uint32_t station)
     rig_anchor(&a);
 }
 
-static int count(const char *text, const char *what)
-{
-    int n = 0;
-    for (; (text = strstr(text, what)) != NULL; text++)
-        n++;
-    return n;
-}
-
 static void expect_scans(int n)
 {
     struct sh_err err = {0};
@@ -40,7 +32,7 @@ static void expect_scans(int n)
     if (rc != 0) fail_msg("%s", err.text);
     e57rig_read(path);
     unlink(path);
-    assert_int_equal(count(e57rig_xml, "<points type="), n);
+    assert_int_equal(rig_count(e57rig_xml, "<points type="), n);
 }
 
 static void begin(void)

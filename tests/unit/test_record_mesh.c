@@ -100,14 +100,6 @@ static void has(const char *text, const char *expected)
     if (strstr(text, expected) == NULL) fail_msg("no '%s' in:\n%s", expected, text);
 }
 
-static unsigned count_of(const char *text, const char *what)
-{
-    unsigned n = 0;
-    for (const char *p = text; (p = strstr(p, what)) != NULL; p += strlen(what))
-        n++;
-    return n;
-}
-
 static void remove_file(const char *name)
 {
     assert_int_equal(unlink(rig_path(name)), 0);
@@ -132,9 +124,9 @@ static void a_step_as_ply(void **state)
     /* The first point is 10 m away, with a reflectance of -5 dB. Its normal points to the head. */
     has(text, "end_header\n10 30 30 0 -1 0 10 -5 0 3\n");
     has(text, "\n13 31 32 0 -1 0 "); /* the last one */
-    assert_int_equal(count_of(text, "\n3 "), 8);
+    assert_int_equal(rig_count(text, "\n3 "), 8);
     has(rig_notes, "4 triangles left out, with an edge over 1.2 times their scan's mean edge, 1.19 m (--long-edge)");
-    assert_int_equal(count_of(rig_notes, "\n"), 1);
+    assert_int_equal(rig_count(rig_notes, "\n"), 1);
     free(text);
     rig_begin();
     begin_scan(1, 3);
@@ -258,7 +250,7 @@ static void two_stations_are_two_objects(void **state)
     has(text, "mtllib b.mtl\no station 1\nv 10 30 30\nvt 0.125 0.166666672\nvn 0 -1 0\n");
     has(text, "usemtl station 1\nf ");
     has(text, "o station 2\nv 10 30 30\n");
-    assert_int_equal(count_of(text, "\nf "), 16);
+    assert_int_equal(rig_count(text, "\nf "), 16);
     has(text, "\nf 13/13/13 "); /* the second object has vertices of its own */
     has(materials, "newmtl station 2\n");
     has(materials, "map_Kd b.2.png\n");

@@ -73,14 +73,6 @@ static void test_stops(void **state)
     assert_non_null(strstr(at, ",12.5\n"));
 }
 
-static int count(const char *in, const char *what)
-{
-    int n = 0;
-    for (; (in = strstr(in, what)) != NULL; in++)
-        n++;
-    return n;
-}
-
 /* Frames share a pose where none was lost. In the next scan times begin again. */
 static void test_moving(void **state)
 {
@@ -107,6 +99,75 @@ static void test_moving(void **state)
     assert_string_equal(at, want);
 }
 
+static void put_scan_start(uint32_t scan)
+{
+    static uint8_t out[256];
+    const struct native_event e = {.code = NATIVE_EV_SCAN_START, .a = scan};
+    rig_put(out, native_encode_event(out, sizeof out, &e, 0, 0));
+}
+
+/* Settings that change within a scan give another descriptor. The poses go on, and their times still rise. */
+static void test_other_settings(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    put_scan_start(1);
+    put_scan(0, 1, &a);
+    put_poses(0, 100, 5);
+    put_scan(0, 1, &a);
+    put_poses(100, 200, 6);
+    const char *at = record();
+    assert_non_null(strstr(at, "\n1,0.000000000,0,5,0,1,0,0,0,0,0\n1,0.100000000,0,6,0,1,0,0,0,0,0\n"
+                               "1,0.200000000,0,7,0,1,0,0,0,0,0\n"));
+    assert_int_equal(rig_count(at, "\n"), 4);
+}
+
+/* Two heads start again, so that each calls both of its scans 5. In the file they are 1 to 4, and no pose is left out. */
+static void test_same_numbers(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    struct sh_err err = {0};
+    struct scanhead *sh[2];
+    struct scanhead_frame frame;
+    struct recorder *rec;
+    size_t len;
+    const char *path = rig_path("a.poses.csv");
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    for (int i = 0; i < 2; i++) {
+        put_scan_start(5);
+        put_scan(0, 5, &a);
+        put_poses(0, 100, 5);
+        put_poses(100, 200, 6);
+    }
+    fclose(rig_stream);
+    rig_stream = NULL;
+    assert_int_equal(recorder_open(recorder_find(path, &err), path, &(struct recorder_options){0}, &rec, &err), 0);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(scanhead_open(rig_shs, &sh[i], NULL, 0), 0);
+        while (scanhead_next(sh[i], &frame, -1) == 0)
+            assert_int_equal(recorder_frame(rec, sh[i], &frame, &err), 0);
+    }
+    assert_int_equal(recorder_close(rec, 1, &err), 0);
+    for (int i = 0; i < 2; i++)
+        scanhead_close(sh[i]);
+    free(text);
+    text = (char *)rig_read(path, &len);
+    unlink(path);
+    for (int i = 1; i <= 4; i++) {
+        char rows[160];
+        snprintf(rows, sizeof rows,
+                 "%d,0.000000000,0,5,0,1,0,0,0,0,0\n%d,0.100000000,0,6,0,1,0,0,0,0,0\n"
+                 "%d,0.200000000,0,7,0,1,0,0,0,0,0\n",
+                 i, i, i);
+        assert_non_null(strstr(text, rows));
+    }
+    assert_int_equal(rig_count(text, "\n"), 1 + 4 * 3);
+}
+
 static void test_link(void **state)
 {
     (void)state;
@@ -119,7 +180,7 @@ static void test_link(void **state)
         put_scan(1, 1, &a);
         put_poses(0, 100, 5);
         const char *at = record();
-        assert_int_equal(count(at, "\n#"), i == 0 ? 0 : 3);
+        assert_int_equal(rig_count(at, "\n#"), i == 0 ? 0 : 3);
         if (i == 0) continue;
         assert_non_null(strstr(at, axes[i]));
         assert_non_null(strstr(at, "ellipsoidal height_m: 10,20,30: 45,9,400.125\n"));
@@ -135,10 +196,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stations),
-        cmocka_unit_test(test_stops),
-        cmocka_unit_test(test_moving),
-        cmocka_unit_test(test_link),
+        cmocka_unit_test(test_stations),       cmocka_unit_test(test_stops),        cmocka_unit_test(test_moving),
+        cmocka_unit_test(test_other_settings), cmocka_unit_test(test_same_numbers), cmocka_unit_test(test_link),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -195,6 +195,31 @@ static void test_geo(void **state)
     free(text);
 }
 
+/* A shot without echo is kept where that is asked for, also if its pose was lost. Then its frame scalar is not known. */
+static void test_empty_shot(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    struct sh_err err = {0};
+    size_t len;
+    const char *path = rig_path("g.ply");
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    rig_descriptor(0, 1);
+    rig_anchor(&a);
+    put_poses(0, 100);
+    rig_points(0, 0, 100, (struct rig_point[]){{0, 0, 0, INT16_MIN, 65535, 0, 0}}, 1);
+    rig_points(1, 150, 150, (struct rig_point[]){{0, 0, 0, INT16_MIN, 65535, 0, 0}}, 1);
+    int rc = rig_record(path, (struct recorder_options){.ascii = 1, .empty_shots = 1}, 1, &err);
+    if (rc != 0) fail_msg("%s", err.text);
+    char *text = (char *)rig_read(path, &len);
+    unlink(path);
+    assert_non_null(strstr(text, "\nnan nan nan nan nan 0.100000000 0 0 65535 1 "));
+    assert_null(strstr(text, "\nnan nan nan nan nan 0.100000000 0 0 65535 1 nan\n"));
+    assert_non_null(strstr(text, "\nnan nan nan nan nan 0.150000000 0 0 65535 1 nan\n"));
+    free(text);
+}
+
 /* Counts of a recording are at least 0.1 mm where the head moves: 32 bits of them are 214 km, of 1e-6 m 2 km. */
 static void test_long_way(void **state)
 {
@@ -228,8 +253,9 @@ static void test_long_way(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ply), cmocka_unit_test(test_las), cmocka_unit_test(test_ptx),
-        cmocka_unit_test(test_e57), cmocka_unit_test(test_geo), cmocka_unit_test(test_long_way),
+        cmocka_unit_test(test_ply),        cmocka_unit_test(test_las), cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_e57),        cmocka_unit_test(test_geo), cmocka_unit_test(test_long_way),
+        cmocka_unit_test(test_empty_shot),
     };
     return cmocka_run_group_tests_name("track", tests, rig_set_up, rig_tear_down);
 }

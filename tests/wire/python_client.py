@@ -290,6 +290,9 @@ def misuse(path):
     refused(head.next_frame, 1e300)  # longer than poll() can wait
     for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
         late_replies(lines)
+    late_answer()
+    dropped_frames()
+    whole_frame()
     print("refused")
 
 
@@ -307,6 +310,60 @@ def late_replies(lines):
 
     threading.Thread(target=answer, daemon=True).start()
     assert [head.query("HEAD:LINes?") for _ in range(3)] == ["2", "2", "2"]
+
+
+def late_answer():
+    """One of two questions for the identity is answered at once, the other one before the reply to the next command."""
+    head, theirs = pair()
+    refused(head.query, "*IDN?", 0.0)
+
+    def answer():
+        asked = 0
+        for line in theirs.makefile():
+            asked += line.strip() == "*IDN?"
+            if line.strip():
+                theirs.sendall({"*IDN?": b"a,b,c,d\r\n" if asked == 2 else b""}.get(line.strip(), b"a,b,c,d\r\n2\r\n"))
+
+    threading.Thread(target=answer, daemon=True).start()
+    assert head.query("HEAD:LINes?") == "2"
+
+
+def whole_frame():
+    """A frame that needs two reads has come all the same."""
+    head, theirs = pair()
+    theirs.sendall(framed(200, scanhead.LOCAL, 65536, bytes(65536)))
+    assert len(head.next_frame(0).payload) == 65536
+    refused(head.next_frame, 0)
+
+
+def dropped_frames():
+    """Frames that find no room while a reply is awaited are counted, and stay in the hash. A wrong one ends the command,
+    whose reply does not count for the next one."""
+    frames = [framed(scanhead.ATTRIBUTES, 0, 16, struct.pack("<QII", i, 0, 0), i) for i in range(10)]
+    wrong = framed(scanhead.DESCRIPTOR, 0, 4, b"abcd") + b"".join(frames[1:4])
+    replies = {"TIME?": b"".join(frames) + b"5\r\n", "SCAN:STARt": wrong, "*IDN?": b"6\r\na,b,c,d\r\n",
+               "HEAD:PRR?": b"7\r\n", "": b""}
+
+    def answer(theirs):
+        for line in theirs.makefile():
+            theirs.sendall(replies[line.strip()])
+
+    whole, theirs = pair()
+    theirs.sendall(b"".join(frames))
+    for _ in frames:
+        whole.next_frame(5)
+    most, scanhead._QUEUE_BYTES = scanhead._QUEUE_BYTES, 2000  # three such frames
+    head, theirs = pair()
+    threading.Thread(target=answer, args=(theirs,), daemon=True).start()
+    assert head.query("TIME?") == "5" and head.dropped == 7, head.dropped
+    for _ in range(3):
+        head.next_frame(5)
+    assert head.stream_sha256() == whole.stream_sha256()
+    head, theirs = pair()
+    threading.Thread(target=answer, args=(theirs,), daemon=True).start()
+    refused(head.query, "SCAN:STARt")
+    assert head.query("HEAD:PRR?") == "7"
+    scanhead._QUEUE_BYTES = most
 
 
 def notices():

@@ -24,13 +24,6 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
 /* ---- a stream that remembers why it failed. It seems to take all that follows: Assimp's exporter of FBX ends the program
  * where a write does not move its place on. */
 
-/* Sets whether the writes that follow go past the system's cache. */
-static void pass_cache(struct mesh_file *file, int on)
-{
-    if (file->is_direct < 0 || file->is_direct == on) return;
-    file->is_direct = direct_set(file->fd, on) == 0 ? on : -1;
-}
-
 /* Returns whether these are full buffers of a long file, as the stream writes them one after the other. */
 static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
 {
@@ -41,16 +34,10 @@ static int is_full_buffer(const struct mesh_file *file, const char *data, size_t
 static ssize_t on_write(void *cookie, const char *data, size_t n)
 {
     struct mesh_file *file = cookie;
-    pass_cache(file, is_full_buffer(file, data, n));
+    direct_set(file->fd, &file->is_direct, is_full_buffer(file, data, n));
     for (size_t done = 0; done < n && file->error == 0;) {
-        const ssize_t wrote = pwrite(file->fd, data + done, n - done, file->at + (off_t)done);
-        if (wrote < 0 && errno == EINTR) continue;
-        if (wrote < 0 && errno == EINVAL && file->is_direct > 0) { /* it can't, or a part was written before */
-            pass_cache(file, 0);
-            file->is_direct = -1;
-            continue;
-        }
-        if (wrote <= 0) file->error = wrote < 0 ? errno : ENOSPC;
+        const ssize_t wrote = direct_pwrite(file->fd, &file->is_direct, data + done, n - done, file->at + (off_t)done);
+        if (wrote < 0) file->error = errno;
         if (wrote > 0) done += (size_t)wrote;
     }
     file->at += (off_t)n;
@@ -61,7 +48,7 @@ static ssize_t on_write(void *cookie, const char *data, size_t n)
 static ssize_t on_read(void *cookie, char *data, size_t n)
 {
     struct mesh_file *file = cookie;
-    pass_cache(file, 0);
+    direct_set(file->fd, &file->is_direct, 0);
     const ssize_t got = pread(file->fd, data, n, file->at);
     if (got > 0) file->at += got;
     return got;

@@ -3,12 +3,13 @@
 
     PYTHONPATH=drivers/host/python python3 lockstep.py SOURCE [STEPS]     SOURCE: tcp:HOST:PORT, tty:PATH
 
-The simulator owns time and pose: it grants 1 ms after the other, each with the car's pose at its end. Before
-the grant's reply come all points whose pulse was fired in that millisecond. The head runs with
+The simulator owns time and pose: it grants one millisecond after the other, each with the car's pose at its end.
+All points whose pulse was fired in that millisecond come before the grant's reply. The head runs with
 config/lockstep.yaml.
 
-To a simulator of your own belong grant(), with your car in car_at(), and take(), with what you do with points.
-All else checks: each pulse came once and within its step, and each point lies where the exact pose puts it.
+A simulator of your own needs two functions: grant(), with your car instead of car_at(), and take(), with your use of
+the points. The rest checks that each pulse comes once and within its step, and that each point lies where the exact
+pose puts it.
 """
 import math
 import sys

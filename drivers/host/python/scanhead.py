@@ -15,7 +15,7 @@ points are numpy arrays where numpy is installed, else lists; the numbers are th
 of libscanhead. Units are in names: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels.
 NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
 
-What is kept is bounded: one frame of bytes (64 KiB), 64 MiB of frames that came while a reply was awaited,
+Memory is bounded: one frame of bytes (64 KiB), 64 MiB of frames that came while a reply was awaited,
 8192 poses, 65535 names.
 """
 import array
@@ -54,11 +54,12 @@ _HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COL
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
-_FRAME_BYTES = 512  # what a kept frame takes beside its payload
+_FRAME_BYTES = 512  # memory of a kept frame beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
-_ANSWERS_S = 0.2  # how long further answers to questions that were given up may take
+_ANSWERS_S = 0.2  # after one answer to *IDN?, how long the others may take
 _SCANNING, _SPIN_DOWN = 4, 5  # states of the head
 _NAN = math.nan
+_NO_WAIT = -math.inf  # a deadline: bytes that are there are taken, all of them
 
 
 class ScanheadError(Exception):
@@ -177,7 +178,7 @@ class _RunningCrc:
         return register ^ registers[end] ^ 0xFFFFFFFF
 
 
-# ---- payloads of fixed layout: (struct format, names; NAME:N is N numbers)
+# ---- payloads of fixed layout: struct format, then names; NAME:N stands for N numbers
 
 _LAYOUT = {
     DESCRIPTOR: ("<96s32sII3Q6q5dIIIIQ", "idn profile layout isa prr_uhz lines_uhz pan_udeg_s "
@@ -198,7 +199,7 @@ _LAYOUT = {
     EMITTER: ("<3I4iIQQqII", "kind n_beams steps first_step last_step front_step turn rings sequence_ns_num "
               "sequence_ns_den first_ring_udeg echoes gaps"),
 }
-_MORE = {  # what payloads may have behind that, piece by piece
+_MORE = {  # pieces that may follow in a payload, in this order
     DESCRIPTOR: [("<II", "content reserved")],
     TELEMETRY: [("<3Q", "scan_fired scan_cast scan_lost"), ("<Q", "lost_lines"),
                 ("<IIqqQ4I", "ptp_port ptp_servo ptp_offset_ns ptp_delay_ns ptp_grandmaster ptp_class "
@@ -300,8 +301,8 @@ class _Sequence:
         self._last_late, self._late_run = 0, 0  # the last late frame; how many came in a row up to it
 
     def take(self, frame: Tuple) -> Tuple[str, int, int]:
-        """frame: its number, flags and all that makes it another one. What is noticed of it ("": nothing), and
-        from which number on how many frames."""
+        """frame: its number, its flags, and all that tells it from others. Returns the kind of its notice ("": there is
+        none), and the first number and the number of the frames concerned."""
         seq, flags = frame[:2]
         if flags & LOCAL:
             kind = "repeated" if frame == self._local else ""
@@ -339,7 +340,8 @@ class _Sequence:
         return False
 
     def _is_run(self, seq: int) -> bool:
-        """Of a late frame: so many in a row are another sequence, whose numbers were all missing."""
+        """Returns whether this late frame is one too many in a row: these are another sequence, whose numbers were all
+        missing."""
         follows = self._late_run > 0 and seq == (self._last_late + 1) % 2**32
         self._late_run, self._last_late = self._late_run + 1 if follows else 1, seq
         return self._late_run == _LATE_RUN
@@ -350,7 +352,7 @@ class _Sequence:
 
 
 class _Bad:
-    """Bytes that belong to nothing, one after the other. most: what a broken frame may have at most."""
+    """Bytes that belong to nothing, one after the other. most: the length of a broken frame, as its header says."""
 
     def __init__(self, kind: str, at_byte: int, t_ns: Optional[int], seq: Optional[int] = None,
                  most: float = math.inf) -> None:
@@ -412,8 +414,8 @@ class Parser:
             self.on_notice(Notice(*fields))
 
     def _end_bad(self, at_end: bool = False) -> None:
-        """What follows is good, or at_end nothing. A frame that seemed to be cut by the end is a broken one if
-        others stood within its length."""
+        """Ends the run of bad bytes: good bytes follow or, at_end, nothing. A frame that seemed to be cut by the end is
+        a broken one if others stood within its length."""
         bad, self._bad = self._bad, None
         if bad is None:
             return
@@ -645,7 +647,7 @@ def _raw_columns(payload: bytes, n: int):
 
 
 def _common(raw, t0_ns: int, layout: int) -> Points:
-    """What both layouts share."""
+    """The columns that both layouts share."""
     p = Points()
     refl, label, tail = raw[3:]
     if np is not None:
@@ -669,7 +671,8 @@ def _empty_as_nan(values, count):
 
 
 def _rings(e: Dict) -> Dict:
-    """Of a sphere: ring i has the elevation first_ring_deg + i ring_step_deg. On the wire the first one is rounded."""
+    """The rings of a sphere: ring i has the elevation first_ring_deg + i ring_step_deg. On the wire the first one is
+    rounded."""
     gaps = e["gaps"] or max(e["rings"], 1) - 1
     first_deg = 1e-6 * e["first_ring_udeg"]
     if gaps == 0:
@@ -1047,7 +1050,7 @@ def _by_row(function, columns):
 # ---- sources
 
 class _Source:
-    """Bytes in and out by a descriptor that does not block. owner: what has to live as long."""
+    """Bytes in and out by a descriptor that does not block. owner: an object to which the descriptor belongs."""
 
     def __init__(self, name: str, fd: int, owner=None, is_file: bool = False) -> None:
         self.name, self.fd, self.owner, self.is_file = name, fd, owner, is_file
@@ -1121,7 +1124,7 @@ class Head:
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
-        self._scan, self.scan_over = None, False  # the scan at hand; whether it ends with this frame
+        self._scan, self.scan_over = None, False  # the number of the present scan; whether it ends with this frame
 
     def __enter__(self) -> "Head":
         return self
@@ -1152,7 +1155,7 @@ class Head:
         self._hand_on(Notice(kind, self.parser.text_at, 0, len(text), self.parser.last_t_ns))
 
     def _stray(self, text: str) -> None:
-        """A line that nobody waits for. An answer to a question of _settle is as it should be."""
+        """Takes a line that nobody waits for. The answer to a question of _settle gives no notice."""
         if self._asked and _is_identity(text):
             self._asked -= 1
             if not self._given_up_identities:
@@ -1161,7 +1164,7 @@ class Head:
         self._note_line(text)
 
     def _gone(self) -> Closed:
-        """To be raised when all that had come was taken."""
+        """The error to raise once all items that had come were taken. Gives the notice "closed" before that."""
         if not self._closed_told:
             self._closed_told = True
             self._hand_on(Notice("closed", self.parser.bytes, 0, 1, self.parser.last_t_ns))
@@ -1221,10 +1224,16 @@ class Head:
         if self._unsettled:
             self._settle(deadline_s)
         self._discard_stale()
+        self._send(line + "\n", deadline_s)
         try:
-            self._send(line + "\n", deadline_s)
-            return self._reply(deadline_s, line)
-        except Timeout:  # its reply may come yet, and is not that of the next line
+            reply = self._reply(deadline_s, line)
+            while self._asked and _is_identity(reply) and not _is_identity_query(line):
+                self._stray(reply)  # the answer to a question of _settle comes after all
+                reply = self._reply(deadline_s, line)
+            return reply
+        except Closed:
+            raise
+        except ScanheadError:  # the reply may come yet, and is not that of the next line
             self._unsettled = True
             self._asked += _is_identity_query(line)
             self._given_up += 1
@@ -1252,16 +1261,15 @@ class Head:
             except Timeout:
                 if not answered:
                     raise
-                self._asked = 0
-                break
+                break  # query() passes over the others, if they come after all
             if _is_identity(reply) and not answered:
                 answered, deadline_s = True, time.monotonic() + _ANSWERS_S
             self._stray(reply)
         self._unsettled = False
 
     def _discard_stale(self) -> None:
-        """Replies that are there already answer commands that were given up. Frames may come without end, so
-        this looks at a few chunks only."""
+        """Skips replies that have come by now: they answer commands that were given up. Frames may come without end,
+        so this looks at a few chunks only."""
         for _ in range(32):
             self._keep_frames()
             try:
@@ -1287,8 +1295,8 @@ class Head:
             self._stuck = 0 < done < len(data)
 
     def _check(self, deadline_s: Optional[float]) -> None:
-        """For loops that a head could keep busy with what nobody waits for."""
-        if deadline_s is not None and time.monotonic() > deadline_s:
+        """Raises Timeout after the deadline. A head could keep a loop busy with bytes that nobody waits for."""
+        if deadline_s is not None and _NO_WAIT < deadline_s < time.monotonic():
             raise Timeout(f"{self._source.name}: what was waited for did not come in time")
 
     def _wait_writable(self, deadline_s: float) -> None:
@@ -1299,7 +1307,7 @@ class Head:
             raise self._gone()
 
     def _reply(self, deadline_s: float, line: str) -> str:
-        """The next line but for those that are what was sent, come back."""
+        """The next line that is not an echo of the line that was sent."""
         while True:
             item = self._next_item(deadline_s)
             if item is None:
@@ -1313,7 +1321,7 @@ class Head:
             self._check(deadline_s)
 
     def _keep_frames(self) -> None:
-        """What has come: frames are kept, lines answer what nobody waits for any more."""
+        """Takes what has come: frames are kept, and nobody waits for the lines any more."""
         item = self.parser.next(self._ended)
         while item is not None:
             if isinstance(item, Frame):
@@ -1326,8 +1334,8 @@ class Head:
         self._queue.append(frame)
         self._queued += len(frame.payload) + _FRAME_BYTES
         while self._queued > _QUEUE_BYTES:
-            self._unqueue()
             self.dropped += 1
+            self._absorb(self._unqueue())  # so that its facts are not lost, and it stays in the hash
 
     def _unqueue(self) -> Frame:
         frame = self._queue.popleft()
@@ -1345,8 +1353,9 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them."""
-        deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
+        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them. timeout_s 0: a
+        frame that has come, in however many pieces."""
+        deadline_s = None if timeout_s is None else _NO_WAIT if timeout_s <= 0 else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
             frame = self._unqueue()
@@ -1379,7 +1388,7 @@ class Head:
         return frame
 
     def _follow_scan(self, frame: Frame) -> None:
-        """SCAN_END may be lost: the next frame that knows better ends the scan, too."""
+        """Sets scan_over. SCAN_END may be lost: so the next frame that reports another scan, or none, ends it, too."""
         f, now = frame.fields, self._scan
         if frame.is_event(EV_SCAN_START):
             now = f["a"]
@@ -1427,7 +1436,7 @@ class Head:
         a["axes"] = a["axes"] if any(a["axes"]) else (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         if a["crs"] > CRS_GEODETIC or a["heights"] > 1:
             raise ScanheadError("an anchor in a CRS that version 1 doesn't have")
-        if self.descriptor is not None:  # without the one of its scan it may as well be of the scan before
+        if self.descriptor is not None:  # without its scan's descriptor, an anchor may be one of the scan before
             self.anchor, self._earth = a, None
 
     def _absorb_points(self, frame: Frame) -> None:
@@ -1438,7 +1447,7 @@ class Head:
             self._forget()
         until_ns = 1000000 * self.anchor["until_ms"] if self.anchor is not None else 0
         if until_ns and p["t0_ns"] >= until_ns:
-            self.anchor = None  # these have an anchor that did not reach us
+            self.anchor = None  # the anchor of these points did not reach us
         self._last_pulse0 = p["pulse0"]
         self._scan_t0_ns = frame.t_ns - p["t0_ns"]
         self._points_key = (frame.seq + 1) % 2**32, p["pulse0"], p["line"], p["n_points"]
@@ -1518,7 +1527,7 @@ class Head:
         return self.descriptor is not None and self.anchor is not None
 
     def _is_of_points(self, frame: Frame, after: int) -> bool:
-        """Whether it follows the last points as the frame of that number, from 1 on, and is about them."""
+        """Whether the frame comes `after` numbers after the last points frame, and is about the same points."""
         keys = ("pulse0", "line", "n_points")
         return self._points_key == ((frame.seq - after + 1) % 2**32, *(frame.fields[k] for k in keys))
 
