@@ -93,7 +93,7 @@ int import_start(struct import_apart *a, struct sh_err *err)
     return rc;
 }
 
-/* ---- what it says */
+/* ---- messages */
 
 static void take_note(struct import_apart *a, struct import_note *note)
 {
@@ -120,7 +120,7 @@ static int take_notes(struct import_apart *a)
     }
 }
 
-/* ---- how it ends */
+/* ---- the end of a process */
 
 /* Collects the process's status. 1: it has ended. */
 static int reap(struct import_apart *a, int flags)

@@ -72,7 +72,7 @@ static bool find_slot(const struct assimp_lib *lib, const struct aiMaterial *mat
            slot->path.length > 0;
 }
 
-/* Physically based materials have a base colour, and some no diffuse one beside it. */
+/* Physically based materials have a base colour, and not all of them a diffuse one. */
 static bool find_diffuse(const struct assimp_lib *lib, const struct aiMaterial *material, struct slot *slot)
 {
     return find_slot(lib, material, aiTextureType_DIFFUSE, slot) ||
@@ -124,8 +124,8 @@ static const struct aiTexture *find_within(const struct aiScene *in, const char 
     return *number >= 0 && *number < (long)in->mNumTextures ? in->mTextures[*number] : NULL;
 }
 
-/* An image that lies within is named after the mesh's file, with its number. Height 0: it is packed, and
- * the width counts bytes. */
+/* An image within the mesh's file gets that file's name and its own number. Height 0 means that it is packed: then its
+ * width counts bytes. */
 static int add_image(struct scene_build *b, const struct aiScene *in, const struct slot *slot, uint16_t *number,
                      struct sh_err *err)
 {

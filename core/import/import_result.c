@@ -255,7 +255,7 @@ struct triangles {
     uint8_t rgb[AT_ONCE][3][4];
 };
 
-/* NaN is none; anything else must be a number. */
+/* A corner without coordinates has NaN; infinite ones are refused. */
 static bool is_uv(const float uv[3][2])
 {
     for (int c = 0; c < 3; c++)
@@ -301,7 +301,8 @@ static int take_triangles(struct result *r, struct triangles *t)
     return rc;
 }
 
-/* With textures without names. Before anything is allocated. */
+/* The least size of a file with these counts: its textures have neither names nor bytes. It is checked before anything
+ * is allocated. */
 static uint64_t least_size(const struct result_head *head)
 {
     const struct scene *s = NULL;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
- * its holes. The rest is ignored. */
+/* Material libraries of an OBJ file. These statements are read: newmtl; Kd, the diffuse colour; d or Tr, the opacity;
+ * map_Kd, the texture; map_d, its holes. The rest is ignored. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -45,7 +45,7 @@ static struct text_span without_quotes(struct text_span name)
     return quoted ? (struct text_span){name.p + 1, name.n - 2} : name;
 }
 
-/* Before " # ", where some writers add a comment. "Material #25" is a name as it stands. */
+/* Cuts a name off before " # ", where some writers add a comment. "Material #25" stays whole. */
 static struct text_span without_comment(struct text_span name)
 {
     for (size_t i = 1; i + 1 < name.n; i++) {
@@ -116,7 +116,7 @@ static void take_colour(struct mtl *m)
         add_missing(&m->colour, at.line, text_rest(&at));
 }
 
-/* d: opacity; Tr: 1 - opacity. d -halo depends on the direction, and is ignored. */
+/* d: opacity; Tr: 1 - opacity. d -halo depends on the direction: it is left out, with a warning. */
 static void take_opacity(struct mtl *m, bool is_opacity)
 {
     struct text at = m->t;

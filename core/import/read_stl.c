@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* STL, text and binary, in double. A binary is told by its size, 84 + 50 bytes a triangle: many begin with "solid", too.
- * Normals are ignored: the order of the corners says which side is outside. */
+/* STL, text and binary, in double. A binary file is recognised by its size, 84 bytes and 50 for each triangle, since
+ * many begin with "solid", too. Normals are ignored: the order of the corners says which side is outside. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -118,7 +118,7 @@ static int read_vertex(struct stl *s, size_t at, struct sh_err *err)
     return take_vertex(s, at, v, err);
 }
 
-/* After the word facet. */
+/* Reads a facet after its first word. */
 static int read_text_facet(struct stl *s, struct sh_err *err)
 {
     size_t n = 0;
@@ -135,7 +135,7 @@ static int read_text_facet(struct stl *s, struct sh_err *err)
     return n < 3 ? SH_OK : build_polygon(s->b, n, s->label, err);
 }
 
-/* After the word solid. */
+/* Reads a solid after its first word. */
 static int read_solid(struct stl *s, struct sh_err *err)
 {
     struct text_span word = {"", 0};

@@ -10,8 +10,8 @@
  *   outside at a distance from the whole scene, looking at it: an object, or a closed shell whose faces point
  *   outward
  *
- * What "sees much" means is measured: rays are cast over the field of view from each candidate. The same
- * scene and view give the same place. */
+ * How much a candidate sees is measured, by rays over the field of view. The same scene and view give the same
+ * place. */
 #ifndef CORE_STUDIO_VIEWPOINT_H
 #define CORE_STUDIO_VIEWPOINT_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/import/gltf: reads a glTF 2.0 file into a scene. As with Assimp, all of it is read in a process of
- * its own: that has the limits, and its end frees memory after a crash. Indices, counts and offsets come from the file:
+ * its own, which has limits, and whose end frees all memory. Indices, counts and offsets come from the file:
  * none is used before it is checked. */
 #ifndef CORE_IMPORT_GLTF_GLTF_H
 #define CORE_IMPORT_GLTF_GLTF_H

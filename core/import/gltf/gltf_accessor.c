@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that sums and
- * products of them stay within 64 bits. */
+/* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that
+ * sums and products of them stay within 64 bits. */
 #include "core/import/gltf/gltf_accessor.h"
 
 #include <math.h>
@@ -118,7 +118,7 @@ static int open_elements(struct gltf *g, const json_t *of, const char *at, uint3
     return SH_OK;
 }
 
-/* ---- sparse ones: a copy in which some elements are replaced */
+/* ---- sparse accessors: a copy in which some elements are replaced */
 
 static int put_sparse(struct gltf *g, const json_t *sparse, const char *at, const struct gltf_view *v, uint32_t size,
                       uint8_t *to)

@@ -35,8 +35,8 @@ static struct ifc_fineness fineness_for(const struct ifc_records *records, doubl
                                  .deviation_m = radius_m * (1.0 - cos(M_PI / (segments - 1.0)))};
 }
 
-/* Type, name and GlobalId, as one word: no two products have the same. A name that is too long is cut, not the GlobalId;
- * it is counted. */
+/* Type, name and GlobalId make one word, so no two products have the same. Where it is too long, the name is cut, never
+ * the GlobalId, and the cut is counted. */
 static char *object_name(struct reading *r, const struct ifc_product *p, const struct ifc_body *body)
 {
     const struct text_span type = body->type.n > 0 ? body->type : p->type;
@@ -165,7 +165,7 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
     return SH_OK;
 }
 
-/* Each product with a body has at least one surface. Checked before minutes are spent on bodies. */
+/* Each product with a body has at least one surface. This is checked before minutes are spent on bodies. */
 static int check_number(struct reading *r)
 {
     size_t n = 0;

@@ -24,8 +24,8 @@ struct ifc_records {
     size_t n_styles, room_styles;
 };
 
-/* Reads records and products; ifc_records_close is due in any case. Errors are those of ifc_index_open. A placement that
- * leads back to itself is an error as well, which names the product. */
+/* Reads records and products; ifc_records_close is due in any case. Errors are those of ifc_index_open. A placement
+ * that leads back to itself is an error as well, which names the product. */
 int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err);
 void ifc_records_close(struct ifc_records *r);
 

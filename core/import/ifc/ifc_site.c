@@ -136,7 +136,7 @@ static int read_angle(struct reader *r, struct text_span span, const char *name,
     return fabs(*deg) <= limit_deg ? SH_OK : ifc_site_fail(r, &r->site, what);
 }
 
-/* n = 2 or 3 numbers of "(a, b, c)". */
+/* Reads min to max numbers of "(a, b, c)"; max <= 3. */
 static int read_numbers(struct reader *r, const struct step_record *at, struct text_span span, size_t min, size_t max,
                         double *value)
 {
@@ -243,7 +243,7 @@ static int read_map_unit(struct reader *r, const struct found *crs, double scale
                      : SH_OK;
 }
 
-/* A number of the map conversion. The first two must be there; a height that is not is NaN. */
+/* Reads a number of the map conversion. Eastings and Northings must be there; a height that is missing is NaN. */
 static int read_number(struct reader *r, struct text_span arg, int which, double *value)
 {
     static const char *const name[MAP_ARGS] = {

@@ -29,7 +29,7 @@ static bool read_colour(const struct ifc_records *r, const struct step_record *s
     return true;
 }
 
-/* The second attribute, a share; of IfcSurfaceStyleShading from IFC4 on. */
+/* Transparency is the second attribute, a share. IfcSurfaceStyleShading has it from IFC4 on. */
 static float read_clear(const struct ifc_records *r, const struct step_record *shading)
 {
     struct text_span arg[2];

@@ -34,7 +34,7 @@ static int read_si(const struct ifc_index *x, const struct step_record *unit, do
     return ifc_index_fail(x, unit, err, "a length unit with an unknown prefix");
 }
 
-/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of feet. */
+/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)): feet, for example. */
 static int read_converted(const struct ifc_index *x, const struct step_record *unit, struct text_span ref, double *m,
                           struct sh_err *err)
 {

@@ -214,7 +214,7 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     w->product = product;
     w->r->stamp++;
     bool done = walk_from(w, product->shape);
-    const bool has_body = product->has_body; /* an opening's is none of its own */
+    const bool has_body = product->has_body; /* the walk also finds bodies of openings, which are not its own */
     for (size_t i = ifc_first(w->voids, w->n_voids, 2 * sizeof *w->voids, product->id);
          i < w->n_voids && w->voids[2 * i] == product->id && done; i++) {
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);

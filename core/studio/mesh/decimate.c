@@ -165,7 +165,7 @@ static double pass(struct work *w, double cell_m, struct sh_err *err)
     return w->faces.n;
 }
 
-/* ---- what is there, and what comes out */
+/* ---- before and after the passes */
 
 /* Bounds and area of all triangles. */
 static void measure(struct work *w)
@@ -260,9 +260,9 @@ int decimate_by_cell(const struct decimate_mesh *mesh, double cell_m, const stru
     return rc;
 }
 
-/* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an angle
- * into half as many cells more, and each of them has two triangles. A first guess that gives far fewer triangles is made
- * finer once. */
+/* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an
+ * angle into one and a half times as many cells, and each of them has two triangles. A first guess that gives far
+ * fewer triangles is made finer once. */
 int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_report *report, struct decimated *out,
              struct sh_err *err)
 {

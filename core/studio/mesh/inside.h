@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the formats of this room share: a file that is being written, and the table of formats. */
+/* Private to core/studio/mesh: files that are being written, and the table of formats. */
 #ifndef CORE_STUDIO_MESH_INSIDE_H
 #define CORE_STUDIO_MESH_INSIDE_H
 

@@ -147,7 +147,8 @@ static int add_image(struct export_scene *s, const struct picture *image, char n
     size_t n = 0;
     FILE *out = open_memstream(&png, &n);
     int rc = out != NULL ? picture_put_png(out, image, NULL) : SH_ENOMEM;
-    /* Numbers follow, which have to begin at multiples of 4 bytes; Assimp counts that wrongly. Readers of PNG stop before. */
+    /* Numbers follow, which have to begin at multiples of 4 bytes; Assimp counts that wrongly. Readers of PNG stop
+     * before these zeros. */
     if (rc == SH_OK) fwrite("\0\0\0", 1, (4 - n % 4) % 4, out);
     if (out != NULL && fclose(out) != 0) rc = SH_ENOMEM;
     texture->pcData = (struct aiTexel *)(void *)png;
@@ -267,7 +268,7 @@ static int fill_part(struct export_scene *s, const struct mesh *m, unsigned i, c
            fill_material(s, part, s->property + N_PROPERTIES * i, material);
 }
 
-/* Parts without a face have no place. */
+/* Parts without a face are left out. */
 static int make_scene(struct export_scene *s, const struct mesh *m, const struct mesh_part *whole)
 {
     const uint32_t n_parts = m->n_parts > 0 ? m->n_parts : 1;
@@ -313,8 +314,8 @@ static int export_scene(const struct mesh_format *format, struct mesh_output *ou
     return rc == SH_OK && e.is_raw ? assimp_copy_raw(&e, err) : rc;
 }
 
-/* FBX: the length of an array is 32 bits, and normals and colours are doubles of each corner of each face. glTF: so is the
- * length of all. */
+/* In FBX the length of an array has 32 bits, and normals and colours are doubles for each corner of each face. In glTF
+ * the length of everything together has 32 bits. */
 static int check_size(const struct mesh_format *format, const char *path, const struct mesh *m, int is_fbx,
                       struct sh_err *err)
 {
@@ -335,7 +336,7 @@ int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out,
     const char *path = out->path;
     struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0,
                              .holds_images = strcmp(format->exporter, "glb2") == 0};
-    /* not the file's name: the exporter would call the .bin of a .gltf something else then */
+    /* It does not have the file's name: then the exporter would choose another name for the .bin of a .gltf. */
     const struct mesh_part whole = {"mesh", mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
     int rc = check_size(format, path, mesh, s.is_fbx, err);
     if (rc != SH_OK) return rc;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates, as
- * fractions: many readers take that, though the format does not name it. */
+/* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates,
+ * as fractions: many readers take that, though the format does not name it. */
 #include <stdlib.h>
 #include <string.h>
 

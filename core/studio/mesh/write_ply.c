@@ -13,7 +13,7 @@ enum {
 
 static const char *const type_name[] = {"double", "float", "ushort", "uchar"};
 
-/* A line of the header: what would end it is a question mark. */
+/* Puts a line of the header. Characters that would end it become question marks. */
 static void put_line(FILE *out, const char *before, const char *text)
 {
     fputs(before, out);
@@ -85,7 +85,7 @@ static void put_float(struct row *r, float v)
         end_text(r, decimal_put_general(begin_text(r), (double)v, 9));
 }
 
-/* size: of its type, 1, 2 or 4 bytes. */
+/* size: bytes of its type, 1, 2 or 4. */
 static void put_whole(struct row *r, uint32_t v, size_t size)
 {
     if (r->ascii)

@@ -25,7 +25,7 @@ struct floors {
     uint32_t n, covered; /* columns that hold anything */
 };
 
-/* All columns at a time: each ray begins just below what the last one has met. */
+/* All columns are followed at a time: each ray begins just below the surface that the last one hit. */
 struct column {
     double top_m, last_m; /* where the next ray begins; the last surface, INFINITY: none yet */
 };
@@ -34,7 +34,7 @@ static void add_drops(struct survey *s, const struct column *column)
 {
     survey_clear(s);
     for (uint32_t i = 0; i < N_COLUMNS; i++) {
-        /* A little beside the middle of its cell: a model's own planes of symmetry are no place. */
+        /* The column is a little beside the middle of its cell, to miss a model's own planes of symmetry. */
         const double x = (i % COLUMNS + 0.537) / COLUMNS, y = ((double)(i / COLUMNS) + 0.537) / COLUMNS;
         const double from[3] = {s->scene->min_m[0] + s->size_m[0] * x, s->scene->min_m[1] + s->size_m[1] * y,
                                 column[i].top_m};
@@ -82,7 +82,7 @@ static double height_m(const struct survey *s, const struct floor *f)
     return fmin(HEAD_M, 0.6 * f->room_m);
 }
 
-/* Level and wide enough for a tripod? Most of the legs meet the floor's own level. */
+/* A floor is level and wide enough for a tripod where most of the legs hit the floor's own level. */
 static int stands(const struct survey *s, uint32_t first, double height)
 {
     int n = 0;

@@ -23,7 +23,7 @@ struct search {
     size_t n_floors, floor_room, n_places, place_room;
 };
 
-/* A ray goes on just below what it has met last. */
+/* A ray goes on just below the last surface that it hit. */
 struct drop {
     double x, y, top_m, last_m; /* last_m: the last surface, INFINITY: none yet */
     int done;
