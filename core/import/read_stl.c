@@ -63,6 +63,7 @@ static int read_facet(struct stl *s, const char *p, struct sh_err *err)
 static int read_binary(struct stl *s, struct sh_err *err)
 {
     const uint32_t n = le_get32(s->t.data + COUNT_AT);
+    const uint64_t size = binary_size(&s->t); /* the count itself is dropped with what is read */
     int rc = begin_solid(s, (struct text_span){"", 0}, err);
     if (rc == SH_OK) rc = build_weld_begin(s->b, &s->weld, 3 * (uint64_t)n + 1, err);
     if (rc == SH_OK) rc = build_reserve(s->b, 0, n, err);
@@ -73,9 +74,9 @@ static int read_binary(struct stl *s, struct sh_err *err)
         if (rc == SH_OK) rc = read_facet(s, s->t.p, err);
     }
     if (rc == SH_OK) rc = build_single(s->b, s->largest, s->largest * BUILD_SINGLE_ROUNDING, false, err);
-    if (rc == SH_OK && s->t.size > binary_size(&s->t))
+    if (rc == SH_OK && s->t.size > size)
         sh_warn(s->b->report, "%s: %llu bytes after the last of its %u triangles ignored", s->b->name,
-                (unsigned long long)(s->t.size - binary_size(&s->t)), n);
+                (unsigned long long)(s->t.size - size), n);
     return rc;
 }
 
