@@ -135,7 +135,7 @@ int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err)
     while ((rc = read_product(&r)) == 1)
         continue;
     if (rc != SH_OK) return rc;
-    qsort(b->body, b->n, sizeof *b->body, ifc_compare);
+    if (b->n > 0) qsort(b->body, b->n, sizeof *b->body, ifc_compare);
     for (size_t i = 0; i < b->n; i++) {
         if (i > 0 && b->body[i].id == b->body[i - 1].id) return wrong(&r, "a product twice");
         ifc_figures(&b->part[b->body[i].first], b->body[i].n_parts, &b->body[i].figures);

@@ -60,7 +60,6 @@ static int ifc_read_add_part(struct reading *r, const struct ifc_part *part, uin
     if (rc == SH_OK) rc = build_corners(b, 3, r->err);
     for (uint32_t i = 0; i < part->n_vertices && rc == SH_OK; i++)
         rc = build_vertex(b, part->vertex_m[i], r->err);
-    b->has_uv = false;
     for (uint32_t i = 0; i < part->n_triangles && rc == SH_OK; i++) {
         for (int k = 0; k < 3; k++)
             b->corner[k] = b->mesh_vertex0 + part->triangle[i][k];

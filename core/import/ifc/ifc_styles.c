@@ -45,7 +45,7 @@ static bool add_style(struct ifc_records *r, uint64_t item, const struct step_re
     struct text_span arg[1];
     bool has_colour = false;
     const char *p = surface_style->args.p, *end = p + surface_style->args.n;
-    for (uint64_t id; !has_colour && (id = ifc_next_reference(&p, end)) != 0;) {
+    for (uint64_t id; !has_colour && ifc_next_reference(&p, end, &id);) {
         const struct step_record *to = ifc_index_find(&r->index, id);
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLERENDERING") || text_is(to->type, "IFCSURFACESTYLESHADING"))
@@ -65,7 +65,7 @@ static bool collect_from(struct ifc_records *r, uint64_t item, const struct step
 {
     bool done = true;
     const char *p = from->args.p, *end = p + from->args.n;
-    for (uint64_t id; done && (id = ifc_next_reference(&p, end)) != 0;) {
+    for (uint64_t id; done && ifc_next_reference(&p, end, &id);) {
         const struct step_record *to = id != item ? ifc_index_find(&r->index, id) : NULL;
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLE"))
