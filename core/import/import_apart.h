@@ -29,6 +29,7 @@ struct import_apart {
     uint64_t most_bytes;      /* its resident memory */
     int is_over, status;      /* as of waitpid */
     enum import_end end;
+    bool is_shortened; /* end_ns comes from the other reader */
     int n_warnings;
     struct sh_err said; /* its error */
 };
