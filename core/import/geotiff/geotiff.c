@@ -43,7 +43,7 @@ int geotiff_is_name(const char *file)
     return dot != NULL && (strcasecmp(dot, ".tif") == 0 || strcasecmp(dot, ".tiff") == 0);
 }
 
-/* A key that is a number in the directory itself; 0: it isn't there. */
+/* Returns a key that is a number in the directory itself; 0: it isn't there. */
 static unsigned key(const struct reader *r, unsigned id)
 {
     for (size_t i = 4; i + 4 <= r->n_key; i += 4)
@@ -300,7 +300,8 @@ int geotiff_utm_code(double lat_deg, double lon_deg)
 {
     if (lat_deg > 84.0) return 32661;
     if (lat_deg < -80.0) return 32761;
-    const int zone = fabs(lon_deg) < 180.0 ? (int)floor(lon_deg / 6.0) + 31 : 1;
+    const double turn = lon_deg + 180.0, east_deg = turn - 360.0 * floor(turn / 360.0); /* a file may count 0 to 360 */
+    const int zone = east_deg >= 0.0 && east_deg < 360.0 ? (int)floor(east_deg / 6.0) + 1 : 1;
     return (lat_deg < 0.0 ? 32700 : 32600) + zone;
 }
 
