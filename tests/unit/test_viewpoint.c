@@ -226,6 +226,23 @@ static void a_view_without_room_is_refused(void **state)
     assert_int_equal(viewpoint_find(NULL, &none, NULL, &at, &err), SH_EINPUT);
 }
 
+/* From above and from the front a box is below 45 degrees, which this view does not hold. */
+static void a_view_that_holds_nothing_is_refused(void **state)
+{
+    (void)state;
+    const struct viewpoint_view up = {0.5, 500, angle_rad(70), angle_rad(85)};
+    struct scene *scene = NULL;
+    struct sh_err err;
+    clear();
+    add_box((const double[3]){0, 0, 0}, (const double[3]){1, 1, 1}, 0);
+    const struct scene_arrays arrays = {
+        (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
+    assert_int_equal(scene_from_arrays(&arrays, &scene, &err), SH_OK);
+    assert_int_equal(viewpoint_find(scene, &up, NULL, &at, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "a view of 70 to 85 deg holds nothing of the scene"));
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -238,6 +255,7 @@ int main(void)
         cmocka_unit_test(between_houses),
         cmocka_unit_test(the_search_can_be_stopped),
         cmocka_unit_test(a_view_without_room_is_refused),
+        cmocka_unit_test(a_view_that_holds_nothing_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -66,7 +66,7 @@ static struct survey_sight outside_look(struct survey *s, const struct viewpoint
     return survey_look(s, 0, GRID * GRID);
 }
 
-void survey_outside(struct survey *s, struct viewpoint *out)
+int survey_outside(struct survey *s, struct viewpoint *out)
 {
     double best = -1.0;
     for (int k = 0; k < SIDES * HEIGHTS; k++) {
@@ -87,6 +87,7 @@ void survey_outside(struct survey *s, struct viewpoint *out)
         *out = at;
         out->seen = sight.seen;
     }
+    return best >= 0.0;
 }
 
 /* ---- a part of the scene */

@@ -60,9 +60,9 @@ struct survey_best {
 };
 int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err);
 
-/* outside.c */
-void survey_outside(struct survey *s, struct viewpoint *out);
-/* The bounds become those of the part that has the most surface: a cell of a quarter of the range. */
+/* outside.c. Returns 0 where the view holds none of the scene from any place. */
+int survey_outside(struct survey *s, struct viewpoint *out);
+/* Sets the bounds to those of the part that has the most surface: a cell of a quarter of the range. */
 int survey_narrow(struct survey *s, struct sh_err *err);
 
 #endif
