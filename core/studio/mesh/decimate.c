@@ -69,7 +69,7 @@ static int table_enlarge(struct table *t)
     return 1;
 }
 
-/* The number of a key, and whether it is new; NONE: no memory. */
+/* Returns the number of a key, and whether it is new; NONE: no memory. */
 static uint32_t table_number(struct table *t, uint64_t key, uint32_t more, int *is_new)
 {
     if ((t->bits == 0 || 2 * ((size_t)t->n + 1) > (size_t)1 << t->bits) && !table_enlarge(t)) return NONE;
@@ -116,7 +116,7 @@ static void swap_if_above(uint32_t *a, uint32_t *b)
     *b = kept;
 }
 
-/* A triangle of clusters, unless it is there already. 0: no memory. */
+/* Adds a triangle of clusters, unless it is there already. 0: no memory. */
 static int add_face(struct work *w, const uint32_t c[3])
 {
     uint32_t s[3] = {c[0], c[1], c[2]};

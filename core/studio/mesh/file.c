@@ -242,6 +242,14 @@ char *mesh_put_number(char *to, double v)
     return decimal_put_short(to + (v < 0 && nm != 0), nm, 9);
 }
 
+void mesh_put_line(FILE *out, const char *key, const char *text)
+{
+    fputs(key, out);
+    for (; *text != '\0'; text++)
+        fputc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, out);
+    fputc('\n', out);
+}
+
 const char *mesh_stem(const char *path, size_t *len)
 {
     const char *name = basename(path), *dot = strrchr(name, '.');

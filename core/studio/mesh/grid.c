@@ -109,7 +109,7 @@ static void put_cell(struct build *b, const struct cell *c)
     if (!has_d) put_triangle(b, c->a, c->b, c->c);
 }
 
-/* The point of a column that lies one row after p, or SCAN_MESH_NONE. */
+/* Returns the point of a column in the row after `row`, or SCAN_MESH_NONE. after: the first point beyond `row`. */
 static uint32_t next_in(const struct scan_grid *g, const struct side *s, uint32_t row, uint32_t after)
 {
     if (g->rows_per_turn >= 3 && row == g->rows_per_turn - 1)
@@ -135,7 +135,7 @@ static void put_cells(struct build *b, const struct side *left, const struct sid
     }
 }
 
-/* Triangles of a pole and each two points of the column beside it. */
+/* Adds triangles of a pole and each two neighbours in the column beside it. */
 static void put_fan(struct build *b, const struct side *pole, const struct side *ring, int mark)
 {
     for (uint32_t p = ring->first; p < ring->end; p++) {
@@ -173,7 +173,7 @@ static void sum_edges(struct build *b, const struct side *s, const struct side *
     }
 }
 
-/* The neighbour after a column; 0: there is none. */
+/* Finds the neighbour after a column. Returns 0 where there is none. */
 static int neighbour(const struct scan_grid *g, uint32_t column, uint32_t *other)
 {
     const int is_last = column + 1 == g->n_columns;

@@ -57,6 +57,9 @@ int mesh_work_step(struct mesh_work *work, struct sh_err *err);
  * (core/decimal.h). Returns the end. */
 char *mesh_put_number(char *to, double v);
 
+/* Puts a line of a key, which ends with a blank, and a text. Control characters in the text become question marks. */
+void mesh_put_line(FILE *out, const char *key, const char *text);
+
 /* The path's name without folders; its length without the ending. */
 const char *mesh_stem(const char *path, size_t *len);
 /* The path with another ending; free it. NULL: no memory. */
