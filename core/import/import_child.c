@@ -71,6 +71,7 @@ static void set_signals(void)
  * when the parent closes them. Output is discarded. */
 static int set_descriptors(const struct import_task *task)
 {
+    /* Both move beyond their places first, since either may stand in the other's. */
     int result = fcntl(task->result_fd, F_DUPFD, FIRST_FREE_FD), note = fcntl(task->note_fd, F_DUPFD, FIRST_FREE_FD);
     int nothing = open("/dev/null", O_RDWR);
     if (result < 0 || note < 0 || nothing < 0) return 0;

@@ -9,7 +9,7 @@
 
 #include <assimp/scene.h>
 
-/* A number of the file's metadata; `other` where it isn't there or is none. */
+/* Returns a number of the file's metadata, or `other` where it isn't there or is not a number. */
 static double number_of(const struct aiScene *in, const char *key, double other)
 {
     const struct aiMetadata *all = in->mMetaData;
@@ -33,7 +33,7 @@ static double number_of(const struct aiScene *in, const char *key, double other)
     return other;
 }
 
-/* An axis of the file: 1 x, 2 y, 3 z, negative in the other direction; 0: it isn't there, or is none. */
+/* Returns an axis of the file: 1 x, 2 y, 3 z, negative in the other direction; 0: it isn't there, or is no axis. */
 static int axis_of(const struct aiScene *in, const char *key, const char *sign_key)
 {
     const double axis = number_of(in, key, -1.0);

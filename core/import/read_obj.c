@@ -119,7 +119,7 @@ static int read_uv(struct obj *o, struct sh_err *err)
     return SH_OK;
 }
 
-/* What a corner names may come later in the file. */
+/* A vertex may come later in the file than the face that names it. */
 enum { LATER = 1 };
 
 /* Index 0: the corner has none. */

@@ -84,7 +84,7 @@ struct pen {
     void (*triangle)(void *on, const double corner[3][2], const uint8_t rgb[3]);
     void (*text)(void *on, const double at[2], enum picture_anchor anchor, const struct picture_type *type,
                  const uint8_t rgb[3], const char *text);
-    /* What is drawn between the two belongs together: a group with a title. */
+    /* Marks that are drawn between these two make a group with a title. */
     void (*begin)(void *on, const char *class_name, const char *title);
     void (*end)(void *on);
 };

@@ -47,7 +47,7 @@ struct scan_faces {
     double mean_edge_m;
 };
 
-/* SH_ENOMEM; SH_ESTOPPED where report asks to stop. scan_faces_free is due in any case. Takes 24 bytes a point while it
+/* SH_ENOMEM; SH_ESTOPPED where report asks to stop. scan_faces_free is due in any case. Takes 25 bytes a point while it
  * works, and gives 12 a triangle. */
 int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, const struct sh_report *report,
                     struct sh_err *err);

@@ -160,6 +160,7 @@ static void deviation_settle(const struct work *w, const struct batch *b, uint32
         same = deviation_is_same(w->of->distance_m[i], along_m, cosine);
     }
     if (same && w->out->met != NULL) w->out->met[i] = first;
+    /* A later echo, or a point beyond glass, belongs to another surface than the first hit. */
     if (!same && nearest != first) {
         const double range_m = bvh_range_of(bvh, nearest, from, hit.beam);
         const double at_m[3] = {from[0] + range_m * hit.beam[0], from[1] + range_m * hit.beam[1],
