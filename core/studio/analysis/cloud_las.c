@@ -112,12 +112,18 @@ static float reflectance_db(unsigned intensity)
     return intensity == 0 ? (float)NAN : (float)(((double)intensity - 32768.0) / 100.0);
 }
 
+/* LAS has no shots without echo: writers that know of no returns leave 0, and then the point is the only one. */
+static uint8_t known_return(int number)
+{
+    return number > 0 ? (uint8_t)number : 1;
+}
+
 static void read_columns(const struct las *las, size_t i, const uint8_t *p)
 {
     struct cloud *c = las->cloud;
     if (c->time_s != NULL) c->time_s[i] = le_get_double(p + time_at[las->format]);
     if (c->reflectance_db != NULL) c->reflectance_db[i] = reflectance_db(le_get16(p + 12));
-    if (c->echo_count != NULL) c->echo_count[i] = las->format >= 6 ? p[14] >> 4 : p[14] >> 3 & 7;
+    if (c->echo_count != NULL) c->echo_count[i] = known_return(las->format >= 6 ? p[14] >> 4 : p[14] >> 3 & 7);
 }
 
 /* Files of ours name the program as their generating software. */
@@ -161,7 +167,7 @@ static int read_points(struct las *las, struct sh_err *err)
             c->xyz_m[i][0] = c->xyz_m[i][1];
             c->xyz_m[i][1] = remainder(lon_deg, 360);
         }
-        c->echo[i] = p[14] & (is_new ? 15 : 7);
+        c->echo[i] = known_return(p[14] & (is_new ? 15 : 7));
         c->station[i] = le_get16(p + (is_new ? 20 : 18));
         if (c->station[i] == 0) las->n_no_station++;
         if (c->label != NULL) c->label[i] = le_get16(p + las->label_at);
