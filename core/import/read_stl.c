@@ -123,10 +123,11 @@ static int read_vertex(struct stl *s, size_t at, struct sh_err *err)
 static int read_text_facet(struct stl *s, struct sh_err *err)
 {
     size_t n = 0;
-    text_next_line(&s->t); /* the normal */
-    int rc = expect(s, "outer", err);
+    struct text_span word = text_word(&s->t);
+    while (word.n > 0 && !text_is_word(word, "outer")) /* the rest of the line is the normal, or also what follows it */
+        word = text_word(&s->t);
+    int rc = word.n > 0 ? SH_OK : expect(s, "outer", err);
     if (rc == SH_OK) rc = expect(s, "loop", err);
-    struct text_span word = {"", 0};
     while (rc == SH_OK && text_is_word(word = next_word(&s->t), "vertex"))
         rc = read_vertex(s, n++, err);
     if (rc == SH_OK && !text_is_word(word, "endloop")) rc = fail_at(s, word, n < 3 ? "vertex" : "endloop", err);

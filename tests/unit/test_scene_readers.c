@@ -274,6 +274,23 @@ static void ply_in_float_warns(void **state)
     scene_free(s);
 }
 
+/* Words of a text STL may stand in any lines, but for the numbers of a vertex. Writers put anything for a normal. */
+static void stl_words_stand_in_any_lines(void **state)
+{
+    (void)state;
+    struct scene *s =
+        load_text("words.stl",
+                  "solid roof of tin\nfacet normal 0 0 1 outer loop vertex 0 0 0\nvertex 1 0 0 vertex 0 1 0\nendloop "
+                  "endfacet\nfacet normal nan nan nan\nouter\nloop\nvertex 0 0 1\nvertex 1 0 1\nvertex 0 1 1\n"
+                  "endloop\nendfacet facet\nouter loop vertex 0 0 2 vertex 1 0 2 vertex 0 1 2 endloop endfacet "
+                  "endsolid roof of tin\n");
+    assert_int_equal(s->n_triangles, 3);
+    assert_int_equal(n_warnings, 0);
+    assert_true(total_area(s) == 1.5);
+    assert_string_equal(s->surface[0].object, "roof of tin");
+    scene_free(s);
+}
+
 /* A binary STL of 3.5 MB: a reader gives back memory of triangles that it has read, from 2 MiB on. */
 static void stl_may_be_large(void **state)
 {
@@ -310,6 +327,7 @@ int main(void)
         cmocka_unit_test(obj_is_read_exactly),
         cmocka_unit_test(ply_is_read_exactly),
         cmocka_unit_test(ply_in_float_warns),
+        cmocka_unit_test(stl_words_stand_in_any_lines),
         cmocka_unit_test(stl_may_be_large),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
