@@ -80,7 +80,7 @@ struct figures_on_scene {
     const struct scene *scene;
     const float *range_m; /* [cloud->n] as deviation_points has it */
 };
-/* Points without a triangle take no part. Up to 4 million cells, 96 MiB. */
+/* Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
 int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
                        struct figures_density *out, struct sh_err *err);
 /* The same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly, and up to

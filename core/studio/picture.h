@@ -36,7 +36,7 @@ void picture_triangle(struct picture *picture, const double corner[3][2], const 
 enum picture_anchor { PICTURE_LEFT, PICTURE_MIDDLE, PICTURE_RIGHT };
 
 struct picture_type {
-    double size_px; /* height of capitals; lines of text are 1.9 of that apart */
+    double size_px; /* height of capitals */
     int bold;
     double halo_px; /* > 0: so much white around the strokes */
 };
