@@ -236,6 +236,9 @@ static int read_records(struct reading *r)
         return read_by_assimp(r, why);
     else
         return build_fail(r->b, SH_EINPUT, r->err, "%s; to read without them set scene.ifc_reader: assimp", why);
+    if (rc == SH_OK && r->records.n_limited > 0)
+        sh_warn(r->b->report, "%s: %zu style%s of surfaces with a colour or transparency beyond 0 to 1, limited to it",
+                r->b->name, r->records.n_limited, r->records.n_limited > 1 ? "s" : "");
     r->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
     return rc;
 }

@@ -22,6 +22,7 @@ struct ifc_records {
     uint32_t *mark, stamp;   /* [index.n] of the last walk */
     struct ifc_style *style; /* [n_styles] by item */
     size_t n_styles, room_styles;
+    size_t n_limited; /* styles whose colour or transparency was beyond 0..1, and is limited to it */
 };
 
 /* Reads records and products; ifc_records_close is due in any case. Errors are those of ifc_index_open. A placement
