@@ -279,6 +279,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while it was read, the first: %s", b->name, log.n, log.first);
+    if (rc == SH_OK) import_say_colours(&im.lib, b, im.in);
     if (rc == SH_OK && im.n_turned > 0)
         sh_warn(b->report, "%s: the textures of %u meshes are rotated: they are read without the rotation", b->name,
                 im.n_turned);
