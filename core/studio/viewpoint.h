@@ -40,7 +40,7 @@ struct viewpoint {
 };
 
 /* SH_EINPUT: the view is empty, or holds nothing of the scene from any place that was tried. Takes memory and time for
- * a BVH, and some 10 to 100 ms. SH_ESTOPPED: report asks to stop. */
+ * a BVH. SH_ESTOPPED: report asks to stop. */
 int viewpoint_find(const struct scene *scene, const struct viewpoint_view *view, const struct sh_report *report,
                    struct viewpoint *out, struct sh_err *err);
 
