@@ -93,7 +93,7 @@ int import_start(struct import_apart *a, struct sh_err *err)
     return rc;
 }
 
-/* ---- what it says */
+/* ---- messages */
 
 static void take_note(struct import_apart *a, struct import_note *note)
 {
@@ -120,7 +120,7 @@ static int take_notes(struct import_apart *a)
     }
 }
 
-/* ---- how it ends */
+/* ---- the end of a process */
 
 /* Collects the process's status. 1: it has ended. */
 static int reap(struct import_apart *a, int flags)
@@ -135,7 +135,7 @@ static int reap(struct import_apart *a, int flags)
     }
 }
 
-/* The reason to end the process now; IMPORT_ENDED: none. */
+/* Returns the reason to end the process now; IMPORT_ENDED: there is none. */
 static enum import_end must_end(const struct import_apart *a)
 {
     if (sh_stopped(a->task.b->report)) return IMPORT_STOPPED;
@@ -143,7 +143,7 @@ static enum import_end must_end(const struct import_apart *a)
     return import_memory_of(a->pid, IMPORT_RESIDENT) > a->most_bytes ? IMPORT_MEMORY : IMPORT_ENDED;
 }
 
-/* Checks on the process; whether it is over. */
+/* Checks on the process. 1: it is over. */
 static int import_apart_look(struct import_apart *a)
 {
     if (!take_notes(a) && a->note[0] >= 0) {
@@ -151,7 +151,7 @@ static int import_apart_look(struct import_apart *a)
         a->note[0] = -1;
     }
     if (reap(a, WNOHANG)) {
-        take_notes(a);
+        take_notes(a); /* it may have written between the two calls, its error among others */
         return 1;
     }
     a->end = must_end(a);
@@ -161,12 +161,14 @@ static int import_apart_look(struct import_apart *a)
     return 1;
 }
 
-/* Shortens the other reader's time: one that hangs would else delay the finished result for minutes. */
+/* Shortens the other reader's time: one that never ends would delay the finished result for minutes. */
 static void shorten(struct import_apart *a, const struct import_apart *done)
 {
     const int64_t now = monotonic_ns(), took = 10 * (now - done->start_ns);
     const int64_t end_ns = now + (took > LEAST_MORE_NS ? took : LEAST_MORE_NS);
-    if (done->status == 0 && done->end == IMPORT_ENDED && end_ns < a->end_ns) a->end_ns = end_ns;
+    if (a->is_over || done->status != 0 || done->end != IMPORT_ENDED || end_ns >= a->end_ns) return;
+    a->end_ns = end_ns;
+    a->is_shortened = true;
 }
 
 void import_watch(struct import_apart *const a[], size_t n)
@@ -199,10 +201,15 @@ static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
 
 static int fail_by_time(const struct import_apart *a, struct sh_err *err)
 {
+    if (a->is_shortened)
+        return build_fail(a->task.b, SH_EINPUT, err,
+                          "%s did not read it within %.3g s, the time that it gets once the other reader has "
+                          "ended: " IMPORT_ELSE_CONVERT,
+                          a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
     return build_fail(
         a->task.b, SH_EINPUT, err,
         "%s did not read it within %g s (scene.import_s): raise that where the mesh needs more; a broken file may "
-        "make the reader hang: " IMPORT_ELSE_CONVERT,
+        "take any time: " IMPORT_ELSE_CONVERT,
         a->task.name, 1e-9 * (double)(a->end_ns - a->start_ns));
 }
 
@@ -223,6 +230,9 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
 
 int import_judge(struct import_apart *a, struct sh_err *err)
 {
+    if (a->n_warnings > MAX_WARNINGS)
+        sh_warn(a->task.b->report, "%s: %s gave %d warnings; the first %d are shown", a->task.b->name, a->task.name,
+                a->n_warnings, MAX_WARNINGS);
     if (a->end == IMPORT_STOPPED) return sh_fail_stopped(err);
     if (a->end == IMPORT_TIME) return fail_by_time(a, err);
     if (a->end == IMPORT_MEMORY) return fail_by_memory(a, err);
@@ -237,8 +247,8 @@ int import_judge(struct import_apart *a, struct sh_err *err)
                       a->task.name, WEXITSTATUS(a->status));
 }
 
-/* Loads it before the fork: the child of a process with threads must not load any, nor should each child do it
- * again. */
+/* Loads the task's library before the fork: the child of a process with threads must not load any, nor should each
+ * child do it again. */
 static int load_library(const struct import_apart *a, struct sh_err *err)
 {
     if (a->task.read == import_assimp) return late_load(LATE_assimp, NULL, NULL, 0, err);
@@ -246,9 +256,23 @@ static int load_library(const struct import_apart *a, struct sh_err *err)
     return SH_OK;
 }
 
+static int read_apart(struct import_apart *a, struct sh_err *err)
+{
+    struct import_apart *const all[1] = {a};
+    int rc = load_library(a, err);
+    if (rc == SH_OK) rc = import_start(a, err);
+    if (rc != SH_OK) return rc;
+    import_watch(all, 1);
+    rc = import_judge(a, err);
+    if (rc == SH_OK) rc = import_result_read(a->task.b, a->result_fd, err);
+    import_close(a);
+    return rc;
+}
+
 int import_apart(struct scene_build *b, struct sh_err *err)
 {
-    struct import_apart a = {.task = {.b = b, .limits = build_limits(b), .name = "Assimp", .read = import_assimp}};
+    const struct import_task assimp = {.b = b, .limits = build_limits(b), .name = "Assimp", .read = import_assimp};
+    struct import_apart a = {.task = assimp};
     if (gltf_is_name(b->spec->file)) {
         a.task.name = "the reader of glTF";
         a.task.read = import_gltf;
@@ -256,13 +280,8 @@ int import_apart(struct scene_build *b, struct sh_err *err)
         a.task.name = "the reader of GeoTIFF";
         a.task.read = import_geotiff;
     }
-    struct import_apart *const all[1] = {&a};
-    int rc = load_library(&a, err);
-    if (rc == SH_OK) rc = import_start(&a, err);
-    if (rc != SH_OK) return rc;
-    import_watch(all, 1);
-    rc = import_judge(&a, err);
-    if (rc == SH_OK) rc = import_result_read(b, a.result_fd, err);
-    import_close(&a);
-    return rc;
+    const int rc = read_apart(&a, err);
+    if (rc != SH_ESTATE || a.task.read != import_gltf) return rc;
+    a = (struct import_apart){.task = assimp}; /* another process, since a fork must not load Assimp's library */
+    return read_apart(&a, err);
 }

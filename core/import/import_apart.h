@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Import in a process of its own. Assimp and the readers of IFC crash, hang or take all memory on some broken files.
- * The readers of glTF and GeoTIFF call decoders of others. So each of them reads in a process of its own, with limits.
- * Its result is checked before it is used.
+/* Import in a process of its own. On some broken files Assimp and the readers of IFC crash, never end, or
+ * take all memory. The readers of glTF and GeoTIFF call decoders of others. So each of them reads in a process of its
+ * own, with limits. Its result is checked before it is used.
  *
- *   import_apart.c     this process: starts the other ones, looks after them, says how they ended
+ *   import_apart.c     this process: starts the other ones, watches them, reports how they ended
  *   import_child.c     the other process: its limits, its messages, its work, or the program that does it
  *   import_assimp.c    the work: Assimp's nodes and meshes into a builder, as the other readers fill one
  *   import_result.c    the scene on its way back: written there, read and checked here */
@@ -19,7 +19,7 @@
 enum import_memory { IMPORT_ADDRESSES, IMPORT_RESIDENT };
 uint64_t import_memory_of(pid_t pid, enum import_memory which);
 
-/* One process that reads, as this one sees it. */
+/* A process that reads, as its parent sees it. */
 enum import_end { IMPORT_ENDED, IMPORT_STOPPED, IMPORT_TIME, IMPORT_MEMORY };
 struct import_apart {
     struct import_task task; /* name, argv, b and limits by the caller */
@@ -29,6 +29,7 @@ struct import_apart {
     uint64_t most_bytes;      /* its resident memory */
     int is_over, status;      /* as of waitpid */
     enum import_end end;
+    bool is_shortened; /* end_ns comes from the other reader */
     int n_warnings;
     struct sh_err said; /* its error */
 };

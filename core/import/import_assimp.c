@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* glTF 1.0 and Draco, FBX, Collada, and IFC where its readers are not installed, through Assimp's C interface, node tree and all.
+/* Assimp's C interface reads FBX, Collada, glTF 1.0 and Draco, and IFC where its readers are not installed. The nodes
+ * of its tree are walked here.
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
  * one level after the other, so that the rounding of single precision on the way is known. */
@@ -74,8 +75,8 @@ static double largest_of(const double v[3], double largest)
     return largest;
 }
 
-/* Adds the error of one coordinate by rounding to single precision: of vertices, up to `most` in each
- * direction, and of the numbers of a matrix. 0 and 1 are exact. */
+/* Takes vertices that are up to `most` in each direction, with an error up to `error`, through one row of a matrix. The
+ * row's numbers were rounded to single precision, too; only 0 and 1 are exact. */
 static void add_rounding(const ai_real row[4], const double most[3], const double error[3], double *out_most,
                          double *out_error)
 {
@@ -278,6 +279,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while it was read, the first: %s", b->name, log.n, log.first);
+    if (rc == SH_OK) import_say_colours(&im.lib, b, im.in);
     if (rc == SH_OK && im.n_turned > 0)
         sh_warn(b->report, "%s: the textures of %u meshes are rotated: they are read without the rotation", b->name,
                 im.n_turned);

@@ -71,6 +71,7 @@ static void set_signals(void)
  * when the parent closes them. Output is discarded. */
 static int set_descriptors(const struct import_task *task)
 {
+    /* Both move beyond their places first, since either may stand in the other's. */
     int result = fcntl(task->result_fd, F_DUPFD, FIRST_FREE_FD), note = fcntl(task->note_fd, F_DUPFD, FIRST_FREE_FD);
     int nothing = open("/dev/null", O_RDWR);
     if (result < 0 || note < 0 || nothing < 0) return 0;
@@ -100,9 +101,9 @@ static void offer_to_the_oom_killer(void)
     close(fd);
 }
 
-/* The parent watches the memory in use, and the clock. The kernel's limits are the second line: processor time where
- * the parent is stopped, and for Assimp the address space. The latter is twice the limit, since a process has more
- * address space than memory. The address sanitizer takes terabytes of it. */
+/* The parent watches the memory in use, and the clock. The kernel's limits are the second line: processor time, for
+ * a parent that is stopped, and in a fork the address space. That limit is twice the one of memory, since a process has
+ * more address space than memory. The address sanitizer takes terabytes of it. */
 static int set_limits(const struct import_task *task)
 {
     const struct scene_import_limits *limits = &task->limits;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The process that reads is told this, and says this on its way. It is a fork, or a program that does the work. */
+/* A process that reads gets a task, and sends messages back. It is a fork, or a program that does the work. */
 #ifndef CORE_IMPORT_IMPORT_CHILD_H
 #define CORE_IMPORT_IMPORT_CHILD_H
 

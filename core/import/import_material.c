@@ -22,19 +22,43 @@ static bool is_made_up(const char *material)
            strcmp(material, "<IFCDefault>") == 0;
 }
 
+static bool is_share(float x)
+{
+    return x >= 0.0f && x <= 1.0f;
+}
+
+static bool is_colour(const struct aiColor4D *c)
+{
+    return is_share(c->r) && is_share(c->g) && is_share(c->b);
+}
+
 /* The first colour that comes with a material's name stays. glTF has linear colours. */
 static void keep_colour(const struct assimp_lib *lib, const struct scene_build *b, const struct aiMaterial *material,
                         struct scene_surface *surface)
 {
     struct aiColor4D c;
     if (surface->has_colour || is_made_up(surface->material)) return;
-    if (lib->aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
+    if (lib->aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS || !is_colour(&c)) return;
     const float rgb[3] = {c.r, c.g, c.b};
-    for (int i = 0; i < 3; i++) {
-        if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
+    for (int i = 0; i < 3; i++)
         surface->colour[i] = gltf_is_name(b->spec->file) ? (float)colour_srgb_encode((double)rgb[i]) : rgb[i];
-    }
     surface->has_colour = 1;
+}
+
+void import_say_colours(const struct assimp_lib *lib, const struct scene_build *b, const struct aiScene *in)
+{
+    struct aiString first = {0}, name = {0};
+    unsigned n = 0;
+    for (unsigned i = 0; i < in->mNumMaterials; i++) {
+        struct aiColor4D c;
+        if (lib->aiGetMaterialString(in->mMaterials[i], AI_MATKEY_NAME, &name) != AI_SUCCESS || is_made_up(name.data) ||
+            lib->aiGetMaterialColor(in->mMaterials[i], AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS || is_colour(&c))
+            continue;
+        if (n++ == 0) first = name;
+    }
+    if (n > 0)
+        sh_warn(b->report, "%s: %u material%s with a colour beyond 0 to 1, which is left out; the first is '%.100s'",
+                b->name, n, n > 1 ? "s" : "", first.data);
 }
 
 /* Keeps transparency, also of glTF packed by Draco; for other glTF their own reader does it. */
@@ -72,7 +96,7 @@ static bool find_slot(const struct assimp_lib *lib, const struct aiMaterial *mat
            slot->path.length > 0;
 }
 
-/* Physically based materials have a base colour, and some no diffuse one beside it. */
+/* Physically based materials have a base colour, and not all of them a diffuse one. */
 static bool find_diffuse(const struct assimp_lib *lib, const struct aiMaterial *material, struct slot *slot)
 {
     return find_slot(lib, material, aiTextureType_DIFFUSE, slot) ||
@@ -124,8 +148,8 @@ static const struct aiTexture *find_within(const struct aiScene *in, const char 
     return *number >= 0 && *number < (long)in->mNumTextures ? in->mTextures[*number] : NULL;
 }
 
-/* An image that lies within is named after the mesh's file, with its number. Height 0: it is packed, and
- * the width counts bytes. */
+/* An image within the mesh's file gets that file's name and its own number. Height 0 means that it is packed: then its
+ * width counts bytes. */
 static int add_image(struct scene_build *b, const struct aiScene *in, const struct slot *slot, uint16_t *number,
                      struct sh_err *err)
 {

@@ -14,6 +14,9 @@ struct aiColor4D;
 int import_material(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,
                     const struct aiMaterial *material, struct scene_surface *surface, struct sh_err *err);
 
+/* Warns of materials whose colour is beyond 0 to 1: import_material doesn't take it. */
+void import_say_colours(const struct assimp_lib *lib, const struct scene_build *b, const struct aiScene *in);
+
 /* The colour of a vertex, as scene->rgb has it. */
 void import_rgb(struct scene_build *b, const struct aiColor4D *colour, uint8_t rgb[4]);
 

@@ -255,7 +255,7 @@ struct triangles {
     uint8_t rgb[AT_ONCE][3][4];
 };
 
-/* NaN is none; anything else must be a number. */
+/* A corner without coordinates has NaN; infinite ones are refused. */
 static bool is_uv(const float uv[3][2])
 {
     for (int c = 0; c < 3; c++)
@@ -301,7 +301,8 @@ static int take_triangles(struct result *r, struct triangles *t)
     return rc;
 }
 
-/* With textures without names. Before anything is allocated. */
+/* The least size of a file with these counts: its textures have neither names nor bytes. It is checked before anything
+ * is allocated. */
 static uint64_t least_size(const struct result_head *head)
 {
     const struct scene *s = NULL;
@@ -323,12 +324,13 @@ static int take_head(struct result *r)
     if (rc == SH_OK && r->head.has_uv > 1) rc = wrong(r, "texture coordinates:", r->head.has_uv);
     if (rc == SH_OK && r->head.has_rgb > 1) rc = wrong(r, "colours:", r->head.has_rgb);
     if (rc == SH_OK && !(r->head.error_m >= 0.0 && r->head.error_m <= BUILD_MAX_COORDINATE_M))
-        rc = wrong(r, "the error of its vertices, above m:", 0);
+        rc = wrong(r, "the error of its vertices is not from 0 m to", (uint64_t)BUILD_MAX_COORDINATE_M);
     if (rc == SH_OK && least_size(&r->head) > r->size) rc = wrong(r, "its size is", r->size);
     if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= BUILD_MAX_COORDINATE_M))
-        rc = wrong(r, "its unit:", 0);
-    if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes:", 0);
-    if (rc == SH_OK && (r->head.says.is_left_handed & ~1) != 0) rc = wrong(r, "the handedness of its axes:", 0);
+        rc = wrong(r, "its unit is not from 0 m to", (uint64_t)BUILD_MAX_COORDINATE_M);
+    if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes are not from -3 to", 3);
+    if (rc == SH_OK && (r->head.says.is_left_handed & ~1) != 0)
+        rc = wrong(r, "the handedness of its axes is not 0 or", 1);
     return rc;
 }
 

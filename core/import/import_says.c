@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which formats define unit and axes: core/scene.h has the list. FBX has them in its global settings, which
+/* core/scene.h lists the formats that define unit and axes. An FBX file states them in its global settings, which
  * Assimp passes on as metadata. Newer versions of Assimp apply some of them; import_assimp.c undoes that. */
 #include "core/import/import_says.h"
 
@@ -9,7 +9,7 @@
 
 #include <assimp/scene.h>
 
-/* A number of the file's metadata; `other` where it isn't there or is none. */
+/* Returns a number of the file's metadata, or `other` where it isn't there or is not a number. */
 static double number_of(const struct aiScene *in, const char *key, double other)
 {
     const struct aiMetadata *all = in->mMetaData;
@@ -33,7 +33,7 @@ static double number_of(const struct aiScene *in, const char *key, double other)
     return other;
 }
 
-/* An axis of the file: 1 x, 2 y, 3 z, negative in the other direction; 0: it isn't there, or is none. */
+/* Returns an axis of the file: 1 x, 2 y, 3 z, negative in the other direction; 0: it isn't there, or is no axis. */
 static int axis_of(const struct aiScene *in, const char *key, const char *sign_key)
 {
     const double axis = number_of(in, key, -1.0);
@@ -41,8 +41,8 @@ static int axis_of(const struct aiScene *in, const char *key, const char *sign_k
     return ((int)axis + 1) * (number_of(in, sign_key, 1.0) < 0.0 ? -1 : 1);
 }
 
-/* Coordinate axis (right), up and front, in this order, are right-handed where they are an even permutation of x, y and z
- * with an even number of signs. */
+/* The axes right (FBX: CoordAxis), up and front, in this order, are right-handed where they are an even permutation of
+ * x, y and z with an even number of minus signs. */
 static int is_left_handed(int right, int up, int front)
 {
     const int a = right < 0 ? -right : right, b = up < 0 ? -up : up, c = front < 0 ? -front : front;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Unit and axes of an imported file, as it comes out of Assimp: some formats define them, some files say
- * them. */
+/* This finds unit and axes of a file as Assimp gives it back: some formats define them, some files state them. */
 #ifndef CORE_IMPORT_IMPORT_SAYS_H
 #define CORE_IMPORT_IMPORT_SAYS_H
 

@@ -75,7 +75,7 @@ const char *const ply_scalar_name[PLY_SCALARS] = {[PLY_X] = "x",
                                                   [PLY_V] = "t",
                                                   [PLY_TEXNUMBER] = "texnumber"};
 
-/* Other names of the same. */
+/* Other names for the same uses. */
 static const struct {
     const char *name;
     enum ply_use use;

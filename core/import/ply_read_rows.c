@@ -142,7 +142,7 @@ static int ply_read_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
         least += ascii ? 2 : ply_type_size[p->is_list ? p->count_type : p->type];
         r->is_single |= !ascii && p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
     }
-    uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* no line end at the end */
+    uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* the last line may lack its end */
     if (e->count == 0 || e->count <= rest / least) return SH_OK;
     return text_fail(&r->t, 0, SH_EINPUT, err,
                      "%llu elements %s need at least %llu bytes each, but %llu bytes are left in the file",
@@ -181,7 +181,7 @@ static bool vertices_follow(const struct ply_header *h, int i)
     return false;
 }
 
-/* Faces that came before their vertices, from where they began. */
+/* Reads the faces that came before their vertices, each element from where it began. */
 static int walk_again(struct ply_rows *r, const struct text at[], const bool is_early[], const struct ply_user *user,
                       struct sh_err *err)
 {

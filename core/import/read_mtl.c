@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The material libraries of an OBJ file: newmtl; Kd, the diffuse colour; d or Tr, its opacity; map_Kd, its texture; map_d,
- * its holes. The rest is ignored. */
+/* Material libraries of an OBJ file. These statements are read: newmtl; Kd, the diffuse colour; d or Tr, the opacity;
+ * map_Kd, the texture; map_d, its holes. The rest is ignored. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,12 +18,19 @@ struct missing {
     char first[96];
 };
 
+/* The libraries say this of a surface's material. */
+struct known {
+    bool is_there;
+    uint32_t opacity_by; /* definition that has its opacity; 0: none so far */
+};
+
 struct mtl {
     struct scene_build *b;
     struct text t; /* the library at hand */
     struct text_span folder;
     uint32_t first;            /* surface of the OBJ */
-    uint8_t *known;            /* [surfaces from first on] a library has their material */
+    struct known *known;       /* [surfaces from first on] */
+    uint32_t definition;       /* number of the newmtl at hand, from 1 */
     char name[SCENE_NAME_LEN]; /* newmtl, cut as the names of surfaces are */
     struct text_span material; /* of name */
     bool has_opacity;          /* d of the material at hand, which counts before Tr */
@@ -45,7 +52,7 @@ static struct text_span without_quotes(struct text_span name)
     return quoted ? (struct text_span){name.p + 1, name.n - 2} : name;
 }
 
-/* Before " # ", where some writers add a comment. "Material #25" is a name as it stands. */
+/* Cuts a name off before " # ", where some writers add a comment. "Material #25" stays whole. */
 static struct text_span without_comment(struct text_span name)
 {
     for (size_t i = 1; i + 1 < name.n; i++) {
@@ -76,8 +83,9 @@ static void set_material(struct mtl *m, struct text_span material)
     scene_copy_name(m->name, sizeof m->name, material.p, material.n);
     m->material = (struct text_span){m->name, strlen(m->name)};
     m->has_opacity = false;
+    m->definition++;
     for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
-        m->known[i - m->first] |= has_material(&m->b->scene->surface[i], m->material);
+        m->known[i - m->first].is_there |= has_material(&m->b->scene->surface[i], m->material);
 }
 
 /* Sets the colour of all surfaces with the current material; the first colour stays. */
@@ -116,7 +124,7 @@ static void take_colour(struct mtl *m)
         add_missing(&m->colour, at.line, text_rest(&at));
 }
 
-/* d: opacity; Tr: 1 - opacity. d -halo depends on the direction, and is ignored. */
+/* d: opacity; Tr: 1 - opacity. d -halo depends on the direction: it is left out, with a warning. */
 static void take_opacity(struct mtl *m, bool is_opacity)
 {
     struct text at = m->t;
@@ -128,9 +136,12 @@ static void take_opacity(struct mtl *m, bool is_opacity)
     }
     if (m->has_opacity && !is_opacity) return;
     m->has_opacity |= is_opacity;
-    for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
-        if (has_material(&m->b->scene->surface[i], m->material))
-            m->b->scene->surface[i].clear = (float)(is_opacity ? 1.0 - share : share);
+    for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++) {
+        uint32_t *by = &m->known[i - m->first].opacity_by;
+        if ((*by != 0 && *by != m->definition) || !has_material(&m->b->scene->surface[i], m->material)) continue;
+        *by = m->definition; /* as for colours, later definitions of the material do not count */
+        m->b->scene->surface[i].clear = (float)(is_opacity ? 1.0 - share : share);
+    }
 }
 
 /* ---- textures */
@@ -348,7 +359,7 @@ static void warn_of_materials(const struct mtl *m)
     const char *first = NULL;
     uint32_t n = 0;
     for (uint32_t i = m->first; i < scene->n_surfaces; i++) {
-        if (m->known[i - m->first] || scene->surface[i].material[0] == '\0') continue;
+        if (m->known[i - m->first].is_there || scene->surface[i].material[0] == '\0') continue;
         if (n++ == 0) first = scene->surface[i].material;
     }
     if (n > 0 && build_wants_textures(m->b))
@@ -362,7 +373,7 @@ int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint3
     bool all = true;
     int rc = SH_OK;
     if (n == 0) return SH_OK;
-    m.known = calloc(b->scene->n_surfaces - first_surface + 1u, 1);
+    m.known = calloc(b->scene->n_surfaces - first_surface + 1u, sizeof *m.known);
     if (m.known == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for materials");
     for (size_t i = 0; i < n && rc == SH_OK; i++)
         rc = read_line(&m, &line[i], &all, err);

@@ -27,12 +27,13 @@ struct ply {
         float rgb[3], uv[2]; /* as in the file; NaN: none */
     } * colour;              /* of each vertex, where colours or texture coordinates are wanted and there */
     size_t n_colours, cap_colours;
-    double rgb_scale;                  /* of colours of vertices; 0: not known yet */
-    double face_scale;                 /* of those of faces */
-    bool has_vertex_rgb;               /* each is also wanted */
-    bool has_face_rgb;                 /* the element at hand */
-    bool has_uv;                       /* by vertex, face or both */
-    bool has_vertex_uv, has_texcoords; /* of vertices; of the row at hand, one pair a corner */
+    double rgb_scale;  /* of colours of vertices; 0: not known yet */
+    double face_scale; /* of those of faces */
+    /* These are there, and wanted: */
+    bool has_vertex_rgb;               /* colours of vertices */
+    bool has_face_rgb;                 /* colours of faces, in the element at hand */
+    bool has_uv;                       /* texture coordinates, by vertex, face or both */
+    bool has_vertex_uv, has_texcoords; /* those of vertices; those of the row at hand, a pair for each corner */
     bool has_texnumbers;
     bool has_label[PLY_MAX_TEXTURES + 1];
     uint16_t labels[PLY_MAX_TEXTURES + 1]; /* by texture; the last is that of faces without */

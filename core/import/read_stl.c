@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* STL, text and binary, in double. A binary is told by its size, 84 + 50 bytes a triangle: many begin with "solid", too.
- * Normals are ignored: the order of the corners says which side is outside. */
+/* STL, text and binary, in double. A binary file is recognised by its size, 84 bytes and 50 for each triangle, since
+ * many begin with "solid", too. Normals are ignored: the order of the corners says which side is outside. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -63,6 +63,7 @@ static int read_facet(struct stl *s, const char *p, struct sh_err *err)
 static int read_binary(struct stl *s, struct sh_err *err)
 {
     const uint32_t n = le_get32(s->t.data + COUNT_AT);
+    const uint64_t size = binary_size(&s->t); /* the count itself is dropped with what is read */
     int rc = begin_solid(s, (struct text_span){"", 0}, err);
     if (rc == SH_OK) rc = build_weld_begin(s->b, &s->weld, 3 * (uint64_t)n + 1, err);
     if (rc == SH_OK) rc = build_reserve(s->b, 0, n, err);
@@ -73,9 +74,9 @@ static int read_binary(struct stl *s, struct sh_err *err)
         if (rc == SH_OK) rc = read_facet(s, s->t.p, err);
     }
     if (rc == SH_OK) rc = build_single(s->b, s->largest, s->largest * BUILD_SINGLE_ROUNDING, false, err);
-    if (rc == SH_OK && s->t.size > binary_size(&s->t))
+    if (rc == SH_OK && s->t.size > size)
         sh_warn(s->b->report, "%s: %llu bytes after the last of its %u triangles ignored", s->b->name,
-                (unsigned long long)(s->t.size - binary_size(&s->t)), n);
+                (unsigned long long)(s->t.size - size), n);
     return rc;
 }
 
@@ -118,14 +119,15 @@ static int read_vertex(struct stl *s, size_t at, struct sh_err *err)
     return take_vertex(s, at, v, err);
 }
 
-/* After the word facet. */
+/* Reads a facet after its first word. */
 static int read_text_facet(struct stl *s, struct sh_err *err)
 {
     size_t n = 0;
-    text_next_line(&s->t); /* the normal */
-    int rc = expect(s, "outer", err);
+    struct text_span word = text_word(&s->t);
+    while (word.n > 0 && !text_is_word(word, "outer")) /* the rest of the line is the normal, or also what follows it */
+        word = text_word(&s->t);
+    int rc = word.n > 0 ? SH_OK : expect(s, "outer", err);
     if (rc == SH_OK) rc = expect(s, "loop", err);
-    struct text_span word = {"", 0};
     while (rc == SH_OK && text_is_word(word = next_word(&s->t), "vertex"))
         rc = read_vertex(s, n++, err);
     if (rc == SH_OK && !text_is_word(word, "endloop")) rc = fail_at(s, word, n < 3 ? "vertex" : "endloop", err);
@@ -135,7 +137,7 @@ static int read_text_facet(struct stl *s, struct sh_err *err)
     return n < 3 ? SH_OK : build_polygon(s->b, n, s->label, err);
 }
 
-/* After the word solid. */
+/* Reads a solid after its first word. */
 static int read_solid(struct stl *s, struct sh_err *err)
 {
     struct text_span word = {"", 0};

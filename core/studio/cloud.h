@@ -34,10 +34,11 @@ struct cloud {
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
-    double count_m; /* what the file rounds coordinates to, on the ground: of LAS the scale, of a PLY as text the 1e-6
-                         * m that our recorder writes, in single precision two units in the last place; 0: nothing */
-    int is_single;  /* 1: in single precision */
-    int is_text;    /* 1: the file holds coordinates as decimal numbers */
+    /* The step to which the file rounds coordinates, on the ground: the scale of LAS; 1e-6 m of a PLY as text, as our
+     * recorder writes it; two units in the last place of single precision; 0: it rounds nothing. */
+    double count_m;
+    int is_single;      /* 1: in single precision */
+    int is_text;        /* 1: the file holds coordinates as decimal numbers */
     int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
     /* Where they were asked for and the file has them, else NULL: */
     double *time_s;        /* [n] PLY: since the scan's start; LAS: as the file counts it */

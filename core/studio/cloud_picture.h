@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* A cloud from above, coloured by a figure. In: places (metres, x to the right, y up) and a figure each. Out: an image of
- * the pixels' means.
+/* A cloud from above, coloured by a figure. In: places (metres, x to the right, y up) and a figure each. Out: an image
+ * of the pixels' means.
  *
- * A pixel shows the mean of its points' figures: by colour_ramp 0 is blue, and most and all beyond it
- * are red. Pixels whose points have no finite figure are black; those without points are white, which the ramp has not. The
+ * A pixel shows the mean of its points' figures: by colour_ramp, 0 is blue; `most`, and all beyond it, is red. Pixels
+ * whose points have no finite figure are black. Those without points are white, a colour that the ramp lacks. The
  * longer side has up to CLOUD_PICTURE_PX pixels, fewer where there are few points, so that areas are filled. */
 #ifndef CORE_STUDIO_CLOUD_PICTURE_H
 #define CORE_STUDIO_CLOUD_PICTURE_H

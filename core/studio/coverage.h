@@ -4,19 +4,20 @@
  * In: a scene with its BVH (prcs, metres), and scans as setups and schedules. Out: figures of each cell of the surface,
  * sums over all cells, a mesh of the cells.
  *
- * Cells. Each triangle is cut into pieces that are at most cell_m across (core/studio/coverage/cut.h); the sum of their areas
- * is its area. Pieces whose centres lie in one cube of side cell_m, that have one
- * label, and whose normals have the same largest component with the same sign, are one cell. So small triangles share
+ * Cells. Each triangle is cut into pieces that are at most cell_m across (core/studio/coverage/cut.h); the sum of their
+ * areas is its area. Pieces make one cell where their centres lie in one cube of side cell_m, they have one label, and
+ * their normals have the same largest component with the same sign. So small triangles share
  * a cell, and the two sides of a wall never do. A cell reaches at most 2.5 cell_m along each axis. Area counts, not
  * the number of cells.
  *
  * A cell is seen where the centre of a pulse hits one of its pieces, from either side, and the head can report it
  * (caster_meet: within its ranges and above its threshold, both without noise; through glass, not in mirrors).
- * Triangles with the same corners are one surface: all but one are left out (scene_find_duplicate_faces). Moving bodies hide
- * the surfaces behind them, and have no cells. Faces between bodies, such as the inner faces of a wall's layers,
+ * Triangles with the same corners are one surface: all but one are left out (scene_find_duplicate_faces). Moving bodies
+ * hide the surfaces behind them, and have no cells. Faces between bodies, such as the inner faces of a wall's layers,
  * count as surface that is never seen.
  *
- * Results do not depend on the number of threads. One coverage belongs to one thread; the work is shared out below. */
+ * A coverage belongs to one thread. Functions that cast start threads of their own; results do not depend on their
+ * number. */
 #ifndef CORE_STUDIO_COVERAGE_H
 #define CORE_STUDIO_COVERAGE_H
 
@@ -51,8 +52,7 @@ struct coverage_scan {
     /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
-    /* This gets the scan's hits, too, those on bodies among them, from the threads that cast; NULL: nobody wants
-     * them. */
+    /* Gets the scan's hits as well, also those on bodies, from the threads that cast. NULL: nobody wants them. */
     void (*take)(void *take_ctx, const struct cast_hit *hit, uint32_t n);
     void *take_ctx;
 };
@@ -72,7 +72,7 @@ void coverage_keep(struct coverage *coverage);
 void coverage_drop(struct coverage *coverage);
 
 /* For stations that are tried and changed one by one. cells[(coverage_cells + 63) / 64]: a bit for each cell that the
- * waiting scan sees. A scan that was written down so can be kept again later; its pulses then count as none. */
+ * waiting scan sees. A scan whose cells are stored can be kept again later, with these cells but without its pulses. */
 void coverage_waiting_cells(const struct coverage *coverage, uint64_t *cells);
 void coverage_keep_cells(struct coverage *coverage, const uint64_t *cells);
 /* Forgets all stations, and the scan that waits. */

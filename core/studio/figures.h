@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Figures of a compared cloud, for tables and pictures: by groups, as histograms, how dense its points lie, when they
- * came. In: distances (core/studio/cloud.h) and deviations (core/studio/deviation.h), metres. Out: statistics. What is NaN takes no
- * part. Pure; whoever makes arrays says how they are freed. */
+ * came. In: distances (core/studio/cloud.h) and deviations (core/studio/deviation.h), metres. Out: statistics. Values
+ * that are NaN take no part. Pure. */
 #ifndef CORE_STUDIO_FIGURES_H
 #define CORE_STUDIO_FIGURES_H
 
@@ -35,7 +35,8 @@ struct figures_in {
 
 enum { FIGURES_NO_GROUP = 0xffffffff };
 
-/* group(ctx, i): of point i, below n_groups or FIGURES_NO_GROUP; NULL: all points are one group. Takes 8 bytes a point while it works. */
+/* group(ctx, i): of point i, below n_groups or FIGURES_NO_GROUP; NULL: all points are one group. It takes 8 bytes a
+ * point while it works. */
 int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)(void *ctx, size_t i), void *ctx,
                struct figures *out, struct sh_err *err);
 
@@ -79,7 +80,7 @@ struct figures_on_scene {
     const struct scene *scene;
     const float *range_m; /* [cloud->n] as deviation_points has it */
 };
-/* Points without a triangle take no part. Up to 4 million cells, 96 MiB. */
+/* Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
 int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
                        struct figures_density *out, struct sh_err *err);
 /* The same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly, and up to

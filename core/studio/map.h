@@ -76,7 +76,7 @@ struct map_counts {
 };
 void map_get_counts(const struct map *map, struct map_counts *counts);
 
-/* Where things are in the image, in pixels from its upper left corner. */
+/* The layout of the image, in pixels from its upper left corner. */
 struct map_layout {
     uint32_t width, height;         /* of the image */
     uint32_t left, top;             /* of the map in the image */

@@ -14,8 +14,8 @@
  * Float steps by up to 6e-8 of a coordinate. Where half a step is more than MESH_FLOAT_PART of the mesh's size (and
  * more than 1 micrometre), the mesh is refused with the figures: nothing is moved to the origin in silence.
  *
- * Ownership: all arrays are the caller's and are not changed. .gltf, .glb and .fbx take about 500 bytes a face of memory
- * while they are written. Not real-time safe; any thread, one file each. */
+ * Ownership: all arrays are the caller's and are not changed. .gltf, .glb and .fbx take about 500 bytes of memory a
+ * face while they are written. Not real-time safe; any thread, one file each. */
 #ifndef CORE_STUDIO_MESH_H
 #define CORE_STUDIO_MESH_H
 
@@ -58,7 +58,7 @@ struct mesh {
     const double (*xyz_m)[3]; /* [n_vertices] */
     const float (*normal)[3]; /* [n_vertices] unit vectors; NULL: none */
     const uint8_t (*rgb)[3];  /* [n_vertices] sRGB; NULL: none */
-    const float (*uv)[2]; /* [n_vertices] 0, 0 is the image's lower left corner; NULL: none. No place in .ply: s, t */
+    const float (*uv)[2]; /* [n_vertices] 0, 0 is the image's lower left corner; in .ply they are s, t; NULL: none */
     const uint32_t (
         *face)[3]; /* [n_faces] indices of vertices, counter-clockwise seen from outside; NULL: points alone */
     const uint8_t (*face_rgb)[3];     /* [n_faces] of .ply alone; NULL: none */

@@ -36,7 +36,7 @@ void picture_triangle(struct picture *picture, const double corner[3][2], const 
 enum picture_anchor { PICTURE_LEFT, PICTURE_MIDDLE, PICTURE_RIGHT };
 
 struct picture_type {
-    double size_px; /* height of capitals; lines of text are 1.9 of that apart */
+    double size_px; /* height of capitals */
     int bold;
     double halo_px; /* > 0: so much white around the strokes */
 };
@@ -84,7 +84,7 @@ struct pen {
     void (*triangle)(void *on, const double corner[3][2], const uint8_t rgb[3]);
     void (*text)(void *on, const double at[2], enum picture_anchor anchor, const struct picture_type *type,
                  const uint8_t rgb[3], const char *text);
-    /* What is drawn between the two belongs together: a group with a title. */
+    /* Marks that are drawn between these two make a group with a title. */
     void (*begin)(void *on, const char *class_name, const char *title);
     void (*end)(void *on);
 };

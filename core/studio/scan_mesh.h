@@ -2,11 +2,11 @@
 /* The mesh of a scan's grid. In: points with their places in the grid, a column a line and a row a shot. Out: triangles
  * that face the head, normals, and points spread evenly over them.
  *
- * A cell lies between two rows and two columns that follow each other. Where all four corners have a point it gives two
- * triangles, cut along the shorter diagonal (from the first row of the first column where both are as long). Where three
- * have one, it gives the triangle of these. Nothing is drawn across a missing row or column. The corners of a triangle
- * are in the order that makes its normal point to the head: counter-clockwise as the head sees it. A triangle without
- * area, or with the head in its plane, is left out and counted.
+ * A cell lies between two rows and two columns that follow each other. Where all four corners have a point it gives
+ * two triangles, cut along the shorter diagonal (from the first row of the first column where both are as long). Where
+ * three have one, it gives the triangle of these. Nothing is drawn across a missing row or column. The corners of a
+ * triangle are in the order that makes its normal point to the head: counter-clockwise as the head sees it. A triangle
+ * without area, or with the head in its plane, is left out and counted.
  *
  * The long-edge filter leaves out each triangle with an edge that is longer than `long_edge` times the mean edge. The
  * mean is over all edges of the mesh before the filter, each counted once: along columns, along rows, and diagonals.
@@ -47,7 +47,7 @@ struct scan_faces {
     double mean_edge_m;
 };
 
-/* SH_ENOMEM; SH_ESTOPPED where report asks to stop. scan_faces_free is due in any case. Takes 24 bytes a point while it
+/* SH_ENOMEM; SH_ESTOPPED where report asks to stop. scan_faces_free is due in any case. Takes 25 bytes a point while it
  * works, and gives 12 a triangle. */
 int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, const struct sh_report *report,
                     struct sh_err *err);
@@ -58,8 +58,8 @@ void scan_faces_free(struct scan_faces *faces);
 void scan_normals(const double (*xyz_m)[3], uint32_t n_points, const uint32_t (*face)[3], uint32_t n_faces,
                   float (*normal)[3]);
 
-/* Leaves out points without a triangle: to[i] is the new number of point i, or SCAN_MESH_NONE; faces get the new numbers.
- * Returns how many are left. */
+/* Leaves out points without a triangle: to[i] is the new number of point i, or SCAN_MESH_NONE; faces get the new
+ * numbers. Returns how many are left. */
 uint32_t scan_drop_loose(uint32_t n_points, uint32_t (*face)[3], uint32_t n_faces, uint32_t *to);
 
 /* Points spread over triangles, uniformly by area, each on its own: point k depends on key and k alone. */

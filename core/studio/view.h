@@ -29,7 +29,7 @@
 enum {
     VIEW_MIN_PX = 16,
     VIEW_MAX_SIDE_PX = 8192,
-    VIEW_MAX_PIXELS = 16777216, /* 1.8 GiB while it is drawn */
+    VIEW_MAX_PIXELS = 16777216, /* 2.05 GiB while it is drawn: 32 bytes a place, 3 a pixel */
 };
 
 struct view_camera {
@@ -83,15 +83,14 @@ struct view_colours {
 /* The image; the caller frees it with picture_free. SH_ESTOPPED where report asks to stop; there is no image then. */
 int view_draw(const struct view *view, const struct view_colours *colours, struct picture *out, struct sh_err *err);
 
-/* ---- what stands beside the picture */
+/* ---- marks and legends */
 
 /* Even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): like the map's heights, but stronger.
  * NaN: colour_unknown. */
 void view_ramp(double part, uint8_t rgb[3]);
 
-/* Draws marks of stations in front of the eye and in the image, and their names where these cover no other name
- * or mark.
- * Returns how many names are left out of those whose marks are drawn. */
+/* Draws marks of the stations that lie in front of the eye and in the image, and their names where these cover no other
+ * name or mark. Returns how many stations have a mark but no name. */
 struct view_station {
     double p_m[3];
     const char *name;

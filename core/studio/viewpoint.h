@@ -10,8 +10,8 @@
  *   outside at a distance from the whole scene, looking at it: an object, or a closed shell whose faces point
  *   outward
  *
- * What "sees much" means is measured: rays are cast over the field of view from each candidate. The same
- * scene and view give the same place. */
+ * How much a candidate sees is measured, by rays over the field of view. The same scene and view give the same
+ * place. */
 #ifndef CORE_STUDIO_VIEWPOINT_H
 #define CORE_STUDIO_VIEWPOINT_H
 
@@ -39,8 +39,8 @@ struct viewpoint {
     int faces_out;               /* outside: there was a room, but its faces point outward */
 };
 
-/* SH_EINPUT: the view is empty. Takes memory and time for a BVH, and some 10 to 100 ms. SH_ESTOPPED: report asks to
- * stop. */
+/* SH_EINPUT: the view is empty, or holds nothing of the scene from any place that was tried. Takes memory and time for
+ * a BVH. SH_ESTOPPED: report asks to stop. */
 int viewpoint_find(const struct scene *scene, const struct viewpoint_view *view, const struct sh_report *report,
                    struct viewpoint *out, struct sh_err *err);
 

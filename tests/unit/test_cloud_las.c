@@ -55,6 +55,29 @@ static void test_read(void **state)
     }
 }
 
+/* The returns of a point are a byte, which some writers leave 0. The point is an echo all the same. */
+static void test_without_returns(void **state)
+{
+    (void)state;
+    size_t len;
+    struct cloud cloud;
+    struct sh_err err = {0};
+    uint32_t at;
+    write_las(NATIVE_CRS_UTM, 32632, 1);
+    uint8_t *las = rig_read(rig_path("a.las"), &len);
+    memcpy(&at, las + 96, sizeof at);
+    las[at + 14] = 0; /* of the first point */
+    FILE *f = fopen(rig_path("a.las"), "wb");
+    assert_int_equal(fwrite(las, 1, len, f), len);
+    fclose(f);
+    free(las);
+    if (cloud_read_columns(rig_path("a.las"), CLOUD_ECHO_COUNT, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    assert_true(cloud.echo[0] == 1 && cloud.echo_count[0] == 1);
+    assert_true(cloud.echo[1] == 2 && cloud.echo_count[1] == 2);
+    cloud_free(&cloud);
+    unlink(rig_path("a.las"));
+}
+
 /* Coordinates are degrees. The file's x is longitude, the cloud's first is latitude, as in a stream, and within
  * -180..180. */
 static void test_degrees(void **state)
@@ -201,8 +224,8 @@ static void test_label_behind_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_geodetic),
-                                       cmocka_unit_test(test_label_behind_others), cmocka_unit_test(test_degrees),
-                                       cmocka_unit_test(test_broken)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_read),    cmocka_unit_test(test_geodetic), cmocka_unit_test(test_label_behind_others),
+        cmocka_unit_test(test_degrees), cmocka_unit_test(test_broken),   cmocka_unit_test(test_without_returns)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -204,6 +204,9 @@ static void test_pcd_that_is_wrong(void **state)
     expect_error(text, len, "no fields x, y and z");
     len = put_header(text, "FIELDS x y z\nSIZE 2 2 2\nTYPE I I I\nCOUNT 1 1 1\n", 1, "ascii");
     expect_error(text, len, "TYPE F");
+    len = put_header(text, "FIELDS x y z i\nSIZE 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n", 1, "binary");
+    memset(text + len, 0, 16);
+    expect_error(text, len + 16, "fewer numbers in SIZE");
     len = put_header(text, XYZ, 1, "zip");
     expect_error(text, len, "neither ascii");
     len = put_header(text, XYZ, 2, "ascii");

@@ -392,6 +392,22 @@ static void what_is_beside_it(void **state)
     unlink(path);
 }
 
+/* Zones are 6 degrees wide, the first from 180 degrees west on. Some files count longitude from 0 to 360. */
+static void advice_names_the_zone(void **state)
+{
+    (void)state;
+    assert_int_equal(geotiff_utm_code(48.0, 11.5), 32632);
+    assert_int_equal(geotiff_utm_code(-33.0, 151.2), 32756);
+    assert_int_equal(geotiff_utm_code(10.0, -180.0), 32601);
+    assert_int_equal(geotiff_utm_code(10.0, 179.99), 32660);
+    assert_int_equal(geotiff_utm_code(10.0, 180.0), 32601);
+    assert_int_equal(geotiff_utm_code(21.3, 202.2), 32604); /* Honolulu, 157.8 west */
+    assert_int_equal(geotiff_utm_code(10.0, 359.0), 32630);
+    assert_int_equal(geotiff_utm_code(85.0, 0.0), 32661);
+    assert_int_equal(geotiff_utm_code(-85.0, 0.0), 32761);
+    assert_int_equal(geotiff_utm_code(0.0, (double)NAN), 32601); /* some zone */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -405,6 +421,7 @@ int main(void)
         cmocka_unit_test(what_is_left_out_is_said),
         cmocka_unit_test(what_is_refused),
         cmocka_unit_test(what_is_beside_it),
+        cmocka_unit_test(advice_names_the_zone),
     };
     return cmocka_run_group_tests_name("geotiff", tests, make_folder, remove_folder);
 }

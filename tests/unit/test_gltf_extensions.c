@@ -97,7 +97,7 @@ static void images_that_are_not_read(void **state)
     static const char required[] = "\"extensionsRequired\":[\"KHR_texture_basisu\"],",
                       alone[] = "{\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}}",
                       beside[] = "{\"source\":1,\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}}",
-                      says[] = "1 textures are images of KHR_texture_basisu, which is not supported";
+                      says[] = "1 primitives have a texture of KHR_texture_basisu, which is not supported";
     struct scene *s;
     struct sh_err err = {0};
     assert_int_equal(load_images(required, alone, 1, &s, &err), SH_EINPUT);

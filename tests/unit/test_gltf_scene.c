@@ -63,7 +63,7 @@ static void matrices_and_their_parts(void **state)
     refuse_tree("\"nodes\":[{\"mesh\":0,\"scale\":[1,1]}]", "nodes[0].scale is not 3 numbers");
 }
 
-/* A shift of 500 km that a node below undoes loses no precision: nodes are multiplied in double. */
+/* A shift of 5000 km that a node below undoes loses no precision: nodes are multiplied in double. */
 static void the_tree_is_in_double(void **state)
 {
     (void)state;
@@ -100,6 +100,10 @@ static void trees_that_are_none(void **state)
     refuse_tree("\"nodes\":[{\"children\":[1],\"mesh\":0},{\"children\":[0]},{\"mesh\":0}]",
                 "nodes[0] is a child of itself");
     refuse_tree("\"nodes\":[{\"children\":[7],\"mesh\":0}]", "nodes[0].children[0] is not a node; there are 1");
+    refuse_tree("\"nodes\":[{\"children\":[\"1\"],\"mesh\":0},{\"mesh\":0}]",
+                "nodes[0].children[0] is not a node; there are 2");
+    refuse_tree("\"scenes\":[{\"nodes\":[null]}],\"nodes\":[{\"mesh\":0}]",
+                "scenes[0].nodes[0] is not a node; there are 1");
     refuse_tree("\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"children\":[1]},{\"mesh\":0}]",
                 "scenes[0].nodes has nodes[1], which is a child of nodes[0]");
     refuse_tree("\"scenes\":[{\"nodes\":[0,0]}],\"nodes\":[{\"mesh\":0}]", "scenes[0].nodes has nodes[0] twice");
@@ -275,6 +279,25 @@ static void morph_targets_by_default_weights(void **state)
     }
 }
 
+/* A target of bytes, at a weight of 0.01, is rounded by up to half of 0.01 m; at twice the size by 0.01 m. */
+static void morph_targets_may_be_whole_numbers(void **state)
+{
+    (void)state;
+    static const int8_t up[4][4] = {{0, 0, 100}, {0, 0, 100}, {0, 0, 100}, {0, 0, 100}};
+    static const double low[3] = {-4, -2, -2}, high[3] = {4, 2, -2};
+    gltf_quad();
+    gltf_block(up, sizeof up, ",\"byteStride\":4");
+    struct scene *s = gltf_load(
+        "\"extensionsRequired\":[\"KHR_mesh_quantization\"],\"nodes\":[{\"mesh\":0,\"scale\":[2,2,2]}],\"meshes\":[{"
+        "\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":2,\"targets\":[{\"POSITION\":3}]}],"
+        "\"weights\":[0.01]}],\"accessors\":[" GLTF_QUAD_ACCESSORS
+        ",{\"bufferView\":3,\"componentType\":5120,\"count\":4,\"type\":\"VEC3\"}]");
+    gltf_check_box(s, low, high, 1e-14); /* z: 2 (-2 + 0.01 * 100) */
+    assert_true(fabs(s->error_m - 0.01) < 1e-15);
+    assert_non_null(strstr(warnings, "(KHR_mesh_quantization), with errors up to 0.01 m"));
+    scene_free(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -289,6 +312,7 @@ int main(void)
         cmocka_unit_test(hidden_nodes_are_left_out),
         cmocka_unit_test(skins_in_their_default_pose),
         cmocka_unit_test(morph_targets_by_default_weights),
+        cmocka_unit_test(morph_targets_may_be_whole_numbers),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

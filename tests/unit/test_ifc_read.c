@@ -156,6 +156,27 @@ static void openings_and_styles(void **state)
     scene_free(scene);
 }
 
+/* Some programs write colours of 0..255, and percent. The body is read, with the nearest colour, and a warning. */
+static void colours_beyond_their_range_are_limited(void **state)
+{
+    (void)state;
+    needs_readers();
+    ifc_write_text(
+        text, "IFC4", NULL, NULL, ifc_shapes, 1,
+        "#5010=IFCCOLOURRGB($,-0.1,0.4,153.);\n#5011=IFCSURFACESTYLERENDERING(#5010,70.,$,$,$,$,$,$,.NOTDEFINED.);\n"
+        "#5012=IFCSURFACESTYLE('Glas',.BOTH.,(#5011));\n#5013=IFCSTYLEDITEM(#1060,(#5012),$);\n");
+    must_read(1e-3);
+    assert_int_equal(scene->n_surfaces, 1);
+    const struct scene_surface *surface = &scene->surface[0];
+    assert_string_equal(surface->material, "Glas");
+    assert_true(surface->has_colour && surface->colour[0] == 0.0f && surface->colour[2] == 1.0f);
+    assert_true(fabsf(surface->colour[1] - 0.4f) < 0.004f && surface->clear == 1.0f);
+    assert_int_equal(n_warnings, 1);
+    if (strstr(warnings, "1 style of surfaces with a colour or transparency beyond 0 to 1, limited to it") == NULL)
+        fail_msg("%s", warnings);
+    scene_free(scene);
+}
+
 /* The files have IFC2x3 and IFC4x3, feet, a site 2,700 km away, and complete names. */
 static void schemas_units_and_places(void **state)
 {
@@ -228,6 +249,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_have_their_area_and_volume),
         cmocka_unit_test(openings_and_styles),
+        cmocka_unit_test(colours_beyond_their_range_are_limited),
         cmocka_unit_test(too_many_products),
 #ifndef SH_SANITIZE /* they run the same code, and take the readers' seconds */
         cmocka_unit_test(facets_hold_the_tolerance),

@@ -104,6 +104,43 @@ static void products_are_found(void **state)
     ifc_records_close(&records);
 }
 
+/* Of a cylinder 30 m high, a cone 40 m high and a pipe whose curve ends at 90, only the radii count. */
+static void heights_are_no_radii(void **state)
+{
+    (void)state;
+    static const struct ifc_shape shapes[] = {
+        {"column", "@50", "50=IFCCSGSOLID(@51)\n51=IFCRIGHTCIRCULARCYLINDER(#12,30.,0.25)", 0, 0, 0},
+        {"spire", "@50", "50=IFCCSGSOLID(@51)\n51=IFCRIGHTCIRCULARCONE(#12,40.,0.5)", 0, 0, 0},
+        {"pipe", "@50",
+         "50=IFCSWEPTDISKSOLID(@51,0.125,0.1,0.,90.)\n51=IFCPOLYLINE((@52,@52))\n"
+         "52=IFCCARTESIANPOINT((0.,0.,0.))",
+         0, 0, 0}};
+    static const double radius_m[3] = {0.25, 0.5, 0.125};
+    for (int i = 0; i < 3; i++) {
+        ifc_write_text(text, "IFC4", NULL, NULL, &shapes[i], 1, NULL);
+        if (open_text() != SH_OK) fail_msg("%s", err.text);
+        if (records.radius_m != radius_m[i]) fail_msg("%s: %g m", shapes[i].name, records.radius_m);
+        ifc_records_close(&records);
+    }
+}
+
+/* All types of openings that IFC2x3 and IFC4 have. */
+static void openings_without_a_wall_are_found(void **state)
+{
+    (void)state;
+    ifc_write_text(text, "IFC4", NULL, NULL, block, 1,
+                   "#5000=IFCOPENINGELEMENT('a',#5,'hole',$,$,#1003,#1002,$,$);\n"
+                   "#5001=IFCOPENINGSTANDARDCASE('b',#5,'hole',$,$,#1003,#1002,$,$);\n"
+                   "#5002=IFCVOIDINGFEATURE('c',#5,'hole',$,$,#1003,#1002,$,$);\n"
+                   "#5003=IFCOPENINGSTANDARDCASE('d',#5,'hole',$,$,#1003,#1002,$,$);\n"
+                   "#5004=IFCRELVOIDSELEMENT('e',#5,$,$,#1000,#5003);\n"
+                   "#5005=IFCSPACE('f',#5,'air',$,$,#1003,#1002,$,$,$,$);\n");
+    if (open_text() != SH_OK) fail_msg("%s", err.text);
+    for (uint64_t id = 5000; id < 5006; id++)
+        if (id != 5004) assert_int_equal(ifc_records_product(&records, id)->opens_nothing, id < 5003);
+    ifc_records_close(&records);
+}
+
 static void refused(const char *expected)
 {
     assert_int_equal(open_text(), SH_EINPUT);
@@ -283,6 +320,8 @@ int main(void)
         cmocka_unit_test(texts_are_whole),
         cmocka_unit_test(units_are_read),
         cmocka_unit_test(products_are_found),
+        cmocka_unit_test(heights_are_no_radii),
+        cmocka_unit_test(openings_without_a_wall_are_found),
         cmocka_unit_test(what_is_not_whole_is_refused),
         cmocka_unit_test(placement_in_a_ring_is_refused),
         cmocka_unit_test(ring_ends),

@@ -198,7 +198,9 @@ static void wrong_map_conversions_are_refused(void **state)
                 "line 19: IFCMAPCONVERSION #20: a Scale of 7 beside a MapUnit; allowed about 0.001,"},
                {"1.,2.,3.,$,$,0.001", "'a',$,$", "IFCPROJECTEDCRS #21: attributes are missing"},
                {"1.,2.,3.,$,$,0.001", "$,$,$,$,$,$,$", "IFCPROJECTEDCRS #21: its name is missing"},
-               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#4", "not a unit of length"}};
+               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#4", "not a unit of length"},
+               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,$,#0", "IFCPROJECTEDCRS #21 refers to #0, but there is no such"},
+               {"1.,2.,3.,$,$,0.001", "'a',$,$,$,$,#,#99", "IFCPROJECTEDCRS #21 refers to #0, but there is no such"}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         int code = load_map(bad[i].map, bad[i].crs);
         if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)

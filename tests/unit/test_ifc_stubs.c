@@ -173,7 +173,8 @@ static void reader_that_hangs_is_ended(void **state)
     make_stubs("setInterval(() => 0, 1e6)", ONE END);
     limits.time_s = 2000; /* beyond the test's own limit: the other reader's end has to end it */
     must_read(1e-3);
-    if (strstr(warnings, "web-ifc did not read it within") == NULL) fail_msg("%s", warnings);
+    if (strstr(warnings, "web-ifc did not read it within") == NULL || strstr(warnings, "scene.import_s") != NULL)
+        fail_msg("%s", warnings); /* a longer limit would not help */
     scene_free(scene);
     make_stubs("setInterval(() => 0, 1e6)", "setInterval(() => 0, 1e6)");
     limits.time_s = 1;

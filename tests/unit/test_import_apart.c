@@ -14,6 +14,7 @@
 #include <assimp/version.h>
 
 #include "core/assimp_lib.h"
+#include "core/import/import_apart.h"
 #include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 
@@ -33,10 +34,13 @@ static const struct aiScene *hang_or_read(const char *file, unsigned flags, stru
     return read_file(file, flags, io, options);
 }
 
+static int n_loads; /* in this process: a fork counts its own */
+
 int late_load(enum late_library which, const char *const *name, void *calls, size_t n, struct sh_err *err)
 {
     (void)err;
     assert_int_equal(which, LATE_assimp);
+    n_loads++;
     void **call = calls, *own;
     for (size_t i = 0; i < n; i++) {
         call[i] = dlsym(RTLD_DEFAULT, name[i]);
@@ -79,6 +83,62 @@ static void hang_ends_in_time(void **state)
     if (strstr(err.text, "endless.dae: Assimp did not read it within 0.15 s (scene.import_s)") == NULL)
         fail_msg("%s", err.text);
     no_child_is_left();
+}
+
+/* glTF 1.0 is for Assimp, which only the reader of glTF finds out. The library is loaded here, not in a fork. */
+static void gltf_of_old_gets_assimp_here(void **state)
+{
+    (void)state;
+    const struct scene_mesh_spec spec = {
+        .file = write_text("old.gltf", "{\"asset\":{\"version\":\"1.0\"},\"meshes\":{}}"), .scale = 1};
+    struct scene *s;
+    struct sh_err err;
+    n_loads = 0;
+    assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_EINPUT); /* it has no mesh */
+    unlink(path);
+    assert_int_equal(n_loads, 1);
+    assert_null(strstr(err.text, "has to read it"));
+    no_child_is_left();
+}
+
+enum { CHATTY = 1003 };
+
+static int warn_often(struct scene_build *b, struct sh_err *err)
+{
+    for (int i = 0; i < CHATTY; i++)
+        sh_warn(b->report, "warning %d", i);
+    return sh_fail(err, SH_EINPUT, "enough");
+}
+
+static void keep_last_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    n_warnings++;
+    snprintf(warnings, sizeof warnings, "%s", text);
+}
+
+/* A thousand warnings are shown, and the number of all. */
+static void warnings_are_counted(void **state)
+{
+    (void)state;
+    static const struct sh_report report = {.warn = keep_last_warning};
+    const struct scene_mesh_spec spec = {.file = "many.dae", .scale = 1};
+    struct sh_err err = {0};
+    struct scene_build b;
+    assert_int_equal(build_init(&b, 1e-3, &report, &err), SH_OK);
+    build_begin_file(&b, &spec);
+    struct import_apart a = {
+        .task = {.b = &b, .limits = scene_import_defaults, .name = "a reader", .read = warn_often}};
+    struct import_apart *const all[1] = {&a};
+    n_warnings = 0;
+    assert_int_equal(import_start(&a, &err), SH_OK);
+    import_watch(all, 1);
+    assert_int_equal(import_judge(&a, &err), SH_EINPUT);
+    import_close(&a);
+    build_release(&b);
+    assert_string_equal(err.text, "enough");
+    assert_int_equal(n_warnings, 1000 + 1);
+    assert_string_equal(warnings, "many.dae: a reader gave 1003 warnings; the first 1000 are shown");
 }
 
 /* A program may be started so. Then there is no status of the child, and its output counts. */
@@ -287,7 +347,8 @@ int main(void)
         cmocka_unit_test(hang_ends_in_time),          cmocka_unit_test(memory_is_limited),
         cmocka_unit_test(crash_is_one_line),          cmocka_unit_test(child_has_limits),
         cmocka_unit_test(child_dies_with_its_parent), cmocka_unit_test(signal_of_children_may_be_ignored),
-        cmocka_unit_test(no_descriptors_are_left),
+        cmocka_unit_test(no_descriptors_are_left),    cmocka_unit_test(gltf_of_old_gets_assimp_here),
+        cmocka_unit_test(warnings_are_counted),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

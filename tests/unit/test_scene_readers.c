@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The scene: our own readers of OBJ and PLY, and their numbers. Formats by Assimp: test_scene_import.c. */
+/* The scene: our own readers of OBJ, PLY and STL, and their numbers. Formats by Assimp: test_scene_import.c. */
 #include <locale.h>
 #include <math.h>
 
@@ -65,6 +65,27 @@ static void obj_takes_colours_from_its_library(void **state)
                     s->surface[i].colour[2] == 1.0f);
     scene_free(s);
     unlink(strcat(strcpy(path, folder), "/my colours.mtl"));
+}
+
+/* Of two definitions of a material the first one counts, in one library or in two. Within it, d counts before Tr. */
+static void obj_takes_the_first_opacity(void **state)
+{
+    (void)state;
+    static const char first[] = "newmtl glass\nTr 0.125\nd 0.25\nnewmtl air\nd 1\nnewmtl glass\nd 0.875\n",
+                      second[] = "newmtl glass\nd 0.75\nnewmtl air\nTr 0.5\nnewmtl late\nTr 0.5\nd -halo 0.5\n";
+    static const char mesh[] = "mtllib a.mtl b.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+                               "usemtl glass\nf 1 2 3\nusemtl air\nf 1 2 3\nusemtl late\nf 1 2 3\n";
+    static const float clear[3] = {0.75f, 0.0f, 0.5f};
+    write_file("a.mtl", first, sizeof first - 1);
+    write_file("b.mtl", second, sizeof second - 1);
+    struct scene *s = load_text("clear.obj", mesh);
+    assert_int_equal(s->n_surfaces, 3);
+    for (int i = 0; i < 3; i++)
+        if (s->surface[i].clear != clear[i]) fail_msg("%s: %g", s->surface[i].material, (double)s->surface[i].clear);
+    assert_non_null(strstr(warnings, "b.mtl, line 7: the opacity '-halo 0.5' is left out"));
+    scene_free(s);
+    unlink(strcat(strcpy(path, folder), "/a.mtl"));
+    unlink(strcat(strcpy(path, folder), "/b.mtl"));
 }
 
 static void obj_without_names(void **state)
@@ -253,17 +274,61 @@ static void ply_in_float_warns(void **state)
     scene_free(s);
 }
 
+/* Words of a text STL may stand in any lines, but for the numbers of a vertex. Writers put anything for a normal. */
+static void stl_words_stand_in_any_lines(void **state)
+{
+    (void)state;
+    struct scene *s =
+        load_text("words.stl",
+                  "solid roof of tin\nfacet normal 0 0 1 outer loop vertex 0 0 0\nvertex 1 0 0 vertex 0 1 0\nendloop "
+                  "endfacet\nfacet normal nan nan nan\nouter\nloop\nvertex 0 0 1\nvertex 1 0 1\nvertex 0 1 1\n"
+                  "endloop\nendfacet facet\nouter loop vertex 0 0 2 vertex 1 0 2 vertex 0 1 2 endloop endfacet "
+                  "endsolid roof of tin\n");
+    assert_int_equal(s->n_triangles, 3);
+    assert_int_equal(n_warnings, 0);
+    assert_true(total_area(s) == 1.5);
+    assert_string_equal(s->surface[0].object, "roof of tin");
+    scene_free(s);
+}
+
+/* A binary STL of 3.5 MB: a reader gives back memory of triangles that it has read, from 2 MiB on. */
+static void stl_may_be_large(void **state)
+{
+    (void)state;
+    enum { N = 70000, SIZE = 84 + 50 * N };
+    char *data = calloc(1, SIZE + 7);
+    const uint32_t n = N;
+    memcpy(data + 80, &n, sizeof n);
+    for (int i = 0; i < N; i++) { /* multiples of 1/512, which floats hold */
+        const float x = (float)(i % 256) / 256, y = (float)(i / 256) / 512;
+        const float corner[3][3] = {{x, y, 0}, {x + 1.0f / 256, y, 0}, {x, y + 1.0f / 512, 0}};
+        memcpy(data + 84 + 50 * i + 12, corner, sizeof corner);
+    }
+    for (int more = 0; more < 8; more += 7) {
+        struct scene *s = load(write_file("large.stl", data, (size_t)(SIZE + more)));
+        unlink(path);
+        assert_int_equal(s->n_triangles, N);
+        assert_int_equal(n_warnings, more != 0);
+        if (more != 0) assert_non_null(strstr(warnings, "7 bytes after the last of its 70000 triangles ignored"));
+        scene_free(s);
+    }
+    free(data);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(obj_is_read),
         cmocka_unit_test(obj_takes_colours_from_its_library),
+        cmocka_unit_test(obj_takes_the_first_opacity),
         cmocka_unit_test(obj_without_names),
         cmocka_unit_test(obj_numbers_are_exact),
         cmocka_unit_test(obj_random_numbers_are_exact),
         cmocka_unit_test(obj_is_read_exactly),
         cmocka_unit_test(ply_is_read_exactly),
         cmocka_unit_test(ply_in_float_warns),
+        cmocka_unit_test(stl_words_stand_in_any_lines),
+        cmocka_unit_test(stl_may_be_large),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -12,10 +12,10 @@
 #include "core/angle.h"
 #include "core/studio/viewpoint.h"
 
-enum { MAX_BOXES = 8, LAND = 20 };
+enum { MAX_BOXES = 8, LAND = 20, PLATES = 150 };
 
-static double vertex_m[(LAND + 1) * (LAND + 1) + 8 * MAX_BOXES][3];
-static uint32_t triangle[2 * LAND * LAND + 12 * MAX_BOXES][3];
+static double vertex_m[(LAND + 1) * (LAND + 1) + 8 * MAX_BOXES + 4 * PLATES][3];
+static uint32_t triangle[2 * LAND * LAND + 12 * MAX_BOXES + 2 * PLATES][3];
 static uint32_t n_vertices, n_triangles;
 static struct viewpoint at;
 
@@ -47,6 +47,19 @@ static void add_box(const double lo[3], const double hi[3], int inward)
         const uint32_t *q = quad[w];
         add_triangle(first + q[0], first + q[1], first + q[2], inward);
         add_triangle(first + q[0], first + q[2], first + q[3], inward);
+    }
+}
+
+/* n level plates from z on, 1 cm apart: the leaves of a tree, say. */
+static void add_plates(int n, double size_m, double z_m)
+{
+    for (int i = 0; i < n; i++) {
+        const double z = z_m + 0.01 * i,
+                     corner[4][3] = {{0, 0, z}, {size_m, 0, z}, {size_m, size_m, z}, {0, size_m, z}};
+        memcpy(vertex_m[n_vertices], corner, sizeof corner);
+        add_triangle(n_vertices, n_vertices + 1, n_vertices + 2, 0);
+        add_triangle(n_vertices, n_vertices + 2, n_vertices + 3, 0);
+        n_vertices += 4;
     }
 }
 
@@ -118,6 +131,43 @@ static void of_two_storeys_the_lower_one(void **state)
     find();
     assert_int_equal(at.kind, VIEWPOINT_INSIDE);
     assert_near(at.position_m[2], 1.6, 1e-6);
+}
+
+/* However many surfaces lie above it, a floor is found. */
+static void a_floor_below_many_surfaces_is_found(void **state)
+{
+    (void)state;
+    clear();
+    add_box((const double[3]){0, 0, 0}, (const double[3]){8, 8, 3}, 1);
+    add_plates(PLATES, 8, 3.1);
+    find();
+    assert_int_equal(at.kind, VIEWPOINT_INSIDE);
+    assert_near(at.position_m[2], 1.6, 1e-6);
+}
+
+static void places_below_many_surfaces_are_found(void **state)
+{
+    (void)state;
+    const struct viewpoint_grid grid = {1.0, 1.2, {0, 0, -1}, {6, 6, 1}};
+    struct scene *scene = NULL;
+    struct bvh *bvh = NULL;
+    struct viewpoint_place *place;
+    uint32_t n;
+    struct sh_err err;
+    clear();
+    add_plates(1, 6, 0);
+    add_plates(PLATES - 1, 6, 3);
+    const struct scene_arrays arrays = {
+        (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
+    assert_int_equal(scene_from_arrays(&arrays, &scene, &err), SH_OK);
+    assert_int_equal(bvh_create(scene, 0, NULL, &bvh, &err), SH_OK);
+    assert_int_equal(viewpoint_places(bvh, &grid, NULL, &place, &n, &err), SH_OK);
+    assert_int_equal(n, 36); /* all cells of 1 m */
+    for (uint32_t i = 0; i < n; i++)
+        assert_near(place[i].position_m[2], 1.2, 1e-9);
+    free(place);
+    bvh_free(bvh);
+    scene_free(scene);
 }
 
 /* All eight corners are within the scanned view, and nothing is nearer than the head can see. */
@@ -226,18 +276,38 @@ static void a_view_without_room_is_refused(void **state)
     assert_int_equal(viewpoint_find(NULL, &none, NULL, &at, &err), SH_EINPUT);
 }
 
+/* From above and from the front a box is below 45 degrees, which this view does not hold. */
+static void a_view_that_holds_nothing_is_refused(void **state)
+{
+    (void)state;
+    const struct viewpoint_view up = {0.5, 500, angle_rad(70), angle_rad(85)};
+    struct scene *scene = NULL;
+    struct sh_err err;
+    clear();
+    add_box((const double[3]){0, 0, 0}, (const double[3]){1, 1, 1}, 0);
+    const struct scene_arrays arrays = {
+        (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
+    assert_int_equal(scene_from_arrays(&arrays, &scene, &err), SH_OK);
+    assert_int_equal(viewpoint_find(scene, &up, NULL, &at, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "a view of 70 to 85 deg holds nothing of the scene"));
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_room_is_entered),
         cmocka_unit_test(under_a_low_ceiling_the_head_stands_lower),
         cmocka_unit_test(of_two_storeys_the_lower_one),
+        cmocka_unit_test(a_floor_below_many_surfaces_is_found),
+        cmocka_unit_test(places_below_many_surfaces_are_found),
         cmocka_unit_test(an_object_is_looked_at_from_the_front),
         cmocka_unit_test(a_plate_is_looked_at_from_its_side),
         cmocka_unit_test(land_is_stood_on),
         cmocka_unit_test(between_houses),
         cmocka_unit_test(the_search_can_be_stopped),
         cmocka_unit_test(a_view_without_room_is_refused),
+        cmocka_unit_test(a_view_that_holds_nothing_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

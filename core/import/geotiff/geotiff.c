@@ -43,7 +43,7 @@ int geotiff_is_name(const char *file)
     return dot != NULL && (strcasecmp(dot, ".tif") == 0 || strcasecmp(dot, ".tiff") == 0);
 }
 
-/* A key that is a number in the directory itself; 0: it isn't there. */
+/* Returns a key that is a number in the directory itself; 0: it isn't there. */
 static unsigned key(const struct reader *r, unsigned id)
 {
     for (size_t i = 4; i + 4 <= r->n_key; i += 4)
@@ -70,7 +70,7 @@ static int read_size(struct reader *r)
 
 /* ---- place */
 
-/* A tie point alone places a raster only with the size of its cells. */
+/* A tie point places a raster only together with the size of its cells. */
 static int fail_unplaced(const struct reader *r, size_t n_tie)
 {
     if (n_tie > 6)
@@ -108,7 +108,7 @@ static int read_map(struct reader *r)
     if (rc == SH_OK && n < 8) rc = read_scale(r);
     if (rc != SH_OK) return rc;
     const double *m = r->map, *z = r->map + 8;
-    /* GDAL doesn't use the third row either. It says nothing as 0 0 0 0, a map of the plane alone, and as 0 0 1 0. */
+    /* GDAL doesn't use the third row either. 0 0 0 0, which maps the plane alone, and 0 0 1 0 change no height. */
     r->g->turns_heights = n >= 12 && (z[0] != 0.0 || z[1] != 0.0 || z[3] != 0.0 || (z[2] != 0.0 && z[2] != 1.0));
     const double area = m[0] * m[5] - m[1] * m[4];
     if (isfinite(area) && area != 0.0 && isfinite(m[3]) && isfinite(m[7])) return SH_OK;
@@ -211,7 +211,7 @@ static int read_item(const struct reader *r, const char *metadata, const char *r
                    r->tags.path, role, n < 40 ? n : 40, at);
 }
 
-/* 1: it is named. */
+/* Returns 1 where the metadata name the unit. */
 static int named_unit(const struct reader *r, const char *metadata, double *unit_m)
 {
     static const struct {
@@ -300,7 +300,8 @@ int geotiff_utm_code(double lat_deg, double lon_deg)
 {
     if (lat_deg > 84.0) return 32661;
     if (lat_deg < -80.0) return 32761;
-    const int zone = fabs(lon_deg) < 180.0 ? (int)floor(lon_deg / 6.0) + 31 : 1;
+    const double turn = lon_deg + 180.0, east_deg = turn - 360.0 * floor(turn / 360.0); /* a file may count 0 to 360 */
+    const int zone = east_deg >= 0.0 && east_deg < 360.0 ? (int)floor(east_deg / 6.0) + 1 : 1;
     return (lat_deg < 0.0 ? 32700 : 32600) + zone;
 }
 

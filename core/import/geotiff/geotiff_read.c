@@ -97,7 +97,7 @@ static uint32_t kind_of(struct raster *r)
     return type;
 }
 
-/* GDAL writes a mask into a file of its own, too. */
+/* GDAL may also write the mask into a file of its own. */
 static int has_mask_beside(const struct raster *r)
 {
     char *name = NULL;
@@ -239,8 +239,8 @@ static double height_of(const struct raster *r, const uint8_t *p)
     return isfinite(value) && value != r->no_data ? r->g.height_m + r->g.height_scale_m * value : NAN;
 }
 
-/* The cells of the block at a column and row. A block without bytes was left out by the writer of the file: it has no
- * heights. */
+/* Reads the cells of the block at a column and row. A block without bytes was left out by the writer of the file: it
+ * has no heights. */
 static int read_block(struct raster *r, uint32_t x, uint32_t y, struct sh_err *err)
 {
     const int is_tiled = r->lib.TIFFIsTiled(r->tif);
@@ -286,7 +286,8 @@ static int add_row(struct raster *r, uint32_t y, const double *height, uint32_t 
     return rc;
 }
 
-/* Between four middles, counter-clockwise seen from above. With three heights it is the triangle between these. */
+/* Adds the triangles between four middles, counter-clockwise seen from above: two, or one where three of them have a
+ * height. */
 static int add_quad(struct raster *r, const uint32_t *above, const uint32_t *below, int is_mirrored, struct sh_err *err)
 {
     const uint32_t round[4] = {above[0], below[0], below[1], above[1]};
@@ -324,7 +325,7 @@ static int add_all(struct raster *r, struct sh_err *err)
     return rc;
 }
 
-/* ---- what is said */
+/* ---- warnings */
 
 static int count_alone(struct raster *r, struct sh_err *err)
 {

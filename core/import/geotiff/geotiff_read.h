@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A GeoTIFF of heights into a scene: a vertex at the middle of each cell, two triangles between four of them. */
+/* Reads a GeoTIFF of heights into a scene: a vertex at the middle of each cell, two triangles between four of them. */
 #ifndef CORE_IMPORT_GEOTIFF_GEOTIFF_READ_H
 #define CORE_IMPORT_GEOTIFF_GEOTIFF_READ_H
 

@@ -20,9 +20,9 @@ struct tags {
 int tags_open(struct tags *tags, const char *path, struct sh_err *err);
 void tags_close(struct tags *tags);
 
-/* The first `most` numbers of a tag, whatever their type; *n of them, 0: there is no such tag. */
+/* Reads up to `most` numbers of a tag, of any type. *n: how many; 0: there is no such tag. */
 int tags_numbers(const struct tags *tags, unsigned tag, double *out, size_t most, size_t *n, struct sh_err *err);
-/* Its text; empty: there is none. SH_EINPUT: it and a NUL have no room. */
+/* Reads its text; empty: there is none. SH_EINPUT: the text and a NUL have no room. */
 int tags_text(const struct tags *tags, unsigned tag, char *out, size_t room, struct sh_err *err);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/import/gltf: reads a glTF 2.0 file into a scene. As with Assimp, all of it is read in a process of
- * its own: that has the limits, and its end frees memory after a crash. Indices, counts and offsets come from the file:
+ * its own, which has limits, and whose end frees all memory. Indices, counts and offsets come from the file:
  * none is used before it is checked. */
 #ifndef CORE_IMPORT_GLTF_GLTF_H
 #define CORE_IMPORT_GLTF_GLTF_H
@@ -42,7 +42,7 @@ struct gltf {
     uint32_t n_unmapped;   /* primitives without the texture coordinates that their material asks for */
     uint32_t n_jointless;  /* primitives with a skin, but without JOINTS_0: their node places them */
     uint64_t n_unweighted; /* vertices of a skin that no joint moves */
-    uint32_t n_images;     /* textures of a format that isn't read */
+    uint32_t n_images;     /* primitives whose texture has a format that isn't read */
     char image[64];        /* the extension of the first of them */
     uint32_t n_odd;        /* values of materials that the format doesn't allow */
     char odd[48];          /* the first of them */

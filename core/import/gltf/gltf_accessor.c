@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that sums and
- * products of them stay within 64 bits. */
+/* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that
+ * sums and products of them stay within 64 bits. */
 #include "core/import/gltf/gltf_accessor.h"
 
 #include <math.h>
@@ -45,7 +45,8 @@ static const json_t *meshopt_of(const json_t *object)
     return more != NULL ? more : gltf_extension(object, "KHR_meshopt_compression");
 }
 
-static int open_part(struct gltf *g, const json_t *object, const char *at, struct gltf_kept *out)
+/* The bytes that a buffer view names, or an extension of it. */
+static int open_part(struct gltf *g, const json_t *object, const char *at, struct gltf_bytes *out)
 {
     uint64_t offset = 0, length = 0;
     uint32_t buffer;
@@ -58,26 +59,17 @@ static int open_part(struct gltf *g, const json_t *object, const char *at, struc
     if (offset > whole.n || length > whole.n - offset)
         return gltf_fail(g, "%s: bytes %llu to %llu go beyond buffers[%u], which has %zu", at,
                          (unsigned long long)offset, (unsigned long long)(offset + length), buffer, whole.n);
-    out->bytes = (struct gltf_bytes){whole.p + offset, (size_t)length};
+    *out = (struct gltf_bytes){whole.p + offset, (size_t)length};
     return SH_OK;
 }
 
 static int open_packed(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out)
 {
     struct gltf_packed p = {.mode = gltf_text(more, "mode"), .filter = gltf_text(more, "filter")};
-    uint64_t offset = 0, length = 0;
-    uint32_t buffer;
-    int rc = gltf_index(g, more, "buffer", at, &buffer);
-    if (rc == SH_OK) rc = gltf_whole(g, more, "byteOffset", at, &offset);
-    if (rc == SH_OK) rc = gltf_whole(g, more, "byteLength", at, &length);
+    int rc = open_part(g, more, at, &p.from);
     if (rc == SH_OK) rc = gltf_whole(g, more, "byteStride", at, &p.stride);
     if (rc == SH_OK) rc = gltf_whole(g, more, "count", at, &p.count);
-    if (rc == SH_OK) rc = gltf_buffer(g, buffer, &p.from);
-    if (rc != SH_OK) return rc;
-    if (offset > p.from.n || length > p.from.n - offset)
-        return gltf_fail(g, "%s goes beyond its buffer of %zu bytes", at, p.from.n);
-    p.from = (struct gltf_bytes){p.from.p + offset, (size_t)length};
-    return gltf_meshopt(g->b, &p, at, &out->own, &out->bytes, g->err);
+    return rc == SH_OK ? gltf_meshopt(g->b, &p, at, &out->own, &out->bytes, g->err) : rc;
 }
 
 int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint64_t *stride)
@@ -93,7 +85,8 @@ int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint
                          MAX_STRIDE);
     struct gltf_kept *kept = &g->view[view];
     const json_t *more = meshopt_of(object);
-    if (!kept->is_open) rc = more != NULL ? open_packed(g, more, at.text, kept) : open_part(g, object, at.text, kept);
+    if (!kept->is_open)
+        rc = more != NULL ? open_packed(g, more, at.text, kept) : open_part(g, object, at.text, &kept->bytes);
     kept->is_open = rc == SH_OK;
     *out = kept->bytes;
     return rc;
@@ -118,7 +111,7 @@ static int open_elements(struct gltf *g, const json_t *of, const char *at, uint3
     return SH_OK;
 }
 
-/* ---- sparse ones: a copy in which some elements are replaced */
+/* ---- sparse accessors: a copy in which some elements are replaced */
 
 static int put_sparse(struct gltf *g, const json_t *sparse, const char *at, const struct gltf_view *v, uint32_t size,
                       uint8_t *to)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Extensions: the known ones, and the rest. */
+/* The list of known extensions, and checks of those that a file names. */
 #include "core/import/gltf/gltf_extensions.h"
 
 #include <math.h>
@@ -96,7 +96,7 @@ static bool is_packed(const json_t *root, const json_t *primitive)
 {
     const json_t *at = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
     const json_t *position =
-        json_array_get(json_object_get(root, "accessors"), (size_t)fmax(json_number_value(at), 0.0));
+        json_array_get(json_object_get(root, "accessors"), (size_t)fmin(fmax(json_number_value(at), 0.0), 0x1p32));
     return gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL &&
            json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The file itself: JSON, alone or in a .glb, and its buffers.
  *
- *   .glb   "glTF" version length | length "JSON" ... | length "BIN\0" ... | others, which nobody knows
+ *   .glb   "glTF" version length | length "JSON" ... | length "BIN\0" ... | others, which are skipped
  *          whole numbers of 32 bits, little-endian; chunks are padded to 4 bytes */
 #include "core/import/gltf/gltf_file.h"
 

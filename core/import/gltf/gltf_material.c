@@ -18,7 +18,7 @@
 
 enum { CLAMP_TO_EDGE = 33071, MIRRORED_REPEAT = 33648 };
 
-/* ---- what the format allows */
+/* ---- values that the format allows */
 
 /* glTF 2.0, material: base colour and transmission are 0..1, a cutoff is not negative, and there are three modes. Other
  * values are left out and counted; the first one is named. */
@@ -65,8 +65,8 @@ static void note_odd(struct gltf *g, const json_t *material, uint32_t number)
     note(g, are_shares(json_object_get(glossy, "diffuseFactor")), "diffuseFactor", number);
 }
 
-/* Two materials of one name would be one surface, with the colour of the first: the later one gets its number. So does one
- * without a name. */
+/* Two materials of one name would be one surface, with the colour of the first. So the later one gets its number, and
+ * so does one without a name. */
 int gltf_name_materials(struct gltf *g)
 {
     json_t *materials, *seen = json_object();
@@ -122,7 +122,7 @@ static int add_file(struct gltf *g, const char *uri, struct build_image *image, 
     return rc;
 }
 
-/* An image that lies within is named after the mesh's file, with its number. */
+/* An image within the file gets the file's name and its own number. */
 static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint16_t *number)
 {
     const struct gltf_at at = gltf_at("images[%u]", i);
@@ -184,8 +184,8 @@ static int add_texture(struct gltf *g, uint32_t i, uint16_t *number)
     return rc == SH_OK ? add_image(g, source, &image, number) : rc;
 }
 
-/* u' = offset + turn * scale * u, from the upper left corner, with v down; a turn is counter-clockwise as one looks at the
- * mesh. (The matrix is that of Khronos' viewer: their text's example, the lower left quarter, needs it so.) */
+/* u' = offset + turn * scale * u, from the upper left corner, with v down; a turn is counter-clockwise as one looks at
+ * the mesh. (The matrix is that of Khronos' viewer: their text's example, the lower left quarter, needs it so.) */
 static int read_lay(struct gltf *g, const json_t *info, const char *at, struct gltf_look *look)
 {
     const json_t *lay = gltf_extension(info, "KHR_texture_transform");
@@ -232,7 +232,8 @@ static int find_base(struct gltf *g, const json_t *material, const char *at, str
     return SH_OK;
 }
 
-/* The base colour's alpha where that is blended, or what KHR_materials_transmission says. */
+/* Keeps the share of light that goes through: from the base colour's alpha where that is blended, or from
+ * KHR_materials_transmission, if that is more. */
 static int keep_clear(struct gltf *g, const struct base *base, const json_t *material, const char *at,
                       struct scene_surface *surface)
 {

@@ -204,7 +204,7 @@ static int add_primitive(struct gltf *g, const struct drawn *d, const json_t *pr
 int gltf_add_mesh(struct gltf *g, uint32_t node, const char *object, const gltf_matrix world)
 {
     json_t *of = json_array_get(json_object_get(g->root, "nodes"), node), *mesh = NULL, *primitives = NULL;
-    uint32_t number;
+    uint32_t number = GLTF_NONE;
     int rc = gltf_index(g, of, "mesh", gltf_at("nodes[%u]", node).text, &number);
     if (rc == SH_OK) rc = gltf_object(g, "meshes", number, &mesh);
     const struct gltf_at at = gltf_at("meshes[%u]", number);

@@ -38,18 +38,28 @@ static int read_local(struct gltf *g, const json_t *node, const char *at, gltf_m
     return rc;
 }
 
+int gltf_node_number(struct gltf *g, const json_t *list, size_t i, const char *key, const char *at, uint32_t *out)
+{
+    const json_t *value = json_array_get(list, i);
+    const double number = json_number_value(value);
+    if (!json_is_number(value) || !(number >= 0.0 && number < g->n_nodes) || floor(number) != number)
+        return gltf_fail(g, "%s.%s[%zu] is not a node; there are %u", at, key, i, g->n_nodes);
+    *out = (uint32_t)number;
+    return SH_OK;
+}
+
 static int take_children(struct gltf *g, uint32_t i, const json_t *node)
 {
     const struct gltf_at at = gltf_at("nodes[%u]", i);
     json_t *children;
     int rc = gltf_list(g, node, "children", at.text, &children);
     for (size_t k = 0; k < json_array_size(children) && rc == SH_OK; k++) {
-        const double child = json_number_value(json_array_get(children, k));
-        if (!(child >= 0.0 && child < g->n_nodes) || floor(child) != child)
-            return gltf_fail(g, "%s.children[%zu] is not a node; there are %u", at.text, k, g->n_nodes);
-        struct gltf_node *below = &g->node[(uint32_t)child];
+        uint32_t child;
+        rc = gltf_node_number(g, children, k, "children", at.text, &child);
+        if (rc != SH_OK) return rc;
+        struct gltf_node *below = &g->node[child];
         if (below->parent != GLTF_NONE)
-            return gltf_fail(g, "nodes[%.0f] is a child of nodes[%u] and of nodes[%u]; allowed is one parent", child,
+            return gltf_fail(g, "nodes[%u] is a child of nodes[%u] and of nodes[%u]; allowed is one parent", child,
                              below->parent, i);
         below->parent = i;
     }
@@ -147,7 +157,7 @@ static int add_instances(struct gltf *g, uint32_t i, const char *object, const j
 
 /* ---- the scene */
 
-/* The node's name, or its place in the file. */
+/* A node without a name is named by its place in the file. */
 static int draw_node(struct gltf *g, uint32_t i, const json_t *node)
 {
     const char *name = gltf_text(node, "name");
@@ -192,15 +202,15 @@ static int draw_roots(struct gltf *g, const json_t *roots, const char *at, uint3
     const json_t *nodes = json_object_get(g->root, "nodes");
     int rc = SH_OK;
     for (size_t k = 0; k < json_array_size(roots) && rc == SH_OK; k++) {
-        const double i = json_number_value(json_array_get(roots, k));
-        if (!(i >= 0.0 && i < g->n_nodes) || floor(i) != i)
-            return gltf_fail(g, "%s.nodes[%zu] is not a node; there are %u", at, k, g->n_nodes);
-        const struct gltf_node *node = &g->node[(uint32_t)i];
+        uint32_t i;
+        rc = gltf_node_number(g, roots, k, "nodes", at, &i);
+        if (rc != SH_OK) return rc;
+        const struct gltf_node *node = &g->node[i];
         if (node->parent != GLTF_NONE)
-            return gltf_fail(g, "%s.nodes has nodes[%.0f], which is a child of nodes[%u]: allowed are roots", at, i,
+            return gltf_fail(g, "%s.nodes has nodes[%u], which is a child of nodes[%u]: allowed are roots", at, i,
                              node->parent);
-        if (node->is_drawn) return gltf_fail(g, "%s.nodes has nodes[%.0f] twice", at, i);
-        rc = draw_tree(g, nodes, (uint32_t)i, stack);
+        if (node->is_drawn) return gltf_fail(g, "%s.nodes has nodes[%u] twice", at, i);
+        rc = draw_tree(g, nodes, i, stack);
     }
     return rc;
 }
@@ -210,7 +220,7 @@ static int draw_default(struct gltf *g, uint32_t *stack)
 {
     const json_t *nodes = json_object_get(g->root, "nodes");
     json_t *scenes, *scene = NULL, *roots = NULL;
-    uint32_t number;
+    uint32_t number = GLTF_NONE;
     int rc = gltf_list(g, g->root, "scenes", "", &scenes);
     if (rc == SH_OK) rc = gltf_index(g, g->root, "scene", "", &number);
     if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) == 0) {

@@ -3,7 +3,9 @@
 #ifndef CORE_IMPORT_GLTF_GLTF_NODES_H
 #define CORE_IMPORT_GLTF_GLTF_NODES_H
 
+#include <jansson.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/import/gltf/gltf_matrix.h"
@@ -16,6 +18,8 @@ struct gltf_node {
     bool is_drawn, has_world;
 };
 
+/* Number i of an object's list of nodes. at: the object, for messages. */
+int gltf_node_number(struct gltf *g, const json_t *list, size_t i, const char *key, const char *at, uint32_t *out);
 /* Finds where each node is. */
 int gltf_place_nodes(struct gltf *g);
 /* Adds the meshes of the scene's nodes, in their order. */

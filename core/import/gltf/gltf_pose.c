@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Morph targets with their default weights, and skins with their joints where the nodes are: the pose of a file without its
- * animations.
+/* Morph targets with their default weights, and skins with their joints where the nodes are. This is the pose of a file
+ * without its animations.
  *
  *   p     = POSITION + sum of weight * target.POSITION
  *   joint = world of the joint's node * inverse bind matrix
@@ -58,7 +58,7 @@ static int open_targets(struct gltf *g, const json_t *node, const json_t *mesh, 
 
 /* ---- skins */
 
-/* A product of matrices with absolute values: the rounding of single precision is a share of it. */
+/* Multiplies absolute values of matrices: the error by rounding to single precision is a share of the product. */
 static void take_reach(const gltf_matrix world, const gltf_matrix bind, gltf_matrix out)
 {
     gltf_matrix a, b;
@@ -74,13 +74,13 @@ static int take_joint(struct gltf *g, const json_t *joints, uint32_t i, const st
                       struct gltf_pose *pose, const char *at)
 {
     gltf_matrix bind = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-    const double node = json_number_value(json_array_get(joints, i));
-    if (!(node >= 0.0 && node < g->n_nodes) || floor(node) != node)
-        return gltf_fail(g, "%s.joints[%u] is not a node; there are %u", at, i, g->n_nodes);
+    uint32_t node;
+    int rc = gltf_node_number(g, joints, i, "joints", at, &node);
+    if (rc != SH_OK) return rc;
     for (uint32_t r = 0; r < 3 && inverse->count > 0; r++)
         for (uint32_t c = 0; c < 4; c++)
             bind[r][c] = gltf_value(inverse, i, 4 * c + r);
-    const struct gltf_node *joint = &g->node[(uint32_t)node];
+    const struct gltf_node *joint = &g->node[node];
     gltf_multiply(joint->world, bind, pose->joint[i]);
     take_reach(joint->world, bind, pose->reach[i]);
     return SH_OK;
@@ -226,20 +226,27 @@ static double place_error(const gltf_matrix m, const double error[3])
     return most;
 }
 
+/* Half a step of a position that is whole numbers, and of its targets. */
+static double half_step(const struct gltf_pose *pose)
+{
+    double half = 0.5 * gltf_step(&pose->position);
+    for (size_t t = 0; t < pose->n_targets; t++)
+        half += 0.5 * fabs(pose->target[t].weight) * gltf_step(&pose->target[t].position);
+    return half;
+}
+
 void gltf_pose_error(struct gltf *g, const struct gltf_pose *pose, const gltf_matrix world)
 {
-    const double half = 0.5 * gltf_step(&pose->position);
+    const double half = half_step(pose), steps[3] = {half, half, half};
     const double bent = 2.0 * BUILD_SINGLE_ROUNDING * pose->most_bent; /* the position, and its inverse bind matrices */
     double error[3];
-    for (int k = 0; k < 3; k++)
-        error[k] = half > 0.0 ? half : BUILD_SINGLE_ROUNDING * pose->most[k];
-    if (half > 0.0) {
-        for (uint32_t j = 0; j < pose->n_joints; j++)
-            g->step_error = fmax(g->step_error, place_error(pose->joint[j], error));
-        if (pose->joint == NULL) g->step_error = fmax(g->step_error, place_error(world, error));
-        return;
-    }
-    for (int k = 0; k < 3; k++)
+    for (uint32_t j = 0; j < pose->n_joints; j++)
+        g->step_error = fmax(g->step_error, place_error(pose->joint[j], steps));
+    if (pose->joint == NULL) g->step_error = fmax(g->step_error, place_error(world, steps));
+    if (pose->position.component != GLTF_F32) return;
+    for (int k = 0; k < 3; k++) {
+        error[k] = BUILD_SINGLE_ROUNDING * pose->most[k];
         g->largest = fmax(g->largest, pose->most[k]);
+    }
     g->error = fmax(g->error, pose->joint != NULL ? bent : place_error(world, error));
 }

@@ -13,7 +13,6 @@
 #include "core/import/gltf/gltf_json.h"
 #include "core/import/gltf/gltf_material.h"
 #include "core/import/gltf/gltf_nodes.h"
-#include "core/import/import_assimp.h"
 
 bool gltf_is_name(const char *file)
 {
@@ -40,8 +39,9 @@ static void say_counts(const struct gltf *g)
         sh_warn(report, "%s: %llu vertices of a skin have no weights: no joint moves them", name,
                 (unsigned long long)g->n_unweighted);
     if (g->n_images > 0)
-        sh_warn(report, "%s: %u textures are images of %s, which is not supported: their surfaces have no texture",
-                name, g->n_images, g->image);
+        sh_warn(report,
+                "%s: %u primitives have a texture of %s, which is not supported: their surfaces have no texture", name,
+                g->n_images, g->image);
     if (g->n_odd > 0)
         sh_warn(report, "%s: %u value%s of materials left out, since the format doesn't allow them; the first: %s",
                 name, g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
@@ -98,5 +98,5 @@ int import_gltf(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK && !by_assimp) rc = read_scene(&g);
     gltf_close(&g);
     if (rc != SH_OK) return say_what_to_do(rc, err);
-    return by_assimp ? import_assimp(b, err) : SH_OK;
+    return by_assimp ? sh_fail(err, SH_ESTATE, "%s: Assimp has to read it", b->name) : SH_OK;
 }

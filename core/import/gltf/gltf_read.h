@@ -8,8 +8,7 @@
 /* Whether the file is one, by its ending. */
 bool gltf_is_name(const char *file);
 
-/* Fills b as a reader does, in the process that reads. Files that Assimp has to read (glTF 1.0, Draco) go to
- * import_assimp. */
+/* Fills b as a reader does, in the process that reads. SH_ESTATE: the file is for Assimp (glTF 1.0, Draco). */
 int import_gltf(struct scene_build *b, struct sh_err *err);
 
 #endif

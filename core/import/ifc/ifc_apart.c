@@ -10,7 +10,8 @@
 
 enum { PATH_LEN = 1024 };
 
-/* Where the readers are, from the program's folder: installed, or built, in which tests lie deeper. */
+/* Places of the readers, from the program's folder: where they are installed, and where they are built. Programs of
+ * tests lie deeper. */
 static const char *const places[] = {"../share/scanhead/ifc", "ifc", "../ifc", "../../../ifc"};
 
 static bool has_readers(const char *folder)
@@ -38,7 +39,7 @@ static bool find_folder(const struct scene_import_limits *limits, char folder[PA
     return false;
 }
 
-/* As execvp looks for it. */
+/* Looks for node where execvp does. */
 static bool has_node(void)
 {
     const char *path = getenv("PATH");
@@ -82,13 +83,10 @@ static void set_command(struct command *c, struct scene_build *b, const char *fo
     c->apart.task = (struct import_task){.b = b, .limits = limits, .name = name, .argv = c->argv};
 }
 
-static int ifc_apart_finish(struct import_apart *a, struct ifc_bodies *bodies, bool *has, struct sh_err *said)
+static void ifc_apart_finish(struct import_apart *a, struct ifc_bodies *bodies, bool *has, struct sh_err *said)
 {
-    int rc = import_judge(a, said);
-    if (rc == SH_OK) rc = ifc_bodies_read(bodies, a->result_fd, said);
-    *has = rc == SH_OK;
+    *has = import_judge(a, said) == SH_OK && ifc_bodies_read(bodies, a->result_fd, said) == SH_OK;
     import_close(a);
-    return rc;
 }
 
 void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN])

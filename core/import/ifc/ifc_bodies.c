@@ -53,7 +53,7 @@ static int check_part(const struct reading *r, const struct ifc_part *part)
         for (int k = 0; k < 3; k++)
             if (part->triangle[i][k] >= part->n_vertices) return wrong(r, "a corner that is not a vertex");
     for (int k = 0; k < 4; k++)
-        if (!(part->colour[k] >= 0.0f && part->colour[k] <= 1.0f)) return wrong(r, "a colour out of range");
+        if (isnan(part->colour[k])) return wrong(r, "a colour that is no number");
     return part->largest_m >= 0.0 && part->largest_m <= MOST_M ? SH_OK : wrong(r, "a rounding out of range");
 }
 
@@ -65,7 +65,9 @@ static int read_part(struct reading *r)
     memcpy(&head, at, sizeof head);
     struct ifc_part part = {
         .n_vertices = head.n_vertices, .n_triangles = head.n_triangles, .largest_m = head.largest_m};
-    memcpy(part.colour, head.colour, sizeof part.colour);
+    /* A reader gives colours as the file has them. ifc_styles.c counts those that are beyond the range. */
+    for (int k = 0; k < 4; k++)
+        part.colour[k] = isnan(head.colour[k]) ? NAN : fminf(fmaxf(head.colour[k], 0.0f), 1.0f);
     part.vertex_m = ifc_bodies_take(r, head.n_vertices * (uint64_t)sizeof *part.vertex_m);
     part.triangle =
         part.vertex_m != NULL ? ifc_bodies_take(r, head.n_triangles * (uint64_t)sizeof *part.triangle) : NULL;
@@ -135,7 +137,7 @@ int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err)
     while ((rc = read_product(&r)) == 1)
         continue;
     if (rc != SH_OK) return rc;
-    qsort(b->body, b->n, sizeof *b->body, ifc_compare);
+    if (b->n > 0) qsort(b->body, b->n, sizeof *b->body, ifc_compare);
     for (size_t i = 0; i < b->n; i++) {
         if (i > 0 && b->body[i].id == b->body[i - 1].id) return wrong(&r, "a product twice");
         ifc_figures(&b->part[b->body[i].first], b->body[i].n_parts, &b->body[i].figures);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Bodies of products, as one reader makes them. In: its result (result.mjs has the form). Out: parts by product, and the
- * figures by which two readings are compared. */
+/* Bodies of products, as one reader makes them. In: its result (result.mjs has the form). Out: parts by product, and
+ * the figures by which two readings are compared. */
 #ifndef CORE_IMPORT_IFC_IFC_BODIES_H
 #define CORE_IMPORT_IFC_IFC_BODIES_H
 

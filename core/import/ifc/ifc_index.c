@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/import/ifc/ifc_index.h"
 
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -71,18 +70,17 @@ static int check_end(const struct ifc_index *x, struct sh_err *err)
     return text_fail(&x->text, 0, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
 }
 
-uint64_t ifc_next_reference(const char **p, const char *end)
+bool ifc_next_reference(const char **p, const char *end, uint64_t *id)
 {
     for (int quoted = 0; *p < end; (*p)++) {
         if (**p == '\'') quoted = !quoted;
         if (quoted || **p != '#') continue;
-        uint64_t id = 0;
-        while (*p + 1 < end && (*p)[1] >= '0' && (*p)[1] <= '9' && id < UINT64_MAX / 20)
-            id = 10 * id + (uint64_t)(*++*p - '0');
-        ++*p;
-        return id;
+        *id = 0;
+        while (++*p < end && **p >= '0' && **p <= '9' && *id < UINT64_MAX / 20)
+            *id = 10 * *id + (uint64_t)(**p - '0');
+        return true;
     }
-    return 0;
+    return false;
 }
 
 static int check_references(const struct ifc_index *x, struct sh_err *err)
@@ -90,7 +88,7 @@ static int check_references(const struct ifc_index *x, struct sh_err *err)
     for (size_t i = 0; i < x->n; i++) {
         const struct step_record *from = &x->record[i];
         const char *p = from->args.p, *end = p + from->args.n;
-        for (uint64_t id; (id = ifc_next_reference(&p, end)) != 0;)
+        for (uint64_t id; ifc_next_reference(&p, end, &id);)
             if (ifc_index_find(x, id) == NULL)
                 return text_fail(&x->text, from->line, SH_EINPUT, err,
                                  "%.*s #%llu refers to #%llu, but there is no such record", (int)from->type.n,

@@ -3,6 +3,7 @@
 #ifndef CORE_IMPORT_IFC_IFC_INDEX_H
 #define CORE_IMPORT_IFC_IFC_INDEX_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -25,12 +26,13 @@ const struct step_record *ifc_index_find(const struct ifc_index *x, uint64_t id)
 /* "FILE, line N: TYPE #n: what": SH_EINPUT. */
 int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, struct sh_err *err, const char *what);
 
-/* The next record number in a list of attributes, from *p on; texts are passed over. 0: there is none. */
-uint64_t ifc_next_reference(const char **p, const char *end);
+/* Finds the next record number in a list of attributes, from *p on; texts are passed over. A # without digits gives 0.
+ * False: there is none. */
+bool ifc_next_reference(const char **p, const char *end, uint64_t *id);
 
 /* Compares entries whose first member is their number, or such a number itself. */
 int ifc_compare(const void *a, const void *b);
-/* The place of the first entry of such a list, sorted, whose number is id or above; n: there is none. */
+/* Finds the first entry of such a sorted list whose number is id or above. Returns its place; n: there is none. */
 size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id);
 
 #endif

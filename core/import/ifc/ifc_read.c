@@ -35,8 +35,8 @@ static struct ifc_fineness fineness_for(const struct ifc_records *records, doubl
                                  .deviation_m = radius_m * (1.0 - cos(M_PI / (segments - 1.0)))};
 }
 
-/* Type, name and GlobalId, as one word: no two products have the same. A name that is too long is cut, not the GlobalId;
- * it is counted. */
+/* Type, name and GlobalId make one word, so no two products have the same. Where it is too long, the name is cut, never
+ * the GlobalId, and the cut is counted. */
 static char *object_name(struct reading *r, const struct ifc_product *p, const struct ifc_body *body)
 {
     const struct text_span type = body->type.n > 0 ? body->type : p->type;
@@ -60,7 +60,6 @@ static int ifc_read_add_part(struct reading *r, const struct ifc_part *part, uin
     if (rc == SH_OK) rc = build_corners(b, 3, r->err);
     for (uint32_t i = 0; i < part->n_vertices && rc == SH_OK; i++)
         rc = build_vertex(b, part->vertex_m[i], r->err);
-    b->has_uv = false;
     for (uint32_t i = 0; i < part->n_triangles && rc == SH_OK; i++) {
         for (int k = 0; k < 3; k++)
             b->corner[k] = b->mesh_vertex0 + part->triangle[i][k];
@@ -165,7 +164,7 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
     return SH_OK;
 }
 
-/* Each product with a body has at least one surface. Checked before minutes are spent on bodies. */
+/* Each product with a body has at least one surface. This is checked before minutes are spent on bodies. */
 static int check_number(struct reading *r)
 {
     size_t n = 0;
@@ -237,6 +236,9 @@ static int read_records(struct reading *r)
         return read_by_assimp(r, why);
     else
         return build_fail(r->b, SH_EINPUT, r->err, "%s; to read without them set scene.ifc_reader: assimp", why);
+    if (rc == SH_OK && r->records.n_limited > 0)
+        sh_warn(r->b->report, "%s: %zu style%s of surfaces with a colour or transparency beyond 0 to 1, limited to it",
+                r->b->name, r->records.n_limited, r->records.n_limited > 1 ? "s" : "");
     r->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
     return rc;
 }

@@ -38,7 +38,7 @@ void ifc_readings_free(struct ifc_readings *r);
 
 /* ---- ifc_say.c */
 
-/* Warnings that name products, some a line, at most MAX_NAMED of them. With strict, the first line of the first
+/* Warns of findings, and names up to 100 products for each, several in a line. With strict, the first line of the first
  * doubtful finding is an error instead. finding[records->n_products]. */
 int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
                      bool strict, struct sh_err *err);

@@ -10,7 +10,8 @@
 #include "core/import/ifc/ifc_unit.h"
 #include "core/import/ifc/ifc_walk.h"
 
-/* Attributes of an IfcProduct: GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement, Representation. */
+/* An IfcProduct has the attributes GlobalId, OwnerHistory, Name, Description, ObjectType, ObjectPlacement and
+ * Representation. */
 enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_PLACEMENT = 5, PRODUCT_SHAPE = 6, PRODUCT_ARGS = 7 };
 
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id)

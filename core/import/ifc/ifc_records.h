@@ -22,10 +22,11 @@ struct ifc_records {
     uint32_t *mark, stamp;   /* [index.n] of the last walk */
     struct ifc_style *style; /* [n_styles] by item */
     size_t n_styles, room_styles;
+    size_t n_limited; /* styles whose colour or transparency was beyond 0..1, and is limited to it */
 };
 
-/* Reads records and products; ifc_records_close is due in any case. Errors are those of ifc_index_open. A placement that
- * leads back to itself is an error as well, which names the product. */
+/* Reads records and products; ifc_records_close is due in any case. Errors are those of ifc_index_open. A placement
+ * that leads back to itself is an error as well, which names the product. */
 int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err);
 void ifc_records_close(struct ifc_records *r);
 

@@ -5,7 +5,7 @@
 #include "core/import/ifc/ifc_read.h"
 #include "core/import/ifc/ifc_records.h"
 
-enum { MAX_NAMED = 100, LINE_ROOM = 420 };
+enum { MAX_NAMED = 100, LINE_ROOM = 420 /* the rest of a line has room for ", and N more" */ };
 
 /* Names, line by line. */
 struct lines {
@@ -43,7 +43,7 @@ static void add_name(struct lines *l, const struct ifc_product *p)
 
 static void end_group(struct lines *l)
 {
-    if (l->n_listed > MAX_NAMED && l->len < LINE_ROOM)
+    if (l->n_listed > MAX_NAMED)
         l->len +=
             (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", and %zu more", l->n_listed - MAX_NAMED);
     end_line(l);

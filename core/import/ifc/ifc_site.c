@@ -136,7 +136,7 @@ static int read_angle(struct reader *r, struct text_span span, const char *name,
     return fabs(*deg) <= limit_deg ? SH_OK : ifc_site_fail(r, &r->site, what);
 }
 
-/* n = 2 or 3 numbers of "(a, b, c)". */
+/* Reads min to max numbers of "(a, b, c)"; max <= 3. */
 static int read_numbers(struct reader *r, const struct step_record *at, struct text_span span, size_t min, size_t max,
                         double *value)
 {
@@ -149,7 +149,7 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct t
     return SH_OK;
 }
 
-/* Location of an IFCAXIS2PLACEMENT3D, in units of the file; axes[0], axes[1]: its z and x axes. */
+/* Reads the location of an IFCAXIS2PLACEMENT3D, in units of the file, and its z and x axes. */
 static int read_axes(struct reader *r, const struct step_record *from, struct text_span ref, double location[3],
                      double axes[2][3])
 {
@@ -167,7 +167,8 @@ static int read_axes(struct reader *r, const struct step_record *from, struct te
     return rc;
 }
 
-/* The site's own placement, absolute: its location is the point that has latitude and longitude. */
+/* The location of the site's own placement is the point that has latitude and longitude. The placement must be
+ * absolute. */
 static int read_origin(struct reader *r, struct text_span ref, double unit_m, double origin_m[3])
 {
     struct found local;
@@ -210,7 +211,7 @@ static int read_north(struct reader *r, struct ifc_site *site)
 
 /* ---- the map */
 
-/* The usual unit of maps that is within 1 % of this: the scale of a map itself differs by less. */
+/* Returns the usual unit of maps that is within 1 % of m, or NaN. A map's own scale differs from 1 by less. */
 static double known_unit_m(double m, double model_m)
 {
     const double known[] = {1.0, model_m, 0.3048, 1200.0 / 3937.0};
@@ -243,7 +244,7 @@ static int read_map_unit(struct reader *r, const struct found *crs, double scale
                      : SH_OK;
 }
 
-/* A number of the map conversion. The first two must be there; a height that is not is NaN. */
+/* Reads a number of the map conversion. Eastings and Northings must be there; a height that is missing is NaN. */
 static int read_number(struct reader *r, struct text_span arg, int which, double *value)
 {
     static const char *const name[MAP_ARGS] = {

@@ -13,8 +13,15 @@
 enum { MAX_DEPTH = 4 };
 #define SAME_COLOUR 0.004f /* a reader may have rounded to 8 bits */
 
+static float limit(double share, bool *is_limited)
+{
+    *is_limited |= !(share >= 0.0 && share <= 1.0);
+    return (float)fmin(fmax(share, 0.0), 1.0);
+}
+
 /* IfcSurfaceStyleShading and -Rendering: the first attribute is an IfcColourRgb(name, red, green, blue). */
-static bool read_colour(const struct ifc_records *r, const struct step_record *shading, float colour[3])
+static bool read_colour(const struct ifc_records *r, const struct step_record *shading, float colour[3],
+                        bool *is_limited)
 {
     struct text_span arg[4];
     uint64_t id;
@@ -24,18 +31,18 @@ static bool read_colour(const struct ifc_records *r, const struct step_record *s
     if (rgb == NULL || !text_is(rgb->type, "IFCCOLOURRGB") || step_split(rgb->args, arg, 4) != 4) return false;
     for (int k = 0; k < 3; k++) {
         if (!step_real(&r->index.text, arg[1 + k], &part)) return false;
-        colour[k] = (float)fmin(fmax(part, 0.0), 1.0);
+        colour[k] = limit(part, is_limited);
     }
     return true;
 }
 
-/* The second attribute, a share; of IfcSurfaceStyleShading from IFC4 on. */
-static float read_clear(const struct ifc_records *r, const struct step_record *shading)
+/* Transparency is the second attribute, a share. IfcSurfaceStyleShading has it from IFC4 on. */
+static float read_clear(const struct ifc_records *r, const struct step_record *shading, bool *is_limited)
 {
     struct text_span arg[2];
     double share;
     if (step_split(shading->args, arg, 2) < 2 || !step_real(&r->index.text, arg[1], &share)) return 0.0f;
-    return (float)fmin(fmax(share, 0.0), 1.0);
+    return limit(share, is_limited);
 }
 
 /* IfcSurfaceStyle(name, side, styles). */
@@ -43,20 +50,21 @@ static bool add_style(struct ifc_records *r, uint64_t item, const struct step_re
 {
     struct ifc_style style = {.item = item};
     struct text_span arg[1];
-    bool has_colour = false;
+    bool has_colour = false, is_limited = false;
     const char *p = surface_style->args.p, *end = p + surface_style->args.n;
-    for (uint64_t id; !has_colour && (id = ifc_next_reference(&p, end)) != 0;) {
+    for (uint64_t id; !has_colour && ifc_next_reference(&p, end, &id);) {
         const struct step_record *to = ifc_index_find(&r->index, id);
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLERENDERING") || text_is(to->type, "IFCSURFACESTYLESHADING"))
-            has_colour = read_colour(r, to, style.colour);
-        if (has_colour) style.clear = read_clear(r, to);
+            has_colour = read_colour(r, to, style.colour, &is_limited);
+        if (has_colour) style.clear = read_clear(r, to, &is_limited);
     }
     if (!has_colour || step_split(surface_style->args, arg, 1) < 1) return true;
     if (!grow(&r->style, &r->room_styles, r->n_styles + 1, sizeof style)) return false;
     style.name = ifc_text(arg[0]);
     if (style.name == NULL) return false;
     r->style[r->n_styles++] = style;
+    r->n_limited += is_limited;
     return true;
 }
 
@@ -65,7 +73,7 @@ static bool collect_from(struct ifc_records *r, uint64_t item, const struct step
 {
     bool done = true;
     const char *p = from->args.p, *end = p + from->args.n;
-    for (uint64_t id; done && (id = ifc_next_reference(&p, end)) != 0;) {
+    for (uint64_t id; done && ifc_next_reference(&p, end, &id);) {
         const struct step_record *to = id != item ? ifc_index_find(&r->index, id) : NULL;
         if (to == NULL) continue;
         if (text_is(to->type, "IFCSURFACESTYLE"))

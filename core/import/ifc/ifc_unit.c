@@ -34,7 +34,7 @@ static int read_si(const struct ifc_index *x, const struct step_record *unit, do
     return ifc_index_fail(x, unit, err, "a length unit with an unknown prefix");
 }
 
-/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of feet. */
+/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)): feet, for example. */
 static int read_converted(const struct ifc_index *x, const struct step_record *unit, struct text_span ref, double *m,
                           struct sh_err *err)
 {
@@ -90,7 +90,7 @@ int ifc_unit_find(const struct ifc_index *x, double *m, struct sh_err *err)
     const struct step_record *units = ifc_unit_follow(x, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
     if (units == NULL) return ifc_index_fail(x, project, err, "no unit of length: it names no IFCUNITASSIGNMENT");
     const char *p = units->args.p, *end = p + units->args.n;
-    for (uint64_t id; (id = ifc_next_reference(&p, end)) != 0;) {
+    for (uint64_t id; ifc_next_reference(&p, end, &id);) {
         const struct step_record *unit = ifc_index_find(x, id);
         if (unit != NULL && is_length(unit, of)) return ifc_unit_of(x, unit, m, err);
     }

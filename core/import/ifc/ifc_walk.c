@@ -21,7 +21,7 @@ enum kind {
     ASSIMP_ERRS = 8, /* Assimp is known to get it wrong, silently */
     POINTS = 16,     /* points, which may be far */
     TURNED = 64,     /* a profile turned about an axis: its radius is among the points */
-    RADIUS = 32,     /* a circle or the like: its last attribute is a radius */
+    RADIUS = 32,     /* a circle or the like: keep_radius knows the attribute */
 };
 
 struct type_kind {
@@ -29,7 +29,7 @@ struct type_kind {
     int kind;
 };
 
-/* By name, for bsearch. Radii: the last attribute of circles, discs and cylinders is one. */
+/* By name, for bsearch. */
 static const struct type_kind kinds[] = {
     {"IFCADVANCEDBREP", BODY | CURVED | ASSIMP_ERRS},
     {"IFCADVANCEDBREPWITHVOIDS", BODY | CURVED | ASSIMP_ERRS},
@@ -124,7 +124,7 @@ static bool push(struct walk *w, uint64_t id)
     return true;
 }
 
-/* The largest number in a list of lists, without its sign. */
+/* Returns the largest number in a list of lists, without its sign. */
 static double largest_number(const struct text *t, struct text_span args)
 {
     double largest = 0.0;
@@ -142,11 +142,11 @@ static void keep_radius(struct ifc_records *r, const struct step_record *record)
 {
     struct text_span arg[STEP_MAX_ARGS];
     const size_t n = step_split(record->args, arg, STEP_MAX_ARGS);
+    /* IfcSweptDiskSolid(directrix, radius, inner radius, start, end) */
+    const size_t at = text_is(record->type, "IFCSWEPTDISKSOLID") ? 1 : n - 1;
     double radius;
-    /* A disc's later numbers are where its curve begins and ends. */
-    const size_t last = strncmp(record->type.p, "IFCSWEPTDISK", 12) == 0 ? 2 : STEP_MAX_ARGS;
-    for (size_t i = 0; i < n && i < last; i++)
-        if (step_real(&r->index.text, arg[i], &radius)) r->radius_m = fmax(r->radius_m, radius * r->unit_m);
+    if (at < n && n <= STEP_MAX_ARGS && step_real(&r->index.text, arg[at], &radius))
+        r->radius_m = fmax(r->radius_m, radius * r->unit_m);
 }
 
 static void look_at(struct walk *w, const struct step_record *record, int kind)
@@ -181,7 +181,7 @@ static bool walk_from(struct walk *w, uint64_t id)
         look_at(w, record, kind);
         done = keep_styles(w, record->id);
         const char *p = record->args.p, *end = p + record->args.n;
-        for (uint64_t to; done && (to = ifc_next_reference(&p, end)) != 0;)
+        for (uint64_t to; done && ifc_next_reference(&p, end, &to);)
             done = push(w, to);
     }
     return done;
@@ -214,7 +214,7 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     w->product = product;
     w->r->stamp++;
     bool done = walk_from(w, product->shape);
-    const bool has_body = product->has_body; /* an opening's is none of its own */
+    const bool has_body = product->has_body; /* the walk also finds bodies of openings, which are not its own */
     for (size_t i = ifc_first(w->voids, w->n_voids, 2 * sizeof *w->voids, product->id);
          i < w->n_voids && w->voids[2 * i] == product->id && done; i++) {
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
@@ -227,10 +227,17 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     return done;
 }
 
+/* Types that IfcRelVoidsElement subtracts. */
+static bool is_opening(struct text_span type)
+{
+    return text_is(type, "IFCOPENINGELEMENT") || text_is(type, "IFCOPENINGSTANDARDCASE") ||
+           text_is(type, "IFCVOIDINGFEATURE");
+}
+
 static void mark_lost_openings(struct walk *w)
 {
     for (size_t i = 0; i < w->r->n_products; i++)
-        w->r->product[i].opens_nothing = text_is(w->r->product[i].type, "IFCOPENINGELEMENT");
+        w->r->product[i].opens_nothing = is_opening(w->r->product[i].type);
     for (size_t k = 0; k < w->n_voids; k++) {
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * k + 1]);
         if (opening != NULL) w->r->product[opening - w->r->product].opens_nothing = false;

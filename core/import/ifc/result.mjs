@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The form in which a reader gives its products to scanhead, on descriptor 3; and errors, on descriptor 4. Numbers are in
-// the machine's order. Coordinates are metres, y up, as other formats of y up come.
+// A reader gives its products to scanhead on descriptor 3, in the form below, and an error on descriptor 4. Numbers are in
+// the machine's byte order. Coordinates are metres, y up.
 //
 //   head     "shifc01\0"
 //   product  u32 express id; u32 parts; u32 failures that the reader admitted; u32 length of text

@@ -54,8 +54,8 @@ static void skip_space(struct text *t)
         t->line += *t->p == '\n';
 }
 
-/* The ';' that ends what begins at p, lines counted; NULL at the end of the file. One within a text, after an odd number
- * of quotes, ends nothing. */
+/* Returns the ';' that ends the statement at p, or NULL at the end of the file, and counts lines. A ';' within a text,
+ * after an odd number of quotes, ends nothing. */
 static const char *find_end(struct text *t)
 {
     uint64_t quotes = 0;

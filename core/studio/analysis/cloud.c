@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A cloud's memory, and which reader a file gets. */
+/* The memory of a cloud, and the choice of its reader. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 static int reserve_one(void *array, size_t n, size_t size)
 {
     void *made = calloc(n, size);
-    memcpy(array, &made, sizeof made); /* whatever it points to */
+    memcpy(array, &made, sizeof made); /* a pointer of any type */
     return made != NULL;
 }
 

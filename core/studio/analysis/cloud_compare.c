@@ -16,7 +16,7 @@ struct work {
     const struct cloud *cloud;
     const struct cloud_site *site;
     const char *what;
-    void (*point)(const struct work *w, size_t i); /* what is done with each */
+    void (*point)(const struct work *w, size_t i); /* called for each point */
     double (*xyz_m)[3];                            /* of cloud_into_scene: the cloud's own */
     double *distance_m;
     uint32_t *triangle;
@@ -57,7 +57,7 @@ void cloud_to_scene(const struct cloud *cloud, const struct cloud_site *site, si
     georef_reverse(georef, d_crs, p_prcs);
 }
 
-/* Whatever the reach, what is found within it is the nearest. */
+/* A triangle that is found within some reach is the nearest of all. */
 static int find_nearest(const struct distance *index, double max_m, const double p_prcs[3], struct distance_hit *hit)
 {
     for (double reach_m = FIRST_REACH_M; reach_m < max_m; reach_m *= 10)

@@ -10,7 +10,7 @@
 
 enum { HEADER_MIN = 227, HEADER_14 = 375, VLR_HEAD = 54, EXTRA_LEN = 192, EXTRA_UINT16 = 3, N_FORMATS = 11 };
 
-/* Of a point's record, without extra bytes, by format; where its GPS time and its colours stand, 0: nowhere. */
+/* By format: the length of a point's record without extra bytes; where its GPS time and its colours are, 0: nowhere. */
 static const unsigned standard_len[N_FORMATS] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
 static const unsigned time_at[N_FORMATS] = {0, 20, 0, 20, 20, 20, 22, 22, 22, 22, 22};
 static const unsigned colours_at[N_FORMATS] = {0, 0, 20, 28, 0, 28, 0, 30, 30, 0, 30};
@@ -78,7 +78,7 @@ static void read_extra(struct las *las, const uint8_t *p, size_t len)
     unsigned at = standard_len[las->format];
     for (; len >= EXTRA_LEN; p += EXTRA_LEN, len -= EXTRA_LEN) {
         unsigned type = p[2];
-        if (type > 10) return; /* arrays, of old: what follows can't be found */
+        if (type > 10) return; /* arrays, now deprecated: the place of later fields is not known */
         if (type == EXTRA_UINT16 && strncmp((const char *)p + 4, "label", 32) == 0 && at + 2 <= las->record_len)
             las->label_at = at;
         at += type == 0 ? p[3] : size[type];
@@ -112,21 +112,27 @@ static float reflectance_db(unsigned intensity)
     return intensity == 0 ? (float)NAN : (float)(((double)intensity - 32768.0) / 100.0);
 }
 
+/* LAS has no shots without echo: writers that know of no returns leave 0, and then the point is the only one. */
+static uint8_t known_return(int number)
+{
+    return number > 0 ? (uint8_t)number : 1;
+}
+
 static void read_columns(const struct las *las, size_t i, const uint8_t *p)
 {
     struct cloud *c = las->cloud;
     if (c->time_s != NULL) c->time_s[i] = le_get_double(p + time_at[las->format]);
     if (c->reflectance_db != NULL) c->reflectance_db[i] = reflectance_db(le_get16(p + 12));
-    if (c->echo_count != NULL) c->echo_count[i] = las->format >= 6 ? p[14] >> 4 : p[14] >> 3 & 7;
+    if (c->echo_count != NULL) c->echo_count[i] = known_return(las->format >= 6 ? p[14] >> 4 : p[14] >> 3 & 7);
 }
 
-/* By the header's generating software. */
+/* Files of ours name the program as their generating software. */
 static int is_ours(const struct las *las)
 {
     return strncmp((const char *)las->data + 58, "scanhead", 32) == 0;
 }
 
-/* What the file has of what is asked for. */
+/* The columns that are asked for and that the file has. */
 static unsigned columns_of(const struct las *las, unsigned asked)
 {
     unsigned has = CLOUD_ECHO_COUNT;
@@ -161,7 +167,7 @@ static int read_points(struct las *las, struct sh_err *err)
             c->xyz_m[i][0] = c->xyz_m[i][1];
             c->xyz_m[i][1] = remainder(lon_deg, 360);
         }
-        c->echo[i] = p[14] & (is_new ? 15 : 7);
+        c->echo[i] = known_return(p[14] & (is_new ? 15 : 7));
         c->station[i] = le_get16(p + (is_new ? 20 : 18));
         if (c->station[i] == 0) las->n_no_station++;
         if (c->label != NULL) c->label[i] = le_get16(p + las->label_at);

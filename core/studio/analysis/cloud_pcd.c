@@ -114,6 +114,7 @@ static int check_fields(struct pcd *g, struct sh_err *err)
     unsigned axes = 0;
     for (unsigned i = 0; i < g->n_fields; i++) {
         struct pcd_field *f = &g->field[i];
+        if (f->size == 0) return pcd_fail(g, err, "its header has fewer numbers in SIZE than names in FIELDS");
         f->at = g->record_len;
         g->record_len += (size_t)f->size * f->count;
         if (f->axis < 0) continue;

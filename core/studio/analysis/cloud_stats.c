@@ -12,7 +12,8 @@ static uint64_t bits_of(double v)
     return bits;
 }
 
-/* 8 bits at a time, it is the value whose leading bits are reached by that many. Eight passes whatever the values are. */
+/* Finds the bits of the value, 8 at a time from the top: each pass counts the values with the bits found so far by
+ * their next 8 bits. It takes eight passes, whatever the values are. */
 double cloud_percentile(const double *v, size_t n, size_t n_finite, unsigned permille)
 {
     size_t rank = n_finite / 1000 * permille + (n_finite % 1000 * permille + 999) / 1000; /* rounded up */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Points from text: a line each, with numbers between blanks, commas, semicolons or tabs. Between commas or
- * semicolons a cell may be empty, or text. The first three are x, y and z,
- * unless a line of names says which columns they are. */
+/* Points from text: a line each, with numbers between blanks, commas, semicolons or tabs. Between commas or semicolons
+ * a cell may be empty, or text. The first three cells are x, y and z, unless a line of names says which ones are. */
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -138,7 +137,7 @@ static int read_lines(struct table *g, const struct sh_report *report, struct sh
     return rc;
 }
 
-/* Its lines look like points, and those of its header do, too. */
+/* The lines of a PTX look like points, and so do those of its header. */
 static int is_ptx(const char *path)
 {
     const char *ending = strrchr(path, '.');

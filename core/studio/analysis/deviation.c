@@ -12,10 +12,11 @@
 
 enum { CHUNK = 16 * BVH_CHUNK, PLACES_AROUND = 12 };
 
-/* As core/studio/deviation.h has it: what may differ where the nearest surface is the one that the beam meets. */
+/* Tolerances of "on a smooth face" (core/studio/deviation.h): the share of the distance, and a length. */
 static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
 
-/* The rays around a footprint, by its radius: outlines that cut it don't pass between neighbours of twelve. */
+/* Rays run around a footprint at this many of its radii. So an outline that cuts it does not pass between two of the
+ * twelve. */
 static const double AROUND = 1.1;
 
 /* Surfaces that are nearer to each other than this can't be told apart, however small the noise. */
@@ -26,7 +27,7 @@ struct work {
     const struct deviation_head *head;
     const struct deviation_points *out;
     const struct sh_report *report;
-    size_t every; /* so many points have one whose sigma is worked out */
+    size_t every; /* sigma is worked out for one point in so many */
     atomic_size_t next;
     atomic_int failed;
 };
@@ -66,8 +67,7 @@ void deviation_points_free(struct deviation_points *points)
     *points = (struct deviation_points){0};
 }
 
-/* Whether the line from a place crosses the triangle itself, not only its plane. A thousandth of a millionth beside
- * it counts. */
+/* Whether a place in the plane of a triangle is within the triangle. Barycentric coordinates from -1e-9 on count. */
 static int crosses(const struct scene *scene, uint32_t triangle, const double at_m[3])
 {
     const double *corner[3];
@@ -114,7 +114,7 @@ static int is_alone(const struct distance *index, const double at_m[3], const do
     return 1;
 }
 
-/* Evenly taken of all, whatever their order: by Fibonacci hashing. */
+/* Fibonacci hashing takes points evenly, whatever their order. */
 static int is_sampled(const struct work *w, size_t i)
 {
     return w->every <= 1 || ((uint64_t)i * 0x9e3779b97f4a7c15ULL >> 32) % w->every == 0;
@@ -160,6 +160,7 @@ static void deviation_settle(const struct work *w, const struct batch *b, uint32
         same = deviation_is_same(w->of->distance_m[i], along_m, cosine);
     }
     if (same && w->out->met != NULL) w->out->met[i] = first;
+    /* A later echo, or a point beyond glass, belongs to another surface than the first hit. */
     if (!same && nearest != first) {
         const double range_m = bvh_range_of(bvh, nearest, from, hit.beam);
         const double at_m[3] = {from[0] + range_m * hit.beam[0], from[1] + range_m * hit.beam[1],
@@ -175,7 +176,7 @@ static void deviation_settle(const struct work *w, const struct batch *b, uint32
     if (same && b->is_cut[k] == 0) deviation_keep(w, head, i, along_m, &hit);
 }
 
-/* Whether a ray around another one meets the same plane as that. */
+/* Whether a ray around the footprint hits the same plane as the ray in its middle. */
 static int is_on_plane(const struct batch *b, uint32_t k, const struct bvh *bvh)
 {
     if (b->triangle[k] == BVH_NO_TRIANGLE || b->triangle_around[k] == BVH_NO_TRIANGLE) return 0;
@@ -233,7 +234,7 @@ static void cast(const struct work *w, struct batch *b, const struct deviation_h
     b->n = 0;
 }
 
-/* The point's ray, where there is one: not of shots without echo, of points that are far, nor of bodies. */
+/* Adds the point's ray. Shots without echo, points that are far, and points of bodies have none. */
 static void deviation_add(const struct work *w, struct batch *b, size_t i, const struct deviation_head *head)
 {
     double p[3], d[3];

@@ -11,7 +11,8 @@ static double square(double v)
     return v * v;
 }
 
-/* How far half a turn's count may be off is half of this. Both ideal: positions take the true angle. */
+/* The counts of both encoders, in radians; an angle is rounded by up to half of one. Where both are ideal, positions
+ * have the true angles. */
 static void encoder_steps(const struct cast_setup *setup, double step_rad[2])
 {
     const int ideal = setup->mirror_counts >= 4294967296.0 && setup->pan_counts >= 4294967296.0;
@@ -37,7 +38,7 @@ static double range_sigma_m(const struct cast_setup *setup, double range_m, doub
     return sqrt(detect->signal->floor2 + detect->signal->jitter2 / (a * a)) + detect->signal->per_distance * range_m;
 }
 
-/* Where the mirror moves the beam, and the pan, per radian, times the normal. */
+/* How far mirror and pan move the beam along the normal, per radian and per metre of range. */
 static void angle_effects(const double rotation[9], const double beam[3], const double normal[3], double effect[2])
 {
     const double up[3] = {rotation[2], rotation[5], rotation[8]};

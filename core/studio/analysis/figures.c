@@ -67,7 +67,7 @@ static void figures_finish(struct figures *f, const struct sums *s)
     f->z_counts = sqrt(mean(s->c2, f->noisy));
 }
 
-/* As figures_by is given them. */
+/* The groups that figures_by gets. */
 struct groups {
     uint32_t n;
     uint32_t (*group)(void *ctx, size_t i);

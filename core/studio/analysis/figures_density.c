@@ -14,7 +14,7 @@ struct table {
     size_t used;
 };
 
-/* What cells are cut from. */
+/* The scene and the size by which a place gets its cell. */
 struct cutter {
     const struct scene *scene;
     double low_m[3], cell_m;
@@ -64,7 +64,7 @@ static uint64_t key_of(const struct cutter *cut, uint32_t triangle, const double
            ((uint64_t)(int64_t)iw & mask);
 }
 
-/* 1: too many cells, or no memory for more (SH_ENOMEM). */
+/* Returns 1 where there would be too many cells, SH_ENOMEM where there is no memory for more. */
 static int figures_density_add(struct table *t, uint64_t key, double area_m2, double range_m)
 {
     if (t->bits == 0 || t->used * 4 >= (size_t)3 << t->bits) {

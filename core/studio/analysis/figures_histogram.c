@@ -30,7 +30,7 @@ static void add_size(struct sizes *s, double v)
     s->count[k < 0 ? 0 : k >= CLASSES ? CLASSES - 1 : k]++;
 }
 
-/* At least that share is no larger; above 0. */
+/* A size above 0 that at least this share of the values does not exceed. */
 static double size_of_share(const struct sizes *s, double share)
 {
     uint64_t sum = 0;
@@ -41,7 +41,7 @@ static double size_of_share(const struct sizes *s, double share)
     return exp2(OCTAVES / 2);
 }
 
-/* Bins for values of up to that size; false: there are none. */
+/* Sets the bins for the values; returns 0 where there are none. */
 static int set_bins(const struct sizes *s, double share, int is_signed, struct figures_histogram *h)
 {
     enum { WANTED = FIGURES_MAX_BINS / 2 - 1 };

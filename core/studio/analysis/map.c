@@ -31,8 +31,7 @@ static int check_area(const struct map_spec *spec, struct sh_err *err)
     return SH_OK;
 }
 
-/* Pixels along a side; a place on the upper limit belongs to the last one. In double: may be beyond any
- * integer. */
+/* Pixels along a side; a place on the upper limit belongs to the last one. The number may be beyond any integer. */
 static double side_px(const struct map_spec *spec, int axis, double pixel_m)
 {
     return fmax(1, ceil((spec->max_m[axis] - spec->min_m[axis]) / pixel_m - 1e-9));
@@ -76,7 +75,7 @@ void map_free(struct map *map)
     free(map);
 }
 
-/* Column and row counted from min_m; false also for what is not a number. */
+/* Column and row count from min_m. Returns 0 outside the area, and for NaN. */
 static int locate(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row)
 {
     if (!(x_m >= map->min_m[0] && x_m <= map->max_m[0] && y_m >= map->min_m[1] && y_m <= map->max_m[1])) return 0;

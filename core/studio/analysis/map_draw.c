@@ -55,9 +55,9 @@ static double height_share(struct height_range range, double height_m)
     return fmin(1, fmax(0, (height_m - range.low_m) / (range.high_m - range.low_m)));
 }
 
-/* What the 3 x 3 pixels about a place hold: the most levels and the lowest point. A wall is then three pixels
- * wide and scan lines close up; where floor and ceiling alternate, the floor shows. Returns 0 where there is
- * no point. */
+/* Finds the most levels of a pixel, and the lowest point, among the 3 x 3 pixels around a place. So a wall is three
+ * pixels wide and scan lines close up; where floor and ceiling alternate, the floor shows. Returns 0 where there is no
+ * point. */
 static int gather(const struct map *map, uint32_t column, uint32_t row, int *levels, double *low_m)
 {
     int hit = 0;
@@ -83,7 +83,7 @@ double map_structure(const struct map *map, uint32_t column, uint32_t row)
     return fmin(1, fmax(0, (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS)));
 }
 
-/* Lightness 0..1 of structure and height 0..1 -> sRGB. */
+/* The colour of a structure and a height, both 0..1. */
 static void colour_of(double structure, double height, uint8_t rgb[3])
 {
     /* From blue over green and yellow to red, away from the purple that would close the circle. */
@@ -174,7 +174,7 @@ static void draw_station(const struct map *map, uint32_t i, struct pen *pen)
     draw_triangle_about(pen, at, MAP_STATION_PX, red);
 }
 
-/* A label that stands away from its station is led there. */
+/* A thin line leads from a label to its station where it stands away from it. */
 static void draw_label(const struct map *map, const struct map_label *label, struct pen *pen)
 {
     const struct map_station *station = &map->station[label->station];

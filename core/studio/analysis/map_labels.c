@@ -51,7 +51,7 @@ static int is_free(const struct map *map, const struct map_label *label, uint32_
     return 1;
 }
 
-/* Share of walls under the box, and a little for its own tick. */
+/* The share of walls under the box, and a little more where the box covers its own station's tick. */
 static double cost_of(const struct map *map, const struct map_layout *at, uint32_t station,
                       const struct picture_box *box)
 {

@@ -8,7 +8,7 @@
 #include "core/studio/analysis/view_inside.h"
 #include "core/vec3.h"
 
-/* Discs larger than that are points beside the eye: they would only cost time. */
+/* The largest radius of a disc, in pixels. Larger discs are of points close to the eye, and would only cost time. */
 #define MAX_RADIUS 24.0
 
 static int check_camera(const struct view_camera *c, struct sh_err *err)
@@ -77,7 +77,7 @@ void view_free(struct view *view)
     free(view);
 }
 
-/* In places; 0: behind the eye. */
+/* Sets `at` in places. Returns 0 where the point is behind the eye. */
 static int project(const struct view *view, const double p_m[3], double at[2], double *depth_m)
 {
     const double *eye = view->spec.camera.eye_m;
@@ -97,7 +97,7 @@ int view_project(const struct view *view, const double p_m[3], double place_px[2
     return 1;
 }
 
-/* The places whose middle is in the disc; at least the one that has the point. */
+/* Draws the places whose middle is in the disc, and the one that has the point in any case. */
 static int draw_disc(struct view *view, const double at[2], double depth_m, const struct view_place *what)
 {
     const struct view_spec *spec = &view->spec;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/analysis: the parts of the view. Points make places (view.c); places make an image (view_draw.c,
- * view_shade.c). */
+/* Private to core/studio/analysis: the parts of the view. Points make places (view.c); places make an image
+ * (view_draw.c, view_shade.c). */
 #ifndef CORE_STUDIO_ANALYSIS_VIEW_INSIDE_H
 #define CORE_STUDIO_ANALYSIS_VIEW_INSIDE_H
 
@@ -27,8 +27,8 @@ struct view {
     struct view_counts counts;
 };
 
-/* Depths as surfaces: [height][width] of smoothed depths, small holes closed by what surrounds them. INFINITY: nothing
- * is there. near: the place that closes a hole has its colour from, as an index. */
+/* Smooths depths within surfaces and closes small holes: depth_m[height][width]; INFINITY: nothing is there. near: the
+ * index of the place from which each place has its colour, for a closed hole another one. */
 int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct sh_err *err);
 /* Brightness of each place, 0..1, from these depths. log_depth: room for as many figures, for the work. SH_ESTOPPED
  * where colours->report asks to stop. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Stations and the legend are drawn beside a view. */
+/* Marks of stations, and legends, on a view. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -123,7 +123,7 @@ void view_draw_scale(struct picture *picture, const char *title, double low, dou
     }
     const double step = round_step(high - low);
     const int digits = (int)fmin(9, fmax(0, -floor(log10(step) + 1e-9)));
-    /* By a whole number: a sum of steps would stand still where they are below the double's last place. */
+    /* Ticks are multiples of the step: a sum of steps would stand still where they are below a double's last place. */
     const double first = ceil(low / step - 1e-9);
     for (int i = 0; i <= MAX_TICKS && (first + i) * step <= high + 1e-9 * step; i++) {
         const double v = (first + i) * step;

@@ -33,7 +33,8 @@ static void close_hole(const struct view *view, int x, int y, float *depth_m, ui
     near[i] = (uint32_t)found;
 }
 
-/* Mean along one axis, of depths that go on evenly: weights fall with the second difference's share of the depth. */
+/* A mean along one axis, over depths that change evenly: weights fall with their second difference, as a share of the
+ * depth. */
 static void smooth_line(const float *in, float *out, size_t n, size_t step)
 {
     for (size_t i = 0; i < n; i++) {

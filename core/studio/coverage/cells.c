@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The surface as cells: cutting triangles, and which pieces are one cell. */
+/* The surface as cells: triangles are cut into pieces, and pieces become cells. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,14 +11,14 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
-/* What makes pieces one cell. */
+/* Pieces with the same key are one cell. */
 struct key {
     int32_t cube[3];
     uint32_t label_side;
 };
 
-/* At most, where each piece is a cell and a column of its own: entries, the cell's key, places of the table, and what
- * growing arrays leaves over. */
+/* The most memory that a piece takes, where each piece is a cell and a column of its own: entries, the cell's key,
+ * places of the table, and the spare room of arrays that grow. */
 enum { PIECE_BYTES = 4 + 2 * (4 + sizeof(struct cell) + sizeof(struct key)) + sizeof(struct cell_met) + 16 };
 enum { TRIANGLE_BYTES = 4 };
 static const double MAX_PIECES = 4e9; /* they are numbered in 32 bits */
@@ -116,7 +116,7 @@ static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
         c->spec.cell_m, pieces, mib_of(c, pieces), c->spec.memory_mib, cell_m);
 }
 
-/* ---- which pieces are one cell */
+/* ---- pieces become cells */
 
 static uint64_t hash_of(const struct key *k)
 {
@@ -229,7 +229,7 @@ static int cells_set_up(struct coverage *c, struct sh_err *err)
     return mib_of(c, pieces) > c->spec.memory_mib || !(pieces < MAX_PIECES) ? refuse(c, pieces, err) : SH_OK;
 }
 
-/* Where each triangle's columns begin, and each column's pieces. */
+/* Numbers the columns of each triangle and the pieces of each column. */
 static int number_pieces(struct coverage *c, struct sh_err *err)
 {
     const uint32_t n = c->scene->n_triangles;
@@ -284,7 +284,6 @@ void coverage_free(struct coverage *coverage)
     free(coverage);
 }
 
-/* Of corner i: the part of the normal that the opposite edge and the point make. */
 uint32_t coverage_cell_at(const struct coverage *c, uint32_t triangle, const double p_m[3])
 {
     if (c->first[triangle] == NO_CELL) return NO_CELL;
@@ -293,7 +292,7 @@ uint32_t coverage_cell_at(const struct coverage *c, uint32_t triangle, const dou
     uint32_t column, row;
     coverage_corners(c, triangle, corner);
     vec3_normal(corner[0], corner[1], corner[2], n);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++) { /* a weight is the area of the triangle that the point and the opposite edge make */
         double across[3];
         vec3_normal(corner[(i + 1) % 3], corner[(i + 2) % 3], p_m, across);
         weight[i] = fmax(vec3_dot(n, across), 0.0);

@@ -71,7 +71,7 @@ void cut_set_up(const double corner[3][3], double size_m, struct cut *cut)
                                          .columns = (uint32_t)ceil(count[i].columns),
                                          .across = count[i].across,
                                          .share = i == 0 ? cut->foot : 1.0 - cut->foot};
-    /* A leg too short for a double: all of the area is the other part's. */
+    /* Where a leg is too short for a double, all of the area is the other part's. */
     for (int i = 0; i < 2; i++)
         if (cut->part[i].columns == 0) {
             cut->part[i].share = 0.0;

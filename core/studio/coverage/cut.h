@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/coverage: a triangle cut into pieces of a size. In: its corners, the size. Out: how many pieces there
- * are, the one that a point lies in, its corners, and its share of the area.
+/* Private to core/studio/coverage: a triangle cut into pieces of a size. In: its corners, the size. Out: how many
+ * pieces there are, the one that a point lies in, its corners, and its share of the area.
  *
  *             T            The longest edge is the base; the foot F of its height cuts the triangle into two with a
  *            /|\           right angle, A F T and B F T. Each of these is cut into columns of the same width, across
@@ -9,11 +9,12 @@
  *       A /___|___\ B
  *             F
  *
- * Columns are at most size / sqrt(5) wide, and so are rows at a column's wide end. A row rises by no more than its width
- * again, since it leaves the longer leg at 45 degrees at most: no two points of a piece are farther apart than size. A
- * triangle whose longest edge is no longer than size is one piece. The number of pieces grows with the area and the
- * longest edge: needles cost no more than their length. Of a part with n columns, column k (from 0) has the share
- * (2 k + 1) / n^2, and all of its pieces are equal: shares are ratios of whole numbers and sum to 1. Pure; any thread. */
+ * Columns are at most size / sqrt(5) wide, and so are rows at a column's wide end. A row rises by no more than its
+ * width again, since it leaves the longer leg at 45 degrees at most: no two points of a piece are farther apart than
+ * size. A triangle whose longest edge is no longer than size is one piece. The number of pieces grows with the area
+ * and the longest edge: needles cost no more than their length. Of a part with n columns, column k (from 0) has the
+ * share (2 k + 1) / n^2, and all of its pieces are equal: shares are ratios of whole numbers and sum to 1. Pure; any
+ * thread. */
 #ifndef CORE_STUDIO_COVERAGE_CUT_H
 #define CORE_STUDIO_COVERAGE_CUT_H
 
@@ -30,9 +31,9 @@ struct cut {
     } part[2];
 };
 
-/* Columns of both parts count through, those of A first. */
+/* Columns are numbered through both parts, those of A first. */
 void cut_set_up(const double corner[3][3], double size_m, struct cut *cut);
-/* What cut_set_up would give, as a double, for triangles of any size. */
+/* The number of pieces that cut_set_up would give, as a double, since a triangle may be of any size. */
 double cut_count(const double corner[3][3], double size_m);
 uint32_t cut_columns(const struct cut *cut);
 uint32_t cut_rows(const struct cut *cut, uint32_t column);
@@ -41,7 +42,7 @@ uint32_t cut_rows(const struct cut *cut, uint32_t column);
  * border. */
 void cut_find(const struct cut *cut, const double weight[3], uint32_t *column, uint32_t *row);
 
-/* Of the triangle's area, a piece of that column. */
+/* The share that a piece of that column has of the triangle's area. */
 double cut_share(const struct cut *cut, uint32_t column);
 
 /* Corners of rows first .. end of a column, which are one polygon: 3 or 4, counter-clockwise where the triangle's are.

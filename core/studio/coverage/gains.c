@@ -20,7 +20,7 @@ struct gains {
     atomic_int failed;
 };
 
-/* What the rays of one place say of a cell. */
+/* A claim of the rays of one place on a cell. */
 struct claim {
     double sum_m2, most_m2; /* of the areas that they stand for */
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/coverage: cells, the pieces that they are made of, and what has been met of each. */
+/* Private to core/studio/coverage: cells, the pieces that they are made of, and how each was hit. */
 #ifndef CORE_STUDIO_COVERAGE_INSIDE_H
 #define CORE_STUDIO_COVERAGE_INSIDE_H
 

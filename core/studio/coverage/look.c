@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Casting a scan onto the cells, on several threads. Sums of whole numbers and the larger of two do not depend on the
- * order, so results don't depend on how the work is shared out. */
+/* Casts a scan onto the cells, on several threads. Neither sums of whole numbers nor the larger of two numbers depend
+ * on the order, so results don't depend on how threads share the work. */
 #include <stdlib.h>
 #include <string.h>
 

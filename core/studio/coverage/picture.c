@@ -82,7 +82,7 @@ static void paint(const struct paint *p, const struct coverage_cell *cell, uint8
 
 /* ---- the mesh */
 
-struct picture {
+struct cell_mesh {
     struct paint paint;
     uint64_t vertices, faces; /* that there will be */
     uint32_t n, n_faces;      /* that there are */
@@ -96,7 +96,7 @@ struct picture {
 
 static void count_face(void *ctx, uint32_t cell, int n, const double corner[4][3])
 {
-    struct picture *p = ctx;
+    struct cell_mesh *p = ctx;
     (void)cell;
     (void)corner;
     p->vertices += (uint32_t)n;
@@ -110,7 +110,7 @@ static float or_not(double value)
 
 static void add_face(void *ctx, uint32_t cell, int n, const double corner[4][3])
 {
-    struct picture *p = ctx;
+    struct cell_mesh *p = ctx;
     struct coverage_cell c;
     uint8_t rgb[3];
     coverage_get(p->paint.c, cell, &c);
@@ -130,7 +130,7 @@ static void add_face(void *ctx, uint32_t cell, int n, const double corner[4][3])
     }
 }
 
-static int picture_make_room(struct picture *p, struct sh_err *err)
+static int picture_make_room(struct cell_mesh *p, struct sh_err *err)
 {
     const struct coverage_spec *spec = &p->paint.c->spec;
     const double mib = ((double)p->vertices * CORNER_BYTES + (double)p->faces * FACE_BYTES) / 0x1p20;
@@ -156,7 +156,7 @@ static int picture_make_room(struct picture *p, struct sh_err *err)
                  : sh_fail(err, SH_ENOMEM, "no memory for a mesh of %llu triangles", (unsigned long long)p->faces);
 }
 
-static int write(const struct picture *p, const char *path, const struct sh_report *report, struct sh_err *err)
+static int write(const struct cell_mesh *p, const char *path, const struct sh_report *report, struct sh_err *err)
 {
     const struct mesh_scalar scalar[] = {{"stations", p->stations, MESH_UINT16},
                                          {"density", p->density, MESH_FLOAT},
@@ -181,7 +181,7 @@ static int write(const struct picture *p, const char *path, const struct sh_repo
 int coverage_write_mesh(const struct coverage *coverage, const char *path, enum coverage_colour colour,
                         const struct sh_report *report, struct sh_err *err)
 {
-    struct picture p = {.paint = {.c = coverage, .colour = colour}};
+    struct cell_mesh p = {.paint = {.c = coverage, .colour = colour}};
     coverage_pieces(coverage, count_face, &p);
     int rc = picture_set_up(&p.paint, err);
     if (rc == SH_OK) rc = picture_make_room(&p, err);

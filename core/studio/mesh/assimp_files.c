@@ -31,7 +31,7 @@ struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mo
     return &e->handle[e->n_files++];
 }
 
-/* What is written is kept or dropped at the end. */
+/* The output keeps or drops the file at its end. */
 void assimp_close(struct aiFileIO *io, struct aiFile *handle)
 {
     (void)io;
@@ -47,7 +47,6 @@ int assimp_check_files(struct exporter *e, struct sh_err *err)
     return rc;
 }
 
-/* The file as it is to be, from what was exported. */
 int assimp_copy_raw(struct exporter *e, struct sh_err *err)
 {
     struct mesh_file *to, *raw = e->file[0];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this room: the files that Assimp's exporter opens. They are ours, of one output (inside.h). */
+/* Private to core/studio/mesh: the files that Assimp's exporter opens. They belong to one output of ours (inside.h). */
 #ifndef CORE_STUDIO_MESH_ASSIMP_FILES_H
 #define CORE_STUDIO_MESH_ASSIMP_FILES_H
 
@@ -14,7 +14,7 @@ struct exporter {
     struct mesh_file *file[ASSIMP_FILES]; /* in the order in which they were opened */
     struct aiFile handle[ASSIMP_FILES];
     int n_files, rc;
-    int is_raw; /* what is written is to be copied, from NAME.raw.part */
+    int is_raw; /* the exporter writes NAME.raw.part, of which the file is made */
     struct sh_err err;
     struct aiFileIO io;
 };
@@ -24,7 +24,7 @@ struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mo
 void assimp_close(struct aiFileIO *io, struct aiFile *handle);
 /* After the export: fails where something could not be written, and says why. */
 int assimp_check_files(struct exporter *exporter, struct sh_err *err);
-/* After that, of raw: the file as it is to be, from what was exported. */
+/* After that, with is_raw: makes the file from the exporter's. */
 int assimp_copy_raw(struct exporter *exporter, struct sh_err *err);
 
 #endif

@@ -69,7 +69,7 @@ static int table_enlarge(struct table *t)
     return 1;
 }
 
-/* The number of a key, and whether it is new; NONE: no memory. */
+/* Returns the number of a key, and whether it is new; NONE: no memory. */
 static uint32_t table_number(struct table *t, uint64_t key, uint32_t more, int *is_new)
 {
     if ((t->bits == 0 || 2 * ((size_t)t->n + 1) > (size_t)1 << t->bits) && !table_enlarge(t)) return NONE;
@@ -116,7 +116,7 @@ static void swap_if_above(uint32_t *a, uint32_t *b)
     *b = kept;
 }
 
-/* A triangle of clusters, unless it is there already. 0: no memory. */
+/* Adds a triangle of clusters, unless it is there already. 0: no memory. */
 static int add_face(struct work *w, const uint32_t c[3])
 {
     uint32_t s[3] = {c[0], c[1], c[2]};
@@ -165,7 +165,7 @@ static double pass(struct work *w, double cell_m, struct sh_err *err)
     return w->faces.n;
 }
 
-/* ---- what is there, and what comes out */
+/* ---- before and after the passes */
 
 /* Bounds and area of all triangles. */
 static void measure(struct work *w)
@@ -260,9 +260,9 @@ int decimate_by_cell(const struct decimate_mesh *mesh, double cell_m, const stru
     return rc;
 }
 
-/* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an angle
- * into half as many cells more, and each of them has two triangles. A first guess that gives far fewer triangles is made
- * finer once. */
+/* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an
+ * angle into one and a half times as many cells, and each of them has two triangles. A first guess that gives far
+ * fewer triangles is made finer once. */
 int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_report *report, struct decimated *out,
              struct sh_err *err)
 {

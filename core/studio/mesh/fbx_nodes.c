@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What Assimp 5.2 writes as binary FBX lacks the empty node that ends each list of nodes: neither Blender nor Assimp
- * itself reads it. Here the nodes are copied, each list with its end, and the ends that nodes name are moved on by that.
+/* Binary FBX files of Assimp 5.2 lack the empty node that ends each list of nodes: neither Blender nor Assimp itself
+ * reads them. Here the nodes are copied, each list with its end, and the offsets of ends that nodes hold grow by that.
  *
- * A node (version 7500 and up): end in the file, number and bytes of its properties as 64 bits each, length of its name as
- * 8 bits, name, properties, nodes. The layout of the file's end is the one that Blender's exporter writes. The time at
- * which the file was made becomes that which Assimp writes elsewhere in it, 1970-01-01 10:00, so that the same mesh gives
- * the same bytes. */
+ * A node (version 7500 and up) is its end's offset in the file, number and bytes of its properties, 64 bits each; the
+ * length of its name, 8 bits; name, properties, nodes. The layout of the file's end is the one that Blender's exporter
+ * writes. The time at which the file was made becomes the one that Assimp writes elsewhere in it, 1970-01-01 10:00, so
+ * that the same mesh gives the same bytes. */
 #include <string.h>
 
 #include "core/bytes.h"
@@ -91,7 +91,7 @@ static int is_named(const struct node *node, const char *name)
     return node->name_len == strlen(name) && memcmp(node->name, name, node->name_len) == 0;
 }
 
-/* A whole number, of a node within CreationTimeStamp. */
+/* Puts the whole number of a node within CreationTimeStamp. */
 static int put_time(struct nodes *n, const struct node *node, struct sh_err *err)
 {
     const int value = is_named(node, "Version") ? 1000
@@ -125,7 +125,7 @@ static int put_node(struct nodes *n, const struct node *node, int is_time, int d
     return rc == SH_OK ? put_zeros(n, NODE_LEN, err) : rc;
 }
 
-/* A mark, zeros up to a multiple of 16, version, zeros, another mark. */
+/* Puts a mark, zeros up to a multiple of 16, the version, zeros, and another mark. */
 static int put_tail(struct nodes *n, uint64_t at, struct sh_err *err)
 {
     if (n->n_raw < at || n->n_raw - at < MARK_LEN + TAIL_LEN) return fbx_nodes_fail(n, at, err);

@@ -21,8 +21,8 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
                    is_full ? ": make room, or write to another disk; nothing of it is kept" : "");
 }
 
-/* ---- a stream that remembers why it failed. It seems to take all that follows: Assimp's exporter of FBX ends the program
- * where a write does not move its place on. */
+/* ---- a stream that remembers why it failed. After that it seems to take all bytes, since Assimp's exporter of FBX
+ * ends the program where a write does not move its place on. */
 
 /* Returns whether these are full buffers of a long file, as the stream writes them one after the other. */
 static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
@@ -149,7 +149,7 @@ void mesh_output_drop(struct mesh_output *out, struct mesh_file *file)
     release(file);
 }
 
-/* 1: its own file, which gets its name when all that it names is there. */
+/* Whether this is the mesh's own file. It is renamed last, after the files that it names. */
 static int is_mesh(const struct mesh_output *out, const struct mesh_file *file)
 {
     return strcmp(file->path, out->path) == 0;
@@ -219,14 +219,22 @@ int mesh_work_step(struct mesh_work *work, struct sh_err *err)
     return sh_check_stop(work->report, err);
 }
 
-/* Up to 9e6 a double times 1e9 is a whole number of at most 53 bits and a part, so that it is rounded once, and rightly but
- * for ties. Beyond, double itself steps by more than a nanometre. */
+/* Up to 9e6, the product with 1e9 has a whole part of at most 53 bits: it is rounded rightly, but for ties. Beyond,
+ * double itself steps by more than a nanometre. */
 char *mesh_put_number(char *to, double v)
 {
     if (fabs(v) > 9e6) return decimal_put_general(to, v, 17);
     const uint64_t nm = (uint64_t)llrint(fabs(v) * 1e9);
     *to = '-';
     return decimal_put_short(to + (v < 0 && nm != 0), nm, 9);
+}
+
+void mesh_put_line(FILE *out, const char *key, const char *text)
+{
+    fputs(key, out);
+    for (; *text != '\0'; text++)
+        fputc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, out);
+    fputc('\n', out);
 }
 
 const char *mesh_stem(const char *path, size_t *len)

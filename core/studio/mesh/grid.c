@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Triangles of a scan's grid. First all triangles; then the mean of their edges; then the filter.
+/* Triangles of a scan's grid. First come all triangles; then the mean of their edges; then the filter.
  *
- * Each edge counts once. Diagonals belong to one cell. An edge along a column, and one across two columns, borders on two
- * cells: it is marked at one of its points by whichever cell uses it, and summed afterwards. */
+ * Each edge counts once. Diagonals belong to one cell. An edge along a column, and one across two columns, borders on
+ * two cells: each cell that uses it marks it at the same one of its points, and marks are summed afterwards. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,7 +28,7 @@ struct side {
     int is_pole;
 };
 
-/* What lies between rows of two columns, or a pole and a column: corners a, b of the first column, d, c of the next. */
+/* The cell between two rows of two columns: corners a, b of the first column, d, c of the next one. */
 struct cell {
     uint32_t a, b, c, d;
 };
@@ -45,7 +45,7 @@ static double distance2(const struct scan_grid *g, uint32_t p, uint32_t q)
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-/* Edges count also where the triangle is left out since it faces nowhere. */
+/* Its edges count even where it is left out, without area or edge-on to the head. */
 static void put_triangle(struct build *b, uint32_t p, uint32_t q, uint32_t r)
 {
     const struct scan_grid *g = b->grid;
@@ -109,7 +109,7 @@ static void put_cell(struct build *b, const struct cell *c)
     if (!has_d) put_triangle(b, c->a, c->b, c->c);
 }
 
-/* The point of a column that lies one row after p, or SCAN_MESH_NONE. */
+/* Returns the point of a column in the row after `row`, or SCAN_MESH_NONE. after: the first point beyond `row`. */
 static uint32_t next_in(const struct scan_grid *g, const struct side *s, uint32_t row, uint32_t after)
 {
     if (g->rows_per_turn >= 3 && row == g->rows_per_turn - 1)
@@ -135,7 +135,7 @@ static void put_cells(struct build *b, const struct side *left, const struct sid
     }
 }
 
-/* Triangles of a pole and each two points of the column beside it. */
+/* Adds triangles of a pole and each two neighbours in the column beside it. */
 static void put_fan(struct build *b, const struct side *pole, const struct side *ring, int mark)
 {
     for (uint32_t p = ring->first; p < ring->end; p++) {
@@ -173,7 +173,7 @@ static void sum_edges(struct build *b, const struct side *s, const struct side *
     }
 }
 
-/* The neighbour after a column; 0: there is none. */
+/* Finds the neighbour after a column. Returns 0 where there is none. */
 static int neighbour(const struct scan_grid *g, uint32_t column, uint32_t *other)
 {
     const int is_last = column + 1 == g->n_columns;

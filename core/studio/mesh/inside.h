@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the formats of this room share: a file that is being written, and the table of formats. */
+/* Private to core/studio/mesh: files that are being written, and the table of formats. */
 #ifndef CORE_STUDIO_MESH_INSIDE_H
 #define CORE_STUDIO_MESH_INSIDE_H
 
@@ -56,6 +56,9 @@ int mesh_work_step(struct mesh_work *work, struct sh_err *err);
 /* Writes a coordinate in metres as decimals to the nanometre, without zeros at its end, in DECIMAL_GENERAL_ROOM bytes
  * (core/decimal.h). Returns the end. */
 char *mesh_put_number(char *to, double v);
+
+/* Puts a line of a key, which ends with a blank, and a text. Control characters in the text become question marks. */
+void mesh_put_line(FILE *out, const char *key, const char *text);
 
 /* The path's name without folders; its length without the ending. */
 const char *mesh_stem(const char *path, size_t *len);

@@ -18,19 +18,28 @@ static const double MAX_BYTES = 4294000000.0; /* of 2^32, less than 1 MB for the
 
 enum { N_AXES = 8, N_UNITS = 2, N_META = N_AXES + N_UNITS, N_PROPERTIES = 4 };
 
+/* Assimp's objects for one part; the scene has pointers to them. */
+struct export_part {
+    struct aiNode node;
+    struct aiMesh mesh;
+    struct aiMaterial material;
+    struct aiMaterialProperty property[N_PROPERTIES], *properties[N_PROPERTIES];
+    struct aiTexture texture; /* of .glb, which holds its images */
+    unsigned index;           /* of its mesh */
+};
+
 struct export_scene {
     struct aiScene scene;
-    struct aiNode root, *node, **child;
-    struct aiMesh *mesh, **meshes;
-    struct aiMaterial *material, **materials;
+    struct aiNode root, **child;
+    struct export_part *part;
+    struct aiMesh **meshes;
+    struct aiMaterial **materials;
+    struct aiTexture **textures;
     struct aiMetadata meta;
     struct aiString meta_key[N_META];
     struct aiMetadataEntry meta_value[N_META];
     int32_t axis[N_AXES];
     double unit_cm;
-    unsigned *index; /* of meshes, from 0 */
-    struct aiMaterialProperty *property, **properties;
-    struct aiTexture *texture, **textures; /* of .glb, which holds its images */
     int is_fbx, holds_images;
 };
 
@@ -140,14 +149,14 @@ static int put_string(struct aiMaterial *to, struct aiMaterialProperty *at, cons
 }
 
 /* A PNG within the scene; materials call it by its number. 0: no memory. */
-static int add_image(struct export_scene *s, const struct picture *image, char name[16])
+static int add_image(struct export_scene *s, const struct picture *image, struct aiTexture *texture, char name[16])
 {
-    struct aiTexture *texture = &s->texture[s->scene.mNumTextures];
     char *png = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&png, &n);
     int rc = out != NULL ? picture_put_png(out, image, NULL) : SH_ENOMEM;
-    /* Numbers follow, which have to begin at multiples of 4 bytes; Assimp counts that wrongly. Readers of PNG stop before. */
+    /* Numbers follow, which have to begin at multiples of 4 bytes; Assimp counts that wrongly. Readers of PNG stop
+     * before these zeros. */
     if (rc == SH_OK) fwrite("\0\0\0", 1, (4 - n % 4) % 4, out);
     if (out != NULL && fclose(out) != 0) rc = SH_ENOMEM;
     texture->pcData = (struct aiTexel *)(void *)png;
@@ -164,13 +173,14 @@ static int add_image(struct export_scene *s, const struct picture *image, char n
     return 1;
 }
 
-static int fill_material(struct export_scene *s, const struct mesh_part *part, struct aiMaterialProperty *at,
-                         struct aiMaterial *to)
+static int fill_material(struct export_scene *s, const struct mesh_part *part, struct export_part *own)
 {
     static const float white[4] = {1, 1, 1, 1}, rough = 1;
     const int is_within = s->holds_images && part->image != NULL;
+    struct aiMaterialProperty *at = own->property;
+    struct aiMaterial *to = &own->material;
     char name[16] = "";
-    if (is_within && !add_image(s, part->image, name)) return 0;
+    if (is_within && !add_image(s, part->image, &own->texture, name)) return 0;
     return put_string(to, &at[0], "?mat.name", 0, part->name) &&
            put_property(to, &at[1], "$clr.diffuse", 0, (struct property){aiPTI_Float, white, sizeof white}) &&
            put_property(to, &at[2], "$mat.roughnessFactor", 0, (struct property){aiPTI_Float, &rough, sizeof rough}) &&
@@ -203,42 +213,28 @@ static void fill_meta(struct export_scene *s)
 
 static void free_scene(struct export_scene *s)
 {
-    for (unsigned i = 0; s->mesh != NULL && i < s->scene.mNumMeshes; i++)
-        free_mesh(&s->mesh[i]);
-    for (unsigned i = 0; s->property != NULL && i < N_PROPERTIES * s->scene.mNumMaterials; i++)
-        free(s->property[i].mData);
-    for (unsigned i = 0; s->texture != NULL && i < s->scene.mNumTextures; i++)
-        free(s->texture[i].pcData);
-    free(s->texture);
-    free(s->textures);
-    free(s->node);
+    for (unsigned i = 0; s->part != NULL && i < s->scene.mNumMeshes; i++) {
+        free_mesh(&s->part[i].mesh);
+        for (int k = 0; k < N_PROPERTIES; k++)
+            free(s->part[i].property[k].mData);
+        free(s->part[i].texture.pcData);
+    }
+    free(s->part);
     free(s->child);
-    free(s->mesh);
     free(s->meshes);
-    free(s->material);
     free(s->materials);
-    free(s->index);
-    free(s->property);
-    free(s->properties);
+    free(s->textures);
 }
 
 static int allocate(struct export_scene *s, unsigned n)
 {
-    s->texture = calloc(n, sizeof *s->texture);
-    s->textures = calloc(n, sizeof *s->textures);
-    s->node = calloc(n, sizeof *s->node);
+    s->part = calloc(n, sizeof *s->part);
     s->child = calloc(n, sizeof *s->child);
-    s->mesh = calloc(n, sizeof *s->mesh);
     s->meshes = calloc(n, sizeof *s->meshes);
-    s->material = calloc(n, sizeof *s->material);
     s->materials = calloc(n, sizeof *s->materials);
-    s->index = calloc(n, sizeof *s->index);
-    s->property = calloc(N_PROPERTIES * n, sizeof *s->property);
-    s->properties = calloc(N_PROPERTIES * n, sizeof *s->properties);
+    s->textures = calloc(n, sizeof *s->textures);
     s->scene.mNumMeshes = s->scene.mNumMaterials = s->root.mNumChildren = n;
-    return s->texture != NULL && s->textures != NULL && s->node != NULL && s->child != NULL && s->mesh != NULL &&
-           s->meshes != NULL && s->material != NULL && s->materials != NULL && s->index != NULL &&
-           s->property != NULL && s->properties != NULL;
+    return s->part != NULL && s->child != NULL && s->meshes != NULL && s->materials != NULL && s->textures != NULL;
 }
 
 static const struct aiMatrix4x4 identity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -246,28 +242,28 @@ static const struct aiMatrix4x4 identity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 
 static int fill_part(struct export_scene *s, const struct mesh *m, unsigned i, const struct mesh_part *part,
                      uint32_t first_vertex, uint32_t first_face)
 {
-    struct aiMesh *mesh = s->meshes[i] = &s->mesh[i];
-    struct aiNode *node = s->child[i] = &s->node[i];
-    struct aiMaterial *material = s->materials[i] = &s->material[i];
-    material->mProperties = s->properties + N_PROPERTIES * i;
+    struct export_part *own = &s->part[i];
+    struct aiMesh *mesh = s->meshes[i] = &own->mesh;
+    struct aiNode *node = s->child[i] = &own->node;
+    struct aiMaterial *material = s->materials[i] = &own->material;
+    material->mProperties = own->properties;
     material->mNumAllocated = N_PROPERTIES;
-    s->index[i] = i;
+    own->index = i;
     set_string(&node->mName, part->name);
     node->mTransformation = identity;
     node->mParent = &s->root;
     node->mNumMeshes = 1;
-    node->mMeshes = &s->index[i];
+    node->mMeshes = &own->index;
     set_string(&mesh->mName, part->name);
     mesh->mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
     mesh->mNumVertices = part->n_vertices;
     mesh->mNumFaces = part->n_faces;
     mesh->mMaterialIndex = i;
     return fill_vertices(s, m, part->texture != NULL, first_vertex, mesh) &&
-           fill_faces(m, first_face, first_vertex, mesh) &&
-           fill_material(s, part, s->property + N_PROPERTIES * i, material);
+           fill_faces(m, first_face, first_vertex, mesh) && fill_material(s, part, own);
 }
 
-/* Parts without a face have no place. */
+/* Parts without a face are left out. */
 static int make_scene(struct export_scene *s, const struct mesh *m, const struct mesh_part *whole)
 {
     const uint32_t n_parts = m->n_parts > 0 ? m->n_parts : 1;
@@ -313,8 +309,8 @@ static int export_scene(const struct mesh_format *format, struct mesh_output *ou
     return rc == SH_OK && e.is_raw ? assimp_copy_raw(&e, err) : rc;
 }
 
-/* FBX: the length of an array is 32 bits, and normals and colours are doubles of each corner of each face. glTF: so is the
- * length of all. */
+/* In FBX the length of an array has 32 bits, and normals and colours are doubles for each corner of each face. In glTF
+ * the length of everything together has 32 bits. */
 static int check_size(const struct mesh_format *format, const char *path, const struct mesh *m, int is_fbx,
                       struct sh_err *err)
 {
@@ -335,7 +331,7 @@ int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out,
     const char *path = out->path;
     struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0,
                              .holds_images = strcmp(format->exporter, "glb2") == 0};
-    /* not the file's name: the exporter would call the .bin of a .gltf something else then */
+    /* It does not have the file's name: then the exporter would choose another name for the .bin of a .gltf. */
     const struct mesh_part whole = {"mesh", mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
     int rc = check_size(format, path, mesh, s.is_fbx, err);
     if (rc != SH_OK) return rc;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates, as
- * fractions: many readers take that, though the format does not name it. */
+/* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates,
+ * as fractions: many readers take that, though the format does not name it. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,15 +34,6 @@ static int has_textures(const struct obj *o)
     return 0;
 }
 
-/* A name ends its line. Most readers accept blanks within it, but not all. */
-static void put_name(FILE *out, const char *key, const char *name)
-{
-    fprintf(out, "%s ", key);
-    for (; *name != '\0'; name++)
-        fputc((unsigned char)*name < 0x20 || *name == 0x7f ? '?' : *name, out);
-    fputc('\n', out);
-}
-
 static int write_materials(const struct obj *o, struct mesh_output *out, const char *path, struct sh_err *err)
 {
     struct mesh_file *file;
@@ -50,9 +41,9 @@ static int write_materials(const struct obj *o, struct mesh_output *out, const c
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n_parts(o); i++) {
         const struct mesh_part *p = part(o, i);
-        put_name(file->file, "newmtl", p->name);
+        mesh_put_line(file->file, "newmtl ", p->name);
         fputs("Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n", file->file);
-        if (p->texture != NULL) put_name(file->file, "map_Kd", p->texture);
+        if (p->texture != NULL) mesh_put_line(file->file, "map_Kd ", p->texture);
     }
     return mesh_file_finish(file, err);
 }
@@ -131,9 +122,9 @@ static int put_parts(const struct obj *o, int materials, struct sh_err *err)
     int rc = SH_OK;
     for (uint32_t i = 0; rc == SH_OK && i < n_parts(o); i++) {
         const struct mesh_part *p = part(o, i);
-        put_name(o->file->file, "o", p->name);
+        mesh_put_line(o->file->file, "o ", p->name);
         rc = put_rows(o, put_vertex, vertex, p->n_vertices, o->work, err);
-        if (materials) put_name(o->file->file, "usemtl", p->name);
+        if (materials) mesh_put_line(o->file->file, "usemtl ", p->name);
         if (rc == SH_OK && o->mesh->face != NULL) rc = put_rows(o, put_face, face, p->n_faces, o->work, err);
         if (rc == SH_OK && o->mesh->face == NULL) rc = put_rows(o, put_point, vertex, p->n_vertices, NULL, err);
         vertex += p->n_vertices;
@@ -147,9 +138,9 @@ static int write_main(struct obj *o, struct mesh_output *out, const char *materi
     int rc = mesh_output_open(out, out->path, &o->file, err);
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < o->mesh->n_comments; i++)
-        put_name(o->file->file, "#", o->mesh->comment[i]);
+        mesh_put_line(o->file->file, "# ", o->mesh->comment[i]);
     size_t len;
-    if (materials != NULL) put_name(o->file->file, "mtllib", mesh_stem(materials, &len));
+    if (materials != NULL) mesh_put_line(o->file->file, "mtllib ", mesh_stem(materials, &len));
     rc = put_parts(o, materials != NULL, err);
     if (rc == SH_OK) rc = mesh_file_check(o->file, err);
     if (rc == SH_OK && materials != NULL) rc = write_materials(o, out, materials, err);

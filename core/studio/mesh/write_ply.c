@@ -13,21 +13,12 @@ enum {
 
 static const char *const type_name[] = {"double", "float", "ushort", "uchar"};
 
-/* A line of the header: what would end it is a question mark. */
-static void put_line(FILE *out, const char *before, const char *text)
-{
-    fputs(before, out);
-    for (; *text != '\0'; text++)
-        fputc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, out);
-    fputc('\n', out);
-}
-
 static void put_header(FILE *out, const struct mesh *m)
 {
     fprintf(out, "ply\nformat %s 1.0\n", m->ascii ? "ascii" : "binary_little_endian");
     for (uint32_t i = 0; i < m->n_comments; i++)
-        put_line(out, "comment ", m->comment[i]);
-    if (m->texture != NULL) put_line(out, "comment TextureFile ", m->texture);
+        mesh_put_line(out, "comment ", m->comment[i]);
+    if (m->texture != NULL) mesh_put_line(out, "comment TextureFile ", m->texture);
     fprintf(out, "element vertex %u\nproperty double x\nproperty double y\nproperty double z\n", m->n_vertices);
     if (m->normal != NULL) fputs("property float nx\nproperty float ny\nproperty float nz\n", out);
     if (m->rgb != NULL) fputs("property uchar red\nproperty uchar green\nproperty uchar blue\n", out);
@@ -85,7 +76,7 @@ static void put_float(struct row *r, float v)
         end_text(r, decimal_put_general(begin_text(r), (double)v, 9));
 }
 
-/* size: of its type, 1, 2 or 4 bytes. */
+/* size: bytes of its type, 1, 2 or 4. */
 static void put_whole(struct row *r, uint32_t v, size_t size)
 {
     if (r->ascii)

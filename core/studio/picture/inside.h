@@ -15,7 +15,7 @@ const char *glyph_strokes(uint32_t code);
  * accent that begins with _ has the same height on a capital. */
 uint32_t glyph_base(uint32_t code, const char **accent);
 
-/* newfile_write; what: the name of the picture in messages. */
+/* Writes by newfile_write. what: the name of the picture in messages. */
 int picture_write_file(newfile_put *encode, const void *source, const char *what, const char *path, struct sh_err *err);
 
 /* A struct picture_part as a PNG. */

@@ -45,7 +45,7 @@ int picture_encode_png(const void *part, FILE *file, struct sh_err *why)
     png_infop info = NULL;
     png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, why, on_error, on_warning);
     if (png != NULL) info = png_create_info_struct(png);
-    int rc = info != NULL ? encode(part, file, png, info) : sh_fail(why, SH_EIO, "no memory");
+    int rc = info != NULL ? encode(part, file, png, info) : sh_fail(why, SH_ENOMEM, "no memory");
     png_destroy_write_struct(&png, &info);
     if (rc == SH_OK && fflush(file) != 0) rc = sh_fail(why, SH_EIO, "%s", strerror(errno));
     return rc;

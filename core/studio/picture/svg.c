@@ -12,7 +12,7 @@ struct svg {
     size_t size;
 };
 
-/* Hundredths of a pixel, as people write them. */
+/* Puts hundredths of a pixel, without zeros at the end. */
 static void put_number(FILE *out, double v)
 {
     const long hundredths = lrint(fmin(1e9, fmax(-1e9, v)) * 100), a = labs(hundredths);
@@ -45,7 +45,7 @@ static size_t character(const unsigned char *p)
     return n;
 }
 
-/* What is no character of XML becomes U+FFFD, the sign for that. */
+/* Bytes that are no character of XML become U+FFFD, the sign for that. */
 void picture_put_escaped(FILE *out, const char *text)
 {
     for (const unsigned char *p = (const unsigned char *)text; *p != '\0';) {

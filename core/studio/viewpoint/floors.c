@@ -3,9 +3,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "core/grow.h"
 #include "core/studio/viewpoint/survey.h"
 
-enum { COLUMNS = 12, MAX_LAYERS = 24, LEGS = 8, AZIMUTHS = 16, LINES = 10, LOOKS = AZIMUTHS * LINES };
+enum { COLUMNS = 12, LEGS = 8, AZIMUTHS = 16, LINES = 10, LOOKS = AZIMUTHS * LINES };
 enum { N_COLUMNS = COLUMNS * COLUMNS };
 
 static const double HEAD_M = 1.6, LEAST_ROOM_M = 1.5;
@@ -22,10 +23,11 @@ struct floor {
 
 struct floors {
     struct floor *floor;
-    uint32_t n, covered; /* columns that hold anything */
+    size_t n, room;
+    uint32_t covered; /* columns that hold anything */
 };
 
-/* All columns at a time: each ray begins just below what the last one has met. */
+/* All columns are followed at a time: each ray begins just below the surface that the last one hit. */
 struct column {
     double top_m, last_m; /* where the next ray begins; the last surface, INFINITY: none yet */
 };
@@ -34,7 +36,7 @@ static void add_drops(struct survey *s, const struct column *column)
 {
     survey_clear(s);
     for (uint32_t i = 0; i < N_COLUMNS; i++) {
-        /* A little beside the middle of its cell: a model's own planes of symmetry are no place. */
+        /* The column is a little beside the middle of its cell, to miss a model's own planes of symmetry. */
         const double x = (i % COLUMNS + 0.537) / COLUMNS, y = ((double)(i / COLUMNS) + 0.537) / COLUMNS;
         const double from[3] = {s->scene->min_m[0] + s->size_m[0] * x, s->scene->min_m[1] + s->size_m[1] * y,
                                 column[i].top_m};
@@ -42,38 +44,47 @@ static void add_drops(struct survey *s, const struct column *column)
     }
 }
 
-static void take_layer(struct survey *s, struct column *column, struct floors *floors)
+/* Returns how many rays hit a surface; negative: no memory. */
+static int take_layer(struct survey *s, struct column *column, struct floors *floors)
 {
-    const double step_m = 1e-6 * s->radius_m;
+    const double step_m = fmax(1e-6 * s->radius_m, 1e-6); /* coordinates up to 1e9 m still move by it */
+    int n_hits = 0;
     for (uint32_t i = 0; i < N_COLUMNS; i++) {
         struct column *c = &column[i];
         if (isnan(s->rays.range_m[i])) continue;
+        n_hits++;
         const double z_m = c->top_m - s->rays.range_m[i], cosine = survey_cosine(s, i);
         if (isinf(c->last_m)) floors->covered++;
-        if (fabs(cosine) >= LEVEL && c->last_m - z_m >= LEAST_ROOM_M)
+        if (fabs(cosine) >= LEVEL && c->last_m - z_m >= LEAST_ROOM_M) {
+            if (!grow(&floors->floor, &floors->room, floors->n + 1, sizeof *floors->floor)) return -1;
             floors->floor[floors->n++] = (struct floor){.at_m = {s->rays.from_x[i], s->rays.from_y[i], z_m},
                                                         .room_m = c->last_m - z_m,
                                                         .front = cosine < 0.0,
                                                         .column = i};
+        }
         c->last_m = z_m;
         c->top_m = z_m - step_m;
     }
+    return n_hits;
 }
 
-static void drop(struct survey *s, struct floors *floors)
+/* 0: no memory. */
+static int drop(struct survey *s, const struct sh_report *report, struct floors *floors)
 {
     struct column column[N_COLUMNS];
     for (int i = 0; i < N_COLUMNS; i++)
         column[i] = (struct column){s->scene->max_m[2] + 0.01 * s->radius_m, INFINITY};
-    for (int layer = 0; layer < MAX_LAYERS; layer++) {
+    for (int n_hits = 1; n_hits > 0 && !sh_stopped(report);) { /* a forest has hundreds of surfaces over its ground */
         add_drops(s, column);
         survey_cast(s);
-        take_layer(s, column, floors);
+        n_hits = take_layer(s, column, floors);
+        if (n_hits < 0) return 0;
     }
-    for (uint32_t k = 0; k < floors->n; k++) {
+    for (size_t k = 0; k < floors->n; k++) {
         struct floor *f = &floors->floor[k];
         f->depth_m = f->at_m[2] - column[f->column].last_m;
     }
+    return 1;
 }
 
 static double height_m(const struct survey *s, const struct floor *f)
@@ -82,7 +93,7 @@ static double height_m(const struct survey *s, const struct floor *f)
     return fmin(HEAD_M, 0.6 * f->room_m);
 }
 
-/* Level and wide enough for a tripod? Most of the legs meet the floor's own level. */
+/* A floor is level and wide enough for a tripod where most of the legs hit the floor's own level. */
 static int stands(const struct survey *s, uint32_t first, double height)
 {
     int n = 0;
@@ -171,11 +182,10 @@ static void try(struct survey *s, const struct floors *floors, const struct floo
 
 int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err)
 {
-    struct floors floors = {.floor = malloc(N_COLUMNS * MAX_LAYERS * sizeof *floors.floor)};
-    if (floors.floor == NULL) return sh_fail(err, SH_ENOMEM, "no memory to look for floors");
-    drop(s, &floors);
-    for (uint32_t i = 0; i < floors.n && !sh_stopped(report); i++)
+    struct floors floors = {0};
+    const int has_room = drop(s, report, &floors);
+    for (size_t i = 0; i < floors.n && has_room && !sh_stopped(report); i++)
         try(s, &floors, &floors.floor[i], best);
     free(floors.floor);
-    return sh_check_stop(report, err);
+    return has_room ? sh_check_stop(report, err) : sh_fail(err, SH_ENOMEM, "no memory to look for floors");
 }

@@ -14,8 +14,8 @@ static const double side_deg[SIDES] = {0, 45, -45, 90, -90, 135, -135, 180};
 static const double side_worth[SIDES] = {1.0, 0.95, 0.95, 0.9, 0.9, 0.85, 0.85, 0.8};
 static const double height_deg[HEIGHTS] = {8, 22, 35}, height_worth[HEIGHTS] = {1.0, 0.9, 0.8};
 
-/* The distance from the centre: the sphere around the scene fills 47 degrees. Not nearer than the head sees;
- * and where the scene is larger than its range, near enough to its side. */
+/* The distance from the centre: the sphere around the scene fills 47 degrees. It is not less than the head can see.
+ * Where the scene is larger than the head's range, the head stands near enough to the scene's side. */
 static double distance_m(const struct survey *s, const double toward[3])
 {
     const struct viewpoint_view *v = s->view;
@@ -66,7 +66,7 @@ static struct survey_sight outside_look(struct survey *s, const struct viewpoint
     return survey_look(s, 0, GRID * GRID);
 }
 
-void survey_outside(struct survey *s, struct viewpoint *out)
+int survey_outside(struct survey *s, struct viewpoint *out)
 {
     double best = -1.0;
     for (int k = 0; k < SIDES * HEIGHTS; k++) {
@@ -87,6 +87,7 @@ void survey_outside(struct survey *s, struct viewpoint *out)
         *out = at;
         out->seen = sight.seen;
     }
+    return best >= 0.0;
 }
 
 /* ---- a part of the scene */

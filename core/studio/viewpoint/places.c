@@ -7,7 +7,7 @@
 #include "core/studio/viewpoint/survey.h"
 #include "core/vec3.h"
 
-enum { MAX_LAYERS = 100, LEGS = 8, LOOKS = 2 * LEGS, TOGETHER = BVH_CHUNK / LOOKS };
+enum { LEGS = 8, LOOKS = 2 * LEGS, TOGETHER = BVH_CHUNK / LOOKS };
 
 static const double LEVEL = 0.9397; /* cosine of a floor's slope, 20 degrees */
 static const double ABOVE_M = 0.2, AROUND_M = 0.3, LEVEL_M = 0.15;
@@ -23,7 +23,7 @@ struct search {
     size_t n_floors, floor_room, n_places, place_room;
 };
 
-/* A ray goes on just below what it has met last. */
+/* A ray goes on just below the last surface that it hit. */
 struct drop {
     double x, y, top_m, last_m; /* last_m: the last surface, INFINITY: none yet */
     int done;
@@ -58,7 +58,7 @@ static int take_surface(struct search *s, struct drop *d, uint32_t ray)
 static int find_floors(struct search *s, struct drop *drop, uint32_t n)
 {
     int has_room = 1, open = 1;
-    for (int layer = 0; layer < MAX_LAYERS && open && has_room; layer++) {
+    while (open && has_room && !sh_stopped(s->report)) {
         open = 0;
         survey_clear(&s->survey);
         for (uint32_t i = 0; i < n; i++)
@@ -106,7 +106,7 @@ static int stands(const struct search *s, uint32_t first)
 
 static int choose(struct search *s)
 {
-    for (size_t first = 0; first < s->n_floors; first += TOGETHER) {
+    for (size_t first = 0; first < s->n_floors && !sh_stopped(s->report); first += TOGETHER) {
         const size_t end = s->n_floors - first < TOGETHER ? s->n_floors : first + TOGETHER;
         survey_clear(&s->survey);
         for (size_t i = first; i < end; i++)
@@ -136,7 +136,7 @@ static int places_find(struct search *s, struct sh_err *err)
         sh_progress(s->report, "looking for floors", (double)(first + n) / (double)all);
     }
     if (s->n_floors > 0) qsort(s->floor, s->n_floors, sizeof *s->floor, places_compare);
-    return choose(s) ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for places to stand");
+    return choose(s) ? sh_check_stop(s->report, err) : sh_fail(err, SH_ENOMEM, "no memory for places to stand");
 }
 
 static int check_grid(struct search *s, struct sh_err *err)

@@ -29,7 +29,7 @@ struct survey {
 /* survey_close is due in any case. */
 int survey_open(struct survey *s, const struct scene *scene, const struct viewpoint_view *view,
                 const struct sh_report *report, struct sh_err *err);
-/* The same with a BVH that is there. */
+/* The same with the caller's BVH. */
 int survey_borrow(struct survey *s, const struct bvh *bvh, const struct viewpoint_view *view, struct sh_err *err);
 void survey_close(struct survey *s);
 
@@ -42,7 +42,7 @@ void survey_clear(struct survey *s);
 /* Cosine between a ray and its triangle's normal, -1..1: negative where it meets the front. */
 double survey_cosine(const struct survey *s, uint32_t ray);
 
-/* What the rays first..first+n-1 say. */
+/* Figures of the rays first to first + n - 1. */
 struct survey_sight {
     double seen, front; /* shares: of rays with a hit in range; of these, on a front */
     double far_m;       /* geometric mean of these ranges; 0: none */
@@ -56,13 +56,13 @@ void survey_direction(double azimuth_rad, double elevation_rad, double dir[3]);
 struct survey_best {
     double inside_score, ground_score;
     struct viewpoint inside, ground;
-    int faces_out; /* a place inside was left out, since what it sees are backs */
+    int faces_out; /* a place inside was left out, since it sees backs of faces */
 };
 int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err);
 
-/* outside.c */
-void survey_outside(struct survey *s, struct viewpoint *out);
-/* The bounds become those of the part that has the most surface: a cell of a quarter of the range. */
+/* outside.c. Returns 0 where the view holds none of the scene from any place. */
+int survey_outside(struct survey *s, struct viewpoint *out);
+/* Sets the bounds to those of the part that has the most surface: a cell of a quarter of the range. */
 int survey_narrow(struct survey *s, struct sh_err *err);
 
 #endif

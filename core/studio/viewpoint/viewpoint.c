@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The order of the three kinds. */
+/* The three kinds of viewpoints are tried in their order. */
 #include "core/studio/viewpoint.h"
 
 #include <stdlib.h>
 
+#include "core/angle.h"
 #include "core/studio/viewpoint/survey.h"
 
 /* From outside, a wide and sparse scene shows next to nothing. Then the survey takes a part of it. */
@@ -11,13 +12,15 @@ static int look_from_outside(struct survey *s, struct viewpoint *out, struct sh_
 {
     const double least_seen = 0.02;
     struct viewpoint part = {0};
-    survey_outside(s, out);
+    const int is_found = survey_outside(s, out);
     if (out->seen >= least_seen) return SH_OK;
     const int rc = survey_narrow(s, err);
     if (rc != SH_OK) return rc;
-    survey_outside(s, &part);
-    if (part.seen > out->seen) *out = part;
-    return SH_OK;
+    const int is_part_found = survey_outside(s, &part);
+    if (part.seen > out->seen || (is_part_found && !is_found)) *out = part;
+    if (is_found || is_part_found) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "viewpoint: a view of %.4g to %.4g deg holds nothing of the scene from around it",
+                   angle_deg(s->view->line_min_rad), angle_deg(s->view->line_max_rad));
 }
 
 static int viewpoint_find_one(struct survey *s, const struct sh_report *report, struct viewpoint *out,
