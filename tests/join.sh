@@ -30,13 +30,13 @@ awk 'NR == FNR { own[$1] = 1; next } { for (i = 2; i <= NF; i++) if ($i in own) 
 grep -v -x -F -f "$work/apart" "$work/list" >"$work/together" || : # none
 
 # one FOLDER/NAME OBJECT...: makes an object in which main has the program's name. It is kept until one of its own
-# objects is newer. Groups of sections end here: of groups of one name in two programs the linker would take one, and
-# clang 19 makes a group of each variable.
+# objects, or this script, is newer. Groups of sections end here: of groups of one name in two programs the linker would
+# take one, and clang 19 makes a group of each variable.
 one() {
     local program=$1 name=${1##*/}
     local out=$work/${program%/*}-$name.o object
     shift
-    for object; do [ "$out" -nt "$object" ] || break; done
+    for object in "$@" tests/join.sh; do [ "$out" -nt "$object" ] || break; done
     [ -e "$out" ] && [ "$out" -nt "$object" ] && return
     "$LD" -r --force-group-allocation -o "$out.new" "$@"
     "$OBJCOPY" --redefine-sym main="$name" --keep-global-symbol="$name" "$out.new"
