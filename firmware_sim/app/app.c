@@ -112,7 +112,8 @@ void app_warn_of(const char *what)
     warned_of = what;
 }
 
-/* Whether it is new. A bound, so that endless work takes no endless memory: what is not kept is printed again. */
+/* Whether no warning had this text before. The texts that are kept have a bound, so that endless work takes no endless
+ * memory; one beyond it is printed each time. */
 static int is_new(const char *text)
 {
     enum { MOST = 256 };

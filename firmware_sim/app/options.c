@@ -167,7 +167,7 @@ void app_arguments(const struct app_command *command, char *buf, size_t len)
     if (command->options[0].kind != APP_LAST && n < len) snprintf(buf + n, len - n, " [options]");
 }
 
-/* The text from column `indent` on, where the line is now; further lines begin there, too. */
+/* Prints the text from the present column, `indent`, on; further lines begin in this column, too. */
 static void print_wrapped(const char *text, int indent)
 {
     int column = indent;

@@ -7,8 +7,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 
-/* What does not depend on the tables. bash takes words apart at '=', so KEY=VALUE comes as three. Answers of
- * _scanhead_value: words W..., keys, files, folders, or text, which nothing completes. */
+/* This part does not depend on the tables. bash takes words apart at '=', so KEY=VALUE comes as three. _scanhead_value
+ * answers: words W..., keys, files, folders, or text, which nothing completes. */
 static const char FUNCTION[] =
     "_scanhead_reply()\n"
     "{\n"

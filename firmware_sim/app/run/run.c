@@ -59,7 +59,7 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
     run_say_links(loop);
 }
 
-/* --start --duration, and a scan that was over before. */
+/* With --start and --duration: says that the scan was over earlier. */
 static void say_short_scan(const struct run_options *o, struct device *device)
 {
     const double scan_s = 1e-9 * (double)device_scan_ns(device), tick_s = 1e-9 * (double)device_tick_ns(device);
@@ -90,7 +90,7 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
         o->device.replay);
 }
 
-static const struct run_page *page; /* NULL: a page is told the stream alone */
+static const struct run_page *page; /* NULL: a page gets the stream alone */
 
 void run_take_page(const struct run_page *told)
 {
@@ -105,8 +105,8 @@ static int tells_page(const struct config *cfg)
     return is_there && page != NULL;
 }
 
-/* Opens what a page gets beside the stream. Where the web link's readers hold back the head, so does the observer,
- * which then sees all of the stream. */
+/* Opens what a page gets beside the stream. Where readers of the web link hold the head back, the observer does so,
+ * too, and then sees the whole stream. */
 static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
                       struct loop_options *loop, struct watch **watch, struct sh_err *err)
 {
@@ -136,7 +136,7 @@ static int open_settings(struct run_options *o, const struct config *cfg, struct
     return SH_OK;
 }
 
-/* Its failure is the run's, unless that has one already. */
+/* A failure of the file is that of the run, unless the run has failed already. */
 static int close_settings(struct settings_file *settings, int rc, struct sh_err *err)
 {
     struct sh_err why;

@@ -68,7 +68,7 @@ int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_ent
 
 /* ---- a shard's own */
 
-/* What follows the last newline was cut short when its writer was killed. */
+/* Text after the last newline is a line whose writer was killed; it is cut off. */
 static int cut_tail(int fd, const char *path, struct sh_err *err)
 {
     off_t end = lseek(fd, 0, SEEK_END), at = end;
@@ -125,7 +125,7 @@ static void put_entry(FILE *out, const struct batch_entry *entry)
     json_end(&json, NULL);
 }
 
-/* In one call of write, so that no reader sees a part of it but where the disk is full. */
+/* Writes the line in one call, so that no reader sees a part of it, except where the disk is full. */
 int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err)
 {
     char *line = NULL;

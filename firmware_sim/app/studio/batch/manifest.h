@@ -29,9 +29,9 @@ void batch_entry_free(struct batch_entry *entry);
 /* One line without its newline; *entry is to be freed. 0: it is none of ours, or not whole. */
 int batch_entry_read(const char *line, struct batch_entry *entry);
 
-/* Gives every entry of every manifest of the folder to `take`, file by file, in the order of their lines; of a job
- * that stands in a file twice, also the earlier one. `take` owns the entry. Lines that can't be read are warned of, but
- * for the last one of a file: its writer may have been killed, or still be there. */
+/* Gives every entry of every manifest of the folder to `take`, file by file, in the order of their lines. A job may
+ * stand in a file twice; both entries are given. `take` owns the entry. Lines that can't be read are warned of, except
+ * for an unfinished last one: its writer may have been killed, or still be there. */
 int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_entry *entry, struct sh_err *err),
                         void *ctx, const struct sh_report *report, struct sh_err *err);
 

@@ -85,7 +85,7 @@ static int note_done(struct runner *r, uint32_t job, const struct record_job *do
     return rc;
 }
 
-/* At most a line a second, and one for the first job. */
+/* Prints at most a line a second, and one for the first job. */
 static void say_progress(struct runner *r, uint32_t job, const char *name)
 {
     const int64_t now_ns = clock_now_ns();
@@ -137,7 +137,7 @@ static int make_folder(const struct batch *b, struct sh_err *err)
                    "-o %s: the folder cannot be made: %s", b->dir, strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
-/* The campaign is made of files that may lie in its folder: none of them has the name of a job's file. */
+/* Inputs of the campaign may lie in its folder: an error where one has the name of a job's file. */
 static int check_inputs(const struct batch *b, struct sh_err *err)
 {
     struct stat folder, here;

@@ -37,7 +37,7 @@ struct coverage_run {
 
 /* ---- scans */
 
-/* What moves, at the time of a run; at a stop, as at the stop's own. */
+/* Puts moving bodies where they are at that time of the scan; at a stop, at the time of the stop. */
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {
     const struct coverage_scan_at *at = ctx;
@@ -116,7 +116,7 @@ static void put_all(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* The picture and the figures are those of the stations that there are. */
+/* Mesh and figures are those of the present stations, so they are made before further ones are looked for. */
 static int show(struct coverage_run *r, struct sh_err *err)
 {
     int rc = sum_up(r, err);

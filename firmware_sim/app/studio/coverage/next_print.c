@@ -18,7 +18,7 @@ static const char *ready_line(const struct coverage_next_place *p, uint32_t numb
     return line;
 }
 
-/* How far scans are from what the rays said, at most. */
+/* The largest difference between a scan's gain and its estimate by rays. */
 static double largest_error_m2(const struct coverage_next *next)
 {
     double most_m2 = 0.0;

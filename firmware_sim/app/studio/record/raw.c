@@ -16,7 +16,7 @@ int raw_is_wanted(int argc, char **argv)
 
 /* ---- escapes */
 
-/* After the backslash: how many characters it takes; 0: it is none. */
+/* Reads an escape after its backslash. Returns how many characters it has; 0: it is no escape. */
 static size_t read_escape(const char *at, uint8_t *byte)
 {
     static const char names[] = "nrt\\\"'0", bytes[] = "\n\r\t\\\"'";

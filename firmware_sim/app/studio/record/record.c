@@ -196,7 +196,7 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
-/* The files that are written beside those of -o: one of each scan, those that a mesh names, and a .wdp. */
+/* Adds the files that are written beside those of -o: one of each scan, those that a mesh names, and a .wdp. */
 static int add_names(struct record_line *r)
 {
     static const struct {

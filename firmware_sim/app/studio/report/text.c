@@ -88,7 +88,7 @@ static void put_name(const char *name, size_t n)
     printf("%.*s%*s", (int)len, name, (int)(n - characters), "");
 }
 
-/* Its line, but for the line's end. */
+/* Prints a row without its newline. */
 static void print_row(const char *name, const struct figures *f)
 {
     put_name(name, 34);

@@ -78,8 +78,8 @@ static int has_dead(void *ctx, pid_t pid)
     return dead;
 }
 
-/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so files
- * are read without it. */
+/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so it is
+ * not held while files are read. */
 static size_t copy_addresses(struct watch *watch, uint64_t *address, size_t cap)
 {
     size_t n = 0;
