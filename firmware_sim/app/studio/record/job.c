@@ -57,6 +57,7 @@ static int close_files(struct record_job *r, int keep, struct sh_err *err)
     struct sh_err why = {0};
     const int of_each = r->each ? record_files_close(&r->parts, keep, &why) : SH_OK;
     const int rc = record_files_close(&r->files, keep, err);
+    if (rc != SH_OK && of_each != SH_OK) sh_warn(&app_report_stderr, "%s", why.text); /* each is named */
     return rc == SH_OK && of_each != SH_OK ? sh_fail(err, of_each, "%s", why.text) : rc;
 }
 

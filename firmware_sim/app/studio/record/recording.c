@@ -260,10 +260,11 @@ static int stop_scan(struct recording *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. */
+/* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. A recorder that only
+ * listens does not ask: its source may be unable to answer, and telemetry or the next scan brings the end. */
 static int look_for_end(struct recording *r, struct sh_err *err)
 {
-    if (!has_lost_frames(r)) return SH_OK;
+    if (!has_lost_frames(r) || (r->o->listen && !(r->o->replug_s > 0.0))) return SH_OK;
     int rc = command(r, "HEAD:STAT?", err);
     if (rc != SH_OK || strcmp(r->reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
@@ -294,7 +295,8 @@ static int recording_follow(struct recording *r, struct sh_err *err)
             asked_ns = clock_now_ns();
         }
         if (asked_ns != 0 && has_waited(r, asked_ns))
-            return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
+            return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan in %.0f s after SCAN:STOP",
+                           1e-9 * (double)(clock_now_ns() - asked_ns));
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
         if (r->now_ns - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;

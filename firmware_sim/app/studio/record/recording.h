@@ -14,7 +14,7 @@
 #include "firmware_sim/base/json.h"
 
 struct recording_options {
-    int listen;                           /* send nothing; take what comes until the stream or the time ends */
+    int listen; /* take the frames that come until the stream or the time ends; send nothing */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     /* Where this is a part of a recording with several heads: first and last station of the whole, for progress and for
      * naming what is missing. 0: this is all of it. */
