@@ -17,7 +17,7 @@ struct record_line {
     long sparse_seed;                       /* likewise */
     int has_rgb, limited;                   /* --colour-rgb, --colour-limits */
     int raw;                                /* 1: raw.h reads the whole line instead */
-    const char *raw_only;                   /* an option that needs --raw; NULL: none */
+    int raw_only;                           /* 1: an option that needs --raw was given */
     const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */
     int n_repairs;
 };
