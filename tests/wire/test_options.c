@@ -216,11 +216,26 @@ static void test_help(void **state)
     assert_true(n >= 7);
     assert_int_equal(usage_complaints, 0);
 }
+
+static void test_list(void **state)
+{
+    static const char *const links[] = {" pty ", " tcp", " udp", " usb ", " web ", " file", " null"};
+    struct wire *wire = *state;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){"list", NULL}, "out", "err", -1)), 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *line = strstr(out, "\nlinks:");
+    assert_non_null(line);
+    *strchr(line + 1, '\n') = '\0';
+    for (size_t i = 0; i < sizeof links / sizeof links[0]; i++)
+        if (strstr(line, links[i]) == NULL) fail_msg("no%s in %s", links[i], line);
+    free(out);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_list, wire_setup, wire_teardown),
     };
     setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
     return cmocka_run_group_tests(tests, NULL, NULL);
