@@ -95,6 +95,19 @@ int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int 
     return rc;
 }
 
+void batch_put_files(struct json *json, const struct batch_entry *entry)
+{
+    json_open_array(json, "files");
+    for (uint32_t i = 0; i < entry->n_files; i++) {
+        json_open_object(json, NULL);
+        json_string(json, "name", entry->file[i].name);
+        json_uint(json, "bytes", entry->file[i].bytes);
+        json_string(json, "sha256", entry->file[i].sha);
+        json_close_object(json);
+    }
+    json_close_array(json);
+}
+
 static void put_entry(FILE *out, const struct batch_entry *entry)
 {
     struct json json;
@@ -112,15 +125,7 @@ static void put_entry(FILE *out, const struct batch_entry *entry)
     json_uint(&json, "points", entry->points);
     json_string(&json, "stream_sha256", entry->stream_sha);
     json_double(&json, "seconds", entry->seconds);
-    json_open_array(&json, "files");
-    for (uint32_t i = 0; i < entry->n_files; i++) {
-        json_open_object(&json, NULL);
-        json_string(&json, "name", entry->file[i].name);
-        json_uint(&json, "bytes", entry->file[i].bytes);
-        json_string(&json, "sha256", entry->file[i].sha);
-        json_close_object(&json);
-    }
-    json_close_array(&json);
+    batch_put_files(&json, entry);
     json_close_object(&json);
     json_end(&json, NULL);
 }

@@ -9,6 +9,8 @@
 #include "firmware_sim/app/studio/batch/provenance.h"
 #include "firmware_sim/app/studio/batch/sweep.h"
 
+struct json;
+
 struct batch_file {
     char name[BATCH_NAME_LEN + 32]; /* in the campaign's folder */
     uint64_t bytes;
@@ -38,5 +40,8 @@ int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_ent
 /* A shard's manifest, open to append; an unfinished last line is cut off. SH_ESTATE: another process has it. */
 int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int *fd, struct sh_err *err);
 int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err);
+
+/* Writes the entry's files as a member of the open object. */
+void batch_put_files(struct json *json, const struct batch_entry *entry);
 
 #endif

@@ -175,7 +175,7 @@ static int plan_config(struct config *cfg, void *ctx, struct sh_err *err)
     struct batch *b = p->b;
     struct batch_provenance *made = &b->made[p->combination];
     uint32_t n_stations = 0;
-    app_warn_settings_file(cfg, "jobs of a batch have the settings of the configuration");
+    if (p->combination == 0) app_warn_settings_file(cfg, "jobs of a batch have the settings of the configuration");
     int rc = record_job_check(p->job, cfg, err);
     if (rc == SH_OK && !config_is_alone(cfg)) rc = check_other_heads(b, p->job, cfg, err);
     if (rc == SH_OK) rc = check_epoch(cfg, err);

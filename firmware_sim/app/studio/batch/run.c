@@ -63,8 +63,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_j
     for (int i = 0; i < files->n && rc == SH_OK; i++) {
         const char *path = files->file[i].path;
         rc = add_file(&l, path);
-        if (rc == SH_OK && (app_ends_in(path, ".obj") || app_ends_in(path, ".gltf")))
-            rc = app_sidecars(path, add_sidecar, &l, err);
+        if (rc == SH_OK && files->file[i].ops->is_mesh) rc = app_sidecars(path, add_sidecar, &l, err);
     }
     if (rc == SH_OK && done->surfaces != NULL) rc = add_file(&l, done->surfaces);
     return rc;
