@@ -24,6 +24,7 @@ void report_name_surface(const struct scene_surface *surface, char name[REPORT_S
 {
     const char *apart = surface->material[0] != 0 ? " | " : "";
     snprintf(name, REPORT_SURFACE_LEN, "%s%s%s", surface->object, apart, surface->material);
+    sh_keep_line(name); /* a mesh may have any bytes */
 }
 
 void report_put_worst(FILE *out, const struct report *r)
