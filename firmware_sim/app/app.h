@@ -44,6 +44,9 @@ int app_fail_config(const struct config_faults *faults);
  * configuration is a line. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
+/* The same for links in YAML, of --link, which have no configuration; NULL: as app_with_config. */
+int app_with_links(const struct app_input *in, const char *links,
+                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
 void app_warn_settings_file(const struct config *cfg, const char *why);
@@ -100,8 +103,8 @@ int app_open_new(const char *path, FILE **out, struct sh_err *err);
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 
-/* --ready-fd: writes one JSON value, by `put`, as a line to descriptor fd, and closes fd. 0: the option was not
- * given, and nothing is done. */
+/* --ready-fd: writes one JSON value, by `put`, as a line to descriptor fd, and closes fd; standard output and standard
+ * error stay open. 0: the option was not given, and nothing is done. */
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err);
 
 #endif

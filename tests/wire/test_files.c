@@ -76,6 +76,22 @@ static void test_links(void **state)
     expect_unharmed(wire, "stream.shs");
 }
 
+/* The line of --ready-fd may go to standard output, and the rest of the output goes there, too. */
+static void test_ready_on_output(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    begin(wire, config);
+    const char *const args[] = {"run",        config, "--duration", "0.01",    "--pace", "fast",
+                                "--ready-fd", "1",    "--quiet",    "--stats", "-",      NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL), *line_end = strchr(text, '\n');
+    assert_int_equal(text[0], '{');
+    assert_non_null(line_end);
+    assert_non_null(strstr(line_end, "\"stream_sha256\": "));
+    free(text);
+}
+
 /* A map replaces only a regular file. */
 static void test_map_on_a_fifo(void **state)
 {
@@ -115,6 +131,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_links, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_ready_on_output, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_map_on_a_fifo, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_full_output, wire_setup, wire_teardown),
     };
