@@ -286,14 +286,15 @@ static int check_dash(const struct app_command *command, const char *word)
 
 /* ---- operands */
 
-/* Files that are no configuration, by their ending, and what takes them: scanhead VERB FILE REST. */
+/* Files that are no configuration, by their ending, and what takes them: scanhead VERB FILE REST. NULL: no command. */
 static const struct {
     const char *endings, *what, *verb, *rest;
 } others[] = {
     {".shs.pcapng", "a recorded stream", "record", " -o points.ply writes its points"},
     {".obj.stl.gltf.glb.fbx.dae.ifc.tif.tiff", "a mesh", "init", " writes a configuration that scans it"},
     {".ply", "a mesh or a point cloud", "init", " writes a configuration that scans a mesh"},
-    {".las.laz.e57.ptx", "a recording", "report CONFIG", " compares points with the scene"},
+    {".las", "a recording", "report CONFIG", " compares points with the scene"},
+    {".laz.e57.ptx", "a recording for other programs", NULL, NULL},
 };
 
 static int check_ending(const struct app_command *command, const char *label, const char *file)
@@ -308,10 +309,11 @@ static int check_ending(const struct app_command *command, const char *label, co
         const char *at = strstr(others[i].endings, ending);
         const char after = at != NULL ? at[strlen(ending)] : 'x';
         if (after != '.' && after != '\0') continue;
-        return app_usage(command, "%s is %s, and %s is %s: scanhead %s %s%s", file, others[i].what,
-                         is_source ? label : "CONFIG",
-                         is_source ? "a head, a recorded stream or a configuration" : "a configuration, a YAML file",
-                         others[i].verb, file, others[i].rest);
+        const char *wanted = is_source ? "SOURCE is a head, a recorded stream or a configuration"
+                                       : "CONFIG is a configuration, a YAML file";
+        if (others[i].verb == NULL) return app_usage(command, "%s is %s, and %s", file, others[i].what, wanted);
+        return app_usage(command, "%s is %s, and %s: scanhead %s %s%s", file, others[i].what, wanted, others[i].verb,
+                         file, others[i].rest);
     }
     return APP_OK;
 }

@@ -27,6 +27,7 @@ static const struct {
     {{"record", "DIR/room.ifc", "-o", "DIR/x.ply"}, {"room.ifc is a mesh, and SOURCE is a head", "scanhead init "}},
     {{"report", "DIR/x.ply", "CONFIG"}, {"x.ply is a mesh or a point cloud, and CONFIG is a configuration"}},
     {{"check", "DIR/x.las"}, {"x.las is a recording", "scanhead report CONFIG "}},
+    {{"check", "DIR/x.e57"}, {"x.e57 is a recording for other programs, and CONFIG is ", "a YAML file; see"}},
     {{"run", "CONFIG", "-start"}, {"-start: did you mean --start?"}},
     {{"run", "CONFIG", "-stats=x"}, {"-stats=x: did you mean --stats?"}},
     {{"run", "CONFIG", "--strat"}, {"unknown option --strat, did you mean --start?"}},
