@@ -2,6 +2,7 @@
 #include "firmware_sim/app/options.h"
 
 #include <ctype.h>
+#include <fcntl.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdarg.h>
@@ -62,7 +63,7 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
 static int parse_number(const struct app_command *command, const struct app_option *row, const char *text, double *out)
 {
     char *end;
-    const int whole = row->kind == APP_WHOLE;
+    const int whole = row->kind != APP_NUMBER;
     *out = strtod(text, &end);
     if (end != text && *end == '\0' && !isspace((unsigned char)text[0]) && *out >= row->min && *out <= row->max &&
         (!whole || *out == floor(*out)))
@@ -118,6 +119,15 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
     rows[n] = (struct app_option)OPTION_END;
 }
 
+/* The number of no open descriptor would be that of a file which is opened later. */
+static int check_output(const struct app_command *command, const struct app_option *row, int fd)
+{
+    const int flags = fcntl(fd, F_GETFL);
+    if (flags >= 0 && (flags & O_ACCMODE) != O_RDONLY) return APP_OK;
+    return app_usage(command, "--%s %d: not open for writing; allowed is a descriptor that is, as with %d>FILE",
+                     row->name, fd, fd);
+}
+
 static int apply(const struct app_command *command, const struct app_option *row, const char *text,
                  struct app_input *in, void *values)
 {
@@ -138,7 +148,9 @@ static int apply(const struct app_command *command, const struct app_option *row
     case APP_NUMBER:
         return parse_number(command, row, text, at);
     case APP_WHOLE:
+    case APP_OUTPUT:
         if (parse_number(command, row, text, &number) != APP_OK) return APP_USAGE;
+        if (row->kind == APP_OUTPUT && check_output(command, row, (int)number) != APP_OK) return APP_USAGE;
         *(long *)at = (long)number;
         return APP_OK;
     case APP_KEY_GIVEN:

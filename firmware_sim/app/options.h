@@ -24,6 +24,7 @@ enum app_option_kind {
     APP_TEXT,      /* sets a const char * */
     APP_NUMBER,    /* sets a double, from min to max */
     APP_WHOLE,     /* sets a long, from min to max */
+    APP_OUTPUT,    /* the same, of a descriptor that the program was started with and can write to */
     APP_KEY,       /* stands for a configuration key */
     APP_KEY_GIVEN, /* the same, and sets an int to 1 */
     APP_SET,       /* any configuration key */

@@ -60,7 +60,7 @@ static const struct {
     {{"run", "CONFIG", "--duration", ""}, {"--duration"}},
     {{"run", "CONFIG", "--frames", "many"}, {"head.frames", "0 to 1000000"}},
     {{"run", "CONFIG", "--ready-fd", "zero"}, {"--ready-fd zero", "1 to 65535"}},
-    {{"run", "CONFIG", "--quiet", "--ready-fd", "77"}, {"--ready-fd 77"}},
+    {{"run", "CONFIG", "--journal", "DIR/journal", "--ready-fd", "77"}, {"--ready-fd 77: not open for writing"}},
     {{"run", "CONFIG", "--set", "head.prr_hz"}, {"--set", "head.prr_hz"}},
     {{"run", "CONFIG", "--set", "head.prr_hz=fast"}, {"--set head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
     {{"run", "CONFIG", "--set", "head.colour=red"}, {"--set", "head.colour"}},

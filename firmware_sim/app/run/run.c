@@ -244,7 +244,7 @@ static const struct app_option OPTIONS[] = {
      .help = "write the surfaces as CSV: label, object, material, IFC type and GlobalId, colour; - is standard output"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay), .file = APP_READS,
      .help = "carry out the commands of a journal at their times, and end when its run ended"},
-    {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
+    {APP_OUTPUT, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
     {APP_NUMBER, "speed", "F", .min = 0.001, .max = 1000, .at = AT(replay.speed),
      .help = "replay a recording F times as fast, in the pace realtime (default 1)"},
