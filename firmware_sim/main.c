@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The command line of both programs: scanhead, and with HEAD_ALONE scanheadd, which is the head alone, for a board. */
 #include <errno.h>
+#include <fcntl.h>
 #include <malloc.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -87,9 +88,21 @@ static int check_stack(void)
     return APP_USAGE;
 }
 
+/* A closed standard stream gets a descriptor that can be neither read nor written. Otherwise the next file would have
+ * its number, and messages would be written into it. */
+static void hold_streams(void)
+{
+    int fd;
+    do
+        fd = open("/", O_PATH);
+    while (fd >= 0 && fd <= STDERR_FILENO);
+    if (fd >= 0) close(fd);
+}
+
 /* A command's output may still be in the buffer. A full disk or a closed pipe shows only here. */
 int main(int argc, char **argv)
 {
+    hold_streams();
     /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
     mallopt(M_MMAP_THRESHOLD, 4 << 20);
 #ifdef HEAD_ALONE

@@ -52,7 +52,9 @@ name() {
     "$head" help --man scanheadd-run.1 | grep -q '^\\fBscanheadd run\\fR' || return
     "$head" run --help | grep -q '^usage: scanheadd run ' || return
     said=$("$head" check "$work/none.yaml" 2>&1)
-    [[ $said == "scanheadd: "* ]]
+    [[ $said == "scanheadd: "* ]] || return
+    "$head" help --completion bash >"$work/completion" || return
+    grep -q '^complete -F _scanheadd scanheadd$' "$work/completion" && ! grep '_scanhead\>\|_scanhead_' "$work/completion"
 }
 
 # With a page, too: it is served without the studio's resources on the scan.

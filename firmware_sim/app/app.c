@@ -76,8 +76,8 @@ int app_fail_config(const struct config_faults *faults)
     return status;
 }
 
-int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
-                    void *ctx)
+int app_with_links(const struct app_input *in, const char *links,
+                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx)
 {
     struct sh_err err = {0};
     struct config_faults faults;
@@ -86,15 +86,22 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
         sh_fail(&err, SH_ENOMEM, "no memory");
         return app_fail(&err);
     }
-    if (config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults) != SH_OK ||
-        (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &faults) != SH_OK)) {
+    int rc = links != NULL ? config_load_links(links, "--link", in->sets.set, in->sets.n, cfg, &faults)
+                           : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults);
+    if (rc != SH_OK || (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &faults) != SH_OK)) {
         free(cfg);
         return app_fail_config(&faults);
     }
-    int rc = app_check_files(in, cfg, &err);
+    rc = app_check_files(in, cfg, &err);
     if (rc == SH_OK) rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
+}
+
+int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
+                    void *ctx)
+{
+    return app_with_links(in, NULL, work, ctx);
 }
 
 void app_warn_settings_file(const struct config *cfg, const char *why)
@@ -105,6 +112,7 @@ void app_warn_settings_file(const struct config *cfg, const char *why)
         sh_warn(&app_report_stderr, "head.settings_file %s: is not used: %s", path, why);
 }
 
+static pthread_mutex_t messages_lock = PTHREAD_MUTEX_INITIALIZER;
 static const char *warned_of; /* NULL: the work is one */
 
 void app_warn_of(const char *what)
@@ -112,19 +120,23 @@ void app_warn_of(const char *what)
     warned_of = what;
 }
 
-/* Whether it is new. A bound, so that endless work takes no endless memory: what is not kept is printed again. */
+/* Whether no warning had this text before. The texts that are kept have a bound, so that endless work takes no endless
+ * memory; one beyond it is printed each time. Threads of a head warn, too. */
 static int is_new(const char *text)
 {
     enum { MOST = 256 };
     static char *known[MOST];
     static int n;
-    for (int i = 0; i < n; i++)
-        if (strcmp(known[i], text) == 0) return 0;
-    if (n < MOST && (known[n] = strdup(text)) != NULL) n++;
-    return 1;
+    int i = 0;
+    pthread_mutex_lock(&messages_lock);
+    while (i < n && strcmp(known[i], text) != 0)
+        i++;
+    const int is_known = i < n;
+    if (!is_known && n < MOST && (known[n] = strdup(text)) != NULL) n++;
+    pthread_mutex_unlock(&messages_lock);
+    return !is_known;
 }
 
-static pthread_mutex_t messages_lock = PTHREAD_MUTEX_INITIALIZER;
 static struct line_writer *messages; /* NULL: messages are printed at once */
 
 static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
@@ -280,6 +292,7 @@ int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), cons
     put(&json, ctx);
     int failed = json_end(&json, NULL) != SH_OK;
     failed |= fclose(out) != 0;
-    close((int)fd);
+    /* The number of a closed stream would be that of the next file or session, and messages would go there. */
+    if (fd > STDERR_FILENO) close((int)fd);
     return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
 }

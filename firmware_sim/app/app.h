@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the commands of the command line share: exit status, messages, loading, signals, files of figures.
+/* The commands of the command line share this: exit status, messages, loading, signals, files of figures.
  *
  * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is one line
  * on standard error; each error of a configuration is a line of its own. */
@@ -40,10 +40,13 @@ int app_fail(const struct sh_err *err);
 int app_fail_config(const struct config_faults *faults);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
- * change it; it is freed afterwards. Returns the exit status, with the reason of a failure printed: of a
- * configuration all faults, a line each. */
+ * change it; it is freed afterwards. Returns the exit status. The reason of a failure is printed: each error of a
+ * configuration is a line. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
+/* The same for links in YAML, of --link, which have no configuration; NULL: as app_with_config. */
+int app_with_links(const struct app_input *in, const char *links,
+                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
 void app_warn_settings_file(const struct config *cfg, const char *why);
@@ -71,8 +74,8 @@ extern const struct sh_report app_report_seconds;
 /* Warnings alone. */
 extern const struct sh_report app_report_quiet;
 
-/* Warnings from now on name a part of the work, which must live on, and each is printed once, whichever part it is of.
- * NULL: as it is at first. */
+/* From now on warnings begin with `what`, the name of a part of the work, which must live on. A warning that several
+ * parts give is printed once. NULL, as at first: warnings have no name, and each is printed. */
 void app_warn_of(const char *what);
 
 /* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second
@@ -84,10 +87,10 @@ void app_catch_signals(void);
 /* Prints a warning for each kind of echoes that the head left out of the stream. */
 void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples);
 
-/* Whether a path ends in that, with something before it; case doesn't count. */
+/* Whether a path has that ending, and something before it; case doesn't count. */
 int app_ends_in(const char *path, const char *ending);
 
-/* Whether its ending is that of a recorded stream: .shs or .pcapng. */
+/* Whether a path has the ending of a recorded stream: .shs or .pcapng. */
 int app_is_recording(const char *path);
 
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
@@ -100,8 +103,8 @@ int app_open_new(const char *path, FILE **out, struct sh_err *err);
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 
-/* --ready-fd: one JSON value in a line, written by `put`, to descriptor fd, which is closed then. fd 0: nothing to
- * do. */
+/* --ready-fd: writes one JSON value, by `put`, as a line to descriptor fd, and closes fd; standard output and standard
+ * error stay open. 0: the option was not given, and nothing is done. */
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err);
 
 #endif

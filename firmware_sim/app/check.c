@@ -172,7 +172,7 @@ struct check_run {
     unsigned n_warnings;
 };
 
-/* Warnings as they are, counted. */
+/* Hands warnings on, and counts them. */
 static void check_warn(void *ctx, const char *text)
 {
     struct check_run *run = ctx;

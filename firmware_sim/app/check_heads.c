@@ -13,7 +13,7 @@ static void print_stations(const struct config *cfg, FILE *out)
     fputs(": ", out);
 }
 
-/* With the stations that it scans from where it is not the only one. */
+/* Where there are several scanners, the line begins with the stations that this one scans from. */
 static void print_head(const struct config *cfg, FILE *out)
 {
     const struct head_settings *s = &cfg->head.settings;

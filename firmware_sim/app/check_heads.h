@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead check` says about heads: of one configuration the scanner of head.station, then those of other
- * stations. Out: lines, with rates in Hz and ranges in metres. */
+/* `scanhead check` prints this about heads. In: the sites of a configuration. Out: lines about the scanner of
+ * head.station, then about those of other stations, with rates in Hz and ranges in metres. */
 #ifndef FIRMWARE_SIM_APP_CHECK_HEADS_H
 #define FIRMWARE_SIM_APP_CHECK_HEADS_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead check` says about places. In: a loaded site. Out: lines with the anchor, and with each
+/* `scanhead check` prints this about places. In: a loaded site. Out: lines with the anchor, and with each
  * station or stop in every frame that is known: metres and degrees. */
 #ifndef FIRMWARE_SIM_APP_CHECK_PLACES_H
 #define FIRMWARE_SIM_APP_CHECK_PLACES_H

@@ -38,7 +38,8 @@ static const char *name_of(const struct part *p, uint32_t object)
     return p->scene->surface[p->objects.object[object].surface].object;
 }
 
-/* The surfaces of one name are few, but need not follow each other. *left counts those from i on: NULL once it is 0. */
+/* The surfaces of an object need not follow each other. *left: how many of them come from *i on. Returns NULL once it
+ * is 0. */
 static const struct scene_surface *next_surface(const struct part *p, uint32_t object, uint32_t *i, uint32_t *left)
 {
     if (*left == 0) return NULL;
@@ -130,7 +131,7 @@ static void print_sum(const struct part *p, FILE *out)
             n[SCENE_OBJECT_TURNED], n[SCENE_OBJECT_EMPTY]);
 }
 
-/* Those that are not closed, a line each, in the order of their areas. */
+/* A line for each object of that state, in the order of their areas. */
 static void print_state(const struct part *p, enum scene_object_state state, FILE *out)
 {
     uint32_t n = 0;

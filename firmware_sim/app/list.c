@@ -40,7 +40,7 @@ static int list_run(int argc, char **argv)
     int status = app_parse(&app_list, argc, argv, &in, NULL);
     if (status != APP_GO_ON) return status;
     if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
-    puts("links: pty (virtual serial port), tcp, udp, usb (usbip, usbredir, functionfs), file, null");
+    puts("links: pty (virtual serial port), tcp, udp, usb (usbip, usbredir, functionfs), web (page), file, null");
     printf("protocols:");
     for (int id = 0; id < PROTOCOL_N; id++)
         printf("%s %s", id > 0 ? "," : "", protocol_ops_get((enum protocol_id)id)->name);

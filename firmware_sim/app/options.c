@@ -2,6 +2,7 @@
 #include "firmware_sim/app/options.h"
 
 #include <ctype.h>
+#include <fcntl.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdarg.h>
@@ -62,7 +63,7 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
 static int parse_number(const struct app_command *command, const struct app_option *row, const char *text, double *out)
 {
     char *end;
-    const int whole = row->kind == APP_WHOLE;
+    const int whole = row->kind != APP_NUMBER;
     *out = strtod(text, &end);
     if (end != text && *end == '\0' && !isspace((unsigned char)text[0]) && *out >= row->min && *out <= row->max &&
         (!whole || *out == floor(*out)))
@@ -118,6 +119,15 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
     rows[n] = (struct app_option)OPTION_END;
 }
 
+/* The number of no open descriptor would be that of a file which is opened later. */
+static int check_output(const struct app_command *command, const struct app_option *row, int fd)
+{
+    const int flags = fcntl(fd, F_GETFL);
+    if (flags >= 0 && (flags & O_ACCMODE) != O_RDONLY) return APP_OK;
+    return app_usage(command, "--%s %d: not open for writing; allowed is a descriptor that is, as with %d>FILE",
+                     row->name, fd, fd);
+}
+
 static int apply(const struct app_command *command, const struct app_option *row, const char *text,
                  struct app_input *in, void *values)
 {
@@ -138,7 +148,9 @@ static int apply(const struct app_command *command, const struct app_option *row
     case APP_NUMBER:
         return parse_number(command, row, text, at);
     case APP_WHOLE:
+    case APP_OUTPUT:
         if (parse_number(command, row, text, &number) != APP_OK) return APP_USAGE;
+        if (row->kind == APP_OUTPUT && check_output(command, row, (int)number) != APP_OK) return APP_USAGE;
         *(long *)at = (long)number;
         return APP_OK;
     case APP_KEY_GIVEN:
@@ -167,7 +179,7 @@ void app_arguments(const struct app_command *command, char *buf, size_t len)
     if (command->options[0].kind != APP_LAST && n < len) snprintf(buf + n, len - n, " [options]");
 }
 
-/* The text from column `indent` on, where the line is now; further lines begin there, too. */
+/* Prints the text from the present column, `indent`, on; further lines begin in this column, too. */
 static void print_wrapped(const char *text, int indent)
 {
     int column = indent;
@@ -286,14 +298,15 @@ static int check_dash(const struct app_command *command, const char *word)
 
 /* ---- operands */
 
-/* Files that are no configuration, by their ending, and what takes them: scanhead VERB FILE REST. */
+/* Files that are no configuration, by their ending, and what takes them: scanhead VERB FILE REST. NULL: no command. */
 static const struct {
     const char *endings, *what, *verb, *rest;
 } others[] = {
     {".shs.pcapng", "a recorded stream", "record", " -o points.ply writes its points"},
     {".obj.stl.gltf.glb.fbx.dae.ifc.tif.tiff", "a mesh", "init", " writes a configuration that scans it"},
     {".ply", "a mesh or a point cloud", "init", " writes a configuration that scans a mesh"},
-    {".las.laz.e57.ptx", "a recording", "report CONFIG", " compares points with the scene"},
+    {".las", "a recording", "report CONFIG", " compares points with the scene"},
+    {".laz.e57.ptx", "a recording for other programs", NULL, NULL},
 };
 
 static int check_ending(const struct app_command *command, const char *label, const char *file)
@@ -308,10 +321,11 @@ static int check_ending(const struct app_command *command, const char *label, co
         const char *at = strstr(others[i].endings, ending);
         const char after = at != NULL ? at[strlen(ending)] : 'x';
         if (after != '.' && after != '\0') continue;
-        return app_usage(command, "%s is %s, and %s is %s: scanhead %s %s%s", file, others[i].what,
-                         is_source ? label : "CONFIG",
-                         is_source ? "a head, a recorded stream or a configuration" : "a configuration, a YAML file",
-                         others[i].verb, file, others[i].rest);
+        const char *wanted = is_source ? "SOURCE is a head, a recorded stream or a configuration"
+                                       : "CONFIG is a configuration, a YAML file";
+        if (others[i].verb == NULL) return app_usage(command, "%s is %s, and %s", file, others[i].what, wanted);
+        return app_usage(command, "%s is %s, and %s: scanhead %s %s%s", file, others[i].what, wanted, others[i].verb,
+                         file, others[i].rest);
     }
     return APP_OK;
 }

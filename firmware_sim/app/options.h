@@ -24,6 +24,7 @@ enum app_option_kind {
     APP_TEXT,      /* sets a const char * */
     APP_NUMBER,    /* sets a double, from min to max */
     APP_WHOLE,     /* sets a long, from min to max */
+    APP_OUTPUT,    /* the same, of a descriptor that the program was started with and can write to */
     APP_KEY,       /* stands for a configuration key */
     APP_KEY_GIVEN, /* the same, and sets an int to 1 */
     APP_SET,       /* any configuration key */
@@ -33,7 +34,7 @@ enum app_option_kind {
     APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
-/* How the command uses the file that an option or an operand names. A pipe, a device and - are never taken for a file. */
+/* How the command uses the file that an option or an operand names. Pipes, devices and - count as no file. */
 enum app_use { APP_NO_FILE, APP_READS, APP_WRITES };
 
 /* A row begins with kind, name and argument; the rest goes by name. */
@@ -101,12 +102,12 @@ struct app_file {
     enum app_use use;
     /* Files that are written, as the command knows them: */
     size_t n_ending; /* bytes of the path's ending, as in .ply */
-    /* Another file beside that, with this ending in place of its own; NULL: that file. */
+    /* It is a sidecar of `path`, with this ending in place of its own; NULL: it is `path` itself. */
     const char *ending;
-    int each; /* and STEM-N.ENDING for N from 1 on */
+    int each; /* 1: files STEM-N.ENDING are written, too, for N from 1 on */
 };
 
-/* What a command line says, but for the command's own options. */
+/* All that a command line says, except for the command's own options. */
 struct app_input {
     const char *operand[APP_MAX_OPERANDS];
     int n_options; /* that were given, --help aside */
@@ -132,11 +133,12 @@ void app_set_help(void (*print)(const struct app_command *command));
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
 int app_add_set(struct app_sets *sets, const char *set);
 
-/* Adds to `rows`, which ends with OPTION_END and has room for APP_MAX_OPTIONS + 1, those options of another command that
- * `names` has (ends with NULL), as APP_PASS to the struct app_words at `at`. A table that has such rows stays as it is. */
+/* Adds rows of another command's table to `rows`: those in `names`, which ends with NULL. They become APP_PASS, with
+ * the struct app_words at `at`. `rows` ends with OPTION_END, and has room for APP_MAX_OPTIONS + 1. A table that has
+ * such rows already stays as it is. */
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
 
-/* n numbers with `between` between them, and nothing else. */
+/* Reads n finite numbers with `between` between them, and nothing else. 0: the text is not that. */
 int app_read_numbers(const char *text, char between, double *out, int n);
 
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */

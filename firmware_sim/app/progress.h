@@ -8,7 +8,7 @@
 
 #include "drivers/host/scanhead.h"
 
-/* The pace of one piece of work after the other; zeroed at first. */
+/* The pace of the work at hand; pieces of work follow each other. Zeroed at first. */
 struct progress_pace {
     char what[64];
     int64_t since_ns;
@@ -19,7 +19,7 @@ struct progress_pace {
  * where it is not known: the first report, an unknown fraction, or nothing done since. */
 double progress_left_s(struct progress_pace *pace, const char *what, double fraction, int64_t now_ns);
 
-/* How long a scan lasts by its descriptor, from the first pulse on; 0: without end, or the frame is none. */
+/* How long a scan lasts by its descriptor, from the first pulse on; 0: it has no end, or the frame is no descriptor. */
 double progress_scan_s(const struct scanhead_frame *descriptor);
 
 #endif

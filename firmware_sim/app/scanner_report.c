@@ -47,7 +47,7 @@ static int was_said(const struct site *first, const char *text)
     return 0;
 }
 
-/* Where all scanners say it, the first one has said it for them. */
+/* Where all scanners give the warning, that of the first one, which was printed, stands for all. */
 static void scanner_report_say(const struct scanner_warnings *w, uint32_t i, int is_said, const struct sh_report *to)
 {
     char stations[4 * CONFIG_MAX_STATIONS + 1] = "";

@@ -14,7 +14,7 @@ struct scanner_warnings {
         char *text;
         uint8_t is_of[CONFIG_MAX_STATIONS]; /* by the scanner's first station, from 0 */
     } one[SITE_MAX_SAID];
-    int are_said; /* from now on, only what is new is said, at once */
+    int are_said; /* from now on only a new warning is printed, at once */
 };
 
 /* A report that notes warnings, and hands on all else. It must not move. */
@@ -26,7 +26,7 @@ struct scanner_report {
 };
 void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station,
                            struct scanner_warnings *warnings);
-/* Says what was noted. first: the site of the first scanner, whose warnings were said at once. */
+/* Prints the warnings that were noted. first: the site of the first scanner, whose warnings were printed at once. */
 void scanner_warnings_say(struct scanner_warnings *warnings, const struct site *first, const struct sh_report *to);
 void scanner_warnings_free(struct scanner_warnings *warnings);
 

@@ -27,7 +27,8 @@ struct search {
     struct sh_err *err;
 };
 
-/* The ending at a dot; 0: none of those. A mesh has a dot in each number: most of them end at the first test. */
+/* The length of the ending that begins at a dot; 0: it is none of these. A mesh has a dot in each number, so the first
+ * test sorts out most of them. */
 static size_t ending_at(const char *p, const char *end)
 {
     static const char *const endings[] = {".mtl", ".bin", ".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp"};
@@ -39,7 +40,7 @@ static size_t ending_at(const char *p, const char *end)
     return 0;
 }
 
-/* Backslashes become slashes, %20 a blank. */
+/* Backslashes become slashes, and %XX the byte with these digits. */
 static void decode(const char *name, char *out)
 {
     for (; *name != '\0'; name++, out++) {
@@ -64,7 +65,7 @@ static int is_file(const struct search *s, const char *name, char path[PATH_MAX]
     return is_file_in(s->here, name, path) || is_file_in(s->folder, name, path);
 }
 
-/* As it stands; then as readers find it: by its last part, which is how files of other machines are found, in any case. */
+/* Tries the name as it stands, then as readers find files of other machines: by its last part, whatever its case. */
 static int sidecars_find(const struct search *s, const char *name, char path[PATH_MAX])
 {
     char decoded[NAME_MAX_LEN + 1];
@@ -99,7 +100,7 @@ static int found(struct search *s, const char *name, const char *path, int depth
     return rc;
 }
 
-/* The text up to `end` that began at or after `first`: all of it may be the name, or what follows a blank. */
+/* The name ends at `end`. It begins at `first`, or after one of the blanks between them. */
 static int try_names(struct search *s, const char *first, const char *end, int depth)
 {
     char name[NAME_MAX_LEN + 1], path[PATH_MAX];

@@ -4,14 +4,14 @@
  *
  * It doesn't parse the formats. A name is any text that has one of these endings and leads to a file, as it stands or
  * by its last part. It is looked for in the folder of the file that names it, and in the mesh's. So it may find more
- * files than a reader opens. It misses a name only where that is escaped in another way than by %20. */
+ * files than a reader opens. It misses names of more than 255 bytes, and escapes other than %XX. */
 #ifndef FIRMWARE_SIM_APP_SIDECARS_H
 #define FIRMWARE_SIM_APP_SIDECARS_H
 
 #include "core/err.h"
 
-/* `take` gets the name as it stands, and the path; what it returns, if not SH_OK, ends the search. .stl names no
- * files. */
+/* `take` gets the name as it stands, and the path. A result other than SH_OK ends the search, and is returned. A .stl
+ * names no files. */
 int app_sidecars(const char *mesh, int (*take)(void *ctx, const char *name, const char *path), void *ctx,
                  struct sh_err *err);
 

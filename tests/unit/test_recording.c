@@ -2,6 +2,7 @@
 /* Taking a scan: a scripted head, over TCP, loses frames to the recorder and is unplugged. Some scans count as
  * broken. */
 #include <arpa/inet.h>
+#include <poll.h>
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,14 +22,15 @@
 /* The head's actions, one after the other. */
 enum deed {
     END,
-    PULSES,   /* some of a scan */
-    LOSES,    /* frames do not reach the recorder, the scan's end among them */
-    TELLS,    /* that it is idle, and what the scan had */
-    ENDS,     /* the scan, with the same counts */
-    IDLE,     /* is asked its state, and says so */
-    SCANNING, /* likewise */
-    FAR,      /* a scan begins, and a time goes back by all that 64 bits hold */
-    UNPLUGGED /* and plugged in again */
+    PULSES,    /* some of a scan */
+    LOSES,     /* frames do not reach the recorder, the scan's end among them */
+    TELLS,     /* that it is idle, and what the scan had */
+    ENDS,      /* the scan, with the same counts */
+    IDLE,      /* is asked its state, and says so */
+    SCANNING,  /* likewise */
+    FAR,       /* a scan begins, and a time goes back by all that 64 bits hold */
+    UNPLUGGED, /* and plugged in again */
+    UNASKED    /* for longer than a recorder waits for pulses */
 };
 
 struct head {
@@ -119,6 +121,8 @@ static void *play(void *arg)
         if (*deed == TELLS) send_telemetry(HEAD_IDLE);
         if (*deed == ENDS) send_end();
         if (*deed == FAR) send_far();
+        if (*deed == UNASKED && poll(&(struct pollfd){.fd = head.fd, .events = POLLIN}, 1, 3000) != 0)
+            head.wrong = "was asked something";
         if (*deed == UNPLUGGED) {
             close(head.fd);
             head.fd = accept(head.listener, NULL, NULL);
@@ -154,7 +158,7 @@ static void keep_fraction(void *ctx, const char *what, double fraction)
     last_fraction = fraction;
 }
 
-static void record(const enum deed *script, struct recording_result *result)
+static void record_with(const enum deed *script, double replug_s, struct recording_result *result)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t len = sizeof at;
@@ -171,7 +175,7 @@ static void record(const enum deed *script, struct recording_result *result)
     const struct sh_report report = {.progress = keep_fraction};
     const struct recording_options options = {.listen = 1,
                                               .frames = -1,
-                                              .replug_s = 20,
+                                              .replug_s = replug_s,
                                               .progress = 1,
                                               .source_bytes = 1000000,
                                               .report = &report,
@@ -187,6 +191,11 @@ static void record(const enum deed *script, struct recording_result *result)
     close(head.listener);
     if (head.wrong != NULL) fail_msg("the head: %s", head.wrong);
     if (rc != SH_OK) fail_msg("%s", err.text);
+}
+
+static void record(const enum deed *script, struct recording_result *result)
+{
+    record_with(script, 20, result);
 }
 
 static void test_unplugged_within_a_scan(void **state)
@@ -211,6 +220,16 @@ static void test_unplugged_after_a_lost_end(void **state)
     assert_int_equal(result.broken_scans, 0);
     /* In the two seconds of silence came reports: for a source of a million bytes, of two frames. */
     assert_true(last_fraction > 0 && last_fraction < 0.01);
+}
+
+/* A source that is only listened to may be a pipe. */
+static void test_nothing_is_asked_of_a_source(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {PULSES, LOSES, UNASKED, END};
+    struct recording_result result;
+    record_with(script, 0, &result);
+    assert_int_equal(result.counts.pulses, 1);
 }
 
 static void check_counts(const struct recording_counts *counts, uint64_t pulses)
@@ -304,6 +323,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_unplugged_within_a_scan),
         cmocka_unit_test(test_unplugged_after_a_lost_end),
+        cmocka_unit_test(test_nothing_is_asked_of_a_source),
         cmocka_unit_test(test_telemetry_after_a_lost_end),
         cmocka_unit_test(test_joined_within_a_scan),
         cmocka_unit_test(test_an_end_after_telemetry),

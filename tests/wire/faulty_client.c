@@ -161,7 +161,8 @@ static int client_connect(struct client *c)
 
 int faulty_client(int argc, char **argv)
 {
-    if (argc != 6) return 2;
+    int pair[2]; /* as loops of events have, to wake themselves: no old connection */
+    if (argc != 6 || socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0) return 2;
     struct client *c = calloc(1, sizeof *c);
     if (c == NULL) return 1;
     c->faults = argv[5];
@@ -184,6 +185,8 @@ int faulty_client(int argc, char **argv)
         close(c->fd);
     }
     const int status = fclose(c->out) == 0 ? 0 : 1;
+    close(pair[0]);
+    close(pair[1]);
     free(c);
     return status;
 }

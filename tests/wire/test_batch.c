@@ -70,20 +70,37 @@ static void test_failing(void **state)
 
 /* All files that are written with a mesh are the job's: for two frames, two images. Without one of them the job isn't
  * whole. */
-static void test_images(void **state)
+static void expect_images(struct wire *wire, const char *format)
 {
-    struct wire *wire = *state;
     char config[352], dir[352];
-    const char *job[] = {"batch",    config,  "-o",       dir,   "--stations", "2",  "--frames", "2",
-                         "--colour", "range", "--format", "obj", "--quiet",    NULL, NULL};
+    const char *job[] = {"batch",    config,  "-o",       dir,    "--stations", "2",  "--frames", "2",
+                         "--colour", "range", "--format", format, "--quiet",    NULL, NULL};
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
-    snprintf(dir, sizeof dir, "%s", wire_path(wire, "images"));
+    snprintf(dir, sizeof dir, "%s", wire_path(wire, format));
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
-    assert_int_equal(unlink(batch_in(wire, "images", "0001_station-2.2.png")), 0);
+    assert_int_equal(unlink(batch_in(wire, format, "0001_station-2.2.png")), 0);
     job[sizeof job / sizeof job[0] - 2] = "--merge";
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 1);
     char *err = wire_read(wire_path(wire, "err"), NULL);
     assert_non_null(strstr(err, "0001_station-2.2.png: is missing"));
+    free(err);
+}
+
+static void test_images(void **state)
+{
+    expect_images(*state, "obj");
+    expect_images(*state, "fbx");
+}
+
+/* A campaign says once what is true of each combination. */
+static void test_one_warning(void **state)
+{
+    struct wire *wire = *state;
+    char set[352];
+    snprintf(set, sizeof set, "head.settings_file=%s", wire_write_text(wire, "kept.json", "{}"));
+    batch_expect(wire, "none", WITH("--list", "--set", set), 0, "kept.json");
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_null(strstr(strstr(err, "kept.json: is not used") + 1, "kept.json: is not used"));
     free(err);
 }
 
@@ -188,6 +205,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_shared, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_failing, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_images, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_one_warning, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_scenario, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_slurm, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_parallel, batch_setup_with_ref, batch_teardown),

@@ -53,8 +53,8 @@ static int record(const char *source, const char *const *words, const char *cons
 {
     static char path[8][352];
     char from[352];
-    const char *args[MOST_ARGS] = {"record", from, "--quiet", "--ascii"};
-    int n = 4, k = 0;
+    const char *args[MOST_ARGS] = {"record", from, "--quiet"};
+    int n = 3, k = 0, ascii = 0;
     snprintf(from, sizeof from, "%s", wire_path(wire, source));
     for (int i = 0; words != NULL && words[i] != NULL; i++)
         args[n++] = words[i];
@@ -62,8 +62,9 @@ static int record(const char *source, const char *const *words, const char *cons
         snprintf(path[k], sizeof path[k], "%s", wire_path(wire, files[i]));
         args[n++] = strcmp(files[i] + strlen(files[i]) - 5, ".json") == 0 ? "--stats" : "-o";
         args[n++] = path[k++];
+        ascii |= strcmp(files[i] + strlen(files[i]) - 4, ".ply") == 0;
     }
-    args[n] = NULL;
+    args[n] = ascii ? "--ascii" : NULL;
     return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
 }
 

@@ -85,6 +85,23 @@ static void test_figures(void **state)
     free(shown);
 }
 
+/* A name from a mesh may have any bytes; none of them reaches a terminal as a command. */
+static void test_names_are_text(void **state)
+{
+    struct wire *wire = *state;
+    const char *config = set_up(wire);
+    char room[sizeof L_ROOM + 8], *at;
+    snprintf(room, sizeof room, "%s", L_ROOM);
+    at = strstr(room, "walls");
+    memcpy(at, "\033[2Jw", 5);
+    wire_write_text(wire, "room.obj", room);
+    const char *const args[] = {"coverage", config, "--by", "label", NULL};
+    char *shown = run(wire, args, 0);
+    assert_null(strchr(shown, '\033'));
+    assert_non_null(strstr(shown, "[2Jw | paint"));
+    free(shown);
+}
+
 /* ---- the mesh of cells, binary little-endian as its header says */
 
 enum { VERTEX = 3 * 8 + 3 + 2 + 3 * 4 + 8, FACE = 1 + 3 * 4 };
@@ -225,6 +242,10 @@ static void test_refused(void **state)
         {{"--grid", "0"}, {"--grid 0", "0.001 to"}},
         {{"--grid", "1", "--candidates", csv}, {"one of them"}},
         {{"--at", "0,0,1,1"}, {"--at: allowed only with --grid"}},
+        {{"--height", "3"}, {"--height: allowed only with --grid"}},
+        {{"--height", "3", "--candidates", csv}, {"--height: allowed only with --grid"}},
+        {{"--step-deg", "2"}, {"--step-deg: allowed only with --grid"}},
+        {{"--scans", "2"}, {"--scans: allowed only with --grid"}},
         {{"--grid", "1", "--at", "0,0,1"}, {"--at 0,0,1:", "X0,Y0,X1,Y1"}},
         {{"--grid", "1", "--at", "1,0,0,1"}, {"--at 1,0,0,1:", "the lower number"}},
         {{"--grid", "1", "--height", "3", "--at", "0,0,6,5,-1,1"}, {"no place to stand", "3.2 m of room"}},
@@ -278,6 +299,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_figures, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_names_are_text, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_mesh, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next_planar, wire_setup, wire_teardown),

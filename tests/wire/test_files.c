@@ -76,6 +76,50 @@ static void test_links(void **state)
     expect_unharmed(wire, "stream.shs");
 }
 
+/* Where all three standard streams are closed, no file of the run gets the number of one, and messages with it. */
+static void test_closed_streams(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const script[] = {"exec \"$0\" \"$@\"", "exec \"$0\" \"$@\" <&- >&- 2>&-"};
+    char config[352], journal[352], *stream[2], *lines[2];
+    size_t size[2];
+    struct room_config file = SCAN;
+    file.links = "links: [{type: file, path: stream.shs}]\n";
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &file));
+    snprintf(journal, sizeof journal, "%s", wire_path(wire, "journal"));
+    for (int i = 0; i < 2; i++) {
+        const char *const args[] = {"-c",       script[i], wire_program(), "run",   config, "--start", "--pace", "fast",
+                                    "--frames", "1",       "--journal",    journal, NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn_program(wire, "/bin/sh", args, "out", "err", -1)), 0);
+        stream[i] = wire_read(wire_path(wire, "stream.shs"), &size[i]);
+        lines[i] = wire_read(journal, NULL);
+    }
+    assert_string_equal(lines[0], lines[1]);
+    assert_int_equal(size[0], size[1]);
+    assert_memory_equal(stream[0], stream[1], size[0]);
+    for (int i = 0; i < 2; i++) {
+        free(stream[i]);
+        free(lines[i]);
+    }
+}
+
+/* The line of --ready-fd may go to standard output, and the rest of the output goes there, too. */
+static void test_ready_on_output(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    begin(wire, config);
+    const char *const args[] = {"run",        config, "--duration", "0.01",    "--pace", "fast",
+                                "--ready-fd", "1",    "--quiet",    "--stats", "-",      NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL), *line_end = strchr(text, '\n');
+    assert_int_equal(text[0], '{');
+    assert_non_null(line_end);
+    assert_non_null(strstr(line_end, "\"stream_sha256\": "));
+    free(text);
+}
+
 /* A map replaces only a regular file. */
 static void test_map_on_a_fifo(void **state)
 {
@@ -115,6 +159,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_links, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_closed_streams, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_ready_on_output, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_map_on_a_fifo, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_full_output, wire_setup, wire_teardown),
     };

@@ -27,6 +27,7 @@ static const struct {
     {{"record", "DIR/room.ifc", "-o", "DIR/x.ply"}, {"room.ifc is a mesh, and SOURCE is a head", "scanhead init "}},
     {{"report", "DIR/x.ply", "CONFIG"}, {"x.ply is a mesh or a point cloud, and CONFIG is a configuration"}},
     {{"check", "DIR/x.las"}, {"x.las is a recording", "scanhead report CONFIG "}},
+    {{"check", "DIR/x.e57"}, {"x.e57 is a recording for other programs, and CONFIG is ", "a YAML file; see"}},
     {{"run", "CONFIG", "-start"}, {"-start: did you mean --start?"}},
     {{"run", "CONFIG", "-stats=x"}, {"-stats=x: did you mean --stats?"}},
     {{"run", "CONFIG", "--strat"}, {"unknown option --strat, did you mean --start?"}},
@@ -59,7 +60,7 @@ static const struct {
     {{"run", "CONFIG", "--duration", ""}, {"--duration"}},
     {{"run", "CONFIG", "--frames", "many"}, {"head.frames", "0 to 1000000"}},
     {{"run", "CONFIG", "--ready-fd", "zero"}, {"--ready-fd zero", "1 to 65535"}},
-    {{"run", "CONFIG", "--quiet", "--ready-fd", "77"}, {"--ready-fd 77"}},
+    {{"run", "CONFIG", "--journal", "DIR/journal", "--ready-fd", "77"}, {"--ready-fd 77: not open for writing"}},
     {{"run", "CONFIG", "--set", "head.prr_hz"}, {"--set", "head.prr_hz"}},
     {{"run", "CONFIG", "--set", "head.prr_hz=fast"}, {"--set head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
     {{"run", "CONFIG", "--set", "head.colour=red"}, {"--set", "head.colour"}},
@@ -93,6 +94,13 @@ static const struct {
     {{"record", "CONFIG", "-o", "DIR/x.e57", "--ply-columns", "xyz"}, {"--ply-columns: no .ply"}},
     {{"record", "CONFIG", "-o", "DIR/x.e57", "--ply-names", "cloudcompare"}, {"--ply-names: no .ply"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--las-version", "1.2"}, {"--las-version: no .las"}},
+    {{"record", "CONFIG", "-o", "DIR/x.las", "--ascii"}, {"--ascii: no .ply is among the files"}},
+    {{"record", "CONFIG", "-o", "DIR/x.las", "--empty-shots"}, {"--empty-shots: no .ply and no .e57"}},
+    {{"record", "DIR/scan.shs", "-o", "DIR/x.ply", "--station", "2"}, {"--station: ", "has the scans that it has"}},
+    {{"record", "DIR/scan.pcapng", "-o", "DIR/x.ply", "--frames", "2"}, {"--frames: ", "has the scans that it has"}},
+    {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--listen", "--frames", "2"},
+     {"--frames: --listen sends no command"}},
+    {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--send=a", "--send=b"}, {"--send", "allowed with --raw"}},
     {{"record", "CONFIG", "-o", "DIR/x.shs", "--colour", "label"}, {"--colour: no .ply, .las, .ptx, .e57, .obj"}},
     {{"map", "CONFIG"}, {"-o"}},
     {{"batch", "CONFIG"}, {"-o DIR is needed"}},
@@ -209,11 +217,26 @@ static void test_help(void **state)
     assert_true(n >= 7);
     assert_int_equal(usage_complaints, 0);
 }
+
+static void test_list(void **state)
+{
+    static const char *const links[] = {" pty ", " tcp", " udp", " usb ", " web ", " file", " null"};
+    struct wire *wire = *state;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){"list", NULL}, "out", "err", -1)), 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *line = strstr(out, "\nlinks:");
+    assert_non_null(line);
+    *strchr(line + 1, '\n') = '\0';
+    for (size_t i = 0; i < sizeof links / sizeof links[0]; i++)
+        if (strstr(line, links[i]) == NULL) fail_msg("no%s in %s", links[i], line);
+    free(out);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_list, wire_setup, wire_teardown),
     };
     setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -7,8 +7,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 
-/* What does not depend on the tables. bash takes words apart at '=', so KEY=VALUE comes as three. Answers of
- * _scanhead_value: words W..., keys, files, folders, or text, which nothing completes. */
+/* This part does not depend on the tables. bash takes words apart at '=', so KEY=VALUE comes as three. _scanhead_value
+ * answers: words W..., keys, files, folders, or text, which nothing completes. */
 static const char FUNCTION[] =
     "_scanhead_reply()\n"
     "{\n"
@@ -57,7 +57,16 @@ static const char FUNCTION[] =
     "        _scanhead_reply files \"$current\"\n"
     "    fi\n"
     "}\n"
-    "complete -F _scanhead scanhead\n";
+    "complete -F _scanhead ";
+
+/* Each program has functions of its own, so that a shell may have the completions of both. */
+static void put_script(const char *text)
+{
+    static const char name[] = "_scanhead";
+    for (const char *at; (at = strstr(text, name)) != NULL; text = at + sizeof name - 1)
+        printf("%.*s_%s", (int)(at - text), text, app_program);
+    fputs(text, stdout);
+}
 
 /* "stations[].name" as it is typed: stations[0].name. */
 static void put_path(const char *path)
@@ -83,10 +92,10 @@ static const char *const *words_of_key(const char *path)
 static void put_keys(void)
 {
     static struct config_key_text key;
-    fputs("_scanhead_keys='", stdout);
+    put_script("_scanhead_keys='");
     for (size_t i = 0; config_describe_key(CONFIG_KEYS, i, &key); i++)
         if (key.has_value) put_path(key.path), putchar(' ');
-    puts("'\n\n_scanhead_key()\n{\n    local key=$1");
+    put_script("'\n\n_scanhead_key()\n{\n    local key=$1\n");
     puts("    [[ $key =~ (\\[[0-9]+\\]|\\.[0-9]+) ]] && key=${key/\"${BASH_REMATCH[1]}\"/'[0]'}");
     puts("    case $key in");
     for (size_t i = 0; config_describe_key(CONFIG_KEYS, i, &key); i++) {
@@ -170,7 +179,7 @@ static void put_options(const struct app_command *command)
 static void put_each(const struct app_command *const *commands, const char *head,
                      void (*put)(const struct app_command *command))
 {
-    puts(head);
+    put_script(head);
     for (; *commands != NULL; commands++)
         help_of(*commands, NULL, put);
     help_of(&help_command, NULL, put);
@@ -179,13 +188,14 @@ static void put_each(const struct app_command *const *commands, const char *head
 
 void completion_print(const struct app_command *const *commands)
 {
-    puts("# bash completion for scanhead, made by: scanhead help --completion bash");
-    fputs("_scanhead_commands='", stdout);
+    printf("# bash completion for %s, made by: %s help --completion bash\n", app_program, app_program);
+    put_script("_scanhead_commands='");
     for (size_t i = 0; commands[i] != NULL; i++)
         printf("%s ", commands[i]->name);
     printf("%s'\n", help_command.name);
     put_keys();
-    put_each(commands, "_scanhead_options()\n{\n    case $1 in", put_options);
-    put_each(commands, "_scanhead_value()\n{\n    case \"$1 $2\" in", put_values);
-    fputs(FUNCTION, stdout);
+    put_each(commands, "_scanhead_options()\n{\n    case $1 in\n", put_options);
+    put_each(commands, "_scanhead_value()\n{\n    case \"$1 $2\" in\n", put_values);
+    put_script(FUNCTION);
+    puts(app_program);
 }

@@ -22,11 +22,12 @@ int help_run(const struct app_command *const *commands, int argc, char **argv);
 extern const char help_title[], help_status[]; /* what the program is; what its exit status says */
 extern const struct app_command help_command;
 
-/* Calls the command with --help and has its table given to `print`. words: "record", or "record --raw". */
+/* Calls the command with --help, and has its table given to `print`. second: an option before --help, as in
+ * `record --raw --help`; NULL: none. */
 void help_of(const struct app_command *command, const char *second, void (*print)(const struct app_command *command));
 
-/* man.c. name: "scanhead-run.1", with the name of the program; NULL: prints the names of all pages. APP_OK, or APP_USAGE
- * with the reason printed. */
+/* man.c. name: that of a page, such as "scanhead-run.1"; NULL: prints the names of all pages. APP_OK, or APP_USAGE with
+ * the reason printed. */
 int man_print(const struct app_command *const *commands, const char *name);
 
 /* completion.c */

@@ -171,7 +171,7 @@ static void list_pages(const struct app_command *const *commands)
     puts(KEYS);
 }
 
-/* Whether it is the page that is wanted; its command's help then goes through put_command. */
+/* Whether a page is the one that is wanted. It notes the page's name, which put_command prints. */
 static int is_page(const char *page, const char *wanted)
 {
     const size_t n = strlen(page);

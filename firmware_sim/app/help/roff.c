@@ -42,7 +42,7 @@ void roff_text(const char *text)
     putchar('\n');
 }
 
-/* Line by line, each with its end. */
+/* Length of the first line, with its '\n'. */
 static size_t line_len(const char *text)
 {
     const size_t n = strcspn(text, "\n");

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead run FILE.pcap: serves a capture of a device's traffic. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/config/load.h"
 #include "firmware_sim/replay/capture.h"
 
 struct capture_run {
@@ -211,28 +209,17 @@ static int check_options(struct run_options *o)
 }
 
 /* The links of --link, or one for each port. */
-static int with_links(struct capture_run *run, struct sh_err *err)
+static int with_links(struct capture_run *run)
 {
     struct run_options *o = run->o;
     char links[sizeof o->links + 1024], text[sizeof links + 16];
-    struct config_faults faults;
-    struct config *cfg = calloc(1, sizeof *cfg);
-    if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory"), app_fail(err);
     links[0] = '\0';
     if (o->links[0] != '\0')
         given_links(o->links, links, sizeof links);
     else
         default_links(run, links, sizeof links);
     snprintf(text, sizeof text, "links:%s%s", links[0] != '\0' ? "\n" : " []", links);
-    if (config_load_links(text, "--link", o->in.sets.set, o->in.sets.n, cfg, &faults) != SH_OK ||
-        (o->in.scenario != NULL && config_add_scenario(cfg, o->in.scenario, &faults) != SH_OK)) {
-        free(cfg);
-        return app_fail_config(&faults);
-    }
-    int rc = app_check_files(&o->in, cfg, err);
-    if (rc == SH_OK) rc = serve(cfg, run, err);
-    free(cfg);
-    return rc == SH_OK ? APP_OK : app_fail(err);
+    return app_with_links(&o->in, text, serve, run);
 }
 
 int run_capture(struct run_options *o)
@@ -242,7 +229,7 @@ int run_capture(struct run_options *o)
     int status = check_options(o);
     if (status != APP_GO_ON) return status;
     if (capture_load(o->in.operand[0], &app_report_stderr, &run.capture, &err) != SH_OK) return app_fail(&err);
-    status = with_links(&run, &err);
+    status = with_links(&run);
     capture_free(run.capture);
     return status;
 }

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that runs tells a page more than its stream: this is the place for it. `run` only opens, starts and closes
- * it. The main of scanhead fills the place (firmware_sim/app/studio/watch); that of scanheadd leaves it empty, and
- * its page shows the stream alone.
+/* A head that runs gives a page more than its stream, by these functions. `run` only opens, starts and closes the
+ * watch. The main of scanhead has one (firmware_sim/app/studio/watch); that of scanheadd has none, and its page shows
+ * the stream alone.
  *
  *     open(cfg, site, &options, &watch, err)            before the loop is made
- *     loop_options.extra = link(watch), loop_options.web = source(watch); loop_create(...)
- *     start(watch, err); loop_start(...)
+ *     loop_options.extra = link(watch), loop_options.web = source(watch)
+ *     start(watch, err)
+ *     loop_create(...); loop_start(...)
  *     ...
- *     loop_free(...); close(watch)                      before device and site go */
+ *     loop_free(...); close(watch)                      before device and site are freed */
 #ifndef FIRMWARE_SIM_APP_RUN_PAGE_H
 #define FIRMWARE_SIM_APP_RUN_PAGE_H
 
@@ -19,7 +20,7 @@
 struct watch;
 
 struct watch_options {
-    double cpu_share;         /* of one processor, that looking at points may take; 0: no limit, and no low priority */
+    double cpu_share;         /* of a processor, for looking at points; 0: no limit, and no low priority */
     int waits;                /* 1: the observer holds back the paces fast and step, and so sees everything */
     struct device *device;    /* whose scans they are; is to be closed after the watch */
     uint32_t scene_triangles; /* of /scene, at most, without what moves */

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead run FILE.shs: serves a recording. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/config/load.h"
 
 static const char DEFAULT_LINKS[] = "links:\n- {type: pty}\n- {type: tcp}\n";
 
@@ -131,24 +129,15 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
 int run_replay(struct run_options *o)
 {
     char text[sizeof o->links + 16];
-    struct sh_err err = {0};
-    struct config_faults faults;
+    const char *option = o->unknown != NULL ? "--unknown" : o->device_port != 0 ? "--device-port" : NULL;
+    if (option != NULL)
+        return app_usage(&app_run, "%s is for a capture of packets, but %s is a recording of a head; not allowed here",
+                         option, o->in.operand[0]);
     if (o->config != NULL) {
         struct app_input in = o->in;
         in.operand[0] = o->config;
         return app_with_config(&in, replay, o);
     }
-    struct config *cfg = calloc(1, sizeof *cfg);
-    if (cfg == NULL) return sh_fail(&err, SH_ENOMEM, "no memory"), app_fail(&err);
     snprintf(text, sizeof text, "links:\n%s", o->links);
-    const char *links = o->links[0] != '\0' ? text : DEFAULT_LINKS;
-    if (config_load_links(links, "--link", o->in.sets.set, o->in.sets.n, cfg, &faults) != SH_OK ||
-        (o->in.scenario != NULL && config_add_scenario(cfg, o->in.scenario, &faults) != SH_OK)) {
-        free(cfg);
-        return app_fail_config(&faults);
-    }
-    int rc = app_check_files(&o->in, cfg, &err);
-    if (rc == SH_OK) rc = replay(cfg, o, &err);
-    free(cfg);
-    return rc == SH_OK ? APP_OK : app_fail(&err);
+    return app_with_links(&o->in, o->links[0] != '\0' ? text : DEFAULT_LINKS, replay, o);
 }

@@ -59,7 +59,7 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
     run_say_links(loop);
 }
 
-/* --start --duration, and a scan that was over before. */
+/* With --start and --duration: says that the scan was over earlier. */
 static void say_short_scan(const struct run_options *o, struct device *device)
 {
     const double scan_s = 1e-9 * (double)device_scan_ns(device), tick_s = 1e-9 * (double)device_tick_ns(device);
@@ -90,7 +90,7 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
         o->device.replay);
 }
 
-static const struct run_page *page; /* NULL: a page is told the stream alone */
+static const struct run_page *page; /* NULL: a page gets the stream alone */
 
 void run_take_page(const struct run_page *told)
 {
@@ -105,8 +105,8 @@ static int tells_page(const struct config *cfg)
     return is_there && page != NULL;
 }
 
-/* Opens what a page gets beside the stream. Where the web link's readers hold back the head, so does the observer,
- * which then sees all of the stream. */
+/* Opens what a page gets beside the stream. Where readers of the web link hold the head back, the observer does so,
+ * too, and then sees the whole stream. */
 static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
                       struct loop_options *loop, struct watch **watch, struct sh_err *err)
 {
@@ -136,7 +136,7 @@ static int open_settings(struct run_options *o, const struct config *cfg, struct
     return SH_OK;
 }
 
-/* Its failure is the run's, unless that has one already. */
+/* A failure of the file is that of the run, unless the run has failed already. */
 static int close_settings(struct settings_file *settings, int rc, struct sh_err *err)
 {
     struct sh_err why;
@@ -244,7 +244,7 @@ static const struct app_option OPTIONS[] = {
      .help = "write the surfaces as CSV: label, object, material, IFC type and GlobalId, colour; - is standard output"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay), .file = APP_READS,
      .help = "carry out the commands of a journal at their times, and end when its run ended"},
-    {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
+    {APP_OUTPUT, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
     {APP_NUMBER, "speed", "F", .min = 0.001, .max = 1000, .at = AT(replay.speed),
      .help = "replay a recording F times as fast, in the pace realtime (default 1)"},

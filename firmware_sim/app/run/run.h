@@ -32,7 +32,7 @@ void run_warn_losses(const struct device_counters *c);
 /* replay.c */
 /* --link: adds one to the options. */
 int run_take_link(void *values, const char *text);
-/* Options that a recording has not, or that nothing else has: APP_GO_ON, or APP_USAGE with the reason printed. */
+/* Refuses options that don't go with a recording, or only with one: APP_GO_ON, or APP_USAGE with the reason printed. */
 int run_check_options(const struct run_options *o, int is_recording);
 /* Serves a recording. Returns the exit status. */
 int run_replay(struct run_options *o);

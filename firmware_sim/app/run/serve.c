@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What `run` does with a head and with a recording alike: serving until the end, statistics. */
+/* `run` does this with a head and with a recording alike: it serves until the end, and writes statistics. */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -46,7 +46,7 @@ static int say_view(const struct loop *loop, struct sh_err *err)
     return fflush(stdout) == 0 ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
 }
 
-/* Tells the service manager that the links are open: services that depend on this head wait for that. */
+/* Reports to the service manager that the links are open: services that depend on this head wait for that. */
 static int notify_ready(const struct loop *loop, struct sh_err *err)
 {
     enum { ROOM = 64 + (CONFIG_MAX_LINKS + 1) * (int)sizeof(struct link_place) }; /* one link is the observer's */
@@ -98,7 +98,7 @@ static void put_pulses(struct json *json, const struct device_counters *c)
     json_uint(json, "lost_ticks", c->lost_ticks);
 }
 
-/* Percentiles, and a member for each octave that is not empty: below so many ns, so many of them. */
+/* Writes percentiles, and a histogram: a member for each octave that is not empty, named by its upper bound in ns. */
 static void put_lateness(struct json *json, const char *name, const struct lateness *lateness)
 {
     static const struct {
@@ -173,7 +173,7 @@ static void warn_lines(const char *file, uint64_t n)
                 (unsigned long long)n);
 }
 
-/* The journal and the truth. What is missing in them is said once: with the reason, or in a warning. */
+/* Closes the journal and the truth. Lines that are missing in them are reported once: as the error, or as a warning. */
 static int close_files(struct loop *loop, struct loop_stats *stats, struct sh_err *err)
 {
     const int rc = loop_close_files(loop, stats, err);

@@ -8,7 +8,8 @@
 #include "drivers/link/web.h"
 #include "firmware_sim/base/json.h"
 
-/* One line of what put writes. SH_ENOMEM, and what JSON can't hold; then out has nothing. */
+/* out: one line of JSON, which `put` writes. SH_ENOMEM, or the error of a value that JSON can't hold; then out has
+ * nothing. */
 int page_json(void (*put)(struct json *json, const void *ctx), const void *ctx, struct web_body *out,
               struct sh_err *err);
 

@@ -11,7 +11,7 @@ struct page_word {
     const char *name; /* NULL ends a list of words */
     double min, max;
     int whole;
-    double value; /* at first the default, which no limit holds for; NaN: the value is needed */
+    double value; /* at first the default, which may be beyond the limits; NaN: the query must give the value */
 };
 
 int page_read_query(struct page_word *words, const char *query, struct sh_err *err);

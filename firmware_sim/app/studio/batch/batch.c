@@ -22,7 +22,7 @@ static int fail_format(const struct batch *b)
                      RECORD_MAX_FILES);
 }
 
-/* Which endings there are, record says (batch_plan). */
+/* Whether an ending is known is checked later, by `record` (batch_plan). */
 static int read_format(struct batch *b)
 {
     b->endings = strdup(b->format);
@@ -36,7 +36,7 @@ static int read_format(struct batch *b)
     return APP_OK;
 }
 
-/* An option that sets a key would do so in every job, whatever its name says. */
+/* An option that sets a key would set it in every job, and the names of jobs would be wrong. */
 static int check_option(const struct batch *b, const char *key)
 {
     static const char *const by[][2] = {{"head.frames", "--frames"},
@@ -79,7 +79,7 @@ static int check_together(const struct batch *b)
     return APP_OK;
 }
 
-/* The files of jobs are checked with each of them. */
+/* Only the manifest is checked here. The files of a job are checked when it begins. */
 static int check_manifest(const struct batch *b, struct sh_err *err)
 {
     char path[PATH_MAX];

@@ -13,9 +13,9 @@
 
 struct batch_job {
     uint32_t combination, station; /* from 0; from 1 */
-    int is_done;                   /* `entry` says of it what is to be expected of its files */
+    int is_done;                   /* 1: `entry` has the files that it must have */
     struct batch_entry entry;
-    const char *other; /* there is an entry that was made otherwise, in these words; NULL: none */
+    const char *other; /* an entry of it was made with these differences, in words; NULL: none */
 };
 
 struct batch {
@@ -72,8 +72,8 @@ void batch_line_free(struct batch_line *line);
 
 /* ---- done.c */
 
-/* Finds out which jobs are done, by the manifests in the folder: job->is_done, entry, other. any_engine: whatever machine
- * they were made on. SH_ESTATE: something there was made otherwise, and force isn't given. */
+/* Finds out which jobs are done, by the manifests in the folder: job->is_done, entry, other. any_engine: jobs of other
+ * kinds of machines count, too. SH_ESTATE: a job there has another provenance, and --force isn't given. */
 int batch_find_done(struct batch *b, int any_engine, struct sh_err *err);
 /* Whether a done job's files are as its entry says; else why not. SH_ESTOPPED after a signal. */
 int batch_check_files(const struct batch *b, uint32_t job, struct sh_err *err);
@@ -84,7 +84,7 @@ int batch_run(struct batch *b);
 /* ---- merge.c: checks all jobs, and writes manifest.json where all are whole. Likewise. */
 int batch_merge(struct batch *b);
 
-/* What job i is, as members of the present object of JSON. */
+/* Writes number, name, station and settings of job i as members of the open object. */
 void batch_put_job(struct json *json, const struct batch *b, uint32_t i);
 /* The list of jobs as text or as JSON (list.c); with a folder, which of them have a line in a manifest. */
 int batch_list(struct batch *b);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which jobs of a campaign are done (batch.h). */
+/* Finds out which jobs of a campaign are done (batch.h). */
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>

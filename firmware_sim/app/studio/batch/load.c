@@ -12,7 +12,8 @@ struct loading {
     struct batch_loaded *before, *now;
 };
 
-/* What now->cfg can share of the site before; NULL: nothing, and it is no more: never two scenes at a time. */
+/* The site before, where now->cfg can share its scene. Else NULL, and the site before is freed first, so that there are
+ * never two scenes at a time. */
 static const struct site *shared_site(struct loading *l)
 {
     struct batch_loaded *before = l->before;
@@ -23,7 +24,7 @@ static const struct site *shared_site(struct loading *l)
     return before->site;
 }
 
-/* Whether what was loaded is what was planned with. */
+/* Whether the inputs that were loaded are those of the plan. */
 static int check_made(struct loading *l, struct sh_err *err)
 {
     const struct batch_provenance *planned = &l->b->made[l->now->combination];
@@ -41,7 +42,7 @@ static int load_site(struct config *cfg, void *ctx, struct sh_err *err)
     now->cfg = malloc(sizeof *now->cfg);
     if (now->cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     *now->cfg = *cfg; /* the site needs it longer than this call lasts */
-    /* which also sets layout and colours */
+    /* record_job_check also sets layout and colours in now->cfg. */
     int rc = record_job_check(&now->line->line.job, now->cfg, err);
     if (rc == SH_OK) rc = offline_load(now->cfg, shared_site(l), &app_report_stderr, &now->site, err);
     if (rc != SH_OK) return rc;

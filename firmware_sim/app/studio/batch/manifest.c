@@ -68,7 +68,7 @@ int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_ent
 
 /* ---- a shard's own */
 
-/* What follows the last newline was cut short when its writer was killed. */
+/* Text after the last newline is a line whose writer was killed; it is cut off. */
 static int cut_tail(int fd, const char *path, struct sh_err *err)
 {
     off_t end = lseek(fd, 0, SEEK_END), at = end;
@@ -95,6 +95,19 @@ int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int 
     return rc;
 }
 
+void batch_put_files(struct json *json, const struct batch_entry *entry)
+{
+    json_open_array(json, "files");
+    for (uint32_t i = 0; i < entry->n_files; i++) {
+        json_open_object(json, NULL);
+        json_string(json, "name", entry->file[i].name);
+        json_uint(json, "bytes", entry->file[i].bytes);
+        json_string(json, "sha256", entry->file[i].sha);
+        json_close_object(json);
+    }
+    json_close_array(json);
+}
+
 static void put_entry(FILE *out, const struct batch_entry *entry)
 {
     struct json json;
@@ -112,20 +125,12 @@ static void put_entry(FILE *out, const struct batch_entry *entry)
     json_uint(&json, "points", entry->points);
     json_string(&json, "stream_sha256", entry->stream_sha);
     json_double(&json, "seconds", entry->seconds);
-    json_open_array(&json, "files");
-    for (uint32_t i = 0; i < entry->n_files; i++) {
-        json_open_object(&json, NULL);
-        json_string(&json, "name", entry->file[i].name);
-        json_uint(&json, "bytes", entry->file[i].bytes);
-        json_string(&json, "sha256", entry->file[i].sha);
-        json_close_object(&json);
-    }
-    json_close_array(&json);
+    batch_put_files(&json, entry);
     json_close_object(&json);
     json_end(&json, NULL);
 }
 
-/* In one call of write, so that no reader sees a part of it but where the disk is full. */
+/* Writes the line in one call, so that no reader sees a part of it, except where the disk is full. */
 int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err)
 {
     char *line = NULL;

@@ -9,6 +9,8 @@
 #include "firmware_sim/app/studio/batch/provenance.h"
 #include "firmware_sim/app/studio/batch/sweep.h"
 
+struct json;
+
 struct batch_file {
     char name[BATCH_NAME_LEN + 32]; /* in the campaign's folder */
     uint64_t bytes;
@@ -29,14 +31,17 @@ void batch_entry_free(struct batch_entry *entry);
 /* One line without its newline; *entry is to be freed. 0: it is none of ours, or not whole. */
 int batch_entry_read(const char *line, struct batch_entry *entry);
 
-/* Gives every entry of every manifest of the folder to `take`, file by file, in the order of their lines; of a job
- * that stands in a file twice, also the earlier one. `take` owns the entry. Lines that can't be read are warned of, but
- * for the last one of a file: its writer may have been killed, or still be there. */
+/* Gives every entry of every manifest of the folder to `take`, file by file, in the order of their lines. A job may
+ * stand in a file twice; both entries are given. `take` owns the entry. Lines that can't be read are warned of, except
+ * for an unfinished last one: its writer may have been killed, or still be there. */
 int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_entry *entry, struct sh_err *err),
                         void *ctx, const struct sh_report *report, struct sh_err *err);
 
 /* A shard's manifest, open to append; an unfinished last line is cut off. SH_ESTATE: another process has it. */
 int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int *fd, struct sh_err *err);
 int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err);
+
+/* Writes the entry's files as a member of the open object. */
+void batch_put_files(struct json *json, const struct batch_entry *entry);
 
 #endif

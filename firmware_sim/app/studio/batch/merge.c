@@ -105,15 +105,7 @@ static void put_job(struct json *json, const struct batch *b, uint32_t i)
     json_uint(json, "pulses", entry->pulses);
     json_uint(json, "points", entry->points);
     json_string(json, "stream_sha256", entry->stream_sha);
-    json_open_array(json, "files");
-    for (uint32_t k = 0; k < entry->n_files; k++) {
-        json_open_object(json, NULL);
-        json_string(json, "name", entry->file[k].name);
-        json_uint(json, "bytes", entry->file[k].bytes);
-        json_string(json, "sha256", entry->file[k].sha);
-        json_close_object(json);
-    }
-    json_close_array(json);
+    batch_put_files(json, entry);
     json_close_object(json);
 }
 

@@ -106,7 +106,7 @@ void batch_job_provenance(const struct batch *b, uint32_t job, struct batch_prov
 
 /* ---- all combinations */
 
-/* After the reason, which may not name all values that it is about. */
+/* Follows the reason, which may not name all values that it depends on. */
 static void print_values(const struct batch *b, uint32_t combination)
 {
     const char *set[BATCH_MAX_SWEEPS];
@@ -175,7 +175,7 @@ static int plan_config(struct config *cfg, void *ctx, struct sh_err *err)
     struct batch *b = p->b;
     struct batch_provenance *made = &b->made[p->combination];
     uint32_t n_stations = 0;
-    app_warn_settings_file(cfg, "jobs of a batch have the settings of the configuration");
+    if (p->combination == 0) app_warn_settings_file(cfg, "jobs of a batch have the settings of the configuration");
     int rc = record_job_check(p->job, cfg, err);
     if (rc == SH_OK && !config_is_alone(cfg)) rc = check_other_heads(b, p->job, cfg, err);
     if (rc == SH_OK) rc = check_epoch(cfg, err);
@@ -193,7 +193,7 @@ static int plan_combination(struct batch *b, uint32_t combination)
     int status = batch_line_make(b, combination, 1, "x", &line);
     if (status == APP_GO_ON) {
         struct planned planned = {b, &line->line.job, combination};
-        line->line.in.n_files = 0; /* no job has this name: those that there are: run.c */
+        line->line.in.n_files = 0; /* no job has this name; run_job makes the lines with the real ones */
         status = app_with_config(&line->line.in, plan_config, &planned);
         if (status != APP_OK) print_values(b, combination);
     }

@@ -32,7 +32,7 @@ static void take_hex(struct sha256_ctx *ctx, char hex[BATCH_SHA_LEN])
     hex[BATCH_SHA_LEN - 1] = '\0';
 }
 
-/* With its end, so that two texts are not one. */
+/* Hashes the text with its NUL, so that "ab", "c" differs from "a", "bc". */
 static void take_text(struct sha256_ctx *ctx, const char *text)
 {
     sha256_update(ctx, strlen(text) + 1, (const uint8_t *)text);

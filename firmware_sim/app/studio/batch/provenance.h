@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A job was made of these, as hashes: two jobs whose structs are equal make the same bytes. In: a
- * configuration, what it names, and a job's settings. Out: a struct batch_provenance.
+/* The inputs of a job, as hashes: two jobs whose structs are equal make the same bytes. In: a configuration, the files
+ * that it names, and a job's settings. Out: a struct batch_provenance.
  *
  * Paths of input files don't count, their content does. So a campaign may go on where its folders are mounted
  * elsewhere. One thread. */
@@ -25,7 +25,7 @@ struct batch_provenance {
     char job[BATCH_SHA_LEN];           /* station, values of keys, options */
 };
 
-/* In words, how `b` differs from `a`; NULL: it doesn't. */
+/* Returns in words how `b` differs from `a`; NULL: it doesn't. */
 const char *batch_provenance_differs(const struct batch_provenance *a, const struct batch_provenance *b);
 
 /* SHA-256 of a whole file, and its length; SH_EINPUT where it isn't there or can't be read. Asks report whether to
@@ -52,7 +52,7 @@ void batch_cache_free(struct batch_cache *cache);
 int batch_provenance_of(const struct config *cfg, struct batch_cache *cache, struct batch_provenance *made,
                         const struct sh_report *report, struct sh_err *err);
 
-/* made->job, of texts each of which counts, in this order. */
+/* Fills made->job from n texts; each of them counts, and so does their order. */
 void batch_provenance_job(struct batch_provenance *made, const char *const *text, uint32_t n);
 
 #endif

@@ -63,8 +63,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_j
     for (int i = 0; i < files->n && rc == SH_OK; i++) {
         const char *path = files->file[i].path;
         rc = add_file(&l, path);
-        if (rc == SH_OK && (app_ends_in(path, ".obj") || app_ends_in(path, ".gltf")))
-            rc = app_sidecars(path, add_sidecar, &l, err);
+        if (rc == SH_OK && files->file[i].ops->is_mesh) rc = app_sidecars(path, add_sidecar, &l, err);
     }
     if (rc == SH_OK && done->surfaces != NULL) rc = add_file(&l, done->surfaces);
     return rc;
@@ -85,7 +84,7 @@ static int note_done(struct runner *r, uint32_t job, const struct record_job *do
     return rc;
 }
 
-/* At most a line a second, and one for the first job. */
+/* Prints at most a line a second, and one for the first job. */
 static void say_progress(struct runner *r, uint32_t job, const char *name)
 {
     const int64_t now_ns = clock_now_ns();
@@ -137,7 +136,7 @@ static int make_folder(const struct batch *b, struct sh_err *err)
                    "-o %s: the folder cannot be made: %s", b->dir, strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
-/* The campaign is made of files that may lie in its folder: none of them has the name of a job's file. */
+/* Inputs of the campaign may lie in its folder: an error where one has the name of a job's file. */
 static int check_inputs(const struct batch *b, struct sh_err *err)
 {
     struct stat folder, here;

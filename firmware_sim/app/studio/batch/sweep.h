@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a campaign varies. In: the texts of --sweep and --stations. Out: the values of each key, every combination
- * of them by its number, and numbers of stations. Pure; errors are SH_EINPUT or SH_ENOMEM. */
+/* The values that a campaign varies. In: the texts of --sweep and --stations. Out: the values of each key, every
+ * combination of them by its number, and numbers of stations. Pure; errors are SH_EINPUT or SH_ENOMEM. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_SWEEP_H
 #define FIRMWARE_SIM_APP_STUDIO_BATCH_SWEEP_H
 
@@ -24,12 +24,12 @@ struct batch_sweeps {
     uint32_t n;
 };
 
-/* KEY=A,B,... or KEY=FIRST:LAST:STEP, whole steps from FIRST that don't go beyond LAST. Commas within brackets,
- * braces and quotes belong to a value. A key, or a value of a key, that is there already is an error. */
+/* Adds KEY=A,B,... or KEY=FIRST:LAST:STEP: whole steps from FIRST, not beyond LAST. Commas within brackets, braces and
+ * quotes belong to a value. A key that is there already is an error, and so is a value. */
 int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_err *err);
 void batch_sweeps_free(struct batch_sweeps *sweeps);
 
-/* Whether a text begins with that key, in either spelling (a.0.b, a[0].b): where it ends there. NULL: it doesn't. */
+/* Where a text begins with a key, in either spelling (a.0.b, a[0].b): the text after the key. NULL: it doesn't. */
 const char *batch_after_key(const char *text, const char *key);
 
 /* How many combinations there are: 1 without sweeps. SH_EINPUT: more than BATCH_MAX_JOBS. */

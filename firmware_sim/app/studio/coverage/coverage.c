@@ -37,7 +37,7 @@ struct coverage_run {
 
 /* ---- scans */
 
-/* What moves, at the time of a run; at a stop, as at the stop's own. */
+/* Puts moving bodies where they are at that time of the scan; at a stop, at the time of the stop. */
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {
     const struct coverage_scan_at *at = ctx;
@@ -116,7 +116,7 @@ static void put_all(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* The picture and the figures are those of the stations that there are. */
+/* Mesh and figures are those of the present stations, so they are made before further ones are looked for. */
 static int show(struct coverage_run *r, struct sh_err *err)
 {
     int rc = sum_up(r, err);
@@ -136,7 +136,7 @@ static int check_output(const struct coverage_run *r, struct sh_err *err)
 {
     if (r->output == NULL) return SH_OK;
     if (strlen(r->output) >= CONFIG_PATH_LEN)
-        return sh_fail(err, SH_EINPUT, "-o %.60s...: longer than %d characters", r->output, CONFIG_PATH_LEN);
+        return sh_fail(err, SH_EINPUT, "-o %.60s...: longer than %d characters", r->output, CONFIG_PATH_LEN - 1);
     return newfile_check(r->output, err);
 }
 
@@ -193,6 +193,9 @@ static int cover(struct config *cfg, void *ctx, struct sh_err *err)
 
 /* ---- options */
 
+static const double HEIGHT_M = 1.6, STEP_DEG = 1.0;
+enum { SCANS = 3 };
+
 static int find_colour(struct coverage_run *r)
 {
     for (size_t i = 0; i < sizeof COLOURS / sizeof COLOURS[0]; i++)
@@ -208,6 +211,13 @@ static int check_next(struct coverage_run *r)
 {
     struct coverage_next_options *o = &r->o;
     const int asks = o->grid_m > 0.0 || o->candidates != NULL;
+    const char *option = o->step_deg >= 0.0 ? "--step-deg" : o->scans > 0 ? "--scans" : NULL;
+    if (o->height_m >= 0.0 && !(o->grid_m > 0.0)) return app_usage(&app_coverage, "--height: allowed only with --grid");
+    if (option != NULL && !asks)
+        return app_usage(&app_coverage, "%s: allowed only with --grid and --candidates", option);
+    if (o->height_m < 0.0) o->height_m = HEIGHT_M;
+    if (o->step_deg < 0.0) o->step_deg = STEP_DEG;
+    if (o->scans < 0) o->scans = SCANS;
     for (int i = 0; i < 3; i++)
         o->area_m[0][i] = o->area_m[1][i] = (double)NAN;
     if (o->stations == 0 && asks) o->stations = 1;
@@ -248,7 +258,7 @@ static int add_numbers(struct coverage_run *r)
 
 static int coverage_run_command(int argc, char **argv)
 {
-    struct coverage_run r = {.o = {.height_m = 1.6, .step_deg = 1.0, .scans = 3}};
+    struct coverage_run r = {.o = {.height_m = -1.0, .step_deg = -1.0, .scans = -1}}; /* negative: not given */
     int status = app_parse(&app_coverage, argc, argv, &r.in, &r);
     if (status == APP_GO_ON) status = check_options(&r);
     if (status == APP_GO_ON) status = add_numbers(&r);
@@ -260,8 +270,8 @@ static int coverage_run_command(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_FLAG, "json", NULL, .at = AT(json),
-     .help = "print the figures as JSON: cell_m, cells, pieces, triangles, area_m2, duplicate_m2, none_m2, one_m2, "
-             "several_m2 and the same as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), "
+     .help = "print the figures as JSON: cell_m, cells, pieces, triangles, area_m2, duplicate_m2, silent_m2, none_m2, "
+             "one_m2, several_m2 and these three as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), "
              "stations, labels, next"},
     {APP_TEXT, "by", "label", .at = AT(by), .help = "also print the figures of each label: object and material"},
     {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: what `scanhead coverage` found, and how it is shown. */
+/* Private to this folder: the results of `scanhead coverage`, and how they are shown. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_COVERAGE_COVERAGE_H
 #define FIRMWARE_SIM_APP_STUDIO_COVERAGE_COVERAGE_H
 

@@ -70,8 +70,8 @@ static int estimate_all(struct chooser *c, double *estimate_m2, struct sh_err *e
     return rc;
 }
 
-/* Where the stations see fronts, a place that sees backs lies within a closed body. Places of one's own are taken as
- * they are. */
+/* Where the stations see fronts, a place that sees backs lies within a closed body. Places of --candidates are never
+ * left out. */
 static void leave_out_bodies(struct chooser *c, double *estimate_m2)
 {
     uint64_t hits = 0, front = 0;
@@ -126,7 +126,7 @@ static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_e
     return rc;
 }
 
-/* In order of gain, of equal ones the first place. */
+/* Keeps the tried places in order of gain; of equal ones the first one tried comes first. */
 static void insert(struct coverage_next_round *round, uint32_t place, double seen_m2, double gain_m2)
 {
     uint32_t at = round->n_tried++;

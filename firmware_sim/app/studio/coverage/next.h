@@ -23,10 +23,10 @@ struct coverage_next_place {
     double position_m[3], heading_deg;
     double floor_m;          /* z; NaN: not known */
     double front;            /* of what is seen, the share seen from the front */
-    enum coverage_place out; /* WITHIN: it sees mostly backs, so it lies within a body */
+    enum coverage_place out; /* not OPEN: it is not compared. WITHIN: it sees mostly backs, so it lies within a body */
 };
 
-/* A round: who was best, by a whole scan. */
+/* A round: the best place, by a whole scan. */
 struct coverage_next_round {
     uint32_t place, n_tried, tried[COVERAGE_MOST_SCANS]; /* by gain, the best one first */
     double seen_m2[COVERAGE_MOST_SCANS], gain_m2[COVERAGE_MOST_SCANS];
@@ -35,10 +35,10 @@ struct coverage_next_round {
 
 struct coverage_next {
     struct coverage_next_place *place;
-    uint32_t n, within; /* places; of these left out, since they lie within bodies */
+    uint32_t n, within; /* places; those that are left out, since they lie within bodies */
     uint32_t directions;
     double step_deg;
-    int whole_cells;     /* rays are pulses of the head: a cell that is met counts as a whole */
+    int whole_cells;     /* rays are pulses of the head: a cell that one hits counts as a whole */
     double *estimate_m2; /* [rounds][n] */
     struct coverage_next_round *round;
     uint32_t n_asked;

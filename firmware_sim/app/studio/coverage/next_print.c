@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "firmware_sim/app/studio/coverage/next.h"
+#include "firmware_sim/app/studio/page_json.h"
 
 enum { LINE_LEN = 160 };
 
@@ -18,7 +19,7 @@ static const char *ready_line(const struct coverage_next_place *p, uint32_t numb
     return line;
 }
 
-/* How far scans are from what the rays said, at most. */
+/* The largest difference between a scan's gain and its estimate by rays. */
 static double largest_error_m2(const struct coverage_next *next)
 {
     double most_m2 = 0.0;
@@ -69,14 +70,6 @@ void coverage_next_print(const struct coverage_next *next, const struct coverage
                next->n_rounds > 0 ? "further " : "");
 }
 
-static void put_position(struct json *json, const struct coverage_next_place *p)
-{
-    json_open_array(json, "position_m");
-    for (int k = 0; k < 3; k++)
-        json_double(json, NULL, p->position_m[k]);
-    json_close_array(json);
-}
-
 static void put_round(struct json *json, const struct coverage_next *next, const struct coverage_result *result,
                       uint32_t number)
 {
@@ -84,7 +77,7 @@ static void put_round(struct json *json, const struct coverage_next *next, const
     const struct coverage_next_place *best = &next->place[r->place];
     char line[LINE_LEN];
     json_open_object(json, NULL);
-    put_position(json, best);
+    page_put_vector(json, "position_m", best->position_m);
     json_double(json, "heading_deg", best->heading_deg);
     json_double(json, "gain_m2", r->gain_m2[0]);
     json_double(json, "gain_percent", coverage_percent(r->gain_m2[0], result->sums.area_m2));
@@ -109,7 +102,7 @@ static void put_place(struct json *json, const struct coverage_next *next, uint3
 {
     const struct coverage_next_place *p = &next->place[i];
     json_open_object(json, NULL);
-    put_position(json, p);
+    page_put_vector(json, "position_m", p->position_m);
     json_double(json, "heading_deg", p->heading_deg);
     json_double(json, "floor_m", p->floor_m);
     json_bool(json, "within_body", p->out == COVERAGE_PLACE_WITHIN);

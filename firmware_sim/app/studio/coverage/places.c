@@ -147,7 +147,8 @@ static int spread_directions(struct coverage_finder *f, struct sh_err *err)
     return rc;
 }
 
-/* Heads whose beams lie in planes or on cones: some of their pulses, and a cell that is met counts as a whole. */
+/* For heads whose beams lie in planes or on cones, rays are some of their pulses, and a cell that one hits counts as a
+ * whole. */
 static int draw_directions(struct coverage_finder *f, struct sh_err *err)
 {
     struct coverage_scan_at at;

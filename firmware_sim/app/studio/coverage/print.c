@@ -7,6 +7,7 @@
 
 #include "core/angle.h"
 #include "firmware_sim/app/studio/coverage/coverage.h"
+#include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/config/places.h"
 
 double coverage_percent(double part, double whole)
@@ -63,10 +64,12 @@ static void print_labels(const struct coverage_result *r)
     for (uint32_t i = 0; i < n; i++) {
         const struct coverage_of_label *l = &r->label[order[i]];
         const struct scene_surface *s = &r->site->scene->surface[order[i]];
-        char density[32] = "-";
+        char density[32] = "-", name[2 * SCENE_NAME_LEN + 8];
+        snprintf(name, sizeof name, "%s | %s", s->object, s->material);
+        sh_keep_line(name); /* a mesh may have any bytes */
         if (l->seen_m2 > 0.0) snprintf(density, sizeof density, "%.4g", (double)l->pulses / l->seen_m2);
-        printf("%12.3f %12.3f %8.3f %12s  %s | %s\n", l->area_m2, l->area_m2 - l->seen_m2,
-               coverage_percent(l->seen_m2, l->area_m2), density, s->object, s->material);
+        printf("%12.3f %12.3f %8.3f %12s  %s\n", l->area_m2, l->area_m2 - l->seen_m2,
+               coverage_percent(l->seen_m2, l->area_m2), density, name);
     }
     free(order);
 }
@@ -111,10 +114,7 @@ static void put_station(struct json *json, const struct coverage_result *r, uint
     const struct coverage_result_station *s = &r->station[i];
     json_open_object(json, NULL);
     json_string(json, "name", r->site->station[i].station->name);
-    json_open_array(json, "position_m");
-    for (int k = 0; k < 3; k++)
-        json_double(json, NULL, r->site->station[i].at.position_m[k]);
-    json_close_array(json);
+    page_put_vector(json, "position_m", r->site->station[i].at.position_m);
     json_uint(json, "pulses", s->pulses.cast);
     json_uint(json, "met", s->pulses.met);
     json_uint(json, "hits", s->pulses.hits);

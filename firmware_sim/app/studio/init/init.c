@@ -99,7 +99,7 @@ static int write_draft(const char *path, const char *draft, const struct init_te
     return rc;
 }
 
-/* The draft as any command would take it. */
+/* Loads the draft as any command would. */
 static int check_draft(const struct init_run *run, const char *draft, struct sh_err *err)
 {
     struct config *cfg = calloc(1, sizeof *cfg);

@@ -149,7 +149,8 @@ static void mesh_turn(struct scene *scene, const struct init_mesh *as, double sc
     }
 }
 
-/* An error may say what to do, or what is allowed, by itself. That of a raster does, which is not to become a mesh. */
+/* Whether an error says by itself what to do, or what is allowed. Errors of rasters do: nobody turns one into a
+ * mesh. */
 static int has_advice(const char *file, const char *text)
 {
     static const char *const words[] = {"export ", "convert ", "copy it", "allowed", "scene.", "join "};
@@ -201,7 +202,7 @@ static int read_mesh(const struct scene_mesh_spec *spec, struct scene **scene, s
     return rc;
 }
 
-/* Without a tolerance: that comes when the configuration is checked. */
+/* The mesh is loaded without a tolerance; the check of the configuration loads it with one. */
 int init_load_mesh(const struct init_wish *wish, const char *name, struct scene **scene, struct init_mesh *mesh,
                    struct sh_err *err)
 {

@@ -15,7 +15,7 @@ struct init_wish {
 struct init_mesh {
     enum scene_up up;
     double scale;
-    char up_from[64], scale_from[176]; /* where they are from, for comments */
+    char up_from[64], scale_from[176]; /* the source of each, for comments */
     char crs[16];                      /* of a GeoTIFF as it is, which PROJ can place; else empty */
 };
 

@@ -121,7 +121,7 @@ static int each_field_line(const struct map_run *run, uint32_t station, const st
     return config_serves(run->cfg, station) ? field_lines_each(run->cfg, at, take, ctx, err) : SH_OK;
 }
 
-/* The height of a head is in the site of its own scanner alone. */
+/* Stations are marked here, one by one, since only the site of a station's own scanner has the height of the head. */
 static int prepare(void *ctx, uint32_t station, struct sh_err *err)
 {
     struct map_run *run = ctx;
@@ -134,7 +134,7 @@ static int prepare(void *ctx, uint32_t station, struct sh_err *err)
     return rc;
 }
 
-/* Their bounds: a little more than they take. */
+/* Includes the corners of their bounds, which are a little more than they take. */
 static void include_copies(const struct map_run *run, const struct scene_copied *of, struct map_spec *spec)
 {
     for (uint32_t k = 0; k < of->n; k++)

@@ -31,7 +31,7 @@ void picturing_end(struct picturing *p);
 struct picturing_bounds {
     double min_m[3], max_m[3];
 };
-/* What is not finite is left out. */
+/* A point with a coordinate that is not finite is left out. */
 void picturing_include(struct picturing_bounds *b, const double p_m[3]);
 
 /* Chooses the eye, unless it is given, so that these bounds are seen. Before points. */

@@ -25,7 +25,7 @@ struct preview_section {
 /* Angles and lengths of a member that is INFINITY are those of the scanner at power-up. */
 struct preview_request {
     enum preview_kind kind;
-    uint32_t station; /* from 0; whose scanner and tripod it is */
+    uint32_t station; /* from 0; the scan has its scanner and its tripod */
     struct site_place place;
     double step_deg, far_m, line_deg[2], pan_deg[2];
     int points; /* 0: only the cells are wanted */

@@ -25,7 +25,7 @@
 enum { JOBS = 64, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
 static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
-static const int64_t LATELY_NS = 500000000; /* it does so at least every 0.2 s; its way to the head takes some, too */
+static const int64_t LATELY_NS = 500000000;     /* it does so every 0.2 s, and the request takes some time, too */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
 
@@ -42,7 +42,7 @@ struct job {
     struct preview_request request;
     uint32_t number; /* from 1, never used again */
     int64_t asked_ns;
-    int passed;            /* of a search: so many others were worked on while it waited */
+    int passed;            /* so many others were worked on while this one waited */
     struct answer *answer; /* NULL: none, or a refusal */
     int rc;
     struct sh_err err;
@@ -53,7 +53,7 @@ struct preview {
     struct sites sites;
     struct preview_work work;
     struct coverage *blind;                       /* of a scene that has no coverage */
-    struct sh_err why;                            /* there is none of these either */
+    struct sh_err why;                            /* why there is no `blind` either */
     atomic_int ending, gives_way, is_place_asked; /* the work at hand; since it began */
     pthread_t thread;
     int running;

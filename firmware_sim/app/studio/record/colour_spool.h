@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The frames of a recording, kept until the smallest and the largest of what its colours show are known. In: each frame
- * of the stream. Out: these two figures, and the frames again, in their order. The frames lie in a nameless file beside
- * the recording; memory holds none of them. One thread. */
+/* The frames of a recording, kept until the smallest and the largest value that its colours show are known. In: each
+ * frame of the stream. Out: these two figures, and the frames again, in their order. The frames lie in a nameless file
+ * beside the recording; memory holds none of them. One thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_COLOUR_SPOOL_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_COLOUR_SPOOL_H
 

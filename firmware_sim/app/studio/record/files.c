@@ -164,7 +164,7 @@ static void close_spools(struct record_files *files)
     files->spooling = 0;
 }
 
-/* Of this scan, where each has its own. To be freed; NULL: no memory. */
+/* The path of the file at hand: with --split it has the scan's number. To be freed; NULL: no memory. */
 static char *present_path(const struct record_files *files, const struct record_file *file, struct sh_err *err)
 {
     const int stem = (int)(strlen(file->path) - strlen(file->ops->ending));
@@ -176,7 +176,7 @@ static char *present_path(const struct record_files *files, const struct record_
     return NULL;
 }
 
-/* The frames of another head are another stream. */
+/* Frames of another head are a stream of their own, so they get a spool of their own. */
 static int add_spool(struct record_files *files, struct sh_err *err)
 {
     struct colour_spool *spool = NULL;
@@ -187,8 +187,7 @@ static int add_spool(struct record_files *files, struct sh_err *err)
     return colour_spool_open(spool, files->file[0].now, files->recorder.colour.scale.mode, err);
 }
 
-/* A file that is coloured when all is known is opened at once, too: what can't be written is to be said before the
- * scan. */
+/* A file that gets its colours at the end is opened now, too: an error of writing must come before the scan. */
 static int open_file(const struct record_files *files, struct record_file *file, struct sh_err *err)
 {
     file->now = present_path(files, file, err);
@@ -206,8 +205,8 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
         part, len, path);
 }
 
-/* A second file of a recording: its name ends so in place of FILE's ending. It may be there without FILE.part, where
- * somebody moved that alone. */
+/* The ending of a second file of a recording, in place of FILE's own ending; NULL: there is none. It may be there
+ * without FILE.part, where somebody moved that alone. */
 static const char *second_of(const struct record_files *files, const struct record_file *file)
 {
     const char *ending = file->ops->ending;
@@ -225,8 +224,8 @@ static int check_second(const char *second, const char *path, struct sh_err *err
                    second, len, path);
 }
 
-/* Refuses what is left of the files of single scans, since a later one would stop the recording at its scan. `end` of a
- * name is in place of that of FILE. */
+/* Looks for remains of the files of single scans: each would stop the recording only when its scan begins. `end` is the
+ * ending of such a name, in place of that of FILE. */
 static int check_parts_of_scans(const struct record_file *file, const char *end,
                                 int (*check)(const char *left, const char *path, struct sh_err *err),
                                 struct sh_err *err)

@@ -3,8 +3,8 @@
  * recorder for each ending writes (drivers/record). All are opened, fed and closed together. All scans go
  * into the same files, or each scan into files of its own.
  *
- * Where colours shall go from the smallest to the largest figure in the files, formats with colours get the frames at
- * the end, when both are known (colour_spool.h). */
+ * Where the limits of colours are the smallest and the largest value in the files, formats with colours get their
+ * frames at the end, when both are known (colour_spool.h). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_FILES_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_FILES_H
 
@@ -17,13 +17,13 @@ enum { RECORD_MAX_FILES = 8 };
 struct record_files {
     int split; /* each scan to files of its own: NAME-1.ply, NAME-2.ply, ... */
     struct recorder_options recorder;
-    int takes_over; /* what an earlier recording has left as FILE.part is overwritten; else record_files_open refuses */
+    int takes_over; /* 1: overwrites a FILE.part of an earlier recording; 0: record_files_open refuses */
     int own_limits; /* the limits of recorder.colour.scale are found in the frames */
     /* inner state */
     struct recorder_padding padding; /* in all parts */
     struct record_file {
         const char *path;
-        char *now; /* of the present scan's file, where each has its own; else the same */
+        char *now; /* the path of the present file: with --split it has the scan's number */
         const struct recorder_ops *ops;
         struct recorder *rec;
     } file[RECORD_MAX_FILES];
@@ -54,18 +54,18 @@ int record_files_check_degrees(const struct record_files *files, struct sh_err *
 int record_files_check_floats(const struct record_files *files, struct sh_err *err);
 /* For a head that moves, in coordinates of the Earth: SH_EINPUT where a file is a mesh, which faces the head. */
 int record_files_check_facing(const struct record_files *files, struct sh_err *err);
-/* For a head that stands still, and whose lines are all one: SH_EINPUT where a file is a mesh. */
+/* For a head that stands still and scans a single line: SH_EINPUT where a file is a mesh. */
 int record_files_check_surface(const struct record_files *files, struct sh_err *err);
-/* SH_EINPUT where a file is a grid, and such a head fires without rows and columns. */
+/* SH_EINPUT where a file is a grid, and a head of this kind fires without rows and columns. */
 int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
 /* SH_EINPUT where a file is the stream of one head, and several heads would send into it. */
 int record_files_check_heads(const struct record_files *files, struct sh_err *err);
-/* SH_EINPUT, which names file and station, where a file can't hold a scan; `first` is the first one of the recording. */
+/* SH_EINPUT, with file and station, where a file can't hold a scan; `first` is the first scan of the recording. */
 int record_files_check_scan(const struct record_files *files, const struct recorder_scan *first,
                             const struct recorder_scan *scan, struct sh_err *err);
-/* SH_ESTATE: a recording that was killed has left something there, and the format can be repaired. */
+/* SH_EINPUT: a recording that was killed has left something there, and the format can be repaired. */
 int record_files_open(struct record_files *files, struct sh_err *err);
-/* About once a second: what has come goes to the disk. */
+/* To be called about once a second: the points so far go to the disk. */
 int record_files_save(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);

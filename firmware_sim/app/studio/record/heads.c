@@ -11,7 +11,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 
-/* Which of those that are known has the scanner of station i, from 0; n: none yet. */
+/* The number of the head that has the scanner of station i, from 0; heads->n: none of those so far. */
 static uint32_t heads_find(const struct heads *heads, uint32_t i)
 {
     const struct config_station *station = heads->one[0].cfg->station;
@@ -22,7 +22,8 @@ static uint32_t heads_find(const struct heads *heads, uint32_t i)
     return k;
 }
 
-/* Which has station s, from 1. Stops without a trajectory are all stations, stop after stop. */
+/* The number of the head that scans from station s, from 1. Stops without a trajectory go through all stations, again
+ * and again. */
 static uint32_t of(const struct heads *heads, uint32_t s)
 {
     return heads->of[(s - 1) % heads->one[0].cfg->n_stations];
@@ -99,7 +100,7 @@ static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *
         to[i] += from[i];
 }
 
-/* Of several streams: the hash of their hashes, as text, in the order of their heads. */
+/* The hash of several streams is that of their hashes, as text, in the order of their heads. */
 static void add_streams(const struct heads *heads, int hash, struct recording_result *sum)
 {
     struct sha256_ctx ctx;
@@ -119,7 +120,7 @@ static void add_streams(const struct heads *heads, int hash, struct recording_re
     if (hash) base16_encode_update(sum->sha256, sizeof digest, digest);
 }
 
-/* Between the parts of a long recording, about once a second; within them recording_run says it. */
+/* Reports progress between the parts of a long recording, about once a second; within a part recording_run does so. */
 static void say_progress(struct heads *heads, const struct recording_options *all, uint32_t station)
 {
     const int64_t now_ns = clock_now_ns();
@@ -171,9 +172,9 @@ static int check_fits(const struct heads *heads, uint32_t k, const struct site *
     return rc;
 }
 
-/* The first head that is due is opened. The other scanners are set up once and let go, so that what is wrong with one
- * of them is said before the first scan, and what several warn of is said once. Their BVHs stay in the world, where
- * they are found when their turn comes. */
+/* Opens the first head that is due. The other scanners are set up once and freed again, so that their errors come
+ * before the first scan, and a warning of several of them comes once. Their BVHs stay in the world, where they are
+ * found when their turn comes. */
 static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};

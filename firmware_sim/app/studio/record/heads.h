@@ -3,8 +3,9 @@
  * configuration, and from which stations to scan. Out: the frames of all scans, station by station, and what came of
  * them in one sum.
  *
- * The head of head.station is there from the start. Any other is opened when its first station is due, beside that
- * one (site_load_beside), and ends after its last; before the first scan it is set up once, for what is wrong with it. Their clocks all begin at the same power-up. */
+ * The head of head.station is there from the start. Any other is opened beside it (site_load_beside) when its first
+ * station is due, and ends after its last. Before the first scan each is set up once, so that its errors come then.
+ * Their clocks all begin at the same power-up. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_HEADS_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_HEADS_H
 
@@ -16,8 +17,8 @@ struct heads_one {
     struct config *cfg;
     struct offline offline;
     struct scanner_report report;
-    uint32_t last_station;  /* of those that are its */
-    int is_open, is_hashed; /* or was */
+    uint32_t last_station;  /* the last of its stations */
+    int is_open, is_hashed; /* now, or earlier */
 };
 
 struct heads {
@@ -29,7 +30,7 @@ struct heads {
     struct heads_one one[CONFIG_MAX_STATIONS]; /* one[0]: of head.station */
     uint32_t n;
     uint32_t of[CONFIG_MAX_STATIONS]; /* by station, from 0 */
-    struct heads_one *at;             /* scans now */
+    struct heads_one *at;             /* the one that scans now */
     double scan_s;
     int64_t said_ns; /* when progress was reported last */
     const struct sh_report *report;
@@ -39,8 +40,8 @@ struct heads {
 /* Loads the configurations of all scanners; nothing runs. heads begins as zeros, is large, and is to be closed, also
  * after an error. cfg must live on, and so must the sets that it was loaded with. */
 int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err);
-/* The configuration of the i-th of those that scan from stations first to last (0, 0: as the head is set); NULL: there
- * is no i-th. */
+/* The configuration of the i-th of the heads that scan from stations first to last (0, 0: the station that the head is
+ * set to); NULL: there is no i-th. */
 struct config *heads_config(const struct heads *heads, uint32_t i, uint32_t first, uint32_t last);
 /* Starts the first head; scan_s as of offline_open. site: of its configuration, by offline_load; NULL: it loads one. */
 int heads_open(struct heads *heads, struct site *site, double scan_s, const struct sh_report *report,
@@ -48,7 +49,7 @@ int heads_open(struct heads *heads, struct site *site, double scan_s, const stru
 /* recording_run, from each station with its own head. */
 int heads_record(struct heads *heads, const struct recording_options *options, struct recording_result *result,
                  struct sh_err *err);
-/* Of the head that scans now. */
+/* The site of the head that scans now. */
 const struct site *heads_site(const struct heads *heads);
 /* For recording_options.prepare. */
 int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err);

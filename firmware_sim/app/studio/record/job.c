@@ -57,6 +57,7 @@ static int close_files(struct record_job *r, int keep, struct sh_err *err)
     struct sh_err why = {0};
     const int of_each = r->each ? record_files_close(&r->parts, keep, &why) : SH_OK;
     const int rc = record_files_close(&r->files, keep, err);
+    if (rc != SH_OK && of_each != SH_OK) sh_warn(&app_report_stderr, "%s", why.text); /* each is named */
     return rc == SH_OK && of_each != SH_OK ? sh_fail(err, of_each, "%s", why.text) : rc;
 }
 
@@ -187,14 +188,16 @@ static int check_can_end(const struct record_job *r, const struct config *cfg, s
     return SH_OK;
 }
 
-/* Whether the points of a recording say what its colours show: colour_check. Else they are as the head sends them. */
+/* Whether a recording has the value that its colours show (colour_check). Else its colours are those that the head
+ * sends. */
 static int is_known_here(const struct config *cfg, enum colour_mode mode)
 {
     if (!config_head_moves(&cfg->platform) || cfg->output.layout != LINE_GEO) return 1;
     return mode != COLOUR_RANGE && (mode != COLOUR_HEIGHT || cfg->output.crs != GEOREF_ECEF);
 }
 
-/* Texels only the head knows. Colours of the configuration that have no limits get those of the recording. */
+/* Colours of textures come from the head. Where the configuration's colours have no limits, the recording finds
+ * them. */
 static void set_colours(struct record_job *r, struct config *cfg)
 {
     struct colour_choice *c = &r->files.recorder.colour;
@@ -224,7 +227,7 @@ static int check_colours(const struct record_job *r, const struct config *cfg, s
         c->scale.mode == COLOUR_RANGE ? "" : " and ECEF");
 }
 
-/* What grids and meshes need of the head, and of the coordinates. */
+/* Refuses grids and meshes that the head, or its coordinates, can't give. */
 static int check_meshes(const struct record_job *r, const struct config *cfg, struct sh_err *err)
 {
     const enum emitter_kind kind = cfg->profile.emitter.kind;
@@ -249,7 +252,7 @@ int record_job_check(struct record_job *r, struct config *cfg, struct sh_err *er
     return rc == SH_OK ? check_meshes(r, cfg, err) : rc;
 }
 
-/* Before anything is loaded: what files can't hold of the heads that will scan. The first is checked. */
+/* Before anything is loaded: whether the files can hold the scans of all heads that will scan. */
 static int check_heads(struct record_job *r, const struct heads *heads, uint32_t last, struct sh_err *err)
 {
     const struct config *cfg;
@@ -263,7 +266,8 @@ static int check_heads(struct record_job *r, const struct heads *heads, uint32_t
     return rc == SH_OK && n > 1 ? record_files_check_heads(&r->files, err) : rc;
 }
 
-/* Counts the shots of a line in the middle: rings at the poles of a sphere have one shot. The others differ by a pulse. */
+/* Takes the shots of a line in the middle for each line: they differ by a pulse, except that the rings at the poles of
+ * a sphere have one. */
 static double most_shots(const struct record_job *r, const struct site *site)
 {
     struct head_settings settings = site->cfg->head.settings;

@@ -22,8 +22,8 @@ struct record_job {
     int texture;                  /* of record_job_off_line: the head is to send colours of textures */
     long station;                 /* 0: as the head is set; APP_WORD: all */
     struct site *site; /* of record_job_off_line: loaded by offline_load, of cfg; NULL: it loads one itself */
-    int only_whole;    /* an incomplete recording leaves no files */
-    int brief;         /* no line about the result */
+    int only_whole;    /* 1: an incomplete recording leaves no files */
+    int brief;         /* 1: prints no line about the result */
     /* Asked often, by the thread of the job: 1 ends it, and it leaves no files. NULL: never. */
     int (*stop)(void *ctx);
     void *stop_ctx;
@@ -39,11 +39,11 @@ struct record_job {
     int interrupted;            /* before the files were completed, which an interrupted recording does, too */
 };
 
-/* What can be known of a recording off line before the scene is loaded: SH_EINPUT where it can't be. cfg is changed. */
+/* Checks a recording off line before the scene is loaded: SH_EINPUT where it is not possible. cfg is changed. */
 int record_job_check(struct record_job *job, struct config *cfg, struct sh_err *err);
-/* The head of cfg runs off line in this process, and so do those of other scanners that the stations have; cfg is
- * changed, and must live on until then, with the sets that it was loaded with. SH_EINPUT: what such a
- * recording can't have. SH_ELOST and others as recording_check_complete: the files keep what came. */
+/* The head of cfg runs off line in this process, and so do those of other scanners that the stations have. cfg is
+ * changed; the sets that it was loaded with must still be there. SH_EINPUT: an option that such a recording can't
+ * have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
 int record_job_off_line(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* A head on a wire, or a raw stream in a file. */
 int record_job_stream(struct record_job *job, struct sh_err *err);

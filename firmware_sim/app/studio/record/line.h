@@ -16,8 +16,8 @@ struct record_line {
     double long_edge;                       /* negative: not given */
     long sparse_seed;                       /* likewise */
     int has_rgb, limited;                   /* --colour-rgb, --colour-limits */
-    int raw;                                /* raw.h takes the whole line then */
-    const char *raw_only;                   /* an option that needs it */
+    int raw;                                /* 1: raw.h reads the whole line instead */
+    int raw_only;                           /* 1: an option that needs --raw was given */
     const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */
     int n_repairs;
 };

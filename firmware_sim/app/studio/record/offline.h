@@ -26,8 +26,8 @@ struct offline {
 };
 
 /* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: it ends each scan after this device
- * time, to the pulse. cfg is changed (pace, links) and must live
- * on. `offline` begins as zeros but for truth, and is to be closed, also after an error. */
+ * time, to the pulse. cfg is changed (pace, links) and must live on. `offline` begins as zeros but for truth, and is to
+ * be closed, also after an error. */
 int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
                  struct sh_err *err);
 /* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
@@ -40,11 +40,11 @@ int offline_open_at(struct site *site, double scan_s, const struct sh_report *re
 /* The same beside another one, of another scanner of the file: the scene that both have is loaded once. */
 int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
                         struct offline *offline, struct sh_err *err);
-/* The head ends, its scene and threads are given back. What the client's handle was told stays. */
+/* The head ends; its scene and its threads are freed. The client's handle keeps what it knows. */
 void offline_stop(struct offline *offline);
 /* The head ends, and the file of the truth is whole: the first error in writing it. Site and handle stay. */
 int offline_finish(struct offline *offline, struct sh_err *err);
-/* Makes ready for a scan from a station, from 1; 0: where the head stands at power-up. While none is on. */
+/* Prepares a scan from a station, from 1; 0: the one at power-up. No scan may be running. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 

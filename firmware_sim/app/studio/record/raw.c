@@ -16,7 +16,7 @@ int raw_is_wanted(int argc, char **argv)
 
 /* ---- escapes */
 
-/* After the backslash: how many characters it takes; 0: it is none. */
+/* Reads an escape after its backslash. Returns how many characters it has; 0: it is no escape. */
 static size_t read_escape(const char *at, uint8_t *byte)
 {
     static const char names[] = "nrt\\\"'0", bytes[] = "\n\r\t\\\"'";
@@ -161,7 +161,7 @@ static const struct app_option OPTIONS[] = {
      .help = "tcp: listen there (default: 127.0.0.1), and connect each client to SOURCE; both directions are "
              "recorded, until Ctrl-C"},
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_WRITES, .help = "write packets, bytes and dropped as JSON; - is standard output"},
-    {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
+    {APP_OUTPUT, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "once it listens, write a line of JSON with the endpoint to descriptor N"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END

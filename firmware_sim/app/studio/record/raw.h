@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw`: what other protocols than the native one have on the wire, to a .pcapng that other programs read.
+/* `record --raw` writes the traffic of any protocol to a .pcapng, which other programs read.
  *
  * In: the command line. Out: Ethernet frames (drivers/protocol/ethernet.h) with the kernel's times of receiving. A
  * source is UDP (sockets of its own) or TCP (a connection of its own, or those of others that it passes on). */
@@ -31,13 +31,13 @@ struct raw;
 
 /* UDP and TCP. Functions return SH_OK or SH_E. */
 struct raw_ops {
-    /* Whatever is to be there at first. May wait up to r->wait_s. close follows in any case. */
+    /* Opens sockets and connections; may wait up to r->wait_s. close follows in any case. */
     int (*open)(struct raw *r, struct sh_err *err);
-    /* What to wait for, up to RAW_MAX_POLLS; returns how many. *timeout_ms is made shorter where there is a reason. */
+    /* Fills in the descriptors to wait for, up to RAW_MAX_POLLS; returns how many. It may make *timeout_ms shorter. */
     int (*wait_for)(struct raw *r, struct pollfd *fds, int *timeout_ms);
-    /* Whatever came, up to RAW_MAX_PASSES pieces, to the file. Returns how many, or SH_E. */
+    /* Writes the data that came, up to RAW_MAX_PASSES pieces, to the file. Returns how many, or SH_E. */
     int (*work)(struct raw *r, struct sh_err *err);
-    /* The recording ends: what is left to be written. */
+    /* The recording ends: writes what is still to be written. */
     int (*finish)(struct raw *r, struct sh_err *err);
     /* After all: whether something is missing in the recording. */
     int (*check)(const struct raw *r, struct sh_err *err);
@@ -82,8 +82,8 @@ int raw_run(struct raw *r, struct sh_err *err);
 /* A frame to the file. payload: how many bytes of it count. */
 int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err);
 struct ethernet_end raw_end_of(const struct sockaddr_storage *at);
-/* The text with its escapes as bytes; in out, which has room for as many as the text has. NULL: *len bytes; else what is
- * wrong with it. */
+/* Turns a text with escapes into *len bytes; `out` has room for as many bytes as the text has. Returns NULL, or what is
+ * wrong with the text. */
 const char *raw_unescape(const char *text, uint8_t *out, size_t *len);
 
 #endif

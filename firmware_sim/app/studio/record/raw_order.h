@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* What came at several sockets, in the order in which it came. Each socket is an input that holds one piece at most.
+/* Puts data from several sockets into the order in which it came. Each socket is an input that holds one piece at most.
  *
- * A piece is passed on once every other input was asked after it was taken: what they have with an earlier time is then
- * known. In: inputs. Out: calls of `pass`. */
+ * A piece is passed on once every other input was asked after it was taken: an earlier piece of theirs is then known.
+ * In: inputs. Out: calls of `pass`. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_ORDER_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_ORDER_H
 

@@ -56,7 +56,8 @@ static void put_stats(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* The first packet may take as long as the recording is to be, unless --wait says otherwise; then time counts from it. */
+/* The first packet is waited for as long as --wait says, else --duration. Once it is there, the duration counts from
+ * it. */
 static int64_t end_of(const struct raw *r, int64_t begin_ns)
 {
     const double first_s = r->wait_s > 0.0 ? r->wait_s : r->duration_s;
@@ -72,7 +73,7 @@ static void raw_run_describe(const struct raw *r, char *text, size_t len)
     if (dropped != 0) snprintf(text + n, len - (size_t)n, ", %llu dropped", (unsigned long long)dropped);
 }
 
-/* Each second; what came is then in the file, too. */
+/* Reports once a second, and saves: the packets so far are in the file then. */
 static int raw_run_report(struct raw *r, int64_t now_ns, int64_t *next_ns, struct sh_err *err)
 {
     char what[112] = "recording: ";
@@ -106,7 +107,8 @@ static int raw_run_follow(struct raw *r, struct sh_err *err)
         if (rc >= 0) rc = raw_run_report(r, clock_now_ns(), &next_ns, err);
         if (rc < 0) return rc;
     }
-    /* What the system holds came before the end. More may come all the time. */
+    /* Packets that the system holds now came before the end, so they are written. As more may come all the time, this
+     * has a limit. */
     for (const int64_t stop_ns = clock_now_ns() + SECOND_NS; rc >= 0 && !r->over && clock_now_ns() < stop_ns;)
         if ((rc = r->ops->work(r, err)) == 0) break;
     r->wall_s = 1e-9 * (double)(clock_now_ns() - (r->first_ns != 0 ? r->first_ns : begin_ns));
@@ -140,7 +142,7 @@ static void say_left(const struct raw *r)
                 part, r->path);
 }
 
-/* As other recordings, it keeps what came also where it ended in a failure. */
+/* Like other recordings, one that failed keeps the packets that came. */
 int raw_run(struct raw *r, struct sh_err *err)
 {
     struct sh_err why = {0};

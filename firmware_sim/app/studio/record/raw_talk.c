@@ -7,7 +7,7 @@
 #include "drivers/socket/socket.h"
 #include "firmware_sim/base/clock.h"
 
-/* A further --send waits until an answer has come and the device is silent for SILENT_MS, but no longer than ANSWER_MS. */
+/* The next --send waits until an answer has come and the device was silent for SILENT_MS, at most ANSWER_MS. */
 enum { SILENT_MS = 50, ANSWER_MS = 1000, LOOK_MS = 10 };
 
 /* ---- frames */
@@ -86,7 +86,7 @@ static int may_send(const struct talk *talk)
     return talk->heard_ns > talk->sent_ns && now_ns - talk->heard_ns >= SILENT_MS * INT64_C(1000000);
 }
 
-/* End 0 is this program: what it is to say next. */
+/* End 0 is this program: takes its next --send. */
 static int take_send(struct raw_input *input, struct sh_err *err)
 {
     struct talk_end *end = (struct talk_end *)input;
@@ -120,7 +120,7 @@ static void push(struct talk_end *end)
     }
 }
 
-/* What an end that has said its last word doesn't take breaks the connection, as it would on the wire. */
+/* An end that has sent its last byte, and takes no more, breaks the connection, as it would on the wire. */
 static int check_deaf(struct talk *talk, struct sh_err *err)
 {
     for (int i = 0; i < 2; i++) {

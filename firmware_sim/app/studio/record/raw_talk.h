@@ -20,9 +20,8 @@ struct talk_end {
     int is_deaf; /* what is sent to it fails */
     enum { TALK_BYTES, TALK_END, TALK_RESET } news;
     uint64_t received;
-    uint8_t
-        bytes[TALK_PIECE]; /* from it: a piece that is to be passed on, then the rest that the other does not take */
-    size_t len, sent;
+    uint8_t bytes[TALK_PIECE]; /* a piece from this end, until the other end has taken all of it */
+    size_t len, sent;          /* of the piece; taken by the other end */
 };
 
 struct talk {
@@ -38,7 +37,7 @@ struct talk {
 /* Both descriptors are taken; fd 0: -1, for this program itself. began_ns: UTC, when the connection was asked for. It
  * writes the handshake. */
 int talk_open(struct talk *talk, struct raw *r, const int fd[2], int64_t began_ns, struct sh_err *err);
-/* What the descriptors are to be polled for; up to two. */
+/* Fills in the descriptors to be polled, up to two, with their events; returns how many. */
 int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms);
 /* Sends what the ends did not take before. */
 int talk_push(struct talk *talk, struct sh_err *err);

@@ -95,6 +95,13 @@ static int take_colour_limits(void *values, const char *text)
     return APP_OK;
 }
 
+static int take_raw_only(void *values, const char *text)
+{
+    (void)text;
+    ((struct record_line *)values)->raw_only = 1;
+    return APP_OK;
+}
+
 static const char *const ply_names[] = {"scanhead", "cloudcompare"};
 
 static int take_ply_names(void *values, const char *text)
@@ -155,14 +162,27 @@ static int check_options(const struct record_line *r)
 {
     const struct recorder_options *o = &r->job.files.recorder;
     const int ply = record_files_have(&r->job.files, ".ply"), las = record_files_have(&r->job.files, ".las");
-    const char *option = o->scalar_names && !ply     ? "--ply-names: no .ply"
-                         : o->columns != 0 && !ply   ? "--ply-columns: no .ply"
-                         : o->las_minor != 0 && !las ? "--las-version: no .las"
-                         : o->las_wdp && !las        ? "--wdp: no .las"
-                                                     : NULL;
+    const int holds_empty = ply || record_files_have(&r->job.files, ".e57");
+    const char *option = o->scalar_names && !ply          ? "--ply-names: no .ply"
+                         : o->columns != 0 && !ply        ? "--ply-columns: no .ply"
+                         : o->ascii && !ply               ? "--ascii: no .ply"
+                         : o->empty_shots && !holds_empty ? "--empty-shots: no .ply and no .e57"
+                         : o->las_minor != 0 && !las      ? "--las-version: no .las"
+                         : o->las_wdp && !las             ? "--wdp: no .las"
+                                                          : NULL;
     if (o->las_wdp && o->las_minor == 2)
         return app_usage(&app_record, "--wdp: LAS 1.2 has no waveforms; allowed is --las-version 1.4");
     return option == NULL ? APP_OK : app_usage(&app_record, "%s is among the files", option);
+}
+
+/* Where no command is sent, the scans are those that come. */
+static int check_commands(const struct record_line *r)
+{
+    const int is_file = app_is_recording(r->in.operand[0]);
+    const char *option = r->job.station > 0 ? "--station" : r->job.recording.frames >= 0 ? "--frames" : NULL;
+    if (option == NULL || (!is_file && !r->job.recording.listen)) return APP_OK;
+    return app_usage(&app_record, "%s: %s; allowed with a CONFIG, and with a head on a wire without --listen", option,
+                     is_file ? "a recorded stream has the scans that it has" : "--listen sends no command");
 }
 
 static int check_colours(const struct record_line *r)
@@ -196,7 +216,7 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
-/* The files that are written beside those of -o: one of each scan, those that a mesh names, and a .wdp. */
+/* Adds the files that are written beside those of -o: one of each scan, those that a mesh names, and a .wdp. */
 static int add_names(struct record_line *r)
 {
     static const struct {
@@ -226,7 +246,7 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
     int status = app_parse(&app_record, argc, argv, &r->in, r);
     if (status != APP_GO_ON) return status;
-    if (r->raw_only != NULL) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
+    if (r->raw_only) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
     if (r->n_repairs > 0) return check_repair(r);
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     if (is_config(r->in.operand[0]) && (r->job.recording.listen || r->job.wait_s > 0 || r->job.recording.replug_s > 0))
@@ -239,7 +259,8 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     struct sh_err err = {0};
     if (r->job.each && record_files_check_each(&r->job.files, &err) != SH_OK)
         return app_usage(&app_record, "%s", err.text);
-    if (check_meshes(r) != APP_OK || check_options(r) != APP_OK || check_colours(r) != APP_OK || add_names(r) != APP_OK)
+    if (check_commands(r) != APP_OK || check_meshes(r) != APP_OK || check_options(r) != APP_OK ||
+        check_colours(r) != APP_OK || add_names(r) != APP_OK)
         return APP_USAGE;
     r->job.source = r->in.operand[0];
     r->job.recording.progress = !r->quiet;
@@ -290,7 +311,8 @@ static const struct app_option OPTIONS[] = {
      .help = "write each scan to its own files: NAME-1.las, NAME-2.las, ..., in the order of scans"},
     {APP_FLAG, "each", NULL, .at = AT(job.each), .help = "like --split, in addition to the files of all scans"},
     {APP_FLAG, "listen", NULL, .at = AT(job.recording.listen),
-     .help = "send no command: record the stream until it ends or Ctrl-C comes"},
+     .help = "send no command: record the stream until it ends or Ctrl-C comes. With --replug only the head's state is "
+             "asked for"},
     {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(job.wait_s),
      .help = "wait up to S seconds for SOURCE to appear"},
     {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(job.recording.replug_s),
@@ -344,10 +366,10 @@ static const struct app_option OPTIONS[] = {
     {APP_FLAG, "raw", NULL, .at = AT(raw),
      .help = "write all data from udp:ADDRESS:PORT,... or tcp:HOST:PORT, of any protocol, to a .pcapng; its options: "
              "scanhead record --raw --help"},
-    {APP_TEXT, "send", "TEXT", .at = AT(raw_only), .help = "only with --raw: text to send when connected"},
-    {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(raw_only),
+    {APP_CALL, "send", "TEXT", .apply = take_raw_only, .help = "only with --raw: text to send when connected"},
+    {APP_CALL, "relay", "[ADDRESS:]PORT", .apply = take_raw_only,
      .help = "only with --raw: listen there, and record the connections of others"},
-    {APP_TEXT, "ready-fd", "N", .at = AT(raw_only),
+    {APP_CALL, "ready-fd", "N", .apply = take_raw_only,
      .help = "only with --raw: descriptor that gets a line when it listens"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END

@@ -70,7 +70,7 @@ static int gives_up(const struct scanhead_frame *frame)
            frame->event_value[0] != HEAD_SCANNING;
 }
 
-/* The head lost power. Who reads it from within its own process hears of that; others lose the connection. */
+/* The head lost power. A reader in the head's own process gets this event; others lose the connection. */
 static int goes_off(const struct scanhead_frame *frame)
 {
     return frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE && frame->event_value[0] == HEAD_OFF;
@@ -114,7 +114,7 @@ static int64_t ns_since(int64_t t_ns, int64_t from_ns)
     return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
 }
 
-/* A frame of a sphere is all its rings. */
+/* A pan sweep of a sphere is all its rings. */
 static uint32_t lines_of_frame(const struct scanhead *sh)
 {
     struct scanhead_emitter e;
@@ -146,7 +146,7 @@ static uint32_t last_of_all(const struct recording_options *o)
     return o->end_station != 0 ? o->end_station : o->last_station;
 }
 
-/* Of all that was asked for; negative where its end is not known. */
+/* The share of the whole recording that is done; negative where its end is not known. */
 static double fraction_done(const struct recording *r)
 {
     const struct recording_options *o = r->o;
@@ -260,10 +260,11 @@ static int stop_scan(struct recording *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. */
+/* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. A recorder that only
+ * listens does not ask: its source may be unable to answer, and telemetry or the next scan brings the end. */
 static int look_for_end(struct recording *r, struct sh_err *err)
 {
-    if (!has_lost_frames(r)) return SH_OK;
+    if (!has_lost_frames(r) || (r->o->listen && !(r->o->replug_s > 0.0))) return SH_OK;
     int rc = command(r, "HEAD:STAT?", err);
     if (rc != SH_OK || strcmp(r->reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
@@ -273,7 +274,8 @@ static int look_for_end(struct recording *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* The scan was to end at a time. A queue that is long, or a slow way, may bring pulses from before for a while. */
+/* The scan was told to end at asked_ns. Pulses from before may still come for a while, from a long queue or a slow
+ * link. */
 static int has_waited(const struct recording *r, int64_t asked_ns)
 {
     const int64_t now_ns = clock_now_ns(), last_ns = r->pulses_ns > asked_ns ? r->pulses_ns : asked_ns;
@@ -293,7 +295,8 @@ static int recording_follow(struct recording *r, struct sh_err *err)
             asked_ns = clock_now_ns();
         }
         if (asked_ns != 0 && has_waited(r, asked_ns))
-            return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
+            return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan in %.0f s after SCAN:STOP",
+                           1e-9 * (double)(clock_now_ns() - asked_ns));
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
         if (r->now_ns - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
@@ -329,7 +332,7 @@ static int record_scan(struct recording *r, uint32_t station, struct sh_err *err
     return recording_follow(r, err);
 }
 
-/* Whoever records a scan without end, of a head that stands, ends it; it is then complete. */
+/* A scan without end, of a head that stands, is complete when its user ends it. */
 static int is_endless(const struct recording *r)
 {
     struct scanhead_info info;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Following scans through libscanhead: start a scan, pass on its frames until it ends, stop it on time.
  *
- * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame to a
- * callback, and what came of it in figures. One recording at a time per handle; not real-time safe. */
+ * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame, to a callback;
+ * figures of the recording. One recording at a time per handle; not real-time safe. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_H
 
@@ -14,10 +14,10 @@
 #include "firmware_sim/base/json.h"
 
 struct recording_options {
-    int listen;                           /* send nothing; take what comes until the stream or the time ends */
+    int listen; /* take the frames that come until the stream or the time ends; send nothing */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
-    /* Of a recording that other heads begin or go on with: its first and last station, for progress and for what is
-     * missing. 0: this is all of it. */
+    /* Where this is a part of a recording with several heads: first and last station of the whole, for progress and for
+     * naming what is missing. 0: this is all of it. */
     uint32_t begin_station, end_station;
     long frames;           /* per scan; -1: as the head is set */
     double duration_s;     /* > 0: stop each scan after this device time ... */
@@ -56,12 +56,12 @@ struct recording_result {
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
                   struct sh_err *err);
 
-/* Adds what another part of the recording gave; not the figures of its stream, nor its hash. */
+/* Adds the figures of another part of the recording; not those of its stream, nor its hash. */
 void recording_add(struct recording_result *sum, const struct recording_result *more);
 /* Writes the result as one JSON object; ctx is the struct recording_result. */
 void recording_put(struct json *json, const void *ctx);
-/* 1: frames came twice or too late, or the head started again; the text says how often. 0: none of it. What came twice
- * or too late is in no file. */
+/* 1: frames came twice or too late, or the head started again; the text says how often. 0: none of these. Frames that
+ * came too late, or a second time, are in no file. */
 int recording_describe_order(const struct recording_result *result, char *text, size_t len);
 /* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. */
 int recording_check_complete(const struct recording_result *result, struct sh_err *err);

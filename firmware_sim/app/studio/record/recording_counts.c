@@ -25,8 +25,7 @@ void recording_count_end(struct recording_counts *c)
     if (c->within) recording_counts_end(c, 0, c->scan.pulses + c->scan.lost + c->scan.left_out, c->scan.lost);
 }
 
-/* Frames of this scan come. Where the one at hand is another one, its end was lost, and nobody said its counts
- * again. */
+/* Frames of scan `number` come. Where the scan at hand is another one, its end was lost, and its counts with it. */
 static enum recording_news enter(struct recording_counts *c, uint32_t number)
 {
     int end_lost = c->within && c->scan.number != 0 && c->scan.number != number;

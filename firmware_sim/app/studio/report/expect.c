@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The deviations that a recording's configuration lets expect, and whether its points have them. */
+/* The deviations that follow from a recording's configuration, and whether its points have them. */
 #include <math.h>
 #include <stdio.h>
 
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/config/config.h"
 
-/* LAS files of ours hold the stream's own counts of the first scan's station; all else they round once more. */
+/* In LAS files of ours, points of the first scan's station are the stream's own counts; others are rounded once
+ * more. */
 static double file_count_m(const struct report *r, uint32_t station, int polar)
 {
     const struct cloud *c = &r->cloud;

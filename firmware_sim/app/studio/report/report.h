@@ -76,7 +76,7 @@ const struct scene_surface *report_worst_surface(const struct report *r);
 
 /* ---- expect.c */
 
-/* What each station's head is: r->f.station[].head. */
+/* Fills r->f.station[].head: the setup and the errors of the head at each station. */
 void report_heads(struct report *r);
 /* After all figures: the verdicts of the stations, and of all. */
 void report_judge(struct report *r);

@@ -24,6 +24,7 @@ void report_name_surface(const struct scene_surface *surface, char name[REPORT_S
 {
     const char *apart = surface->material[0] != 0 ? " | " : "";
     snprintf(name, REPORT_SURFACE_LEN, "%s%s%s", surface->object, apart, surface->material);
+    sh_keep_line(name); /* a mesh may have any bytes */
 }
 
 void report_put_worst(FILE *out, const struct report *r)
@@ -88,7 +89,7 @@ static void put_name(const char *name, size_t n)
     printf("%.*s%*s", (int)len, name, (int)(n - characters), "");
 }
 
-/* Its line, but for the line's end. */
+/* Prints a row without its newline. */
 static void print_row(const char *name, const struct figures *f)
 {
     put_name(name, 34);

@@ -9,7 +9,7 @@
 #include "core/angle.h"
 #include "firmware_sim/config/config.h"
 
-/* What the plan says of the cast; rays per call don't matter to it. */
+/* The error of the cast by the plan, which does not depend on the number of rays per call. */
 static double cast_error_m(void)
 {
     struct plan_row row;
@@ -41,8 +41,8 @@ void report_head_of(const struct site *site, uint32_t station, struct deviation_
         georef_count_m(site->station[station].georef, cfg->profile.range_max_m * SITE_MARGIN, head->setup.xyz_scale);
 }
 
-/* Points that are judged by the bound: all, but with a footprint only those on smooth faces, since at an edge it
- * meets more than one surface. */
+/* All points are judged by the bound. With a footprint only those on smooth faces are: at an edge it hits more than one
+ * surface. */
 static int is_judged(const struct deviation_head *head, double distance_m, double along_m)
 {
     if (isnan(distance_m)) return 0;
@@ -90,9 +90,10 @@ static void judge_bound(struct report_verdict *v, const struct figures *f, int f
 
 enum { JUDGED_LEAST = 100 };
 
-/* z^2 of a normal deviation has a variance of 2; six standard errors of its mean are exceeded once in 5e8. One part in
- * fifty more, as sigma is of first order and smooth faces are told by the noisy points themselves; for the mean, a
- * hundredth of sigma. Counts add between nothing and three times their variance (core/studio/deviation.h). */
+/* z^2 of a normal deviation has a variance of 2; six standard errors of its mean are exceeded once in 5e8. A
+ * fiftieth is added, since sigma is of first order, and the noisy points themselves decide where faces are smooth.
+ * For the mean a hundredth of sigma is added. Counts add between nothing and three times their variance
+ * (core/studio/deviation.h). */
 static void judge_noise(struct report_verdict *v, const struct figures *f)
 {
     const double n = (double)f->noisy, tolerance = 6.0 * sqrt(2.0 / n) + 0.02, z2 = f->z_rms * f->z_rms;

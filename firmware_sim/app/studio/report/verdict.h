@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether the deviations of points are as expected of configuration and plan: of a recording's station (expect.c), and
- * of a scan that is still on (firmware_sim/app/studio/watch). In: what the station's head is, and the figures of its points
- * (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. Also the JSON of both, which
- * `report --json` and /quality share (json.c). */
+/* Whether the deviations of points are as configuration and plan let expect: of a recording's station (expect.c), and
+ * of a scan that is still on (firmware_sim/app/studio/watch). In: the setup of the station's head, and the figures of
+ * its points (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. Also the JSON of
+ * both, which `report --json` and /quality share (json.c). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 
@@ -23,11 +23,11 @@ struct report_verdict {
 /* "within", "beyond", "not judged". */
 const char *report_judgement_name(enum report_judgement judgement);
 
-/* What the head of a site is at a station, from 0. file_count_m is the caller's. */
+/* Fills in the setup and the errors of a site's head at a station, from 0. file_count_m is the caller's. */
 void report_head_of(const struct site *site, uint32_t station, struct deviation_head *head);
 
-/* Counts one point: its distance from the scene, its deviation along the beam and its range, as core/studio/deviation.h has
- * them. */
+/* Counts one point, by its distance from the scene, its deviation along the beam and its range
+ * (core/studio/deviation.h). */
 void report_count(struct report_verdict *v, const struct deviation_head *head, double distance_m, double along_m,
                   double range_m);
 

@@ -52,8 +52,8 @@ static int work_load(struct report *r, struct sh_err *err)
     return rc == SH_OK && r->site->legs != NULL ? index_legs(r, err) : rc;
 }
 
-/* Turns a point on a moving body into the body's own frame and gives the body's index. At a stop the body
- * stands still during the scan. */
+/* Takes a point on a moving body to the body's own frame, and returns the body's index. At a stop the body stands still
+ * during the scan. */
 static const struct distance *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
 {
     const struct report *r = ctx;
@@ -177,8 +177,8 @@ static uint32_t by_incidence(void *ctx, size_t i)
     return bin < REPORT_INCIDENCES ? (uint32_t)bin : REPORT_INCIDENCES - 1;
 }
 
-/* Bins of 1, 2 or 5 times a power of ten; there are ranges at all. Up to the farthest point that is near the scene: a
- * stray one must not put all others into one bin. */
+/* Bins are 1, 2 or 5 times a power of ten wide. They end at the farthest point that is near the scene: a stray one must
+ * not put all others into one bin. */
 static void choose_ranges(struct report *r)
 {
     double far_m = 0.0;
@@ -262,7 +262,7 @@ static int times(struct report *r, struct sh_err *err)
     return rc;
 }
 
-/* That share of the points is within a histogram's bins. */
+/* The share of the points that lies within a histogram's bins. */
 static const double SHOWN = 0.995;
 
 int report_work(struct report *r, struct sh_err *err)

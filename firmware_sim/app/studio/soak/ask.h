@@ -16,8 +16,8 @@ struct soak_ask {
     int settling; /* the library first comes into step, with questions of its own */
     uint32_t n;   /* faults that hit replies since the question went out */
     struct fault_note note[SOAK_MAX_REPLY_NOTES];
-    uint32_t echoes; /* noticed since then, and: */
-    uint64_t bad_bytes;
+    uint32_t echoes;             /* noticed since then */
+    uint64_t bad_bytes;          /* likewise */
     uint64_t others;             /* faults of any other kind since then */
     int64_t ended_ns;            /* clock: when a session last ended, or a client was turned away; 0: not yet */
     char before[SOAK_REPLY_LEN]; /* the last reply that came */
@@ -27,7 +27,7 @@ struct soak_ask {
 
 /* Asks the next question, and judges its answer. */
 void soak_ask_next(struct soak_link *link);
-/* Sees to it that the head scans. */
+/* Asks for the head's state; starts a scan where it is idle, and resets it where it is in fault. */
 void soak_ask_scan(struct soak_link *link);
 
 #endif

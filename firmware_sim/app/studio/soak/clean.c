@@ -65,7 +65,7 @@ soak_seq soak_clean_top(struct soak *soak)
     return top;
 }
 
-/* How the head is. */
+/* Asks for the head's identity and state. */
 static void ask(struct soak_clean *c)
 {
     if (scanhead_command(c->sh, "*IDN?", c->idn, sizeof c->idn, REPLY_MS) != SCANHEAD_OK) c->idn[0] = '\0';

@@ -50,7 +50,7 @@ static const char *why_not(const struct link_place *place, const struct link_spe
     return NULL;
 }
 
-/* Its packets begin anew then, or are missing, and those of the link beside it are not. */
+/* Whether a fault makes the packets of a link begin anew, or stop for a while: they can't be compared then. */
 static int begins_anew(const struct soak *soak)
 {
     for (uint32_t i = 0; i < soak->faults.n; i++) {
@@ -107,7 +107,7 @@ static int is_over(const struct soak_link *link)
     return phase == SOAK_ENDS || (phase == SOAK_DRAINS && atomic_load(&link->done));
 }
 
-/* Nothing but the end is waited for once it has all frames up to the last fault, and the head scans. */
+/* A client is done once it has all frames up to the last fault, and the head scans. */
 static void see_whether_done(struct recorder *r)
 {
     struct soak_link *link = r->link;
@@ -134,7 +134,8 @@ static void began(struct recorder *r)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* Each try is one of its own, so that a refusal is seen. Until the head is there, or the soak ends. */
+/* Tries until the head is there, or the soak ends. The library makes a single attempt in each try, so that a refusal is
+ * seen. */
 static void open_head(struct recorder *r)
 {
     struct soak_link *link = r->link;
@@ -170,7 +171,7 @@ static void reattach(struct recorder *r)
     open_head(r);
 }
 
-/* A frame whose content the library refuses, or a stream without frames, which is over. */
+/* The library refuses the content of a frame; or the stream ended without a frame, and the connection is over. */
 static void refuse_frame(struct recorder *r)
 {
     struct scanhead_stats stats;

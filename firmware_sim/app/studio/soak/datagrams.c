@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* A reader of a link that sends datagrams: it compares each with those of a second link, which has no faults.
  *
- * Both links speak the same protocol and begin at power-up. So datagram n of the clean one is what unit n of the other
- * was before faults met it. A reader of its own has no numbers: it notices what is missing, doubled or late by the
- * times in the packets, and what is cut by their length. Datagrams wait a moment here, so that the clean one is there
- * first. */
+ * Both links speak the same protocol and begin at power-up. So datagram n of the clean one is unit n of the other,
+ * before faults hit it. Datagrams have no numbers: each is found among the clean ones by its content, near the place
+ * where it is expected. Datagrams wait a moment here, so that the clean one is there first. */
 #include <netinet/in.h>
 #include <poll.h>
 #include <stdio.h>
@@ -25,7 +24,7 @@
 enum { LONGEST = 65536, RECEIVE_BYTES = 4 << 20, POLL_MS = 20, LOOK_BACK = 4096, WAITING = 1 << 14 };
 static const int64_t WAIT_NS = 300000000;
 
-/* Unit n is n from here on. */
+/* The number of unit n is UNITS + n, so that 0 stays free for `none`. */
 static const soak_seq UNITS = (soak_seq)1 << 32;
 
 struct datagram {

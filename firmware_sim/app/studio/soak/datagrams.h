@@ -18,7 +18,7 @@ struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct 
 void soak_datagrams_close(struct soak_datagrams *datagrams);
 int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
 void soak_datagrams_step(struct soak_link *link);
-/* Takes what is on its way still. */
+/* Waits for datagrams that are still on their way, and takes them. */
 void soak_datagrams_finish(struct soak_link *link);
 uint64_t soak_datagrams_top(struct soak_link *link);
 soak_seq soak_unit(uint64_t number);

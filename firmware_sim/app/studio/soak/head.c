@@ -14,7 +14,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Another reader of the stream would take this for a step of the clock: far above a nanosecond, far below a jump. */
+/* STEP_S: a step of the clock, as any reader would see it. GAIN_S: the least drift between two events that counts. Both
+ * are far above a nanosecond and far below a jump. PPS_WITHIN_S: the longest time between two pulses. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
 /* Kinds that a client can't notice by itself, and why. */
@@ -146,7 +147,7 @@ void soak_saw_state(struct soak_link *link, const char *state)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* A boot that took longer than it was told to be; a self-test that failed. */
+/* Notices a boot that took as long as its fault said, and a self-test that failed. */
 static void take_state(struct soak_link *link, const struct scanhead_frame *frame)
 {
     if (frame->event_value[0] == HEAD_FAULT) see_kind(link, FAULT_SELF_TEST, INT64_MIN, frame->t_ns);
@@ -167,7 +168,7 @@ static void hide_clock(struct soak_link *link, int64_t at_ns)
     }
 }
 
-/* The head's clock beside device time: since the last event that had both. */
+/* Compares how far the head's clock and device time went since the last event that had both. */
 static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
 {
     struct soak_times *t = &link->times;
@@ -188,14 +189,14 @@ static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
     t->gps_ns = gps_ns;
 }
 
-/* No PPS for longer than a second, from the last one on, or from the first frame. */
+/* Notices that no PPS came for PPS_WITHIN_S since the last one, or since the first frame. */
 static void miss_pps(struct soak_link *link, int64_t at_ns)
 {
     const int64_t last_ns = link->times.pps_ns;
     if (1e-9 * (double)(at_ns - last_ns) > PPS_WITHIN_S) see_kind(link, FAULT_PPS_LOST, last_ns, at_ns);
 }
 
-/* Its first PPS came soon after its first frame: those before that it can't miss. */
+/* A client can't miss pulses from before its first frame. */
 static void hide_pps(struct soak_link *link, int64_t first_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;)
@@ -203,7 +204,7 @@ static void hide_pps(struct soak_link *link, int64_t first_ns)
             hide_moment(link, i, "it was before the client had a frame");
 }
 
-/* A pulse that is as late against the one before it as the fault says, or early by that. */
+/* Notices a pulse that is late against the one before it by as much as the fault says, or early by that. */
 static void see_jitter(struct soak_link *link, int64_t at_ns, int64_t gps_s)
 {
     const struct soak_times *t = &link->times;

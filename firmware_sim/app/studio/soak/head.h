@@ -34,7 +34,7 @@ struct soak_times {
 void soak_heard_head(struct soak_link *link, const struct fault_note *note);
 /* Its client's first frame. */
 void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame);
-/* A power cycle that began before that device time, and was not noticed, is. 0: there is none. */
+/* Notes as noticed a power cycle that began before that device time. Returns 0 where there is none. */
 int soak_saw_power_go(struct soak_link *link, int64_t before_ns);
 void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame);
 void soak_saw_state(struct soak_link *link, const char *state);

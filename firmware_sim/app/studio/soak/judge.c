@@ -13,8 +13,8 @@
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Noticed by its time: a frame that comes so much later than it says. A block of pulses lasts a tick, and the smallest
- * time that any frame took is not the smallest possible. */
+/* A frame counts as late from LATE_MS on. MARGIN_MS: a block of pulses lasts a tick, and the smallest time that any
+ * frame took is not the smallest possible. */
 static const double LATE_MS = 10.0, MARGIN_MS = 5.0;
 enum { NEAR_FRAMES = 64 };
 static const int64_t NEAR_NS = 20000000, FAR_NS = 20000000000;
@@ -73,7 +73,7 @@ static void judge_duplicate(struct soak_link *link, const struct soak_fact *f)
         decide(row, f->times[FAULT_DUPLICATE], f->got + f->late + f->repeated == 1 + f->copies);
 }
 
-/* All that could overtake it were destroyed, or held back themselves. */
+/* Whether all frames that could overtake it were destroyed, or held back themselves. */
 static int nothing_overtook(struct soak_link *link, const struct soak_fact *f)
 {
     for (uint32_t i = 1; i <= f->behind; i++) {

@@ -80,7 +80,7 @@ static void take_kind(struct soak_fact *fact, const struct fault_note *note)
     }
 }
 
-/* Those that went into one datagram. */
+/* Marks the frames that went into one datagram. */
 static void mark_merged(struct soak_link *link, const struct fault_note *note)
 {
     for (uint64_t i = 0; i < note->n; i++) {
@@ -229,7 +229,7 @@ static void ledger_begin(struct soak_link *link, soak_seq seq)
     link->begun = link->in_session = 1;
 }
 
-/* The library has their numbers, and gives no gap: they came, and it refused them for what they hold. */
+/* The library gives no gap for frames that came and that it refused for their content. Marks them as missing here. */
 static void mark_refused(struct soak_link *link, soak_seq to)
 {
     for (soak_seq seq = link->last + 1; seq < to && link->refused_now > 0; seq++) {
@@ -352,7 +352,7 @@ void soak_saw_open(struct soak_link *link)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* What was to be done to the session after its end, was not. */
+/* Acts on a session that has ended before them were not done. */
 static void forget_acts(struct soak_link *link, uint32_t from)
 {
     for (uint32_t i = from; i < link->n_acts; i++)
@@ -394,7 +394,8 @@ void soak_saw_end(struct soak_link *link)
     link->in_session = 0;
     link->ask.ended_ns = clock_now_ns();
     link->closings++;
-    /* It is said some ticks before power goes. The client may be far behind then, the clean reader is not. */
+    /* The board reports a power cycle some ticks before power goes. The client may be far behind then, the clean reader
+     * is not. */
     const int64_t act_ns = link->n_acts != 0 ? link->act[0].t_ns : INT64_MAX;
     const int64_t now_ns = link->begun ? soak_clean_t_ns(link->soak) : INT64_MAX - AHEAD_NS;
     if (soak_saw_power_go(link, act_ns != INT64_MAX ? act_ns : now_ns + AHEAD_NS)) {

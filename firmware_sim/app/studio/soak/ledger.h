@@ -20,7 +20,7 @@ struct soak_fact {
     /* what the client saw */
     uint64_t digest;
     uint32_t got, gap, repeated, late;
-    int64_t after_ns; /* from the time that the frame itself says to its arrival, by another clock: link->offset_ns */
+    int64_t after_ns; /* clock at its arrival, minus its own device time; link->offset_ns is the smallest of these */
     int away;         /* there was no session then */
     /* what was done to it */
     int64_t t_ns;

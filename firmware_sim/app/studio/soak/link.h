@@ -33,11 +33,11 @@ struct soak_link {
     struct soak_row row[SOAK_N_ROWS];
     struct soak_fact *fact;
     int begun, in_session;
-    soak_seq judged, first, last, top; /* the next to be judged; of the frames received; known of at all */
+    soak_seq judged, first, last, top; /* next to be judged; first and last that were received; newest with an entry */
     uint64_t frames, bytes, refused_frames, sessions, closings, refused;
     uint64_t refused_now;       /* frames since the last one that was taken */
-    uint64_t lost_plain;        /* without a fault ... */
-    uint64_t reader_lost;       /* ... and those that the head said it left out, as the client was too slow */
+    uint64_t lost_plain;        /* frames that are missing without a fault */
+    uint64_t reader_lost;       /* frames that the head says it left out, since the client was too slow */
     uint64_t wrong_plain;       /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;           /* the clean reader did not get them */
     uint64_t odd_closings;      /* the connection was closed without a fault */

@@ -58,7 +58,7 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
 {
     const uint64_t bad = link->bad_bytes;
     struct soak_row sum = {0};
-    /* What was left to be done at the end was not done. */
+    /* Acts that the client has not noticed by the end are missed. */
     for (uint32_t i = 0; i < link->n_acts; i++)
         link->row[link->act[i].kind].missed++;
     for (uint32_t i = 0; i < link->n_refusals; i++)

@@ -82,7 +82,7 @@ static int is_head_seen(struct soak *soak)
 
 /* ---- the run */
 
-/* Of the clock, in real time; else of the head. */
+/* Time since from_ns: of the clock, in real time; else of the head, since its first points. */
 static double passed_s(struct soak *soak, int64_t from_ns)
 {
     if (soak->realtime) return 1e-9 * (double)(clock_now_ns() - from_ns);
@@ -162,8 +162,8 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
 
-/* A second link beside each that sends datagrams, without faults. Where it has no room, its first is not soaked. A
- * device on USB gets a name. Where nobody could start a scan, the head does so itself. */
+/* Adds a second link, without faults, beside each that sends datagrams. Where there is no room for it, the first one is
+ * not soaked. A device on USB gets a name. Where no client could start a scan, the head does so itself. */
 static void open_clean_links(struct config *cfg, struct soak *soak, struct soak_options *o)
 {
     int starts = 0;

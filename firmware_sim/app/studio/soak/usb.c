@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that is attached to this machine as a USB device: how its client finds it, and enumerations that went wrong. */
+/* A head that is attached to this machine by USB: how its client finds it, and enumerations that went wrong. */
 #include <glob.h>
 #include <stdio.h>
 #include <string.h>
@@ -34,7 +34,7 @@ void soak_usb_source(const struct link_spec *spec, char *source, size_t len)
     snprintf(source, len, "usb:%04x:%04x:%s", (unsigned)spec->vid, (unsigned)spec->pid, spec->serial);
 }
 
-/* ---- by how much the configuration says that it is longer than it is, as Linux got it */
+/* ---- the bytes that the configuration descriptor announces beyond those that Linux got */
 
 static size_t read_file(const char *folder, const char *name, uint8_t *to, size_t len)
 {

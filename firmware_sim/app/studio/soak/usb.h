@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that is attached to this machine as a USB device: how its client finds it, and enumerations that went wrong. */
+/* A head that is attached to this machine by USB: how its client finds it, and enumerations that went wrong. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_USB_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_USB_H
 

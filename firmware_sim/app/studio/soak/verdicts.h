@@ -11,7 +11,7 @@ enum { VERDICTS_MAX_SCENARIOS = 16 };
 struct verdicts {
     struct verdict_options options;
     const char *scenario[VERDICTS_MAX_SCENARIOS]; /* as the command line has them */
-    uint32_t n;                                   /* 0: one run, with the faults of the configuration alone */
+    uint32_t n;                                   /* 0: a single run, with the configuration's own faults */
     const char *json, *junit;                     /* NULL: none */
 };
 

@@ -13,10 +13,10 @@ struct checks {
     struct watch *watch;
     const struct client *client;
     int has_sessions;           /* clients of the link connect to it; 0: it sends to whoever is there */
-    int is_open;                /* it has a session at the end, before the client was ended */
+    int is_open;                /* the client has a session at the end, before it is ended */
     int scans, holds;           /* points came to the end; the client keeps a dead connection */
     int64_t start_ns, ended_ns; /* of the client, and when its end was asked for */
-    int was_there;              /* it had not ended by itself until then */
+    int was_there;              /* the client had not ended by itself until then */
 };
 
 void checks_judge(const struct checks *checks, struct verdict *verdict);

@@ -40,17 +40,22 @@ static int is_held(const char *line, uint64_t address)
            address_of(host, port) == address && (state == STATE_ESTABLISHED || state == STATE_CLOSE_WAIT);
 }
 
+/* In some tables the inode is at the end of a line. */
 static int has_inode(const char *line, uint64_t inode)
 {
     char word[32];
-    snprintf(word, sizeof word, " %" PRIu64 " ", inode);
-    return strstr(line, word) != NULL;
+    const int len = snprintf(word, sizeof word, " %" PRIu64, inode);
+    const char *at = line;
+    while ((at = strstr(at, word)) != NULL && at[len] != ' ' && at[len] != '\n')
+        at += len;
+    return at != NULL;
 }
 
 /* Whether a socket is in no table: it was connected, and is so no more. */
 static int is_dead(uint64_t inode)
 {
-    static const char *const tables[] = {"tcp", "tcp6", "udp", "udp6", "unix", "netlink", "raw", "packet"};
+    static const char *const tables[] = {"tcp",  "tcp6",  "udp",     "udp6", "raw",   "raw6",
+                                         "icmp", "icmp6", "netlink", "unix", "packet"};
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
         char path[PATH_BYTES];
         snprintf(path, sizeof path, "/proc/net/%s", tables[i]);
@@ -78,8 +83,8 @@ static int has_dead(void *ctx, pid_t pid)
     return dead;
 }
 
-/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so files
- * are read without it. */
+/* Copies the clients' addresses of sessions after which nobody came back. The links' threads need the lock, so it is
+ * not held while files are read. */
 static size_t copy_addresses(struct watch *watch, uint64_t *address, size_t cap)
 {
     size_t n = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Connections that the head has ended, and that the client still has. In: the peers of sessions that have ended. Out:
- * whether there is one. By Linux's /proc, so of clients on this machine. */
+ * whether there is one. It reads Linux's /proc, so it knows clients on this machine alone. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_HELD_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_HELD_H
 

@@ -112,7 +112,8 @@ static int compare_spoiled(const void *left, const void *right)
     return a->seq != b->seq ? (a->seq < b->seq ? -1 : 1) : 0;
 }
 
-/* How many sessions were sent the frame. At their ends they have the benefit of the doubt, of two ticks. */
+/* How many sessions were sent the frame. A session's time is taken two ticks longer at both ends, since frames there
+ * may have been sent or not. */
 static uint32_t count_sent(const struct watch *watch, int64_t tick_ns, const struct own_frame *frame)
 {
     uint32_t n = 0;
@@ -173,7 +174,7 @@ static void count_groups(const struct match_index *index, struct match *m)
     }
 }
 
-/* With a large distance each point agrees with very many, so a stop is looked for often. */
+/* With a large distance each point agrees with very many others, so it often asks whether to stop. */
 static int count_points(struct match_index *index, const struct match_input *in, const struct way *way, struct match *m,
                         struct sh_err *err)
 {

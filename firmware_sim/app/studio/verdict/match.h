@@ -14,7 +14,7 @@ struct match {
     size_t unknown;          /* no pulse had them */
     size_t repeated;         /* the client has them more often than they were sent */
     size_t sent;             /* points of the head that some session was sent, once for each */
-    size_t again;            /* of sent, those that agree with another one: a repeated one may go unseen there */
+    size_t again;            /* of `sent`, those that agree with another point: a repeated one may go unseen there */
     size_t first_unknown;    /* index in the cloud */
     const char *frame;       /* the coordinate frame in which they agree best */
     double unit_m, within_m; /* what the file rounds to; how far a coordinate may differ */

@@ -62,7 +62,7 @@ static void keep_points(struct own_stream *s, const struct scanhead_frame *frame
     s->frame[s->n_frames++] = (struct own_frame){frame->seq, frame->t_ns, s->n};
 }
 
-/* By its events, and by its telemetry each second (EVENTS.md). */
+/* The head's state is in its events, and in its telemetry each second (EVENTS.md). */
 static void see_state(struct own_stream *s, const struct scanhead_frame *frame)
 {
     uint64_t state;

@@ -31,7 +31,7 @@ struct own_stream {
     size_t n_frames, room_frames, n, room;
     struct scanhead_info info; /* of the first points */
     int have_info, is_moved;   /* is_moved: the head stood in several places */
-    char short_of[256];        /* why points are missing; empty: they are all there */
+    char short_of[256];        /* why points are missing; empty: none is */
 };
 
 int own_stream_open(struct own_stream *stream, struct sh_err *err);

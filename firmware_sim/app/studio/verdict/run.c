@@ -140,7 +140,7 @@ static int never(struct run *r)
     return 0;
 }
 
-/* Waits until all who were sent away are back and, after that, points come. */
+/* Waits until all clients that were sent away are back, and points come. */
 static void run_settle(struct run *r)
 {
     struct checks *c = &r->checks;
@@ -205,8 +205,8 @@ static int is_new(const struct run *r)
            now.st_mtim.tv_sec != r->before.st_mtim.tv_sec || now.st_mtim.tv_nsec != r->before.st_mtim.tv_nsec;
 }
 
-/* Returns what a link's own numbers round coordinates to, m: half a millimetre of range, and angles (SCIP, CoLa); for a
- * VLP-16 half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream
+/* By how much a link's protocol rounds coordinates, m. SCIP and CoLa: half a millimetre of range, and angles.
+ * VLP-16: half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream
  * does not. */
 static double match_of(const struct run *r)
 {

@@ -30,7 +30,7 @@ struct config;
 enum verdict_check { VERDICT_CHECKS(VERDICT_ENUM) VERDICT_N_CHECKS };
 extern const char *const verdict_names[VERDICT_N_CHECKS], *const verdict_asks[VERDICT_N_CHECKS]; /* by check */
 
-/* ALLOWED: found, and the user knows it. */
+/* ALLOWED: found, but --allow names the check. */
 enum verdict_state { VERDICT_NOT_JUDGED, VERDICT_PASSED, VERDICT_FOUND, VERDICT_ALLOWED };
 
 struct verdict_result {

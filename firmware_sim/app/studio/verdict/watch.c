@@ -142,13 +142,13 @@ static void on_refused(void *ctx, uint32_t session, const char *line, const char
 
 /* ---- faults */
 
-/* Ends sessions, or may make a client end its own: it was silent for a while. */
+/* Whether a fault ends sessions, or makes the head silent, so that a client may end its own. */
 static int ends_sessions(enum fault_kind kind)
 {
     return fault_is_act(kind) || kind == FAULT_POWER_CYCLE || kind == FAULT_STALL;
 }
 
-/* The thread of a link tells later that such a fault has ended its sessions. */
+/* Notes the fault; the link's thread reports later that sessions have ended. */
 static void watch_act(struct watch *w, const struct fault_note *note)
 {
     const int64_t over_ns = clock_now_ns() + (int64_t)(1e6 * note->for_ms);
@@ -162,7 +162,7 @@ static void watch_act(struct watch *w, const struct fault_note *note)
     }
 }
 
-/* Power came later than its fault said, where the head had to wait. */
+/* Power is back now, which may be later than the fault said. */
 static void power_is_back(struct watch *w)
 {
     for (size_t i = 0; i < w->n_broken; i++)

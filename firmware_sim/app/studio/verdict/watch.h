@@ -45,10 +45,10 @@ struct watch {
     pthread_mutex_t lock;
     struct links_observer observer;
     uint32_t n_links, chosen; /* chosen: the client's, from 1 */
-    uint32_t must_ask; /* bit per link: who has come back there gets nothing before a request, and is back with it */
-    int64_t limit_ns;  /* how long after a fault that leaves sessions their end still counts as caused by it */
-    int is_over;       /* what follows is the end of the run, and no client's doing */
-    int is_short;      /* memory was */
+    uint32_t must_ask;        /* bit per link: a client there is back with its first request, not with its connection */
+    int64_t limit_ns;         /* how long after a fault that leaves sessions their end still counts as caused by it */
+    int is_over;              /* 1: the run ends, so that sessions that end now are no client's doing */
+    int is_short;             /* 1: there was no memory for something */
     struct watch_link link[CONFIG_MAX_LINKS];
     struct watch_break *broken;
     struct watch_span *span; /* of the chosen link */

@@ -9,7 +9,7 @@
 #include "core/infile.h"
 #include "firmware_sim/app/studio/view/viewed.h"
 
-/* Shots without echo go, and points that have no place; what is left keeps its order. */
+/* Removes shots without echo, and points that have no place; the others keep their order. */
 static void leave_out_empty(struct viewed *v)
 {
     struct viewed_points *p = &v->points;
@@ -52,7 +52,7 @@ static void cloud_take(struct viewed *v, struct cloud *c)
     *c = (struct cloud){0};
 }
 
-/* What our recorder writes into the header's comments: "label N OBJECT | MATERIAL", "idn ...", "profile ...". */
+/* Our recorder writes these comments into the header: "label N OBJECT | MATERIAL", "idn ...", "profile ...". */
 static int take_comment(struct viewed *v, char *line, struct sh_err *err)
 {
     unsigned label;

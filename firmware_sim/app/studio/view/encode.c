@@ -38,7 +38,7 @@ static size_t padded(size_t bytes)
     return (bytes + 3) & ~(size_t)3;
 }
 
-/* How many there are from `first` on in steps, and no more than asked for and allowed. */
+/* How many of n there are from `first` on, in steps of `every`; no more than `most` and `allowed`. */
 static uint32_t count_of(uint32_t n, uint32_t first, uint32_t every, uint32_t most, uint32_t allowed)
 {
     const uint32_t there = first < n ? (n - first - 1) / every + 1 : 0;
@@ -98,7 +98,7 @@ static void put_row(char *to, const struct view_column *c, size_t offset)
     le_put32(to + 28, (uint32_t)offset);
 }
 
-/* Bytes of the answer; without a body, or with it. */
+/* Returns the length of the answer, and writes it where body is not NULL. */
 static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
 {
     size_t at = VIEW_CLOUD_HEAD + (size_t)n_columns * VIEW_CLOUD_COLUMN, size;

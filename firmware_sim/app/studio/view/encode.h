@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead view` serves, as bytes: points, triangles, and the description of both. In: a recording. Out: bodies that
- * the caller frees. The formats are in README.md; all numbers are little-endian. */
+/* Encodes what `scanhead view` serves: points, triangles, and the description of both. In: a recording. Out: bodies
+ * that the caller frees. The formats are in README.md; all numbers are little-endian. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_ENCODE_H
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_ENCODE_H
 

@@ -22,7 +22,8 @@ static float ratio_of(const double (*xyz_m)[3], const uint32_t f[3], double mean
     return (double)near < ratio ? nextafterf(near, INFINITY) : near;
 }
 
-/* By rising ratio, equal ones by rising number: positive floats are in the order of their bits (two passes of 16 bits). */
+/* Sorts by rising ratio, equal ones by rising number. Positive floats are in the order of their bits, which two passes
+ * of 16 bits sort. */
 static int sort_faces(struct viewed_mesh *m)
 {
     enum { BINS = 1 << 16 };

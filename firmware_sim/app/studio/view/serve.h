@@ -10,7 +10,7 @@
 struct view_serve {
     const struct viewed *viewed;
     const struct sh_report *report; /* its stop ends what takes long; may be NULL */
-    /* the last sparse points that were made, and what of */
+    /* the last sparse points that were made, and by which request */
     struct viewed_points sparse;
     int made;
     double per_m2, long_edge;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Points spread evenly over a recording's meshes, as `scanhead record --sparse` makes them. In: density, long-edge factor,
- * seed. Out: points with range, reflectance, label, station, and colour where the recording has it. */
+/* Points spread evenly over a recording's meshes, as `scanhead record --sparse` makes them. In: density, long-edge
+ * factor, seed. Out: points with range, reflectance, label, station, and colour where the recording has it. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_SPREAD_H
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_SPREAD_H
 

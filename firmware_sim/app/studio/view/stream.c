@@ -30,7 +30,8 @@ static int place_station(struct viewed_stream *s, struct sh_err *err)
     return SH_OK;
 }
 
-/* Why points of this track have no mesh, as recorders say it, but for the path and for what else could be recorded. */
+/* Returns 0 where points of this track have no mesh; the reason is then that of recorders, without the path and without
+ * what else could be recorded. */
 static int check_mesh(struct viewed_stream *s)
 {
     struct sh_err why = {0};

@@ -112,7 +112,7 @@ static const struct app_option OPTIONS[] = {
      .help = "port of the page; 0: the system chooses (default)"},
     {APP_TEXT, "address", "A", .at = AT(address),
      .help = "address to listen on, a number or a name (default 127.0.0.1: only this machine)"},
-    {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
+    {APP_OUTPUT, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the page's address to descriptor N once it can be opened"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "print only errors and warnings"},
     OPTION_END

@@ -39,7 +39,7 @@ int viewed_check_ending(const char *path, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "%s: recordings with this ending are not shown; %s", path, allowed);
 }
 
-/* That it is a file, and not empty; the first bytes. */
+/* Checks that the path leads to a file that is not empty, and reads its first bytes. */
 static int look_at(const char *path, char head[4], struct sh_err *err)
 {
     const char *why;
@@ -95,7 +95,7 @@ static void to_enu(const struct geoframe *frame, int is_geodetic, double p[3])
     mat3_apply_transposed(frame->rotation, d, p);
 }
 
-/* Angles of a head in ECEF, by its attitude there; in degrees they are those of its place already. */
+/* Turns the angles of a head in ECEF to its new frame. For points in degrees they refer to its place already. */
 static void turn_station(const struct geoframe *frame, struct viewed_station *s)
 {
     double quat[4], in_ecef[9], back[9], turned[9];

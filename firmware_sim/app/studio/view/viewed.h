@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .ply, .las). Out:
- * arrays, in metres, in one frame with z up.
+/* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .ply, .las).
+ * Out: arrays, in metres, in one frame with z up.
  *
- * Points without echo are counted, not held. Meshes are those of `scanhead record --mesh` before the long-edge filter;
- * their triangles carry what the filter asks for, so that any factor can be shown at once.
+ * Shots without echo are counted, not held. Meshes are those of `scanhead record --mesh` before the long-edge filter.
+ * Each triangle has its edge ratio, by which the filter decides, so that any factor can be shown at once.
  *
- * Memory: 24 bytes a point; range, reflectance and amplitude 4 each, time 8, label and station 2 each, echo and echoes 1
- * each, colour 3; of a mesh 20 a triangle, two a point. Constant after viewed_load; any thread. */
+ * Memory: 24 bytes a point; range, reflectance and amplitude 4 each, time 8, label and station 2 each, echo and echoes
+ * 1 each, colour 3; of a mesh 20 a triangle, two a point. Constant after viewed_load; any thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 
@@ -43,8 +43,8 @@ struct viewed_points {
 
 /* The array of a column, or NULL; *size: bytes of one value, its components together. */
 const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size);
-/* Room for n points, in arrays that are there; has: bit c for column c, with n 0 to begin with. SH_ENOMEM: points is as it
- * was, but for room. */
+/* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c), which are NULL at first. SH_ENOMEM:
+ * points are as before, except for the room. */
 int viewed_points_room(struct viewed_points *points, size_t n, unsigned has, struct sh_err *err);
 void viewed_points_free(struct viewed_points *points);
 
@@ -61,7 +61,7 @@ struct viewed_mesh {
 
 struct viewed_station {
     uint32_t number;
-    int placed; /* 1: where it is, is known: */
+    int placed; /* 1: its place is known: */
     double p_m[3], heading_rad, pitch_rad, roll_rad;
 };
 
@@ -103,8 +103,8 @@ void viewed_free(struct viewed *viewed);
 int viewed_check_ending(const char *path, struct sh_err *err);
 int viewed_load_cloud(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
 int viewed_load_stream(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
-/* Whether a point of a file in this CRS has a place that can be shown: within 10^12 m, in degrees at a latitude. Of numbers
- * beyond that, which broken files hold, nothing finite would be left when they are turned. */
+/* Whether a point of a file in this CRS has a place that can be shown: within 10^12 m, or in degrees with a latitude
+ * within 90. Broken files hold larger numbers, which would not stay finite when they are turned. */
 int viewed_can_show(int64_t epsg, const double p[3]);
 /* Takes points and stations in ECEF or in degrees to metres east, north, up of the first point. */
 int viewed_turn(struct viewed *viewed, struct sh_err *err);

@@ -23,7 +23,7 @@
 #include "firmware_sim/app/studio/watch/save.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 
-/* Points kept of a scan, at most; points compared at a time; the largest `every`. */
+/* The most points of a scan that are held; how many are compared at a time; the largest `every`. */
 enum { WATCH_MOST_POINTS = 1 << 17, WATCH_BATCH = 1024, WATCH_LEAST_SHARE = 1 << 20 };
 
 /* Points of the scan at hand that are looked at, in the scene's frame. */
@@ -31,7 +31,7 @@ struct watch_sample {
     uint32_t every; /* a power of two: one of so many pulses */
     size_t n, done; /* points, and how many of them were compared */
     double (*xyz_m)[3];
-    uint32_t *hash; /* of the point's pulse: kept where hash % every is 0 */
+    uint32_t *hash; /* of the point's pulse; a point is in the sample where hash % every is 0 */
     double *distance_m;
     uint32_t *triangle;
     struct deviation_points points;

@@ -13,8 +13,8 @@
 #include "firmware_sim/command/head.h"
 
 enum { NEXT_MS = 100, QUIET = 20 };
-/* The stream comes tick by tick. Taken in larger pieces it costs half: so much of 2.2 million pulses a second fits into
- * the socket, and the link's queue has the rest. */
+/* The stream comes tick by tick. The observer sleeps so long when nothing is there, since larger pieces cost less to
+ * read. The socket and the link's queue hold what comes meanwhile. */
 static const int64_t NAP_NS = 4000000;
 static const int64_t PUBLISH_NS = 500000000;
 
@@ -27,8 +27,8 @@ static int is_about(const struct georef *georef, const struct scanhead_info *inf
     return fabs(d[0]) <= info->scale[0] && fabs(d[1]) <= info->scale[1] && fabs(d[2]) <= info->scale[2];
 }
 
-/* A georeference about the place that the stream says: of the station's, which may have moved since. 0: there is
- * none. */
+/* Makes a georeference around the place that the stream says, from that of the station, which may have moved since.
+ * Returns 0 where there is none. */
 static int follow_georef(struct watch *w, const struct georef *of, const struct scanhead_info *info)
 {
     struct sh_err err;
@@ -43,8 +43,8 @@ static void let_go(struct watch *w)
     w->now_georef = NULL;
 }
 
-/* Takes over the settings and the place that the scan is made with; gives the site that has them. Where the scan is
- * over already, the configuration's settings have to do, at the place that the stream says. */
+/* Takes the settings and the place of the scan, and returns the site that has them. Where the scan is over already, it
+ * takes the configuration's settings, at the place that the stream says. */
 static const struct site *find_head(struct watch *w, const struct scanhead_info *info)
 {
     const uint32_t station = info->station - 1;
@@ -57,7 +57,7 @@ static const struct site *find_head(struct watch *w, const struct scanhead_info 
     return site;
 }
 
-/* A scan of which nothing is known but its number and its station: its points can't be taken. */
+/* Only the number and the station of this scan are known, so its points can't be taken. */
 static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
 {
     let_go(w);

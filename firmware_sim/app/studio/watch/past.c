@@ -35,7 +35,7 @@ struct past {
     /* the taker's */
     struct placing placing[KINDS];
     int is_new;     /* they are not in the last piece yet */
-    int after_pose; /* the last frame was one of poses: points that need it follow */
+    int after_pose; /* the last frame had poses: the points that need them follow */
 
     pthread_mutex_t lock; /* of all below */
     struct piece piece[MOST_PIECES];
@@ -172,7 +172,7 @@ static void take_placing(struct past *past, int kind, const struct scanhead_fram
     memcpy(copy, frame->raw, frame->raw_len);
     past->is_new = 1;
     if (kind != 0) return;
-    for (int k = 1; k < KINDS; k++) { /* those of its own follow */
+    for (int k = 1; k < KINDS; k++) { /* emitter and anchor of the new descriptor follow it */
         free(past->placing[k].frame);
         past->placing[k] = (struct placing){0};
     }

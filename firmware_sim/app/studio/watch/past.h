@@ -9,7 +9,7 @@
  * second of them may be as long as all else. When there are more than `points` or `bytes`, the oldest piece goes, and
  * its points are counted as gone.
  *
- * Memory: none but this until the first points come; then a piece of PAST_PIECE bytes after the other, up to `bytes`.
+ * Memory: a piece of PAST_PIECE bytes after the other as points come, up to `bytes`; nothing before the first points.
  * Threads: one takes frames; any number of others read. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
@@ -32,8 +32,8 @@ enum { PAST_PIECE = 1 << 20, PAST_MOST_BYTES = 320 << 20, PAST_HEAD_LEN = 56 };
 
 /* NULL: no memory. */
 struct past *past_create(const struct past_limits *limits);
-/* lost_frames: of the taker's so far, which readers are told. Where there is no memory for points they are gone, and
- * counted. */
+/* lost_frames: so many the taker has lost so far; readers get this number. Points for which there is no memory count as
+ * gone. */
 void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames);
 /* The frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece; one
  * beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */

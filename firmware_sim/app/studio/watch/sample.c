@@ -13,7 +13,7 @@
 #define REACH_M    10.0
 #define REACH_TEXT "10 m"
 
-/* As the report's: the first cell of densities; that share of the points is within the histogram. */
+/* As in the report: the first size of density cells, and the share of the points within the histogram. */
 static const double CELL_M = 0.1, SHOWN = 0.995;
 
 int watch_sample_open(struct watch *w, struct sh_err *err)
@@ -68,7 +68,7 @@ static void move_point(struct watch_sample *s, size_t to, size_t from)
     p->range_m[to] = p->range_m[from];
 }
 
-/* Half as many pulses. */
+/* Keeps the points of half of the pulses. */
 static void thin(struct watch_sample *s)
 {
     size_t n = 0, done = 0;
@@ -113,9 +113,9 @@ static void without_beams(const struct deviation_points *p, const uint32_t *tria
     }
 }
 
-/* As many as the budget allows, from how long one takes and how many have come. Reading the stream and working out
- * figures come first; comparing has what they leave, and a tenth of the budget in any case. Of the first second it may
- * have all at once: points that are passed over now are not sampled later. */
+/* Thins the sample until comparing it fits the budget, by the time that one point takes and by how many have come.
+ * Reading the stream and working out figures come first; comparing has what they leave, and a tenth of the budget in
+ * any case. The budget of the first second is there at once: points that are passed over now can't be sampled later. */
 static void adapt(struct watch *w, size_t n, int64_t took_ns)
 {
     struct watch_sample *s = &w->sample;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The scene, coarse; what the head is; its plan. */
+/* /scene, /head and /plan: the coarse scene, the head and its stations, its plan. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,7 @@
 #include "firmware_sim/site/plan_rows.h"
 
 enum { PLAN_LEN = 512, HEAD_BYTES = 40, VERTEX_BYTES = 12, TRIANGLE_BYTES = 12, VERSION = 1 };
-/* Of each body that moves: a tenth of the scene's. */
+/* Each body that moves gets a tenth of the scene's triangles. */
 enum { BODY_PART = 10 };
 
 /* ---- /scene */

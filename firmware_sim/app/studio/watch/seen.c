@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which cells of the surface have points: a bit for each, by station. */
+/* Marks the cells of the surface that have points: a bit for each cell, by station. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,8 @@
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/config/config.h"
 
-/* The limits of cells, which is approximate, and of memory. A cell's piece takes up to 144 bytes, and a triangle at
- * least one (core/studio/coverage/cells.c). */
+/* Limits of the number of cells, which is approximate, and of memory. A piece of a cell takes up to 144 bytes, and each
+ * triangle has at least one piece (core/studio/coverage/cells.c). */
 static const double MOST_CELLS = 20000.0, MOST_MIB = 160.0;
 enum { TRIES = 12 };
 
