@@ -47,7 +47,7 @@ struct recorder_options {
     struct colour_choice colour; /* for formats that hold a colour */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads;            /* heads that scan one after the other in one scene; 0: one, as far as known */
+    uint32_t n_heads;            /* heads that scan one after the other, each as often as it comes; 0: 1 */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int las_wdp;   /* waveforms of .las go to a .wdp beside it */

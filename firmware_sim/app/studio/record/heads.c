@@ -49,6 +49,14 @@ int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err)
     return rc;
 }
 
+uint32_t heads_turns(const struct heads *heads, uint32_t first, uint32_t last)
+{
+    uint32_t n = 1;
+    for (uint32_t s = first + 1; first != 0 && s <= last; s++)
+        n += of(heads, s) != of(heads, s - 1);
+    return n;
+}
+
 struct config *heads_config(const struct heads *heads, uint32_t i, uint32_t first, uint32_t last)
 {
     uint8_t is_used[CONFIG_MAX_STATIONS] = {0};

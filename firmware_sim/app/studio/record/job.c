@@ -262,7 +262,7 @@ static int check_heads(struct record_job *r, const struct heads *heads, uint32_t
         rc = check_can_end(r, cfg, err);
         if (rc == SH_OK) rc = check_meshes(r, cfg, err);
     }
-    r->files.recorder.n_heads = r->files.split ? 1 : n;
+    r->files.recorder.n_heads = r->files.split ? 1 : heads_turns(heads, r->recording.first_station, last);
     return rc == SH_OK && n > 1 ? record_files_check_heads(&r->files, err) : rc;
 }
 
