@@ -373,6 +373,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         while (has_room(s) && take_tick(pump, s))
             more = 1;
         more |= take_input(pump, s);
+        more |= !has_room(s); /* ticks that had no room may have it once units are out */
         full = flush(pump, s, index);
         if (full < 0) {
             session_close(pump, s);
