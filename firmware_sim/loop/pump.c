@@ -214,7 +214,8 @@ static int is_unread(struct pump *pump, struct session *s, int index, int64_t no
     return unread > 0 || now_ns - s->moved_ns < MOMENT_NS;
 }
 
-/* True while some session has something to write and its reader takes it. */
+/* True while some session has something to write and its reader takes it. A client in memory shows by each turn that it
+ * does, however long it works on bytes between two of them. */
 static int has_more(struct pump *pump)
 {
     uint64_t released = stream_released(pump->stream);
@@ -229,7 +230,8 @@ static int has_more(struct pump *pump)
                          s->commands.moving || s->units.n != 0 || link.waits)) ||
             is_unread(pump, s, i, now_ns);
         const int in_time = now_ns - pump->over_ns < DRAIN_NS || !link.keeps_back;
-        if (pending && in_time && now_ns - s->moved_ns < DRAIN_NS) return 1;
+        const int takes = pump->client != NULL || (in_time && now_ns - s->moved_ns < DRAIN_NS);
+        if (pending && takes) return 1;
     }
     return 0;
 }
