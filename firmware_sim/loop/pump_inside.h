@@ -164,7 +164,7 @@ void pump_end_move(struct pump *pump, struct session *s);
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* A client that floods the link with wrong lines would cost a processor. So a link rests when one of its sessions had
- * WRONG_AT_ONCE of them. 1: it did, and more lines may wait. */
+ * WRONG_AT_ONCE of them, or when its input has no room. 1: it did, and more lines may wait. */
 int pump_rest(struct pump *pump);
 /* Reads what the client sent. */
 void pump_read(struct pump *pump, struct session *s, int index);

@@ -330,7 +330,7 @@ void session_read_protocol(struct pump *pump, struct session *s, int index)
     struct session_commands *c = &s->commands;
     pump_read(pump, s, index);
     if (pump->ops->datagrams) take_input(pump, s); /* before the next one comes */
-    /* Without a rest, poll() would say over and over that there is more, for which there is no room. */
+    /* As in pump_read_commands. */
     if (c->in_len - c->in_pos == READ_BYTES && piece_of(pump, s) == 0) c->wrong = WRONG_AT_ONCE;
 }
 
