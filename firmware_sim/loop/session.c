@@ -64,7 +64,9 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
 
 void session_cut(struct pump *pump, struct session *s)
 {
+    const struct loop_source *source = pump->links->source;
     s->open = 0;
+    if (source->ops->session_over != NULL) source->ops->session_over(source->self);
     tell_observer(pump, s, 0);
     session_gone(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);

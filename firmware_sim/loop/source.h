@@ -20,6 +20,9 @@ struct loop_source_ops {
     void (*overlong)(void *self, uint32_t session, struct command_result *out);
     void (*session_opened)(void *self, uint32_t session, const char *who);
     void (*session_closed)(void *self, uint32_t session, const char *who, int partial);
+    /* A session that was opened is over, whatever its protocol; a client may have sent its last command long before.
+     * NULL: the source does not count them. */
+    void (*session_over)(void *self);
     void (*report)(void *self, int number, const char *text);
     struct fault_board *(*faults)(const void *self);
     uint64_t (*rests_from)(void *self);

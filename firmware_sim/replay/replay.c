@@ -208,6 +208,7 @@ const struct loop_source_ops replay_source = {
     .pps = replay_pps,
     .session_opened = replay_session_opened,
     .session_closed = replay_session_closed,
+    .session_over = replay_session_over,
     .report = replay_report,
     .faults = faults,
     .rests_from = rests_from,
