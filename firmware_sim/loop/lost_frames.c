@@ -58,7 +58,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
         count_lost(pump, frames, pulses);
         lost_frames_report(pump, s);
         if (pump->protocol->passes_native) announce(pump, s, tick, frames, pulses);
-    } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
+    } else if (released - s->cursor <= 1 + pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
         s->lost.lagging = 0;
     }
     s->lost.have_seq = 1;
