@@ -313,7 +313,7 @@ int device_claim(struct device *device, struct device_work *work)
 void device_lost(struct device *device, const struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
-    device_count_lost(&device->overrun, work);
+    device_count_lost(&device->overrun, work, device->power.off_tick);
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
     if (work->scanning && work->stretch != device->scan.stretch)
         device->scan.anchor_lost = 1; /* the anchor may be in this tick, or in another */
