@@ -40,6 +40,9 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     const int native = pump->protocol->passes_native;
     clear(s);
     s->moved_ns = clock_now_ns();
+    /* In the paces that wait, no more than the queue is released from here on. So the tick at the cursor, which is read
+     * after that, stays in the ring. */
+    stream_set_reader(pump->stream, s->reader, stream_released(pump->stream), pump->holds);
     s->cursor = stream_released(pump->stream);
     s->power_from = s->came_at = 0;
     s->shut = s->left = 0;
@@ -49,6 +52,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     if (native ? s->out == NULL : session_open_protocol(pump, s, &err) != SH_OK) {
         source_report(pump->links->source, CMD_E_REFUSED, err.text);
         if (pump->ops->end != NULL) pump->ops->end(pump->link, session_index(pump, s));
+        stream_set_reader(pump->stream, s->reader, s->cursor, 0);
         return;
     }
     s->open = 1;
