@@ -203,7 +203,7 @@ static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
     return n;
 }
 
-/* True while the system holds bytes that closing would discard. It reports the last ones a moment late. */
+/* True while the system holds bytes that closing would discard. The system reports the last bytes a moment late. */
 static int is_unread(struct pump *pump, struct session *s, int index, int64_t now_ns)
 {
     static const int64_t MOMENT_NS = 20000000;
@@ -322,7 +322,7 @@ static void turn_for_client(void *owner, int most_ms)
 
 int pump_start(struct pump *pump, struct sh_err *err)
 {
-    /* Sessions that are open from the start (a file's) begin with the first tick, however late this thread starts. */
+    /* Sessions that are open from the start (a file's) begin with the first tick, however late their thread starts. */
     take_events(pump, 0, 0);
     atomic_fetch_add(&pump->links->n_busy, 1);
     pump->at_once = 1; /* for these sessions */

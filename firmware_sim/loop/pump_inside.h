@@ -137,8 +137,8 @@ static inline int session_index(const struct pump *pump, const struct session *s
 int pump_power(struct pump *pump, uint32_t full);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
-/* Learns the number of the next frame from the tick before the cursor, if the ring still has it. So a loss shows even if
- * it is that of the session's first frames. */
+/* Learns the number of the next frame from the tick before the cursor, if the ring still has it. So a loss shows even
+ * if it is that of the session's first frames. */
 void session_know_next(struct pump *pump, struct session *s);
 /* Moves the cursor, whose tick the ring no longer has: to the oldest tick if nothing is lost before it, else with room
  * to recover; not beyond off_tick. */
@@ -155,7 +155,7 @@ void session_gone(struct pump *pump, struct session *s);
 void session_leave(struct pump *pump, struct session *s);
 
 /* pump_commands.c */
-/* Adds a reply line after those that wait already. */
+/* Adds a reply line after those that wait already; counts it as dropped where there is no room. */
 void pump_add_reply(struct session *s, const char *text);
 /* Adds the reply to SITE:POSE, once it is there. */
 void pump_end_move(struct pump *pump, struct session *s);

@@ -130,8 +130,8 @@ void session_shut(struct pump *pump, struct session *s)
     if (s->open) leave_when_done(pump, s);
 }
 
-/* Whether something is still due to the client. In the native protocol nothing is once the head waits for a command and
- * the stream up to that tick is written. */
+/* Whether something is still due to the client. In the native protocol the stream is due up to the tick from which on
+ * the head waits for a command, and so are replies. */
 static int owes(const struct pump *pump, const struct session *s)
 {
     const struct loop_source *source = pump->links->source;
@@ -234,8 +234,8 @@ static int has_stepped(const struct pump *pump, const struct session *s)
     return s->cursor >= tick && stream_has_written(pump->stream, pump->listener, s->reader, tick);
 }
 
-/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. Where ticks were lent,
- * the cursor goes on by LENT_TICKS at most, empty ticks included. */
+/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. Where ticks were
+ * lent, the cursor goes on by LENT_TICKS at most, empty ticks included. */
 static void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to the files of this folder. */
+/* Private to replay*.c: a recording that is played. */
 #ifndef FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
 #define FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
 
