@@ -6,6 +6,8 @@
 
 #include "firmware_sim/device/device_state.h"
 
+_Static_assert((int)COMMAND_PEERS == (int)DEVICE_MAX_SESSIONS + 1, "each session has a place for its client's name");
+
 static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
