@@ -6,6 +6,8 @@
 
 #include "firmware_sim/device/device_state.h"
 
+_Static_assert((int)COMMAND_PEERS == (int)DEVICE_MAX_SESSIONS + 1, "each session has a place for its client's name");
+
 static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
@@ -146,28 +148,23 @@ void device_command_once(struct device *device, uint32_t session, const char *li
     pthread_mutex_unlock(&device->lock);
 }
 
-static void carry_out_report(struct device *device, uint32_t session, int number, const char *text)
+void device_report(struct device *device, int number, const char *text)
 {
     pthread_mutex_lock(&device->lock);
     command_queue_push(&device->cmd.queue, number, text);
-    device_push_error(&device->events, session, number, text);
+    device_push_error(&device->events, 0, number, text);
     pthread_mutex_unlock(&device->lock);
-}
-
-void device_report(struct device *device, int number, const char *text)
-{
-    carry_out_report(device, 0, number, text);
 }
 
 void device_overlong(struct device *device, uint32_t session, struct command_result *out)
 {
-    memset(out, 0, sizeof *out);
     char text[96];
     snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
-    carry_out_report(device, session, CMD_E_OVERRUN, text);
-    out->error = CMD_E_OVERRUN;
-    snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN),
-             text);
+    memset(out, 0, sizeof *out);
+    pthread_mutex_lock(&device->lock);
+    command_refuse(&device->cmd, CMD_E_OVERRUN, text, out);
+    device_push_error(&device->events, session, CMD_E_OVERRUN, text);
+    pthread_mutex_unlock(&device->lock);
 }
 
 void device_session_opened(struct device *device, uint32_t session, const char *who)

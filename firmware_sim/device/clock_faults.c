@@ -34,7 +34,7 @@ static void change(struct head_clock *clock, const struct head_fault *f, int64_t
     head_clock_change(clock, t_ns, &change);
 }
 
-/* The tick ends at end_ns and takes tick_ns. */
+/* Applies to the clock what a fault does in a tick, which ends at end_ns and takes tick_ns. */
 static void clock_faults_run(struct head_clock *clock, struct head_fault *f, int64_t end_ns, int64_t tick_ns)
 {
     const int lasts = (HEAD_FAULT(f->fault.kind) & (GAINS | HEAD_FAULT(FAULT_CLOCK_STOP))) != 0;

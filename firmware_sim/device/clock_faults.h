@@ -10,11 +10,11 @@
 struct device_events;
 struct head_clock;
 
-/* Begins and ends those of a tick. */
+/* Begins and ends the faults that do so in a tick. */
 void device_run_clock_faults(struct head_faults *faults, struct head_clock *clock, struct device_events *events,
                              uint64_t tick);
-/* For kinds that strike at pulses and sentences, after a step of the tick: whether one has this device time; counts the
- * pulse or sentence for the note of their end. */
+/* Both are for kinds that strike at pulses and sentences, after a step of the tick. The first says whether a fault of
+ * the kind has this device time. The other counts a pulse or a sentence there, for the note of the fault's end. */
 int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 

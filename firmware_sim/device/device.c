@@ -302,7 +302,8 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    int told = device->ending || tick >= device->end_tick; /* 1: told to end; 0: at most its one scan is over */
+    /* 0: if the run ends here all the same, its one scan is over, and this tick was part of it. */
+    const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;
     device->next_tick = tick + 1;
@@ -313,7 +314,7 @@ int device_claim(struct device *device, struct device_work *work)
 void device_lost(struct device *device, const struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
-    device_count_lost(&device->overrun, work);
+    device_count_lost(&device->overrun, work, device->power.off_tick);
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
     if (work->scanning && work->stretch != device->scan.stretch)
         device->scan.anchor_lost = 1; /* the anchor may be in this tick, or in another */

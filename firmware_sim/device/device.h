@@ -8,7 +8,8 @@
  * on to that tick. A command takes effect at the first tick that is not claimed yet. A client that asks for
  * the state gets that of the last released tick, not of the last claimed one.
  *
- * Thread: any. There is one lock inside, held for microseconds. The pacing thread never takes it. */
+ * Thread: any. There is one lock inside, held for microseconds; for milliseconds where a site has to be planned for
+ * settings (site_vary). The pacing thread never takes it. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_H
 #define FIRMWARE_SIM_DEVICE_DEVICE_H
 
@@ -217,12 +218,13 @@ enum protocol_pps device_pps(struct device *device, int64_t t_ns, int64_t *hour_
 /* The tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
 uint64_t device_rests_from(struct device *device);
 
-/* Device time at which power last came, or, while it is off, will come back; 0: it has always been on. */
-int64_t device_power_ns(struct device *device);
-/* How often power has come, including the first time. */
-uint32_t device_power_ons(struct device *device);
-/* Since the last power-up counters begin this far below their wrap; 0: they begin at 0. */
-uint32_t device_near_wrap(struct device *device);
+/* The last power-up. While power is off, all but the time are those of the power-up before. */
+struct device_power_up {
+    int64_t t_ns;       /* device time at which power came, or will come back; 0: it has always been on */
+    uint32_t ons;       /* how often power has come, including the first time */
+    uint32_t near_wrap; /* since then counters begin this far below their wrap; 0: they begin at 0 */
+};
+struct device_power_up device_last_power(struct device *device);
 
 /* Loss of optical power at the window by injected faults, both ways together, dB; 0 without a scan. It is that of the
  * last tick that was claimed. */

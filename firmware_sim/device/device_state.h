@@ -22,8 +22,8 @@
 #include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
 
-/* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had
- * come. */
+/* Poses of a live platform. Each tick begins with a pose of the head. It is made once, from the platform's poses that
+ * had come by then. */
 struct device_live {
     struct device_sample {
         int64_t t_ns;     /* device time */
@@ -73,7 +73,7 @@ struct device {
     const struct site *site; /* as of now */
     struct device_moves moves;
     struct device_options options;
-    struct settings_file *settings; /* NULL: none, or what it had is just being restored */
+    struct settings_file *settings; /* NULL: there is none, or its settings are still being carried out */
     struct device_counters counters;
     struct command_device cmd;
     struct head_clock clock;

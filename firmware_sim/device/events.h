@@ -38,8 +38,8 @@ void device_take_events(struct device_events *events, struct device_work *work);
 /* Adds an event for an error of a session, or of the head (0). Each of these gets at most DEVICE_ERRORS_A_SECOND such
  * events in a second of device time. Further errors are held back. */
 void device_push_error(struct device_events *events, uint32_t session, int number, const char *text);
-/* Adds an event for each session with the number of errors that were held back in a second that is over. is_over: the
- * run is, so none is waited for. */
+/* Adds an event for each session of which errors were held back in a second that is over, with their number. is_over:
+ * the run is over, so seconds that are not over count, too. */
 void device_say_held(struct device_events *events, uint64_t tick, int is_over);
 
 #endif

@@ -28,7 +28,9 @@
 #include "core/utc.h"
 #include "firmware_sim/config/epoch.h"
 
-enum { HEAD_CLOCK_CHANGES = 64 }; /* the last ones are kept; nobody asks for times before the first of these */
+/* The last changes are kept. With the shortest interval of Syncs, 250 ms, these are 16 s, and no session is further
+ * behind. */
+enum { HEAD_CLOCK_CHANGES = 64 };
 
 /* A change of the clock at a device time. */
 struct head_clock_change {
@@ -62,9 +64,8 @@ struct head_clock {
 
 /* Takes the table of leap seconds that reaches further: the built-in one, or the system's. */
 int head_clock_create(const struct config_time *time, struct head_clock *clock, struct sh_err *err);
-/* Device time 0 is at this time of clock_now_ns(): sets the true time by the system's clock where that is the
- * source.
- */
+/* Device time 0 is at this time of clock_now_ns(). Sets the true time by the system's clock where that is the
+ * source. */
 int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err *err);
 
 /* TAI at a device time: the true one, and the head's. Real-time safe. */

@@ -71,8 +71,8 @@ struct head_faults_tick {
 
 void head_faults_init(struct head_faults *faults, struct fault_board *board, int64_t tick_ns);
 
-/* Begins and ends faults of these kinds; each kind belongs to one step of a tick. Ticks come in order. Returns 1 when
- * one of them is active or has just ended. */
+/* Begins and ends faults of these kinds. A tick may have several such steps, each for other kinds. Ticks come in order.
+ * Returns 1 when one of the faults is active or has just ended. */
 int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct head_faults_tick *tick);
 
 /* The faults of a kind that are active, one after the other; from NULL to NULL. */

@@ -82,7 +82,7 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
                      (double)(t_ns - a_ns) / (double)(b_ns - a_ns), out);
         return 0;
     }
-    *out = sample_at(live, live->n - kept)->pose; /* t_ns is before the first pose that is kept */
+    *out = sample_at(live, live->n - kept)->pose; /* t_ns is before all poses that are still here */
     return 0;
 }
 

@@ -47,7 +47,7 @@ void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick)
 
 /* Puts the events of a lost tick before later ones. An overrun event is taken back instead: the next one
  * reports its losses and the new ones. So a long overload can't fill the room for events. */
-static void take_back(struct device_overrun *overrun, const struct device_work *work)
+static void take_back(struct device_overrun *overrun, const struct device_work *work, int is_forgotten)
 {
     struct device_events *events = overrun->events;
     uint32_t n = 0;
@@ -55,7 +55,7 @@ static void take_back(struct device_overrun *overrun, const struct device_work *
     for (uint32_t i = 0; i < work->n_events; i++) {
         const struct native_event *e = &work->event[i];
         if (e->code != NATIVE_EV_OVERRUN) {
-            event[n++] = *e;
+            if (!is_forgotten) event[n++] = *e;
             continue;
         }
         overrun->pulses_said -= e->b;
@@ -70,12 +70,12 @@ static void take_back(struct device_overrun *overrun, const struct device_work *
     events->n += n;
 }
 
-void device_count_lost(struct device_overrun *overrun, const struct device_work *work)
+void device_count_lost(struct device_overrun *overrun, const struct device_work *work, uint64_t off_tick)
 {
     if (work->scanning) {
         atomic_fetch_add(&overrun->counters->lost_pulses, work->n_cast);
         if (work->cast0 < overrun->first) overrun->first = work->cast0;
     }
     atomic_fetch_add(&overrun->counters->lost_ticks, 1);
-    take_back(overrun, work);
+    take_back(overrun, work, work->tick < off_tick);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The head's losses, and the events for them: pulses that it could not compute in time, and lines that its files lack. */
+/* The head's losses, and the events for them: pulses that it could not compute in time, and lines that its files
+ * lack. */
 #ifndef FIRMWARE_SIM_DEVICE_OVERRUN_H
 #define FIRMWARE_SIM_DEVICE_OVERRUN_H
 
@@ -10,7 +11,7 @@
 
 struct command_queue;
 
-/* Losses that the head could not compute in time, and the events for them. */
+/* Ticks and pulses that the head could not compute in time, lines that its files lack, and what events told of both. */
 struct device_overrun {
     struct device_counters *counters; /* these four are the device's */
     struct device_events *events;
@@ -24,11 +25,13 @@ struct device_overrun {
     uint64_t lines_tick; /* of the last event; 0: there was none */
 };
 
-/* Adds an event for the losses since the last one. pulse_next: of the scan, where no lost pulse is known. */
+/* Adds an event for the losses since the last one. It names the first lost pulse, or pulse_next, the scan's next one,
+ * where none is known. */
 void device_say_overrun(struct device_overrun *overrun, uint64_t pulse_next, uint64_t tick);
-/* The same for lines, once a second at most. */
+/* Adds an event for lines that files lack, once a second at most. */
 void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick);
-/* Counts a lost tick, and keeps its events for later ones. */
-void device_count_lost(struct device_overrun *overrun, const struct device_work *work);
+/* Counts a lost tick, and keeps its events for later ones. off_tick: power has gone with it; events from before are
+ * gone, too. */
+void device_count_lost(struct device_overrun *overrun, const struct device_work *work, uint64_t off_tick);
 
 #endif

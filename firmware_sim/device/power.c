@@ -3,7 +3,7 @@
  *
  * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a
  * battery. All else is as at power-up. A reboot by command is a power cycle of one tick. Protocols whose devices count
- * from power-up count from device_power_ns(). */
+ * from power-up count from device_last_power(). */
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"
@@ -108,7 +108,7 @@ int device_end_boot(struct device *device, uint64_t tick)
     return 1;
 }
 
-/* The tick at which power comes back that goes in this tick; 0: it does not go. */
+/* Whether power goes in this tick: the tick at which it will come back, or 0. */
 static uint64_t goes_until(struct device *device, uint64_t tick)
 {
     const struct head_fault *f = NULL;
@@ -146,20 +146,13 @@ int device_is_dead(const struct device *device, uint64_t released)
     return power->on_tick != 0 && device->next_tick > power->off_tick && released < power->on_tick;
 }
 
-int64_t device_power_ns(struct device *device)
+struct device_power_up device_last_power(struct device *device)
 {
+    const struct device_power *power = &device->power;
     pthread_mutex_lock(&device->lock);
-    int64_t t_ns = time_of(device, device->power.on_tick);
+    const struct device_power_up last = {time_of(device, power->on_tick), power->again + 1, power->near_wrap};
     pthread_mutex_unlock(&device->lock);
-    return t_ns;
-}
-
-uint32_t device_power_ons(struct device *device)
-{
-    pthread_mutex_lock(&device->lock);
-    const uint32_t n = device->power.again + 1;
-    pthread_mutex_unlock(&device->lock);
-    return n;
+    return last;
 }
 
 double device_window_loss_db(struct device *device)
@@ -168,12 +161,4 @@ double device_window_loss_db(struct device *device)
     const double loss_db = device_beam_loss_db(&device->beam);
     pthread_mutex_unlock(&device->lock);
     return loss_db;
-}
-
-uint32_t device_near_wrap(struct device *device)
-{
-    pthread_mutex_lock(&device->lock);
-    uint32_t n = device->power.near_wrap;
-    pthread_mutex_unlock(&device->lock);
-    return n;
 }

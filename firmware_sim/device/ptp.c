@@ -121,7 +121,8 @@ static int64_t sum_ns(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns)
     return sum;
 }
 
-/* The fault that describes the grandmaster with this identity; of several, the last in the list. NULL: none does. */
+/* Finds the fault that describes the grandmaster with this identity. Of several, the last one in the list counts. NULL:
+ * there is none. */
 static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identity, int64_t t_ns)
 {
     const struct head_fault *f = NULL, *last = NULL;
@@ -130,7 +131,7 @@ static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identit
     return last;
 }
 
-/* The identity of the best one: of several faults, the last in the list says it. */
+/* The identity of the best grandmaster. Of several faults, the last one in the list decides. */
 static uint64_t best_master(const struct ptp *ptp, int64_t t_ns)
 {
     const struct head_fault *f = NULL;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A PTP follower that disciplines the head's clock. No message of PTP is on any wire: master and path are staged.
+/* A PTP follower that disciplines the head's clock. No message of PTP is on any wire: master and path are
+ * simulated.
  *
  * In: keys time.ptp, the injected faults of a tick, the head's clock. Out: the port's and the servo's state, the offset
  * from the master as the follower measures it, and the changes of the clock that its servo makes.

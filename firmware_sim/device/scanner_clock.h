@@ -16,12 +16,12 @@
 
 struct device;
 
-/* Between two power-ups. */
+/* The clock between two power-ups. */
 struct scanner_clock {
     int64_t from_ns;  /* device time of power-up */
     int by_utc;       /* it began with UTC */
-    int64_t zero_ns;  /* what the head's clock then showed, TAI */
-    int64_t shift_ns; /* of a clock whose power is gone; else that of the command set holds */
+    int64_t zero_ns;  /* time of the head's clock at that moment, TAI */
+    int64_t shift_ns; /* set once power has come again; until then it is command_device.shift_ns */
 };
 
 int64_t device_date_ns(struct device *device, int64_t t_ns);

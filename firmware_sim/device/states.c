@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The states of the head, and when each one ends. */
+/* The states of the head, and the time at which each one ends. */
 #include <math.h>
 
 #include "firmware_sim/config/profile.h"

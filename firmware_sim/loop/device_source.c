@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head that computes, as a source of the loop. */
+/* The head that computes, as a source of the loop: the functions of device.h, each by a void pointer. */
 #include "firmware_sim/loop/source.h"
 
 #include "firmware_sim/device/scanner_clock.h"
@@ -64,24 +64,14 @@ static uint64_t rests_from(void *self)
     return device_rests_from(self);
 }
 
-static int64_t power_ns(void *self)
+static struct device_power_up last_power(void *self)
 {
-    return device_power_ns(self);
-}
-
-static uint32_t power_ons(void *self)
-{
-    return device_power_ons(self);
+    return device_last_power(self);
 }
 
 static enum protocol_pps pps(void *self, int64_t t_ns, int64_t *hour_ns)
 {
     return device_pps(self, t_ns, hour_ns);
-}
-
-static uint32_t near_wrap(void *self)
-{
-    return device_near_wrap(self);
 }
 
 static int store(void *self, const char *name, const char *text)
@@ -147,10 +137,8 @@ const struct loop_source_ops loop_device_source = {
     .next_fix_ns = next_fix_ns,
     .fix = fix,
     .rests_from = rests_from,
-    .power_ns = power_ns,
-    .power_ons = power_ons,
+    .last_power = last_power,
     .pps = pps,
-    .near_wrap = near_wrap,
     .store = store,
     .stored = stored,
     .window_loss_db = window_loss_db,

@@ -50,7 +50,6 @@ static void identify(struct links *links, const struct config *cfg)
     struct protocol_identity *id = &links->identity;
     snprintf(id->maker, sizeof id->maker, "%s", cfg->profile.maker);
     snprintf(id->model, sizeof id->model, "%s", cfg->profile.model);
-    snprintf(id->profile, sizeof id->profile, "%s", cfg->profile.name);
     snprintf(id->firmware, sizeof id->firmware, "%s", cfg->profile.firmware);
     snprintf(id->serial, sizeof id->serial, "%s", cfg->head.serial);
     snprintf(id->name, sizeof id->name, "%s", cfg->head.name);
@@ -60,7 +59,6 @@ static void identify(struct links *links, const struct config *cfg)
                                                      cfg->profile.arrangement.geometry[i].steps_per_turn};
     config_fill_fields(cfg, &links->fields);
     id->fields = cfg->n_fields + cfg->n_inputs != 0 ? &links->fields : NULL;
-    links->fixes_hz = cfg->gnss.rate_hz;
     for (uint32_t i = cfg->n_links; i-- > 0;) {
         if (cfg->link[i].protocol != PROTOCOL_VELODYNE || cfg->link[i].type != LINK_UDP) continue;
         snprintf(links->data_address, sizeof links->data_address, "%s", cfg->link[i].address);

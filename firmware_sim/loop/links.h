@@ -54,7 +54,6 @@ struct links {
     const struct links_observer *observer; /* NULL: none */
     struct protocol_identity identity;
     struct cola_fields fields; /* of the identity, where there are some */
-    uint32_t fixes_hz;         /* of the GNSS receiver */
     char data_address[64];     /* where the first velodyne link sends; empty: there is none */
     int data_port;
 

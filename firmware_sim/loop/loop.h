@@ -28,7 +28,7 @@ struct loop_options {
     const struct web_source *web;          /* what links of type web serve beside the page; NULL: nothing */
     const struct sh_report *report;        /* warnings while running (from any thread); NULL: none */
     const struct links_observer *observer; /* NULL: none; it must outlive the loop */
-    double planned_ns;                     /* for a pulse; warns where it takes much more; 0: as the site's plan has */
+    double planned_ns; /* processor time for a pulse: ten times that gives a warning. 0: the time of the site's plan */
 };
 
 struct loop_stats {

@@ -33,7 +33,7 @@ struct casters {
     _Atomic uint32_t n_computing; /* claimed ticks that are neither ready nor reported lost yet */
     _Atomic uint64_t drop_until;  /* ticks before this one are not worth computing any more */
     _Atomic int in_vain;          /* the last tick that was computed came too late */
-    _Atomic int no_memory;        /* the last tick had no room in its slot, and the error queue has that */
+    _Atomic int no_memory;        /* the last tick had no room in its slot, which is reported */
 };
 
 /* pacer.c */

@@ -58,7 +58,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
         count_lost(pump, frames, pulses);
         lost_frames_report(pump, s);
         if (pump->protocol->passes_native) announce(pump, s, tick, frames, pulses);
-    } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
+    } else if (released - s->cursor <= 1 + pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
         s->lost.lagging = 0;
     }
     s->lost.have_seq = 1;
@@ -68,7 +68,7 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
     return frames;
 }
 
-/* Ticks that the head itself lost have no numbers, so one before them will do. */
+/* Ticks that the head itself lost have no frames and no numbers. So the last tick before them tells what comes next. */
 void session_know_next(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
@@ -84,8 +84,8 @@ void session_know_next(struct pump *pump, struct session *s)
     s->lost.next_pulse = tick.pulses_before + tick.n_cast;
 }
 
-/* Frames are rare where nothing is scanned, and empty ticks wake nobody. So a session may find all that it has not
- * taken overtaken, and nothing of it lost. */
+/* Frames are rare where nothing is scanned, and empty ticks wake nobody. So the ring may no longer have the ticks that
+ * a session has not taken, and yet none of them had a frame. */
 void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick)
 {
     struct ring *ring = &pump->stream->ring;
@@ -123,7 +123,8 @@ static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
     return frames;
 }
 
-/* Counts what the ring no longer has of a session that is gone: nobody will take the next tick, which would show it. */
+/* Counts the frames of a session that is gone which the ring no longer has. The number of the next tick's frames would
+ * show them, but nobody takes that tick any more. */
 static void count_overtaken(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;
@@ -158,8 +159,9 @@ void session_leave(struct pump *pump, struct session *s)
     uint32_t frames = 0;
     const int native = pump->protocol->passes_native, over = atomic_load(&stream->over);
     const struct faulty_unwritten in_link = faulty_forget(pump->link, session_index(pump, s));
-    if (s->lost.have_seq) { /* the pacing thread no longer changes seq */
-        frames = (native ? count_unwritten(s, &unwritten) : 0) + stream->seq - s->lost.next_seq;
+    if (s->lost.have_seq && native) frames = count_unwritten(s, &unwritten);
+    if (s->lost.have_seq && over) { /* now the pacing thread no longer changes seq */
+        frames += stream->seq - s->lost.next_seq;
         pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
     }
     pump->counts.received_pulses -= unwritten + in_link.pulses;

@@ -9,7 +9,7 @@ void mover_create(struct mover *mover, struct device *device, struct stream *str
     mover->device = device;
     mover->stream = stream;
     pthread_mutex_init(&mover->lock, NULL);
-    pthread_cond_init(&mover->rings, NULL);
+    pthread_cond_init(&mover->changed, NULL);
 }
 
 /* The ticket is compared since the session may have gone meanwhile: its place then waits for another ticket or none. */
@@ -39,7 +39,7 @@ static void *mover_main(void *arg)
     pthread_mutex_lock(&mover->lock);
     for (;;) {
         while (!mover->asked && !mover->ending)
-            pthread_cond_wait(&mover->rings, &mover->lock);
+            pthread_cond_wait(&mover->changed, &mover->lock);
         if (!mover->asked) break;
         const struct move_job job = mover->job;
         mover->asked = 0;
@@ -57,12 +57,15 @@ void mover_ask(struct mover *mover, struct move_box *box, int wake_fd)
     const struct move_job job = {++mover->ticket, box, wake_fd};
     box->ticket = job.ticket;
     box->done = 0;
-    if (!mover->running) mover->running = pthread_create(&mover->thread, NULL, mover_main, mover) == 0;
+    /* Links still take commands while the run ends. After mover_join nobody would wait for a new thread. */
+    if (!mover->running && !mover->ending)
+        mover->running = pthread_create(&mover->thread, NULL, mover_main, mover) == 0;
+    const int has_thread = mover->running;
     mover->job = job;
-    mover->asked = mover->running;
-    pthread_cond_signal(&mover->rings);
+    mover->asked = has_thread;
+    pthread_cond_signal(&mover->changed);
     pthread_mutex_unlock(&mover->lock);
-    if (!mover->running) carry_out(mover, &job);
+    if (!has_thread) carry_out(mover, &job);
 }
 
 int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY])
@@ -79,12 +82,11 @@ int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX
 void mover_join(struct mover *mover)
 {
     pthread_mutex_lock(&mover->lock);
-    mover->ending = 1;
     const int running = mover->running;
-    pthread_cond_signal(&mover->rings);
-    pthread_mutex_unlock(&mover->lock);
-    if (!running) return;
-    device_end(mover->device); /* ends the planning, too */
-    pthread_join(mover->thread, NULL);
+    mover->ending = 1;
     mover->running = 0;
+    pthread_cond_signal(&mover->changed);
+    pthread_mutex_unlock(&mover->lock);
+    if (mover->device != NULL) device_end(mover->device); /* ends the planning, too, now and later */
+    if (running) pthread_join(mover->thread, NULL);
 }

@@ -21,7 +21,7 @@ struct mover {
     struct device *device;
     struct stream *stream;
     pthread_mutex_t lock;
-    pthread_cond_t rings;
+    pthread_cond_t changed;
     pthread_t thread;
     int running, ending;
     uint64_t ticket; /* of the last move */
@@ -34,12 +34,12 @@ struct mover {
 };
 
 void mover_create(struct mover *mover, struct device *device, struct stream *stream);
-/* Plans the move that the device has begun. The box must stay until mover_join; wake_fd, an eventfd, is written once the
- * reply is there. Where no thread can be started, the caller's thread plans. */
+/* Plans the move that the device has begun. The box must stay until mover_join; wake_fd, an eventfd, is written once
+ * the reply is there. Where no thread can be started, and after mover_join, the caller's thread plans. */
 void mover_ask(struct mover *mover, struct move_box *box, int wake_fd);
 /* Takes the reply. 0: it is not there yet. */
 int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY]);
-/* Ends the thread. A move that is under way is refused. After the casters are joined. */
+/* Ends the thread. A move that is under way is refused, and so are later ones. After the casters are joined. */
 void mover_join(struct mover *mover);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Decides what the pacing thread does next, in real time. Pure: the caller reads the clock.
  *
- * In: the tick whose turn it is, whether it is ready, and the time. Out: sleep, wait for the tick, release it, or give it
- * up; and how late wake-ups and releases were.
+ * In: the tick whose turn it is, whether it is ready, and the time. Out: sleep, wait for the tick, release it, or give
+ * it up; and how late wake-ups and releases were.
  *
  * A tick is due when its last pulse has fired, or with the tick that it goes out with. A late tick is released as soon
  * as it is ready. The pacing thread does not sleep until the next tick is due meanwhile, since a head with few ticks

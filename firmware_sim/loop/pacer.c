@@ -87,13 +87,16 @@ static int create_realtime(struct pacer *pacer, struct loop *loop)
 int pacer_start(struct loop *loop, struct sh_err *err)
 {
     struct pacer *pacer = &loop->pacer;
-    const char *warning;
+    const char *warning = NULL;
     pacer->pace.tick_ns = loop->stream.tick_ns;
     pacer->pace.late_ns = (int64_t)(loop->cfg->loop.late_ms * 1e6);
     pacer->pace.counters = loop->stream.counters;
     pacer->pace.epoch_ns = clock_now_ns();
-    int rc = loop->source.ops->power_up(loop->source.self, pacer->pace.epoch_ns, &warning, err);
-    if (rc != SH_OK) return rc;
+    const struct loop_source *source = &loop->source;
+    if (source->ops->power_up != NULL) {
+        const int rc = source->ops->power_up(source->self, pacer->pace.epoch_ns, &warning, err);
+        if (rc != SH_OK) return rc;
+    }
     if (warning != NULL) sh_warn(loop->options.report, "%s", warning);
     int failed = loop->stream.waits ? EPERM : create_realtime(pacer, loop);
     if (failed == EPERM) failed = pthread_create(&pacer->thread, NULL, pacer_main, loop);

@@ -13,14 +13,15 @@ static int may_make(const struct loop *loop)
     return loop->cfg->loop.pace != PACE_STEP || next < atomic_load(&loop->stream.granted);
 }
 
-/* Puts the frames into the tick's slot. 0: the tick was given up meanwhile, or the slot has no room. */
+/* Puts the frames into the tick's slot. 0: the tick was given up meanwhile, or the slot has no room. Without room the
+ * tick goes out empty: in the paces that wait, nobody would give it up. */
 static int player_put(struct loop *loop, const struct ring_tick *tick, uint64_t number)
 {
     struct ring_slot *slot = ring_claim(&loop->stream.ring, number);
     if (slot == NULL) return 0;
     if (ring_put(slot, tick) != SH_OK) {
         source_report(&loop->source, CMD_E_PULSES, "no memory for a tick");
-        ring_drop(slot);
+        ring_ready(slot, number);
         return 0;
     }
     return ring_ready(slot, number);

@@ -21,7 +21,8 @@
 
 struct pose_feed;
 
-/* Listens at platform.address and platform.port. device NULL: only tries whether it can; it is not started. */
+/* Listens at platform.address and platform.port. device NULL: the caller only tries whether that works, and does not
+ * start it. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
 /* "udp:127.0.0.1:4711" */

@@ -203,7 +203,7 @@ static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
     return n;
 }
 
-/* True while the system holds bytes that closing would discard. It reports the last ones a moment late. */
+/* True while the system holds bytes that closing would discard. The system reports the last bytes a moment late. */
 static int is_unread(struct pump *pump, struct session *s, int index, int64_t now_ns)
 {
     static const int64_t MOMENT_NS = 20000000;
@@ -214,7 +214,8 @@ static int is_unread(struct pump *pump, struct session *s, int index, int64_t no
     return unread > 0 || now_ns - s->moved_ns < MOMENT_NS;
 }
 
-/* True while some session has something to write and its reader takes it. */
+/* True while some session has something to write and its reader takes it. A client in memory shows by each turn that it
+ * does, however long it works on bytes between two of them. */
 static int has_more(struct pump *pump)
 {
     uint64_t released = stream_released(pump->stream);
@@ -229,7 +230,8 @@ static int has_more(struct pump *pump)
                          s->commands.moving || s->units.n != 0 || link.waits)) ||
             is_unread(pump, s, i, now_ns);
         const int in_time = now_ns - pump->over_ns < DRAIN_NS || !link.keeps_back;
-        if (pending && in_time && now_ns - s->moved_ns < DRAIN_NS) return 1;
+        const int takes = pump->client != NULL || (in_time && now_ns - s->moved_ns < DRAIN_NS);
+        if (pending && takes) return 1;
     }
     return 0;
 }
@@ -320,7 +322,7 @@ static void turn_for_client(void *owner, int most_ms)
 
 int pump_start(struct pump *pump, struct sh_err *err)
 {
-    /* Sessions that are open from the start (a file's) begin with the first tick, however late this thread starts. */
+    /* Sessions that are open from the start (a file's) begin with the first tick, however late their thread starts. */
     take_events(pump, 0, 0);
     atomic_fetch_add(&pump->links->n_busy, 1);
     pump->at_once = 1; /* for these sessions */

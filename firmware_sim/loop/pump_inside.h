@@ -137,8 +137,8 @@ static inline int session_index(const struct pump *pump, const struct session *s
 int pump_power(struct pump *pump, uint32_t full);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
-/* Learns the number of the next frame from the tick before the cursor, if the ring still has it. So a loss shows even if
- * it is that of the session's first frames. */
+/* Learns the number of the next frame from the tick before the cursor, if the ring still has it. So a loss shows even
+ * if it is that of the session's first frames. */
 void session_know_next(struct pump *pump, struct session *s);
 /* Moves the cursor, whose tick the ring no longer has: to the oldest tick if nothing is lost before it, else with room
  * to recover; not beyond off_tick. */
@@ -155,7 +155,7 @@ void session_gone(struct pump *pump, struct session *s);
 void session_leave(struct pump *pump, struct session *s);
 
 /* pump_commands.c */
-/* Adds a reply line after those that wait already. */
+/* Adds a reply line after those that wait already; counts it as dropped where there is no room. */
 void pump_add_reply(struct session *s, const char *text);
 /* Adds the reply to SITE:POSE, once it is there. */
 void pump_end_move(struct pump *pump, struct session *s);
@@ -164,7 +164,7 @@ void pump_end_move(struct pump *pump, struct session *s);
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* A client that floods the link with wrong lines would cost a processor. So a link rests when one of its sessions had
- * WRONG_AT_ONCE of them. 1: it did, and more lines may wait. */
+ * WRONG_AT_ONCE of them, or when its input has no room. 1: it did, and more lines may wait. */
 int pump_rest(struct pump *pump);
 /* Reads what the client sent. */
 void pump_read(struct pump *pump, struct session *s, int index);

@@ -50,12 +50,6 @@ static int host_command(void *ctx, const char *line, char *reply, size_t cap)
     return result.error;
 }
 
-static int64_t host_utc_ns(void *ctx, int64_t t_ns)
-{
-    const struct session *s = ctx;
-    return s->pump->links->source->ops->utc_ns(s->pump->links->source->self, t_ns);
-}
-
 static int host_fix(void *ctx, int64_t t_ns, struct nmea_fix *fix)
 {
     const struct session *s = ctx;
@@ -80,7 +74,7 @@ static int64_t host_date_ns(void *ctx, int64_t t_ns)
     const struct loop_source *source = s->pump->links->source;
     if (source->ops->date_ns != NULL) return source->ops->date_ns(source->self, t_ns);
     const int64_t utc_ns = source->ops->utc_ns(source->self, t_ns);
-    return utc_ns != INT64_MIN ? utc_ns : t_ns - source->ops->power_ns(source->self);
+    return utc_ns != INT64_MIN ? utc_ns : t_ns - source->ops->last_power(source->self).t_ns;
 }
 
 static int host_store(void *ctx, const char *lines)
@@ -94,7 +88,7 @@ static double host_window_loss_db(void *ctx)
 {
     const struct session *s = ctx;
     const struct loop_source *source = s->pump->links->source;
-    return source->ops->window_loss_db(source->self);
+    return source->ops->window_loss_db != NULL ? source->ops->window_loss_db(source->self) : 0.0;
 }
 
 static void host_tell_once(void *ctx, const char *text)
@@ -155,7 +149,7 @@ static void look_back(const struct pump *pump, struct session *s)
     const struct loop_source *source = pump->links->source;
     const uint64_t ticks = pump->stream->ring.queue_ticks / 4 * 3; /* with room for those that come meanwhile */
     if (pump->links->identity.fields == NULL || pump->stream->waits) return;
-    const uint64_t power = (uint64_t)(source->ops->power_ns(source->self) / pump->stream->tick_ns);
+    const uint64_t power = (uint64_t)(source->ops->last_power(source->self).t_ns / pump->stream->tick_ns);
     uint64_t from = s->cursor > ticks ? s->cursor - ticks : 0;
     if (from < power) from = power;
     s->power_from = s->came_at = s->cursor; /* power that went before the client came doesn't end its session */
@@ -182,13 +176,13 @@ _Static_assert((int)PROTOCOL_STORED == (int)SETTINGS_FILE_TEXT, "what a protocol
 static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_err *err)
 {
     const struct loop_source *source = pump->links->source;
+    const struct device_power_up power = source->ops->last_power(source->self);
     char stored[SETTINGS_FILE_TEXT] = "";
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {.ctx = s,
                  .send = host_send,
                  .command = host_command,
-                 .utc_ns = host_utc_ns,
                  .fix = host_fix,
                  .count = host_count,
                  .hang_up = host_hang_up,
@@ -198,11 +192,9 @@ static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_
                  .store = host_store,
                  .window_loss_db = host_window_loss_db,
                  .tell_once = host_tell_once},
-        .session = s->id,
-        .fixes_hz = pump->links->fixes_hz,
-        .power_ns = source->ops->power_ns(source->self),
-        .power_ons = source->ops->power_ons(source->self),
-        .near_wrap = source->ops->near_wrap(source->self),
+        .power_ns = power.t_ns,
+        .power_ons = power.ons,
+        .near_wrap = power.near_wrap,
         .keeps = source->ops->stored != NULL && source->ops->stored(source->self, pump->protocol->name, stored) == 0,
         .stored = stored,
         .dialect = pump->dialect,
@@ -330,7 +322,7 @@ void session_read_protocol(struct pump *pump, struct session *s, int index)
     struct session_commands *c = &s->commands;
     pump_read(pump, s, index);
     if (pump->ops->datagrams) take_input(pump, s); /* before the next one comes */
-    /* Without a rest, poll() would say over and over that there is more, for which there is no room. */
+    /* As in pump_read_commands. */
     if (c->in_len - c->in_pos == READ_BYTES && piece_of(pump, s) == 0) c->wrong = WRONG_AT_ONCE;
 }
 
@@ -373,6 +365,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         while (has_room(s) && take_tick(pump, s))
             more = 1;
         more |= take_input(pump, s);
+        more |= !has_room(s); /* ticks that had no room may have it once units are out */
         full = flush(pump, s, index);
         if (full < 0) {
             session_close(pump, s);

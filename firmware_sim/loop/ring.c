@@ -71,6 +71,8 @@ static int is_being_read(struct ring *ring, uint64_t tick)
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
 {
     struct ring_slot *slot = slot_of(ring, tick);
+    /* No claim is further ahead of `released` than ahead_ticks. So the slot's old tick is too old to be read by now,
+     * and a reader that begins after this look finds that out (ring_look). */
     while (atomic_load(&slot->busy) || (tick >= ring->n_slots && is_being_read(ring, tick - ring->n_slots)))
         sched_yield();
     uint64_t seen = atomic_load(&slot->state);

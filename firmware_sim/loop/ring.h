@@ -13,9 +13,9 @@
  * Memory: each slot has room for a usual tick from the start, and more while its tick needs more. The caster
  * makes that room while the slot is its own, so that the pacing thread never allocates.
  *
- * Threads: one claim at a time, which the caller sees to; begin to ready by the claiming caster; release and
- * lose by the pacing thread alone; read by any number of readers, each with its own hazard number. There are
- * no locks. A claim may yield to a reader. */
+ * Threads: any caster claims, and the callers make sure that they do so one at a time. From begin to ready the slot
+ * belongs to the caster that claimed it. The pacing thread alone releases and loses. Any number of readers read, each
+ * with its own hazard number. There are no locks. A claim may yield to a reader. */
 #ifndef FIRMWARE_SIM_LOOP_RING_H
 #define FIRMWARE_SIM_LOOP_RING_H
 

@@ -40,6 +40,9 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     const int native = pump->protocol->passes_native;
     clear(s);
     s->moved_ns = clock_now_ns();
+    /* In the paces that wait, no more than the queue is released from here on. So the tick at the cursor, which is read
+     * after that, stays in the ring. */
+    stream_set_reader(pump->stream, s->reader, stream_released(pump->stream), pump->holds);
     s->cursor = stream_released(pump->stream);
     s->power_from = s->came_at = 0;
     s->shut = s->left = 0;
@@ -49,6 +52,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     if (native ? s->out == NULL : session_open_protocol(pump, s, &err) != SH_OK) {
         source_report(pump->links->source, CMD_E_REFUSED, err.text);
         if (pump->ops->end != NULL) pump->ops->end(pump->link, session_index(pump, s));
+        stream_set_reader(pump->stream, s->reader, s->cursor, 0);
         return;
     }
     s->open = 1;
@@ -64,7 +68,9 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
 
 void session_cut(struct pump *pump, struct session *s)
 {
+    const struct loop_source *source = pump->links->source;
     s->open = 0;
+    if (source->ops->session_over != NULL) source->ops->session_over(source->self);
     tell_observer(pump, s, 0);
     session_gone(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
@@ -124,8 +130,8 @@ void session_shut(struct pump *pump, struct session *s)
     if (s->open) leave_when_done(pump, s);
 }
 
-/* Whether something is still due to the client. In the native protocol nothing is once the head waits for a command and
- * the stream up to that tick is written. */
+/* Whether something is still due to the client. In the native protocol the stream is due up to the tick from which on
+ * the head waits for a command, and so are replies. */
 static int owes(const struct pump *pump, const struct session *s)
 {
     const struct loop_source *source = pump->links->source;
@@ -228,8 +234,8 @@ static int has_stepped(const struct pump *pump, const struct session *s)
     return s->cursor >= tick && stream_has_written(pump->stream, pump->listener, s->reader, tick);
 }
 
-/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. Where ticks were lent,
- * the cursor goes on by LENT_TICKS at most, empty ticks included. */
+/* Writes long ticks, then puts the next ticks and replies into the buffer, which was written out. Where ticks were
+ * lent, the cursor goes on by LENT_TICKS at most, empty ticks included. */
 static void session_fill(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;

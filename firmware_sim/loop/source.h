@@ -20,6 +20,9 @@ struct loop_source_ops {
     void (*overlong)(void *self, uint32_t session, struct command_result *out);
     void (*session_opened)(void *self, uint32_t session, const char *who);
     void (*session_closed)(void *self, uint32_t session, const char *who, int partial);
+    /* A session that was opened is over, whatever its protocol; a client may have sent its last command long before.
+     * NULL: the source does not count them. */
+    void (*session_over)(void *self);
     void (*report)(void *self, int number, const char *text);
     struct fault_board *(*faults)(const void *self);
     uint64_t (*rests_from)(void *self);
@@ -29,13 +32,11 @@ struct loop_source_ops {
     int64_t (*next_fix_ns)(void *self, int64_t t_ns);
     int64_t (*date_ns)(void *self, int64_t t_ns); /* NULL: UTC, or the time since power-up */
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
-    int64_t (*power_ns)(void *self);
-    uint32_t (*power_ons)(void *self);
+    struct device_power_up (*last_power)(void *self);
     enum protocol_pps (*pps)(void *self, int64_t t_ns, int64_t *hour_ns);
-    uint32_t (*near_wrap)(void *self);
     int (*store)(void *self, const char *name, const char *text);
     int (*stored)(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
-    double (*window_loss_db)(void *self);
+    double (*window_loss_db)(void *self); /* NULL: 0 */
     /* The conversation that a link of the protocol `capture`, counted from 0, has; NULL: the source has none. */
     const struct talk *(*talk)(const void *self, uint32_t link, const struct talk_options **options);
 
@@ -43,7 +44,7 @@ struct loop_source_ops {
     int64_t (*tick_ns)(const void *self);
     struct device_counters *(*counters)(void *self);
     uint64_t (*scans)(void *self);
-    /* The run begins, with the thread that paces it. */
+    /* The run begins, with the thread that paces it. NULL: there is nothing to do. */
     int (*power_up)(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
     void (*end)(void *self);
     /* True while files that the source writes are behind. In the paces that wait, time waits. Takes no lock. */

@@ -238,7 +238,19 @@ void stream_wait_for_casters(struct stream *stream)
     wakeup_sleep(&stream->pace);
 }
 
-/* A reader that gets to `wanted` rings at once; one that does not rings before it sleeps. */
+/* The run is to end: waits for readers, but not for ever. Wake-ups by other readers, and by commands, give the tick no
+ * more time. */
+static void wait_patiently(struct stream *stream, uint64_t tick)
+{
+    if (stream->held_tick != tick) stream->held_until_ns = clock_now_ns() + PATIENCE_NS;
+    stream->held_tick = tick;
+    wakeup_sleep_until(&stream->pace, stream->held_until_ns);
+    if (clock_now_ns() < stream->held_until_ns) return;
+    for (int i = 0; i < RING_MAX_READERS; i++)
+        if (holds_back(stream, i, tick)) atomic_store(&stream->reader[i].active, 0);
+}
+
+/* A reader that gets to `wanted` signals at once; any other one signals before it sleeps. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick)
 {
     say_released(stream);
@@ -247,9 +259,8 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick)
         /* the reader went on meanwhile */
     } else if (!atomic_load(&stream->ending)) {
         wakeup_sleep(&stream->pace);
-    } else if (wakeup_sleep_until(&stream->pace, clock_now_ns() + PATIENCE_NS)) {
-        for (int i = 0; i < RING_MAX_READERS; i++)
-            if (holds_back(stream, i, tick)) atomic_store(&stream->reader[i].active, 0);
+    } else {
+        wait_patiently(stream, tick);
     }
     atomic_store(&stream->wanted, UINT64_MAX);
 }
@@ -377,8 +388,12 @@ uint64_t stream_grant(struct stream *stream, uint64_t ns)
 
 uint64_t stream_pass(struct stream *stream, uint64_t total_ns)
 {
-    uint64_t tick = total_ns / (uint64_t)stream->tick_ns;
-    atomic_store(&stream->granted, tick);
+    const uint64_t tick = total_ns / (uint64_t)stream->tick_ns;
+    uint64_t seen = atomic_load(&stream->granted);
+    /* The run's end, or a later grant of another session, may have let more time pass by now. That is not taken
+     * back. */
+    while (seen < tick && !atomic_compare_exchange_weak(&stream->granted, &seen, tick))
+        continue;
     return tick;
 }
 

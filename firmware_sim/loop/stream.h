@@ -95,9 +95,11 @@ struct stream {
     _Atomic uint64_t awaited; /* real time: the pacing thread waits for this late tick; UINT64_MAX: for none */
     _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
     /* of the pacing thread alone */
-    uint64_t unsaid;     /* ticks released since casters, or in the paces that wait any thread, were woken */
-    uint64_t say_ticks;  /* casters are woken after so many */
-    uint64_t lazy_ticks; /* an eighth of the queue */
+    uint64_t held_tick;    /* the tick that readers held back last, once the run is to end; 0: none */
+    int64_t held_until_ns; /* clock: when they no longer do */
+    uint64_t unsaid;       /* ticks released since casters, or in the paces that wait any thread, were woken */
+    uint64_t say_ticks;    /* casters are woken after so many */
+    uint64_t lazy_ticks;   /* an eighth of the queue */
     uint32_t n_casters;
     struct stream_listener listener[STREAM_MAX_LISTENERS];
     uint32_t n_listeners;
@@ -167,7 +169,8 @@ uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor);
 uint64_t stream_power_tick(const struct stream *stream, uint32_t i);
 /* A peer grants time. Returns the sum of all grants, ns. */
 uint64_t stream_grant(struct stream *stream, uint64_t ns);
-/* Lets device time pass up to that sum. Returns the tick before which all may pass. */
+/* Lets device time pass up to that sum, if it may not pass farther already. Returns the tick before which all may pass
+ * by this grant. */
 uint64_t stream_pass(struct stream *stream, uint64_t total_ns);
 /* Something happened that casters or the pacing thread may wait for: a command, a grant, the end. Any
  * thread. */

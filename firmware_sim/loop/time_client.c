@@ -173,7 +173,8 @@ static void take_answer(struct time_client *c)
     const ssize_t len = recv(c->fd, packet, sizeof packet, 0);
     const int64_t t4_ns = utc_now_ns(c);
     if (len < NTP_LEN || c->give_up_ns == INT64_MAX) return; /* one that comes too late is none */
-    if (ntp_read_answer(packet, (size_t)len, c->t1_ns, t4_ns, &answer) == NTP_FOREIGN) return; /* no fault counts it */
+    /* Injected faults strike at answers to this request alone, and count them. */
+    if (ntp_read_answer(packet, (size_t)len, c->t1_ns, t4_ns, &answer) == NTP_FOREIGN) return;
     if (device_change_time_answer(c->device, clock_now_ns() - c->epoch_ns, packet)) return;
     const enum ntp_kind kind = ntp_read_answer(packet, (size_t)len, c->t1_ns, t4_ns, &answer);
     c->give_up_ns = INT64_MAX;

@@ -9,8 +9,9 @@
  *   beyond max_offset_s   is refused, once the clock was set: error 107
  *   no answer in 1 s      is counted; the clock runs on. Error 107 where one had come before
  *   not synchronised      is counted as refused: error 107
- *   kiss-o'-death         DENY and RSTR: the server is asked no more, until TIME:SERVer changes a setting or a power cycle;
- *                         RATE: from then on it is asked half as often; others only count as refused. Error 107
+ *   kiss-o'-death         DENY and RSTR: the server is asked no more, until a setting changes or power comes again;
+ *                         RATE: from then on it is asked half as often. Other kisses are counted as refused, and
+ *                         change nothing. Error 107
  *   no route              is tried again after update_s
  *
  * Two requests are at least 1 s apart, however often settings change.

@@ -22,7 +22,7 @@ int unit_queue_create(struct unit_queue *queue, uint32_t cap);
 void unit_queue_free(struct unit_queue *queue);
 void unit_queue_clear(struct unit_queue *queue);
 
-/* Bytes left for further units; each takes a few bytes more than its length. */
+/* Returns the bytes that are left for further units. Each unit takes a few bytes more than its length. */
 uint32_t unit_queue_room(const struct unit_queue *queue);
 struct unit_kind {
     uint64_t tick;      /* when it was made */

@@ -17,7 +17,7 @@ struct capture_segment {
 /* All packets between two ends: a TCP connection, or the datagrams of two UDP ports. */
 struct capture_flow {
     int is_tcp;
-    struct ethernet_end end[2]; /* 0: who sent the first packet */
+    struct ethernet_end end[2]; /* 0: the end that sent the first packet */
     int device, has_begin;      /* side of the device, which a SYN says */
     uint64_t n_sent[2], bytes_sent[2];
     struct capture_segment *segment; /* in the order of the file */
@@ -31,7 +31,7 @@ struct capture_said {
     size_t at; /* in bytes of the builder */
     uint32_t len, side;
     int64_t begin_ns, end_ns; /* of its first and its last byte */
-    size_t number;            /* of the flow's segment that made it whole */
+    size_t number;            /* of the flow's segment with its last byte, from which on the receiver had it */
 };
 
 struct replay_capture {
@@ -58,8 +58,8 @@ struct replay_capture {
 /* capture_read.c: the packets of the file, as flows. */
 int capture_read_flows(struct replay_capture *capture, const char *path, struct sh_err *err);
 
-/* capture_stream.c: the messages of one side of a flow, of the kind, behind those of *said. Bytes go into the store.
- * SH_OK or SH_ENOMEM. */
+/* capture_stream.c: adds the messages of one side of a flow to the list, and their bytes to the store. The kind says
+ * where a message ends. SH_OK or SH_ENOMEM. */
 struct capture_list {
     struct capture_said *said;
     size_t n, room;

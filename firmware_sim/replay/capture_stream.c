@@ -55,8 +55,8 @@ static int collect(const struct capture_flow *f, uint32_t side, struct parts *pa
     return SH_OK;
 }
 
-/* Leaves out bytes that came before. A receiver has a byte once all before it have come. Without a SYN the first
- * segment of the file need not be the first of the stream. */
+/* Leaves out bytes that came twice. A part gets the time at which all bytes before it had come, too, since a receiver
+ * has its bytes only then. Without a SYN the first segment of the file need not be the first of the stream. */
 static void trim(struct replay_capture *c, struct parts *parts)
 {
     int64_t place = parts->has_begin || parts->n == 0 ? 0 : parts->part[0].from, t_ns = INT64_MIN;
@@ -98,7 +98,7 @@ static int add_said(struct capture_list *list, const struct capture_said *said)
     return SH_OK;
 }
 
-/* Where a message begins and ends in the parts. at: of the side's bytes without gaps. */
+/* A place that moves forward through the parts. part_at finds the part with byte `at` of the side, gaps not counted. */
 struct cursor {
     size_t part, passed; /* passed: bytes of the parts before */
 };

@@ -11,7 +11,7 @@
 enum { MAX_REQUESTS = 20000, MAX_STREAMS = 16, MOST_PENDING = 16, MOST_BACK = 4096, KIND_BYTES = 1024 };
 enum { OF_CONNECTION = -1 };
 
-/* A request each time that it came. */
+/* A request, as often as it came. */
 struct asked {
     uint32_t request; /* of the store */
     size_t at;
@@ -69,7 +69,7 @@ static void end_streams(struct builder *b, const struct capture_said *s)
     b->n_streaming = n;
 }
 
-/* The oldest of the last requests that has no answer yet, and that this is one to. */
+/* Looks at the last requests that have no answer yet. Returns the oldest one that this message answers. */
 static int find_answered(struct builder *b, const struct capture_said *s)
 {
     const uint8_t *bytes = b->store->bytes;
@@ -101,7 +101,7 @@ static int find_stream(struct builder *b, const struct capture_said *s)
     return OF_CONNECTION;
 }
 
-/* A device that speaks in turns. */
+/* The device takes turns with its client: each message belongs to the last request. */
 static int last_asked(const struct builder *b)
 {
     return b->n_asked > b->first_asked ? (int)b->n_asked - 1 : OF_CONNECTION;
@@ -173,7 +173,7 @@ static int put_messages(struct builder *b, int device, int64_t t0_ns)
     return SH_OK;
 }
 
-/* The runs of each request one after the other, and that of the connection last. */
+/* Puts the runs of each request one after the other, and that of the connection last. */
 static int put_runs(struct builder *b)
 {
     struct capture_store *store = b->store;
@@ -196,7 +196,7 @@ static int put_runs(struct builder *b)
 
 /* ---- places */
 
-/* The order of the file is that of time, and decides where clocks are too coarse to. */
+/* Packets lie in the file in the order of time. So their order decides also where clocks are too coarse. */
 static int by_order(const void *a, const void *b)
 {
     const struct capture_said *one = a, *other = b;

@@ -35,7 +35,8 @@ struct recording {
     /* frames that wait, item i at i % RECORDING_QUEUE */
     struct recording_item item[RECORDING_QUEUE];
     uint32_t first, n;
-    int64_t last_t_ns, first_t_ns; /* of the last frame that was given; of the first with a time, once it was given */
+    int64_t last_t_ns;  /* of the last frame that was given */
+    int64_t first_t_ns; /* of the first frame with a time of its own, once it was given */
     int has_first;
     int at_end, restarted;
 };

@@ -66,7 +66,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     if (r->playing && !wishes.paused) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
-        /* --duration counts such time, and protocols measure it */
+        /* Time without frames passes at once only where nobody counts it: --duration does, and so do devices'
+         * protocols. */
         replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX && !r->is_device);
         replay_count(r);
         r->tick.n_cast += before.n_cast;
@@ -121,28 +122,10 @@ static uint64_t rests_from(void *self)
     return plays ? UINT64_MAX : tick;
 }
 
-static int64_t power_ns(void *self)
+static struct device_power_up last_power(void *self)
 {
     (void)self;
-    return 0;
-}
-
-static uint32_t power_ons(void *self)
-{
-    (void)self;
-    return 1;
-}
-
-static uint32_t near_wrap(void *self)
-{
-    (void)self;
-    return 0;
-}
-
-static double window_loss_db(void *self)
-{
-    (void)self;
-    return 0.0;
+    return (struct device_power_up){.ons = 1};
 }
 
 static int64_t tick_ns(const void *self)
@@ -181,15 +164,6 @@ static const struct talk *talk(const void *self, uint32_t link, const struct tal
     return r->options.talk != NULL && link < r->cfg->n_links ? r->options.talk[link] : NULL;
 }
 
-static int power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)
-{
-    (void)self;
-    (void)now_ns;
-    (void)err;
-    *warning = NULL;
-    return SH_OK;
-}
-
 static void replay_end(void *self)
 {
     struct replay *r = self;
@@ -208,18 +182,15 @@ const struct loop_source_ops replay_source = {
     .pps = replay_pps,
     .session_opened = replay_session_opened,
     .session_closed = replay_session_closed,
+    .session_over = replay_session_over,
     .report = replay_report,
     .faults = faults,
     .rests_from = rests_from,
-    .power_ns = power_ns,
-    .power_ons = power_ons,
-    .near_wrap = near_wrap,
-    .window_loss_db = window_loss_db,
+    .last_power = last_power,
     .talk = talk,
     .tick_ns = tick_ns,
     .counters = counters,
     .scans = scans,
-    .power_up = power_up,
     .end = replay_end,
     .files_fill = files_fill,
     .close_files = close_files,

@@ -188,9 +188,16 @@ void replay_session_closed(void *self, uint32_t session, const char *who, int pa
     snprintf(text, sizeof text, "session %u, %.60s", session, who);
     pthread_mutex_lock(&r->lock);
     const int in_control = r->cmd.control == session;
-    r->n_clients--;
     if (in_control) r->cmd.control = 0;
     if (partial) command_queue_push(&r->cmd.queue, CMD_E_PARTIAL, text);
     if (in_control || r->playing) command_queue_push(&r->cmd.queue, CMD_E_CLIENT_LOST, text);
+    pthread_mutex_unlock(&r->lock);
+}
+
+void replay_session_over(void *self)
+{
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    r->n_clients--;
     pthread_mutex_unlock(&r->lock);
 }

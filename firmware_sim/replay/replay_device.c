@@ -11,8 +11,8 @@
 
 /* ---- which device it can be */
 
-/* Names a thing that the stream must have beside its emitter, and lacks. NULL: it lacks none. Amplitudes are not asked
- * for: without them protocols take reflectances. */
+/* Whether the stream has all that the protocol needs beside the emitter. NULL: it has; else a text says what is
+ * missing. Amplitudes are not asked for, since protocols take reflectances without them. */
 static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e)
 {
@@ -83,7 +83,7 @@ int64_t replay_utc_ns(void *self, int64_t t_ns)
     struct replay *r = self;
     pthread_mutex_lock(&r->lock);
     const int is_known = r->utc0_ns != INT64_MIN;
-    const int64_t utc_ns = (int64_t)((uint64_t)r->utc0_ns + (uint64_t)t_ns);
+    const int64_t utc_ns = native_after_ns(r->utc0_ns, t_ns);
     pthread_mutex_unlock(&r->lock);
     return is_known && utc_ns > 0 && utc_ns < LAST_NS ? utc_ns : INT64_MIN;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Takes from the frames what commands and statistics show: settings, states, counts. */
+/* Takes settings, states and counts from the frames, for commands and statistics. */
 #include "firmware_sim/replay/replay_state.h"
 
 static void note_event(struct replay *r, const uint8_t *frame, uint64_t tick)

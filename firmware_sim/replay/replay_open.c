@@ -59,7 +59,7 @@ static int read_clock(struct replay *r, struct sh_err *err)
         native_read_header(frame.bytes, &header);
         if (header.type != NATIVE_TELEMETRY) continue;
         if (native_decode_telemetry(frame.bytes + NATIVE_HEADER_LEN, header.length, &t) != SH_OK) continue;
-        if (t.utc_ns > 0) r->utc0_ns = (int64_t)((uint64_t)t.utc_ns - (uint64_t)header.t_ns);
+        if (t.utc_ns > 0) r->utc0_ns = native_since_ns(t.utc_ns, header.t_ns);
         break;
     }
     return got < 0 ? got : recording_rewind(&r->recording, err);

@@ -108,7 +108,7 @@ static void set_shift(struct replay *r)
 static void set_clock(struct replay *r)
 {
     set_shift(r);
-    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = (int64_t)((uint64_t)r->utc0_ns - (uint64_t)r->shift_ns);
+    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = native_since_ns(r->utc0_ns, r->shift_ns);
 }
 
 /* The tick with which the next frame goes out. */

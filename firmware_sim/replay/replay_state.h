@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to the files of this folder. */
+/* Private to replay*.c: a recording that is played. */
 #ifndef FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
 #define FIRMWARE_SIM_REPLAY_REPLAY_STATE_H
 
@@ -93,6 +93,7 @@ void replay_command_once(void *self, uint32_t session, const char *line, uint64_
 void replay_overlong(void *self, uint32_t session, struct command_result *out);
 void replay_session_opened(void *self, uint32_t session, const char *who);
 void replay_session_closed(void *self, uint32_t session, const char *who, int partial);
+void replay_session_over(void *self);
 void replay_report(void *self, int number, const char *text);
 
 /* replay_player.c, by the player's thread. Begins to play with this tick. */

@@ -9,29 +9,19 @@ __extension__ typedef unsigned __int128 wide;
 
 static const uint64_t FEMTO = UINT64_C(1000000000000000); /* 1e15: ns x uHz */
 
-/* A recording may have any numbers: this sum wraps instead of overflowing. */
-static int64_t sum(int64_t a, int64_t b)
-{
-    return (int64_t)((uint64_t)a + (uint64_t)b);
-}
-
-static int64_t difference(int64_t a, int64_t b)
-{
-    return (int64_t)((uint64_t)a - (uint64_t)b);
-}
-
 /* Firing time of pulse k since the scan's start, if the rates have never changed. */
 static int64_t fired_ns(const struct timing *t, uint64_t k)
 {
     const uint64_t n = t->n_beams > 0 ? t->n_beams : 1;
-    return sum((int64_t)(uint64_t)((wide)(k / n) * t->num / t->den), t->n_beams > 0 ? t->offset_ns[k % n] : 0);
+    return native_after_ns((int64_t)(uint64_t)((wide)(k / n) * t->num / t->den),
+                           t->n_beams > 0 ? t->offset_ns[k % n] : 0);
 }
 
-/* Firing time of a pulse at or after another one, whose time is known. */
+/* Firing time of pulse k, at or after another pulse whose time is known. */
 static int64_t fired_after_ns(const struct timing *t, uint64_t known, int64_t known_ns, uint64_t k)
 {
     if (fired_ns(t, known) == known_ns) return fired_ns(t, k);
-    return sum(known_ns, difference(fired_ns(t, k), fired_ns(t, known)));
+    return native_after_ns(known_ns, native_since_ns(fired_ns(t, k), fired_ns(t, known)));
 }
 
 /* Finds the first pulse of the points' line. 0: it is not known. */
@@ -58,14 +48,15 @@ static struct timing_moment timing_take_points(const struct timing *t, const str
     struct timing_moment moment = {TIMING_KNOWN, header->t_ns};
     if (native_decode_points(payload, header->length, &points) != SH_OK || points.n_points == 0) return moment;
     native_decode_point(payload, points.n_points - 1, &last);
-    const int64_t scan_t0_ns = difference(header->t_ns, points.t0_ns);
+    const int64_t scan_t0_ns = native_since_ns(header->t_ns, points.t0_ns);
     const uint64_t k = points.pulse0 + points.n_pulses - 1; /* the last pulse */
-    moment.t_ns = sum(header->t_ns, last.dt_ns);
+    moment.t_ns = native_after_ns(header->t_ns, last.dt_ns);
     if (!t->has_rate || points.n_pulses == 0 || !find_first(t, &points, &first) || k < first) return moment;
     const uint64_t rest = (k + 1 - first) % SCHEDULE_PACKET;
     if (rest == 0) return moment;
     moment.kind = TIMING_AT_MOST;
-    moment.t_ns = sum(scan_t0_ns, fired_after_ns(t, points.pulse0, points.t0_ns, k + SCHEDULE_PACKET - rest));
+    moment.t_ns =
+        native_after_ns(scan_t0_ns, fired_after_ns(t, points.pulse0, points.t0_ns, k + SCHEDULE_PACKET - rest));
     return moment;
 }
 
@@ -75,7 +66,7 @@ static struct timing_moment take_line_end(struct timing *t, const struct native_
     struct timing_moment moment = {TIMING_KNOWN, header->t_ns};
     if (native_decode_line_end(payload, header->length, &end) != SH_OK) return moment;
     const uint64_t next = end.pulse0 + end.n_fired;
-    const int64_t scan_t0_ns = difference(header->t_ns, end.t1_ns);
+    const int64_t scan_t0_ns = native_since_ns(header->t_ns, end.t1_ns);
     t->knows_line = 1;
     t->next_line = end.line + 1;
     t->next_first = next;
@@ -83,8 +74,8 @@ static struct timing_moment take_line_end(struct timing *t, const struct native_
     if (!t->has_rate || next == 0) return moment;
     /* t1 is the time of the next line's first pulse; this line's last pulse is the one before that. */
     moment.t_ns = fired_ns(t, next) == end.t1_ns
-                      ? sum(scan_t0_ns, fired_ns(t, next - 1))
-                      : difference(header->t_ns, difference(fired_ns(t, next), fired_ns(t, next - 1)));
+                      ? native_after_ns(scan_t0_ns, fired_ns(t, next - 1))
+                      : native_since_ns(header->t_ns, native_since_ns(fired_ns(t, next), fired_ns(t, next - 1)));
     return moment;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Finds when a head released the frames of a recording.
+/* Finds the times at which a head released the frames of a recording.
  *
  * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end
  * the head released it. Most frames have that time in their header. For points it follows from their pulses: a head

@@ -32,7 +32,8 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
-/* Why the scene has no outlines; NULL: it has. Textures' cut-outs have none, and those of copies are not made. */
+/* Returns why the scene has no outlines; NULL: it has some. Holes that textures cut have none, and those of copies are
+ * not made. */
 static const char *has_no_outlines(const struct site *site)
 {
     int cutouts = site->scene->cutout != NULL, copies = site->scene->n_copies > 0;
@@ -43,7 +44,7 @@ static const char *has_no_outlines(const struct site *site)
                     : NULL;
 }
 
-/* Why a beam is not possible here; NULL: it is. */
+/* Returns why a beam is not possible here; NULL: it is. */
 static const char *why_not(const struct site *site, enum beam_mode mode)
 {
     if (mode == BEAM_SINGLE) return NULL;
@@ -172,7 +173,8 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     return rc;
 }
 
-/* Adds the error at the ends of planes: the tolerance is an RMS over all echoes, and few of these are there. */
+/* Adds the error at the ends of planes to the row. The tolerance is an RMS over all echoes, which hides it: few echoes
+ * lie there. */
 static void say_end_error(const struct plan_methods *methods, struct plan_row *row)
 {
     const size_t used = strlen(row->why);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Chooses the beam of a pulse, and how far pulses are followed through glass and mirrors. Both are measured on the scene
- * where the configuration leaves them open. */
+/* Chooses the beam of a pulse, and how far pulses are followed through glass and mirrors. Both are measured on the
+ * scene where the configuration leaves them open. */
 #ifndef FIRMWARE_SIM_SITE_BEAM_CHOICE_H
 #define FIRMWARE_SIM_SITE_BEAM_CHOICE_H
 

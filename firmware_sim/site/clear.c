@@ -19,7 +19,8 @@ static int is_decided(const struct scene_surface *s, const struct surface_rule *
     return 0;
 }
 
-/* A byte becomes up to four: a control character does; so does a backslash, since fnmatch and YAML each halve them. */
+/* A byte becomes up to four: a control character is written as \xNN. A backslash is doubled for fnmatch, and both are
+ * doubled again for YAML. */
 enum { NAME_ROOM = 4 * SCENE_NAME_LEN };
 
 /* Writes a pattern that fits this name alone, as a double-quoted scalar of YAML. */

@@ -57,7 +57,8 @@ static void widen(struct colour_scale *scale, double v)
     scale->high = fmax(scale->high, v);
 }
 
-/* The smallest and the largest value that a stream may have; of frames, those of the trajectory's part. */
+/* Finds the smallest and the largest value that a stream may have. Numbers of frames are those of the part of the
+ * trajectory. */
 static void find_limits(const struct site *site, struct colour_scale *scale)
 {
     scale->low = INFINITY;

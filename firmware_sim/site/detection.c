@@ -67,14 +67,15 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
 }
 
 /* For surfaces whose reflectance no entry of `surfaces` gives. Warns of textures that can't be read. */
-static int set_up_textures(struct site *site, const uint8_t *said, const struct sh_report *report, struct sh_err *err)
+static int set_up_textures(struct site *site, const uint8_t *is_given, const struct sh_report *report,
+                           struct sh_err *err)
 {
     struct sh_err why, first = {0};
     uint32_t failed = 0;
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
-        const struct scene_texture *texture = said[i] ? NULL : site_texture(site, i);
-        if (!said[i] && site_surface(site, i)->vertex_colours != SCENE_COLOURS_NONE)
+        const struct scene_texture *texture = is_given[i] ? NULL : site_texture(site, i);
+        if (!is_given[i] && site_surface(site, i)->vertex_colours != SCENE_COLOURS_NONE)
             rc = surface_table_by_vertex(&site->detect.surfaces, i, &why);
         if (rc != SH_OK) break;
         if (texture == NULL || texture->unreadable) continue;
@@ -103,19 +104,19 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
 {
     const struct config *cfg = site->cfg;
     uint32_t fits[CONFIG_MAX_SURFACES] = {0}, unknown = 0;
-    uint8_t *is_said = calloc(site->n_surfaces, 1);
+    uint8_t *is_given = calloc(site->n_surfaces, 1);
     int rc = surface_table_alloc(site->n_surfaces, &site->detect.surfaces, err);
-    if (rc == SH_OK && is_said == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
+    if (rc == SH_OK && is_given == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
         int rule = surface_table_set(&site->detect.surfaces, i, site_surface(site, i), cfg->surface, cfg->n_surfaces,
                                      cfg->signal.reflectance);
         if (rule >= 0) fits[rule]++;
-        int said = rule >= 0 && !isnan(cfg->surface[rule].surface.reflectance);
-        is_said[i] = (uint8_t)said;
-        unknown += !said && lacks_colour(site_surface(site, i));
+        int given = rule >= 0 && !isnan(cfg->surface[rule].surface.reflectance);
+        is_given[i] = (uint8_t)given;
+        unknown += !given && lacks_colour(site_surface(site, i));
     }
-    if (rc == SH_OK && cfg->signal.on) rc = set_up_textures(site, is_said, report, err);
-    free(is_said);
+    if (rc == SH_OK && cfg->signal.on) rc = set_up_textures(site, is_given, report, err);
+    free(is_given);
     if (rc == SH_OK && cfg->signal.on && unknown > 0)
         sh_warn(
             report,

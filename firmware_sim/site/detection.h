@@ -21,8 +21,8 @@ int site_vary_detect(struct site *site, struct sh_err *err);
 /* Sets the number of surfaces of glass or mirrors that pulses are followed through. */
 void site_set_depth(struct site *site, uint32_t depth);
 
-/* site_noise_m: how far noise may take a point, whether it is on or not. The others: its part that is ball noise; ten
- * sigma of the range noise. */
+/* site_noise_m: how far noise may take a point, whether noise is on or not. site_ball_m: the part of it that is ball
+ * noise. site_range_noise_m: ten sigma of the range noise; 0 while that is off. */
 double site_noise_m(const struct site *site);
 double site_ball_m(const struct site *site);
 double site_range_noise_m(const struct site *site);

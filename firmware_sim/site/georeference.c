@@ -133,7 +133,7 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
 
 static const double FINEST_M = 1e-6, MOST_RANGE_COUNTS = 4294967295.0;
 
-/* Polar: a range that needs more than 32 bits would be read as a short one. */
+/* For the polar layout. A range that needs more than 32 bits would be read as a short one. */
 static int choose_range_scale(struct site *site, double *scale_m, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -149,8 +149,8 @@ static int choose_range_scale(struct site *site, double *scale_m, struct sh_err 
         cfg->file, *scale_m, most_m, least_m);
 }
 
-/* The finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale: in the polar
- * layout ranges into 32 bits, in the geo layout coordinates from anywhere on the leg into 31. */
+/* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. In the polar
+ * layout ranges must fit into 32 bits, in the geo layout coordinates from anywhere on the leg into 31. */
 static int choose_scale(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;

@@ -174,8 +174,8 @@ static int load_emitter(struct site *site, struct sh_err *err)
     return SH_OK;
 }
 
-/* The anchor comes before the scene, so that an error of an IFC file's site is reported, not an error that follows from
- * it. */
+/* The anchor comes before the scene. So an error in an IFC file's site is reported, not a later error that it
+ * causes. */
 static int load_load(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = load_emitter(site, err);

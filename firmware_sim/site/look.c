@@ -13,7 +13,7 @@ static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
     setup->n_knots = (uint32_t)site->n_knots;
 }
 
-/* Fills a place with one pan sweep; along a trajectory with all of it. */
+/* Fills a place: its pulses are those of one pan sweep, or of the whole trajectory where there is one. */
 static void fill_place(const struct site *site, struct site_look_at *at, struct plan_place *place)
 {
     struct head_settings settings = *site_settings(site);

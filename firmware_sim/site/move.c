@@ -57,7 +57,8 @@ static int move_on_earth(const struct placement *was, const struct site_place *t
     return SH_OK;
 }
 
-/* s: as configured. Back at its first place it stays so, with its floor and its place on the Earth. */
+/* Sets the station's new place in s, which is as configured. Back at its first place the station stays as configured,
+ * with its floor and its place on the Earth. */
 static int place(const struct site *first, uint32_t station, const struct site_place *to, struct config_station *s,
                  struct sh_err *err)
 {

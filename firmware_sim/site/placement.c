@@ -45,7 +45,8 @@ static int find_ifc(const struct config *cfg, const struct config_mesh **out, st
     return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but no mesh is an .ifc file", cfg->file);
 }
 
-/* A height that counts from the sea, unless the configuration gives one; NaN: the file has none. */
+/* Returns a model's height. It counts from the sea, unless the configuration gives one. height_m: of the file; NaN: the
+ * file has none. */
 static double ifc_height(const struct config *cfg, const struct sh_report *report, const char *file, const char *what,
                          double height_m)
 {
@@ -79,7 +80,8 @@ static void compare_site(const struct sh_report *report, const char *file, const
                 file, 1e-3 * apart_m);
 }
 
-/* The model's origin is at the map conversion's place, and its x axis lies in the grid, which is turned from true north. */
+/* The model's origin is at the map conversion's place, and its x axis lies in the grid, which is turned from true
+ * north. */
 static int anchor_by_map(const struct config *cfg, const struct sh_report *report, const struct config_mesh *mesh,
                          const struct ifc_site *site, struct geoframe *frame, struct sh_err *err)
 {

@@ -175,7 +175,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     return site_rate_row(site, &plan->row[plan->n++], err);
 }
 
-/* The cost of a row. A row that depends on the scene has none: then `most` replaces it. */
+/* The cost of a row. Where that depends on the scene, the row has no figure, and `most` is returned. */
 static double cost_ns(const struct plan_row *row, double most)
 {
     return isnan(row->cost_ns) ? most : row->cost_ns;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The plan of a site as rows for people to read. core/plan chooses, the site applies it (site->plan); nothing else decides on methods. */
+/* The plan of a site as rows for people to read. core/plan chooses methods, and the site applies the choice
+ * (site->plan). Nothing else decides on methods. */
 #ifndef FIRMWARE_SIM_SITE_PLAN_ROWS_H
 #define FIRMWARE_SIM_SITE_PLAN_ROWS_H
 

@@ -17,7 +17,7 @@
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
-/* The part of the trajectory that the configuration names, in its own times. */
+/* The part of the trajectory that the configuration names, in the times of the trajectory's file. */
 struct part {
     struct trajectory *trajectory; /* the caller that opened it frees it; NULL: the head stands at its stations */
     double start_s, end_s;

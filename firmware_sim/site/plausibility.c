@@ -30,7 +30,7 @@ static const struct config_program *program_of(const struct site *site)
     return &cfg->profile.program[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)];
 }
 
-static void doubt_size(const struct site *site, const struct sh_report *report)
+static void check_size(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
     double size_m = 0.0;
@@ -46,7 +46,7 @@ static void doubt_size(const struct site *site, const struct sh_report *report)
 
 /* Warns of lines without a pulse. Each line has the same window; unless the pulse rate is a multiple of the line rate,
  * some lines may still have a pulse in it. */
-static void doubt_lines(const struct site *site, const struct sh_report *report)
+static void check_lines(const struct site *site, const struct sh_report *report)
 {
     const struct head_settings *s = &site->cfg->head.settings;
     struct schedule_spec spec;
@@ -70,7 +70,7 @@ static void doubt_lines(const struct site *site, const struct sh_report *report)
 }
 
 /* Warns where the step of a sphere is rounded, so that a turn has a whole number of steps. */
-static void doubt_step(const struct site *site, const struct sh_report *report)
+static void check_step(const struct site *site, const struct sh_report *report)
 {
     const struct emitter *e = &site->emitter;
     if (e->kind != EMITTER_SPHERE || emitter_sphere_is_exact(e)) return;
@@ -86,7 +86,7 @@ static void doubt_step(const struct site *site, const struct sh_report *report)
             site->cfg->file, asked_deg, e->gaps, 180.0 / e->gaps, e->steps, 360.0 / e->steps);
 }
 
-static void doubt_attributes(const struct site *site, const struct sh_report *report)
+static void check_attributes(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
     if (!cfg->output.attributes || cfg->signal.on) return;
@@ -94,7 +94,7 @@ static void doubt_attributes(const struct site *site, const struct sh_report *re
             cfg->beam.mode == BEAM_SINGLE ? ", and with beam.mode single each has the pulse's width" : "");
 }
 
-static void doubt_colours(const struct site *site, const struct sh_report *report)
+static void check_colours(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
     if (cfg->output.colour != COLOUR_REFLECTANCE || cfg->signal.on) return;
@@ -105,7 +105,7 @@ static void doubt_colours(const struct site *site, const struct sh_report *repor
         cfg->file);
 }
 
-static void doubt_fields(const struct site *site, const struct sh_report *report)
+static void check_fields(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
     if (cfg->n_fields + cfg->n_inputs == 0 || cfg->links_are_not_here || config_speaks(cfg, PROTOCOL_COLA)) return;
@@ -117,7 +117,7 @@ static void doubt_fields(const struct site *site, const struct sh_report *report
 
 /* Warns of transparent surfaces without a rule. A file's transparency is for pictures; only the configuration says
  * whether a laser goes through. */
-static void doubt_clear(const struct site *site, const struct sh_report *report)
+static void check_clear(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
     const uint32_t n = site->detect.ghost != NULL ? site->detect.n_real : site->n_surfaces;
@@ -151,7 +151,7 @@ static double distance_from(const struct scene_copy *copy, const double p[3])
     return vec3_length(off);
 }
 
-/* Copies of one mesh. */
+/* Whether the point is within reach of one of a mesh's copies: sets *reached. */
 static int is_copy_reached(const struct scene_copied *of, const double p[3], double reach_m, int *reached,
                            struct sh_err *err)
 {
@@ -190,7 +190,7 @@ static int is_reached(const struct scene *scene, const double p[3], double reach
     return rc;
 }
 
-static int doubt_reach(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
+static int check_reach(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
     const double reach_m = program_of(site)->range_max_m, *p = site->station[i].at.position_m;
     int reached, rc = is_reached(site->scene, p, reach_m, &reached, err);
@@ -223,7 +223,7 @@ static void cast(const struct site *site, const struct site_station *s, struct b
 }
 
 /* Warns of a head below its floor: then a surface is above it, and none under it. */
-static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
+static int check_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
                        struct sh_err *err)
 {
     const struct site_station *s = &site->station[i];
@@ -282,7 +282,7 @@ static void fill_window(const struct site *site, const struct site_station *s, s
     }
 }
 
-static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
+static void check_view(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
                        const struct sh_report *report)
 {
     const struct config_program *program = program_of(site);
@@ -316,7 +316,7 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
 
 /* Checks the views of stations. There is no check with moving meshes, which may fill a view, nor with a path, which
  * leads elsewhere. Of many stops only some are checked. */
-static int doubt_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
+static int check_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;
     struct look *look = malloc(sizeof *look);
@@ -324,10 +324,10 @@ static int doubt_stations(const struct site *site, const struct sh_report *repor
     int rc = look != NULL ? bvh_work_create(&work, err) : sh_fail(err, SH_ENOMEM, "no memory to look from stations");
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
         if (!config_serves(site->cfg, i)) continue;
-        rc = doubt_reach(site, i, report, err);
+        rc = check_reach(site, i, report, err);
         if (rc != SH_OK || site->n_movers > 0) continue;
-        rc = doubt_floor(site, i, work, report, err);
-        if (rc == SH_OK) doubt_view(site, i, work, look, report);
+        rc = check_floor(site, i, work, report, err);
+        if (rc == SH_OK) check_view(site, i, work, look, report);
     }
     bvh_work_free(work);
     free(look);
@@ -336,12 +336,12 @@ static int doubt_stations(const struct site *site, const struct sh_report *repor
 
 int site_check_plausibility(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    doubt_size(site, report);
-    doubt_step(site, report);
-    doubt_lines(site, report);
-    doubt_fields(site, report);
-    doubt_attributes(site, report);
-    doubt_colours(site, report);
-    doubt_clear(site, report);
-    return doubt_stations(site, report, err);
+    check_size(site, report);
+    check_step(site, report);
+    check_lines(site, report);
+    check_fields(site, report);
+    check_attributes(site, report);
+    check_colours(site, report);
+    check_clear(site, report);
+    return check_stations(site, report, err);
 }

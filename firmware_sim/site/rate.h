@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Measures how many pulses per second this machine computes at a site: the head's own pulses, cast to points, and their
- * frames. The figures hold for this machine at this moment, so no method is chosen by them.
- * Each call takes about 10 ms, at most 20. */
+/* Measures how many pulses per second this machine computes at a site: it casts pulses of the head to points, and
+ * writes their frames. The figures hold for this machine at this moment, so no method is chosen by them. A call takes
+ * about 8 ms of processor time; a few milliseconds more where pulses have many sub-rays. */
 #ifndef FIRMWARE_SIM_SITE_RATE_H
 #define FIRMWARE_SIM_SITE_RATE_H
 

@@ -15,7 +15,7 @@ static const int64_t ENDLESS_NS = 3600000000000;
 /* Approximate width of the squares of directions in which a map is made (core/sight). */
 static const double SQUARE_RAD = 0.1;
 
-/* Why no station has a map; NULL: stations may have one. */
+/* Returns why no station can have a map; NULL: stations may have one. */
 static const char *why_not(const struct site *site)
 {
     const char *moves = config_rays_move(site->cfg);

@@ -201,8 +201,8 @@ struct site_place {
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out);
 /* Why no station of a site can be moved; NULL: they can. */
 const char *site_why_fixed(const struct site *site);
-/* A station (0..) of a scanner that is moved. `to` NULL: back to where it stood in `first`, the site that was loaded from
- * the configuration. */
+/* A station (0..) of a scanner that is moved. `to` NULL: back to where it stood in `first`, the site that was loaded
+ * from the configuration. */
 struct site_station_move {
     const struct site *first;
     uint32_t station;
@@ -211,8 +211,8 @@ struct site_station_move {
 /* Makes the site beside `from` in which the station stands at its new place. The result is as from a configuration with
  * that place. Maps of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs
  * are shared. from and move->first may be cast from meanwhile; sites of one world are loaded and freed by one thread at
- * a time. report gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can stand
- * there. */
+ * a time. report gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can
+ * stand there. */
 int site_load_moved(const struct site *from, const struct site_station_move *move, const struct sh_report *report,
                     struct site **out, struct sh_err *err);
 /* Frees the site's maps, once nobody casts from it any more. The owner still has to free the site. */
@@ -284,8 +284,8 @@ void site_describe_tripod(const struct site_station *station, char *text, size_t
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
 double site_mover_time(const struct site *site, uint32_t station, double scan_s);
 
-/* Whether a direction, socs, lies within what the head of a station scans with the settings at power-up. Heads that turn
- * without a pan count with their whole field of view, as do spheres and lists. */
+/* Whether a direction, socs, lies within what the head of a station scans with the settings at power-up. Heads that
+ * turn without a pan count with their whole field of view, as do spheres and lists. */
 int site_scans(const struct site *site, uint32_t station, const double dir_socs[3]);
 
 /* Fills in what casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */

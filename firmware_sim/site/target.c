@@ -191,8 +191,8 @@ int site_set_up_silent(struct site *site, struct sh_err *err)
     if (t->is_target == NULL) return SH_OK;
     site->silent = calloc((size_t)site->n_surfaces + 1, 1);
     if (site->silent == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
-    for (uint32_t i = 0; i < site->n_surfaces;
-         i++) /* labels of tripods' legs come after the scene's; they are no object of it */
+    /* Labels of tripods' legs come after those of the scene's objects. Legs are no such object: they give echoes. */
+    for (uint32_t i = 0; i < site->n_surfaces; i++)
         site->silent[i] = i % n_real < t->all_surfaces && !t->is_target[i % n_real];
     return SH_OK;
 }

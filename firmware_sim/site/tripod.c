@@ -45,7 +45,7 @@ int site_name_legs(struct site *site, struct sh_err *err)
     return SH_OK;
 }
 
-/* Columns: right, forward, up at a station, scene frame. */
+/* The columns of level are right, forward and up at a place, in the scene frame. */
 static int level_at(const struct site *site, const double at_m[3], double level[9], struct sh_err *err)
 {
     memcpy(level, mat3_unit, 9 * sizeof *level);

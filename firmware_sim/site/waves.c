@@ -168,7 +168,8 @@ static const double USUAL_SIGNAL = 100.0;
 /* Queues hold 0.3 s and more of the stream, which must fit into memory. */
 static const double MOST_BYTES_S = 4e8;
 
-/* Windows and samples of a head-on return. The most of eight places between two samples. */
+/* Windows and samples of a return from a surface that is hit at a right angle. Eight places between two samples are
+ * tried, and the largest counts are returned. */
 static struct site_wave_room sample_return(const struct waveform *waveform, double amplitude)
 {
     enum { PLACES = 8 };
@@ -187,7 +188,7 @@ static struct site_wave_room sample_return(const struct waveform *waveform, doub
     return most;
 }
 
-/* Where the usual signal does not reach keep_db, a stronger one counts that does. */
+/* Where the usual signal does not reach keep_db, it is doubled until it does. */
 static struct site_wave_room find_usual(const struct waveform *waveform)
 {
     struct site_wave_room usual = {0, 0};

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The waveforms of a site's scans need two things: the digitiser of the configuration, made once, and room for their
- * samples. */
+/* Waveforms of a site's scans. Out: the digitiser of the configuration, made once, and the room that samples need. */
 #ifndef FIRMWARE_SIM_SITE_WAVES_H
 #define FIRMWARE_SIM_SITE_WAVES_H
 
@@ -30,11 +29,11 @@ struct site_waves {
 int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_waves(struct site *site);
 
-/* A block of so many pulses has room for these windows and samples. Those without room are counted (core/line.h). 0
- * where no waveforms are sent. */
+/* Returns the windows and samples that a block of so many pulses has room for; 0 where no waveforms are sent. Samples
+ * without room are counted (core/line.h). */
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
-/* Returns the windows and samples of as many usual pulses, each with a return of 20 dB on a surface that is hit head
- * on. */
+/* Returns the windows and samples of so many usual pulses. Each has a return of 20 dB from a surface that is hit at a
+ * right angle. */
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
 /* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double site_wave_bytes_s(const struct site *site);

@@ -81,6 +81,13 @@ class Knobs(clients.Client):
             self.stop.wait(self.pause_s)
 
 
+def knobs_apart(endpoints, n, stop):
+    """Knobs whose faults strike at their own link alone. A client that waits for each reply would wait for a dropped one for ever."""
+    knobs = Knobs("knobs", endpoints[n], stop, 3)
+    knobs.LINES = [line.replace("every: 30", f"every: 30, link: {n + 1}") for line in knobs.LINES]
+    return knobs
+
+
 class Poses(threading.Thread):
     """Sends the poses of a live platform by UDP."""
 
@@ -199,7 +206,7 @@ def vlp16():
 
 
 def vlp16_clients(endpoints, stop):
-    return [clients.Datagrams("packets", endpoints[0], stop, 1), clients.Http("http", endpoints[2], stop, 2), Knobs("knobs", endpoints[3], stop, 3)]
+    return [clients.Datagrams("packets", endpoints[0], stop, 1), clients.Http("http", endpoints[2], stop, 2), knobs_apart(endpoints, 3, stop)]
 
 
 def planar(profile, protocol):
@@ -214,7 +221,7 @@ def planar(profile, protocol):
 def planar_clients(kind):
     def who(endpoints, stop):
         return [kind(kind.__name__.lower(), endpoints[0], stop, 1), clients.Misbehaves("hostile", endpoints[0], stop, 2),
-                Knobs("knobs", endpoints[2], stop, 3)]
+                knobs_apart(endpoints, 2, stop)]
     return who
 
 

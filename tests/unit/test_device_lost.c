@@ -56,11 +56,35 @@ static void a_lost_overrun_is_said_with_the_next(void **state)
     rig_close(rig);
 }
 
+/* A tick from before a power cycle is lost late. While power is off, and after that, no event of it comes; its loss is
+ * still counted. */
+static void a_head_without_power_forgets_what_it_had_to_say(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, 300);
+    rig_tell(rig, "SCAN:START", 300);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 100);
+    struct device_work lost = rig->work;
+    rig_tell(rig, "HEAD:REBOOT", rig->next);
+    assert_true(rig_claim(rig));
+    assert_true(rig->work.power == DEVICE_POWER_GOES);
+    device_lost(rig->device, &lost);
+    for (int i = 0; i < 300; i++) { /* boot_s is 0.2 s */
+        assert_true(rig_claim(rig));
+        assert_null(rig_event(rig, NATIVE_EV_SCAN_START));
+    }
+    assert_true(atomic_load(&device_counters(rig->device)->lost_pulses) == lost.n_cast);
+    assert_non_null(strstr(rig_tell(rig, "SYST:ERR?", rig->next), "103,"));
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_lost_tick_says_its_events_again),
         cmocka_unit_test(a_lost_overrun_is_said_with_the_next),
+        cmocka_unit_test(a_head_without_power_forgets_what_it_had_to_say),
     };
     return cmocka_run_group_tests_name("device lost", tests, make_folder, remove_folder);
 }

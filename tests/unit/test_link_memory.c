@@ -290,6 +290,40 @@ static void a_head_may_end_within_a_scan(void **state)
     rig_close(rig);
 }
 
+/* Between two turns a client may work for longer than other readers are waited for at the end. The run is over
+ * meanwhile: its queue has room for all ticks. */
+static void a_client_that_works_for_long_still_gets_the_end(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"loop.pace=fast", "head.frames=0", "loop.queue_ms=1000"};
+    struct link_memory memory = {0};
+    const struct link_spec spec = {.type = LINK_MEMORY, .memory = &memory};
+    const struct loop_options options = {.extra = &spec};
+    struct rig *rig = rig_open(&(struct device_options){.start = 1, .duration_s = 0.1}, sets, 3);
+    struct sh_err err;
+    struct loop *loop;
+    struct loop_stats stats;
+    const uint8_t *bytes;
+    uint64_t got = 0;
+    need(loop_create(rig->site, rig->device, &options, &loop, &err), &err);
+    need(loop_start(loop, &err), &err);
+    for (int k = 0; !atomic_load(&loop->stream.over); k++) {
+        assert_true(k < NEXT_MS);
+        poll(NULL, 0, 1);
+    }
+    poll(NULL, 0, 2100); /* DRAIN_NS of pump.c is 2 s */
+    while (!memory.over) {
+        memory_turn(&memory, NEXT_MS);
+        for (size_t n; (n = memory_take(&memory, &bytes)) != 0;)
+            got += n;
+    }
+    loop_join(loop, &stats);
+    loop_free(loop);
+    rig_close(rig);
+    assert_int_equal(stats.counters.reader_lost_frames, 0);
+    assert_true(got > 20 * stats.counters.pulses && stats.counters.pulses > 1000); /* 20 bytes for each, and more */
+}
+
 /* Waits until the head stops: each tick is claimed that its one reader leaves room for, or the scan is over. */
 static void wait_full(struct loop *loop)
 {
@@ -364,11 +398,16 @@ static void bytes_that_are_lent_move(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_write_is_read_where_it_lies),  cmocka_unit_test(a_client_sends_until_there_is_no_room),
-        cmocka_unit_test(pieces_come_in_their_order),     cmocka_unit_test(each_end_may_go),
-        cmocka_unit_test(the_stream_is_that_of_a_socket), cmocka_unit_test(a_client_may_go_within_a_scan),
-        cmocka_unit_test(a_head_may_end_within_a_scan),   cmocka_unit_test(a_lent_tick_stays_while_its_client_reads),
+        cmocka_unit_test(a_write_is_read_where_it_lies),
+        cmocka_unit_test(a_client_sends_until_there_is_no_room),
+        cmocka_unit_test(pieces_come_in_their_order),
+        cmocka_unit_test(each_end_may_go),
+        cmocka_unit_test(the_stream_is_that_of_a_socket),
+        cmocka_unit_test(a_client_may_go_within_a_scan),
+        cmocka_unit_test(a_head_may_end_within_a_scan),
+        cmocka_unit_test(a_lent_tick_stays_while_its_client_reads),
         cmocka_unit_test(bytes_that_are_lent_move),
+        cmocka_unit_test(a_client_that_works_for_long_still_gets_the_end),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -2,11 +2,13 @@
 /* The stream at release: numbers of frames, counts of echoes in line ends, and readers that are waited for. */
 #include "tests/common/cases.h"
 
+#include <poll.h>
 #include <string.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/stream.h"
 
 static const struct ring_size SIZE = {.ahead_ticks = 4, .queue_ticks = 3, .spare_ticks = 2, .usual_bytes = 512};
@@ -205,6 +207,35 @@ static void grants_add_up(void **state)
     assert_int_equal(stream.granted, 2);
 }
 
+/* Grants of two sessions may be passed on in any order, and so may one after the run's end, which lets all time pass. */
+static void time_that_may_pass_is_not_taken_back(void **state)
+{
+    (void)state;
+    assert_int_equal(stream_pass(&stream, 9000000), 9);
+    assert_int_equal(stream_pass(&stream, 2000000), 2);
+    assert_int_equal(stream.granted, 9);
+    atomic_store(&stream.granted, UINT64_MAX);
+    assert_int_equal(stream_pass(&stream, 10000000), 10);
+    assert_true(atomic_load(&stream.granted) == UINT64_MAX);
+}
+
+/* Other readers rest, and commands come, again and again. Each of these wakes the pacing thread. */
+static void a_reader_that_stands_still_delays_the_end_for_a_limited_time(void **state)
+{
+    (void)state;
+    const int64_t begin_ns = clock_now_ns();
+    stream.waits = 1;
+    atomic_store(&stream.ending, 1);
+    stream_set_reader(&stream, 0, 10, 1);
+    while (!stream_has_room(&stream, 12) && clock_now_ns() - begin_ns < 20000000000) {
+        stream_poke(&stream);
+        stream_wait_for_readers(&stream, 12);
+        poll(NULL, 0, 10);
+    }
+    assert_true(stream_has_room(&stream, 12));
+    assert_true(clock_now_ns() - begin_ns >= 2000000000); /* it has that time, as stream.h says */
+}
+
 /* ---- who is woken in real time */
 
 enum { LISTENERS = 3, POWER_TICK = 57, END_TICK = 100 };
@@ -286,6 +317,8 @@ int main(void)
         WITH_STREAM(a_scan_end_that_comes_late_counts_its_own_scan),
         WITH_STREAM(active_readers_hold_back),
         WITH_STREAM(grants_add_up),
+        WITH_STREAM(time_that_may_pass_is_not_taken_back),
+        WITH_STREAM(a_reader_that_stands_still_delays_the_end_for_a_limited_time),
         WITH_STREAM(nobody_is_woken_too_late),
     };
     return cmocka_run_group_tests_name("stream", tests, NULL, NULL);

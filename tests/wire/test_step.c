@@ -294,6 +294,51 @@ static void test_pose_with_each_grant(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* Returns the processor time of a process so far. */
+static int64_t taken_ms(pid_t pid)
+{
+    char name[64], text[1024];
+    unsigned long user, kernel;
+    snprintf(name, sizeof name, "/proc/%d/stat", (int)pid);
+    FILE *f = fopen(name, "r");
+    assert_non_null(f);
+    assert_non_null(fgets(text, sizeof text, f));
+    fclose(f);
+    assert_int_equal(
+        sscanf(strrchr(text, ')'), ") %*c %*d %*d %*d %*d %*d %*u %*u %*u %*u %*u %lu %lu", &user, &kernel), 2);
+    return (int64_t)(user + kernel) * 1000 / sysconf(_SC_CLK_TCK);
+}
+
+/* A client that reads nothing holds back a step, and its further lines fill the head's buffer for them. The head then
+ * waits without using a processor: it rests 2 ms between two looks, so a tenth of the time is far more than it needs. */
+static void test_lines_that_wait_for_a_step(void **state)
+{
+    enum { WINDOW_MS = 500, WINDOWS = 40, MOST_MS = WINDOW_MS / 10 };
+    struct wire *wire = *state;
+    static char lines[1 << 18];
+    struct room_config config = SHORT;
+    const char *const more[] = {"--pace", "step", NULL};
+    config.prr_hz = 1000000;
+    config.frames = 0;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), more);
+    const int fd = raw_connect(head_endpoint(&head, "tcp"));
+    raw_send(fd, "TIME:STEP 1 S\nSCAN:STAR\nTIME:STEP 100 S\n", 40);
+    memset(lines, '\n', sizeof lines);
+    struct pollfd slot = {.fd = fd, .events = POLLOUT};
+    while (poll(&slot, 1, 300) == 1)
+        send(fd, lines, sizeof lines, MSG_DONTWAIT);
+    int64_t took_ms = WINDOW_MS;
+    for (int i = 0; i < WINDOWS && took_ms > MOST_MS; i++) { /* at first it still scans */
+        const int64_t before_ms = taken_ms(head.pid);
+        poll(NULL, 0, WINDOW_MS);
+        took_ms = taken_ms(head.pid) - before_ms;
+    }
+    assert_in_range(took_ms, 0, MOST_MS);
+    close(fd);
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -302,6 +347,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_refusals, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_commands_sent_ahead, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_pose_with_each_grant, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_lines_that_wait_for_a_step, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
