@@ -164,7 +164,7 @@ static int is_same_place(const struct sockaddr_storage *a, const struct sockaddr
     return strcmp(text[0], text[1]) == 0;
 }
 
-/* The address that the system would choose. */
+/* Asks the system for the source that it would choose. */
 static int ask_source(const struct sockaddr_storage *to, socklen_t len, struct sockaddr_storage *from)
 {
     socklen_t from_len = sizeof *from;
@@ -203,7 +203,7 @@ static int is_of_one(const struct sockaddr_storage *at)
     return ok;
 }
 
-/* Where packets come from, its port included. 0: from where the system says; 1: from there; -1: errno. */
+/* Finds the source of packets, with its port. Returns 0: the system chooses it; 1: it is *from; -1: errno. */
 static int find_source(const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
                        const struct network *net, struct sockaddr_storage *from)
 {
@@ -255,7 +255,7 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
     return 0;
 }
 
-/* Where packets go. */
+/* The receiver of packets, and the interface that leads to it. */
 struct receiver {
     struct sockaddr_storage at;
     socklen_t len;
@@ -365,7 +365,7 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
         udp->refused += errno == ECONNREFUSED;
     }
     udp->refused++;
-    return (ssize_t)len; /* no cable, no route, no memory: gone as on any way */
+    return (ssize_t)len; /* without a cable, a route or memory the datagram is lost, as it may be on any way */
 }
 
 /* The socket stays, so that the source of the datagrams stays the same. What came meanwhile is dropped. */
@@ -387,7 +387,7 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
     if (what != LINK_FAULT_PLUG) return SH_ESTATE;
     const int was_away = udp->unplugged || udp->is_silent;
     for (int i = 0; i < DRAIN_READS && was_away && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0; i++)
-        continue; /* who sends faster than this reads is not waited for */
+        continue; /* a sender that is faster than this is not waited for */
     udp->unplugged = udp->is_silent = 0;
     return SH_OK;
 }

@@ -140,7 +140,8 @@ void web_session_gone(struct web_conn *conn)
     struct web_session *s = conn->session;
     if (s == NULL) return;
     s->wsi = NULL;
-    s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED; /* nobody has heard of it yet, or somebody has to */
+    /* An owner that has not heard of the session need not hear of its end. */
+    s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED;
     conn->session = NULL;
     web_set_phase(conn, WEB_PARTING);
 }

@@ -74,7 +74,7 @@ void web_linger(struct web_link *web, struct web_conn *conn)
         linger(conn);
 }
 
-/* ---- who comes in */
+/* ---- clients that come */
 
 /* A client with half a request gets the reason; others get nothing. One without a whole answer counts as refused. */
 static void web_accept_make_room(struct web_link *web, struct web_conn *conn)
@@ -130,13 +130,13 @@ static void accept_some(struct web_link *web)
     }
 }
 
-/* ---- what is asked */
+/* ---- requests */
 
 /* Hands the connection to libwebsockets, which reads the new request at once, for its answer or its WebSocket. */
 static int hand_over(struct web_link *web, struct web_conn *conn)
 {
     char text[400] = "GET / HTTP/1.1\r\n\r\n";
-    const int fd = dup(web_lws.lws_get_socket_fd(conn->wsi)); /* the one at hand goes with what it was waited for by */
+    const int fd = dup(web_lws.lws_get_socket_fd(conn->wsi)); /* libwebsockets closes its own */
     if (fd < 0) return -1;
     if (conn->request.key[0] != '\0')
         snprintf(text, sizeof text,

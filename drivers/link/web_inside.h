@@ -112,7 +112,7 @@ struct web_link {
     char at[72];      /* "127.0.0.1:40123" */
     char host[64];    /* as the user named it */
     const struct web_source *source;
-    struct web_conn *entering; /* whom libwebsockets is being given */
+    struct web_conn *entering; /* the one that libwebsockets is being given */
     struct web_conn conn[WEB_PLACES];
     struct web_session session[LINK_MAX_SESSIONS];
 };

@@ -30,7 +30,8 @@ void stamped_enable(int fd)
     setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
 }
 
-/* The kernel's time or, where it gave none (see stamped_begin), the time of reading. */
+/* Returns the time in a note: when the kernel received the bytes or, if it stamped nothing then (stamped_begin), when
+ * they were read. */
 static int64_t time_of(const struct cmsghdr *c)
 {
     struct timespec t;

@@ -3,8 +3,8 @@
 // oldest blocks are dropped.
 //
 // Positions are Float32, relative to `origin` (Float64, scene frame), which is the place of the first point. So a
-// cloud at UTM
-// coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have 0.5 m.
+// cloud at UTM coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have
+// 0.5 m.
 //
 // In a closed block the first k points are spread evenly over the block, for any k: one point at random from each k-th
 // part of it. So a level of detail is a prefix of each block. Every k-th point would not do, since k may be the length
@@ -39,7 +39,7 @@ function mix(h) {
   return (h ^ (h >>> 16)) >>> 8;
 }
 
-const MODELLED = ['reflectance', 'amplitude']; // values not modelled are NaN; an empty block has no array
+const MODELLED = ['reflectance', 'amplitude']; // a block whose values are all NaN, not modelled, has no array
 
 class Block {
   n = 0;

@@ -40,7 +40,7 @@ export function eventWords(e) {
 export class Log {
   #list = make('ol', {class: 'log', tabindex: '0', 'aria-label': 'Events, the newest first'});
   #waiting = [];
-  #last = null; // each entry is {text, times, span}
+  #last = null; // the newest entry: {text, times, span, time}
   #timer = 0;
   #aside = byId('panel-log').querySelector('summary').appendChild(make('span', {class: 'aside'}));
   #gone = 0;

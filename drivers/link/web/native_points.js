@@ -115,9 +115,8 @@ export function polarPlacer(descriptor, anchor) {
   };
 }
 
-/** Does the same for a geo stream. `exact` is as for toScene. The range is the distance from the anchor, in the CRS
- * or, if that
- * is geodetic, straight through space. It is NaN where the head moves, since the anchor is not its place. */
+/** Does the same for a geo stream. The range is the distance from the anchor, in the CRS or, if that is geodetic,
+ * straight through space. It is NaN where the head moves, since the anchor is not its place. */
 export function geoPlacer(descriptor, anchor) {
   const {at: exactAt, exact, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
   let place = isFlat ? placeFlat(exactAt, anchor) : isGeodetic ? placeExactly(exactAt) : null;

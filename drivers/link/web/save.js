@@ -13,8 +13,8 @@ async function get(path) {
   return answer;
 }
 
-// Returns {blob, gone, lost_frames}: the file, how many points it lacks, and the frames that did not reach the head's store. Another
-// page may begin a file of its own as soon as this one is done.
+// Returns {blob, gone, lost_frames}: the file, how many points it lacks, and the frames that did not reach the head's
+// store. Another page may begin a file of its own as soon as this one is done.
 export async function fetchSaved(as) {
   let status = await (await get(`/save?as=${as}`)).json();
   const {file} = status;

@@ -92,7 +92,7 @@ export class Stations extends EventTarget {
     const button = (name, click, title) => make('button', {type: 'button', click, title}, name);
     const buttons = {
       move: make('button', {type: 'submit', class: 'main'}, 'Move'),
-      back: button('As it was', () => this.#fill(this.#of(number), true), 'The place that holds'),
+      back: button('As it was', () => this.#fill(this.#of(number), true), 'Writes the present place into the fields again'),
       home: button('Power-up place', () => this.#send(number, `${number}, DEF`)),
       use: button('Put the head here', () => this.#use(number), 'Its next scan is from here: press Start'),
       look: button('Look from here', () => this.#view?.lookFrom(number)),

@@ -54,7 +54,7 @@ export class TargetList {
     this.element.append(make('div', {class: 'actions'}, this.#put), this.#list, this.#says);
   }
 
-  // While one is to be put, clicks and these keys are its own, also where a tool is open.
+  // While a target is to be put, it takes clicks and these keys, also where a tool is open.
   tap({x, y}) {
     this.#at(x, y);
     return true;

@@ -180,7 +180,7 @@ export class View extends EventTarget {
     if (isMoving) this.cameraMoved();
   }
 
-  // It returns the legend; see legendOf in view_colours.js.
+  // Returns the legend, as legendOf in view_colours.js makes it.
   legend() { return this.#scale.legend(); }
 
   pointSize(px) {
@@ -238,7 +238,7 @@ export class View extends EventTarget {
 
   // ---- what follows from the cloud
 
-  // True: too many drawn points are gone, or the colours' limits have changed.
+  // Returns whether too many drawn points are gone, or the colours' limits have changed.
   #follow() {
     const {cloud} = this;
     const gone = cloud.gone;

@@ -126,9 +126,9 @@ export function ticks([lo, hi], most = 6) {
 }
 
 // Returns the legend for panels: {mode, title, unit, none}. A ramp adds {stops: colours, from, to, ticks: [{at,
-// text}]}, a list
-// {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names the item. A colour is
-// [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of their own.
+// text}]}. A list adds {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names
+// the item. A colour is [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of
+// their own.
 export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true, scale = 'usual', oldest_s = NaN}) {
   const {title, unit, kind} = MODES[mode], ramp = rampOf(mode, scale);
   const legend = {mode, title, unit, none: GREY};

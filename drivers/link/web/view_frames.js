@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// These are the frames of a view: when what is drawn, and when it comes onto the page. While the view moves they have a
-// level of detail, as much as a picture's time allows. At rest the other points are added, a slice at a time.
+// This class decides when the parts of a picture are drawn, and when the picture comes onto the page. While the view
+// moves, a picture has as many points as its time allows. At rest the other points are added, a slice at a time.
 
 import {Camera} from './view_camera.js';
 import {Painter, progress, shares} from './view_draw.js';
@@ -37,8 +37,9 @@ export class Frames {
   #photo = null; // it takes the next picture on the page
   #seen; // it is the camera of the picture on the page
 
-  // contents is what is drawn, {parts, aim(scale), follow, fit, under(shown), over(camera)}: parts of the stored picture;
-  // what goes over it, each time it is shown; layers over the canvas. follow() returns whether all is to be drawn again.
+  // contents is {parts, aim(scale), follow, fit, under(shown), over(camera)}. parts() are those of the stored picture;
+  // under() draws over that picture each time it is shown, and over() on the canvas over it. follow() returns whether
+  // all is to be drawn again.
   constructor(view, gl, contents) {
     this.#view = view;
     this.#gl = gl;
@@ -73,7 +74,7 @@ export class Frames {
     this.schedule();
   }
 
-  // The same as 'restart', but the old picture stays until the new one has as many points.
+  // Draws all again like 'restart', but the old picture stays until the new one has as many points.
   restartLater() {
     this.#want.restart ??= 'later';
     this.schedule();

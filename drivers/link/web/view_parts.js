@@ -13,9 +13,9 @@ class BlockPart {
   weight = 1;
   drawn = 0;
   skip = false;
-  #held = 0; // it has the positions on the GPU
-  #timed = 0; // it has the times on the GPU
-  #valued = 0; // it has the numbers on the GPU, for
+  #held = 0; // so many of its positions are on the GPU
+  #timed = 0; // so many of its times
+  #valued = 0; // so many of its numbers, those of #mode
   #mode = null;
   #closed = false;
   #capacity = 0;
@@ -257,7 +257,7 @@ export class Mesh {
     return array;
   }
 
-  // Returns it as a part of the stored picture; `look` and `camera` are set before.
+  // Draws some triangles into the stored picture; `look` and `camera` are set before.
   draw(from, to) {
     useMesh(this.gl, this.programs, this.camera, this.origin, this.look);
     this.triangles(from, to);

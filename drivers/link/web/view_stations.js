@@ -81,7 +81,7 @@ export class Stations {
       {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
   }
 
-  // Returns the ring around a station: its radius in metres is at least 46 px on the screen; null: it is out of sight.
+  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: it is out of sight.
   ring(camera, station) {
     const {at, heading_deg} = this.placeOf(station);
     const {w} = camera.project(at);

@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // A Wire decodes one connection with a head. It runs in the page's worker (wire_worker.js), or in the page itself if
-// it has
-// no workers. It passes on frames and replies, many in one message, and reads no further until its owner has taken
-// these (`ack`).
+// that has no workers. It passes on frames and replies, many in one message, and reads no further until its owner has
+// taken these (`ack`).
 //
-// There are two ways to read. A WebSocketStream is read when there is room: what isn't read stays with the head, which
-// leaves
+// There are two ways to read. A WebSocketStream is read when there is room. The rest stays with the head, which leaves
 // out whole frames for this reader and says how many, or waits, as its link is set. A plain WebSocket can't be told to
 // wait: the bytes would pile up in the browser. So it is always decoded at once, and batches that have no room are
 // dropped here, and counted (dropped_points, dropped_shots).
@@ -15,8 +13,8 @@ import {Past} from './past.js';
 
 const SUBPROTOCOL = 'scanhead-native-1';
 const MAX_UNTAKEN = 3; // so many messages may be without the owner's `ack`
-const MESSAGE_POINTS = 65536, MESSAGE_THINGS = 4096; // a message goes out when it has so many,
-const MESSAGE_MS = 30; // or it goes out after so long
+const MESSAGE_POINTS = 65536, MESSAGE_THINGS = 4096; // a message goes out once it has so many
+const MESSAGE_MS = 30; // or after so long
 const ANSWER_S = 10; // a head may take so long to answer
 const OPENING_MS = 100; // a link may take so long to refuse a connection that it has accepted
 const MAX_POINTS = 1 << 20; // so many wait for a message, if the reading can't stop
@@ -30,8 +28,8 @@ export class Wire {
   #timer = 0;
   #untaken = 0;
   #room = null; // it resolves when the owner has taken enough
-  #opening = 0; // a timer, as
-  #limit = 0;
+  #opening = 0; // the timer after which a connection counts as open; 0: it is open, or there is none
+  #limit = 0; // the timer of ANSWER_S
   #number = 0; // it numbers the connection, so that late events of an older one are ignored
   #past = new Past({give: (batch) => this.#addPast(batch), hasRoom: () => this.#untaken < MAX_UNTAKEN});
   #pastUrl = null;
@@ -153,7 +151,7 @@ export class Wire {
     this.#send();
   }
 
-  // It follows the points that came before it.
+  // Queues a thing after the points that came before it.
   #add(name, value) {
     this.decoder.flush();
     if (this.#things.length >= 4 * MESSAGE_THINGS && name !== 'text' && name !== 'close') this.dropped.dropped_things++;
@@ -216,7 +214,7 @@ export class Wire {
     }
   }
 
-  // Resolves at once unless the owner is behind.
+  // Returns null where there is room, else a promise that resolves once there is.
   #hasRoom() {
     if (this.#untaken < MAX_UNTAKEN) return null;
     return new Promise((resolve) => {
