@@ -20,7 +20,6 @@ const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from
 
 export class View extends EventTarget {
   static keys = KEYS; // these are [[keys, their effect]], for a help text
-  static modes = MODES;
   movable = true; // stations can be dragged
   camera = new Camera();
   tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}, each returns whether it has used it
@@ -126,6 +125,7 @@ export class View extends EventTarget {
   useCloud(cloud) {
     cloud.window = this.cloud.window;
     this.cloud.changed = null;
+    this.pointed.at(null); // a point of the other cloud is not in this one
     this.cloud = this.#points.cloud = cloud;
     this.#scale.use(cloud);
     this.#watchCloud();
