@@ -18,6 +18,7 @@ const MESSAGE_MS = 30; // or after so long
 const ANSWER_S = 10; // a head may take so long to answer
 const OPENING_MS = 100; // a link may take so long to refuse a connection that it has accepted
 const MAX_POINTS = 1 << 20; // so many wait for a message, if the reading can't stop
+const ALWAYS = ['open', 'close', 'text', 'waves', 'kept']; // somebody waits for these: they are never dropped
 
 export class Wire {
   #post;
@@ -77,7 +78,7 @@ export class Wire {
     this.#pastUrl = past;
     this.#number++;
     const number = this.#number;
-    const mine = (act) => (...values) => number === this.#number && act(...values);
+    const mine = (act) => (...values) => number === this.#number && this.#socket !== null && act(...values);
     const on = {
       open: mine(() => {
         clearTimeout(this.#limit);
@@ -125,7 +126,6 @@ export class Wire {
     this.parser.end();
     this.decoder.flush(true);
     this.#addNow('close', {code, reason});
-    this.#number++;
   }
 
   // ---- what comes
@@ -154,7 +154,7 @@ export class Wire {
   // Queues a thing after the points that came before it.
   #add(name, value) {
     this.decoder.flush();
-    if (this.#things.length >= 4 * MESSAGE_THINGS && name !== 'text' && name !== 'close') this.dropped.dropped_things++;
+    if (this.#things.length >= 4 * MESSAGE_THINGS && !ALWAYS.includes(name)) this.dropped.dropped_things++;
     else this.#things.push([name, value]);
     this.#later();
   }
@@ -228,7 +228,7 @@ export class Wire {
     return {...p, ...d, ...this.dropped, ...past, past_hash: this.#past.pointHash,
       unplaced_points: d.unplaced_points + unplaced.points, unplaced_shots: d.unplaced_shots + unplaced.shots,
       kept_bytes: this.#keeper.bytes, kept_full: this.#keeper.isFull, point_hash: this.decoder.pointHash, waiting_points: this.#points,
-      decode_ms: this.busy_ms, decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
+      decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
   }
 }
 
