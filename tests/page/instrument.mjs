@@ -8,7 +8,7 @@ import {tableOf} from '../../drivers/link/web/view_colours.js';
 import {rampAt} from '../../drivers/link/web/view_ramps.js';
 import {Client, end, endpoint, run, start} from './head.mjs';
 import {pixelsOf} from './png8.mjs';
-import {CONFIG} from './rig.mjs';
+import {choose, CONFIG} from './rig.mjs';
 import {equal, folder, is, near, test} from './work.mjs';
 
 const ROOT = new URL('../..', import.meta.url).pathname;
@@ -73,13 +73,6 @@ const pointsAround = (share) => `(() => {
   all.sort((a, b) => a.t - b.t);
   return {from: all[0].t, to: all.at(-1).t, old: all[Math.floor(0.25 * all.length)], young: all[Math.floor(0.9 * all.length)]};
 })()`;
-
-const choose = (page, selector, value) => page.eval(`(() => {
-  const field = document.querySelector(${JSON.stringify(selector)});
-  field.value = ${JSON.stringify(value)};
-  field.dispatchEvent(new Event('input', {bubbles: true}));
-  field.dispatchEvent(new Event('change', {bubbles: true}));
-})()`);
 
 async function saved(ending) {
   const at = `${folder}/saved`;
@@ -213,6 +206,7 @@ export async function testInstrument(browser) {
 
   await test('the picture as a file, with its legend', async () => {
     await page.eval('scanhead.view.fit()');
+    equal(await page.eval('Promise.all([scanhead.view.picture(), scanhead.view.picture()]).then((all) => all.length)'), 2, 'pictures, asked for at once');
     await page.press('#screenshot');
     const {width, height, size, out} = pixelsOf(readFileSync(await saved('.png')));
     equal(JSON.stringify([width, height]), JSON.stringify(await page.eval('[scanhead.view.canvas.width, scanhead.view.canvas.height]')), 'its size');

@@ -60,7 +60,7 @@ export class Session extends EventTarget {
     if (this.link !== 'open') return 'The head is not connected.';
     if (!this.mine) return this.owner ? `${this.who} has control and has to give it back first.` : 'Take control first.';
     if (states === 'all' || states.split(' ').includes(this.state)) return '';
-    return `Not while the head is ${stateWord(this.state ?? 'off').toLowerCase()}.`;
+    return `Not in the state ${stateWord(this.state ?? 'off')}.`;
   }
 
   command(line, options) {

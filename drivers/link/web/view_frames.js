@@ -34,7 +34,7 @@ export class Frames {
   #made = null; // it is {target, camera} of a frame that is not on the page yet
   #grown = false; // more is drawn than on the page
   #showEvery = SHOW_MS;
-  #photo = null; // it takes the next picture on the page
+  #photos = []; // these take the next picture on the page
   #seen; // it is the camera of the picture on the page
 
   // contents is {parts, aim(scale), follow, fit, under(shown), over(camera)}. parts() are those of the stored picture;
@@ -84,7 +84,7 @@ export class Frames {
   async picture() {
     await this.ready();
     return new Promise((resolve) => {
-      this.#photo = resolve;
+      this.#photos.push(resolve);
       this.ask('show');
     });
   }
@@ -97,7 +97,7 @@ export class Frames {
 
   get state() {
     const {drawn, left} = progress(this.#parts());
-    return {drawn, left, moving: this.#moving, frames_per_s: this.#fps, budget: this.#painter.moving.points, lost: this.#lost};
+    return {drawn, left, moving: this.#moving, frames_per_s: this.#fps};
   }
 
   schedule() {
@@ -207,8 +207,8 @@ export class Frames {
     target.toPage(width, height);
     this.#seen = camera;
     this.#over();
-    this.#photo?.(copyOf(this.#view.canvas, this.#view.overlay.canvas)); // a WebGL canvas can be read in the task that drew it
-    this.#photo = null;
+    // A WebGL canvas can be read in the task that drew it.
+    for (const photo of this.#photos.splice(0)) photo(copyOf(this.#view.canvas, this.#view.overlay.canvas));
     if (moving) {
       if (this.#lastFrame > 0 && now - this.#lastFrame < 1000) {
         const fps = 1000 / Math.max(1, now - this.#lastFrame);
