@@ -161,30 +161,36 @@ static void test_ends(void **state)
     }
 }
 
-/* A WebSocket and a page that is asked for: libwebsockets is silent, too. */
+/* A WebSocket and a client that asks for a file meanwhile: libwebsockets is silent, too. */
 static void test_web(void **state)
 {
     (void)state;
-    char place[64];
+    char place[64], request[200], answer[2000];
     struct bench bench = web_open(place);
     uint8_t frame[7];
+    snprintf(request, sizeof request, "GET /scene HTTP/1.1\r\nHost: %s\r\n\r\n", place);
     for (int resets = 0; resets < 2; resets++) {
-        const int fd = web_upgrade(&bench, place, "/ws", "");
+        const int fd = web_upgrade(&bench, place, "/ws", ""), other = web_dial(place);
         bench_expect(&bench, LINK_OPENED, 0);
+        for (int i = 0; i < 3; i++)
+            bench_poll(&bench, 0, 1);
         assert_int_equal(fault(&bench, LINK_FAULT_CABLE, 0), SH_OK);
         assert_int_equal(fault(&bench, LINK_FAULT_CABLE, 0), SH_ESTATE);
-        const uint32_t before = info_of(fd).tcpi_segs_in;
+        const uint32_t before = info_of(fd).tcpi_segs_in, before_other = info_of(other).tcpi_segs_in;
         web_send_frame(fd, 0x81, "*IDN?", 5);
+        assert_int_equal(send(other, request, strlen(request), MSG_NOSIGNAL), strlen(request));
         for (const int64_t end_ms = give_up_ms(); info_of(fd).tcpi_total_retrans < 2;) {
             assert_int_equal(bench_poll(&bench, 1, 10), 0);
             assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 0);
             if (now_ms() > end_ms) give_up("a repetition");
         }
         assert_int_equal(info_of(fd).tcpi_segs_in, before);
+        assert_int_equal(info_of(other).tcpi_segs_in, before_other);
         assert_int_equal(fault(&bench, LINK_FAULT_PLUG, (uint32_t)resets), SH_OK);
         if (resets) {
             bench_expect(&bench, LINK_CLOSED, 0);
             assert_int_equal(fd_read(fd, frame, 1), -1);
+            assert_int_equal(fd_read(other, frame, 1), -1);
         } else {
             char line[6];
             bench_read_all(&bench, 0, line, 6);
@@ -193,8 +199,11 @@ static void test_web(void **state)
             bench_expect(&bench, LINK_WRITABLE, 1);
             fd_read_all(fd, frame, 7);
             assert_memory_equal(frame, "\x81\x05hello", 7);
+            assert_true(web_listen_to(&bench, other, answer, sizeof answer) > 13);
+            assert_memory_equal(answer, "HTTP/1.1 200 ", 13);
         }
         close(fd);
+        close(other);
         if (!resets) bench_expect(&bench, LINK_CLOSED, 0);
     }
     bench_close(&bench);
