@@ -379,6 +379,8 @@ test('a cloud that is cleared while it is measured gives no figures', () => {
   const corners = [[0.45, 0.45], [2.45, 0.45], [2.45, 2.45], [0.45, 2.45]].map(([x, y]) => ({x, y, z: 0, error: null}));
   same(cleared((cloud) => pointsOnFace(cloud, camera(), corners, 0.05)).places.length, 0, 'points on a face');
   same(Number.isNaN(cleared((cloud) => spacingAround(cloud, [1.5, 1.5, 0], 0.001))), true, 'distance of points');
+  same(ended(pointsOnFace(new Cloud(), camera(), corners, 0.05)).places.length, 0, 'no points at all');
+  same(Number.isNaN(ended(spacingAround(new Cloud(), [0, 0, 0], 0.001))), true, 'distance of none');
 });
 
 test('a pixel at the side of a panorama has no neighbour at the other side', () => {

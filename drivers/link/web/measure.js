@@ -140,9 +140,10 @@ const FURTHER = 4; // points up to so many depths from the plane are counted, as
 
 // Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value
 // is {places (relative to the cloud's origin), plane, beyond}; `beyond` counts points a little further from the plane.
-// There are no places if the cloud was cleared meanwhile.
+// There are no places if the cloud has no points, or was cleared meanwhile.
 export function* pointsOnFace(cloud, camera, corners, depth_m) {
   const {origin, window} = cloud;
+  if (origin === null) return {plane: null, beyond: 0, places: new Float32Array(0)};
   const own = corners.map((p) => sub(placeOf(p), origin));
   const plane = planeThrough(own.flat());
   const across = unit(cross(Math.abs(plane.normal[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], plane.normal)), up = cross(plane.normal, across);
@@ -214,7 +215,9 @@ const NEIGHBOURS = 8;
 // Steps towards the mean distance of the points around a place. It follows from the area of the k nearest points, which
 // has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m, or the cloud was cleared.
 export function* spacingAround(cloud, place, first_m) {
-  const {window, origin} = cloud, p = sub(place, origin);
+  const {window, origin} = cloud;
+  if (origin === null) return NaN;
+  const p = sub(place, origin);
   for (let r = Math.max(1e-4, first_m); r < 6; r *= 3) {
     const near = [];
     for (const block of [...cloud.blocks]) {
