@@ -380,7 +380,7 @@ test('a saved file: its number is in each request, another page\'s file is refus
   });
   answers(() => ({state: 'done', as: 'las', file: 4, bytes: 3, gone: 0, lost_frames: 2}));
   const saved = await fetchSaved('las');
-  equal([asked, saved.blob.size, savedWords(saved)], [['/save?as=las', '/saved?file=4&from=0'], 3, 'Saved, without 2 frames that were lost.']);
+  equal([asked, saved.blob.size, savedWords(saved)], [['/save?as=las', '/saved?file=4&from=0'], 3, 'Saved, without 2 stream frames that were lost.']);
   equal(savedWords({gone: 0, lost_frames: 0}), 'Saved.');
   answers((path) => (path === '/save' ? {state: 'done', as: 'ply', file: 5, bytes: 3} : {state: 'working', as: 'las', file: 4, bytes: 0}));
   let said = '';

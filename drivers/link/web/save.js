@@ -37,7 +37,7 @@ export async function fetchSaved(as) {
 export function savedWords({gone, lost_frames}) {
   const lacks = [];
   if (gone > 0) lacks.push(`${grouped(gone)} older points, which the head no longer keeps`);
-  if (lost_frames > 0) lacks.push(`${grouped(lost_frames)} frames that were lost`);
+  if (lost_frames > 0) lacks.push(`${grouped(lost_frames)} stream frames that were lost`);
   return lacks.length > 0 ? `Saved, without ${lacks.join(', and ')}.` : 'Saved.';
 }
 
