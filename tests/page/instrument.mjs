@@ -112,6 +112,7 @@ export async function testInstrument(browser) {
       const wide = await one.eval(`(() => { // with the longest of its figures
         document.querySelector('#panel-figures').open = true;
         document.querySelector('#figure-past').textContent = '2.31 M, 1.23 M older ones are gone, 12 345 stream frames not kept';
+        document.querySelector('#figure-time').textContent = '12:34:56 since power-up, PTP UNCALIBRATED, s0, −37 000 000 123 ns';
         return document.documentElement.scrollWidth;
       })()`);
       is(wide <= size[0], `nothing is wider than ${size[0]} px: ${wide}`);
