@@ -150,11 +150,12 @@ export class Head extends EventTarget {
       this.#taken(data);
       worker.postMessage({ack: true});
     };
-    worker.onerror = (event) => { // it could not be loaded
+    worker.onerror = (event) => { // it could not be loaded, or has failed
       event.preventDefault?.();
       worker.terminate();
       this.#wire = this.#inPage();
-      this.#connect();
+      if (this.isOpen) this.#closed({code: 1006, reason: 'this page failed to read the stream'}); // which connects again
+      else this.#connect();
     };
     return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};
   }
