@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The file link: one session, the stream as it is into a file.
+/* The file link: one session, whose bytes go into a file unchanged.
  *
  * Regular files and character devices (/dev/null, /dev/full) are taken; a directory, a FIFO or a socket is
  * refused: a FIFO would block in open until a reader comes, which a pty or TCP does better. The first failed

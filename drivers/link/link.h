@@ -38,7 +38,7 @@ struct link_spec {
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int baud;           /* pty: of the head's UART; clients with another rate get, and send, other bytes. 0: any rate */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
-    int dialect;        /* of that protocol; 0: any. Nor at this */
+    int dialect;        /* of that protocol; 0: any. Links don't look at it either */
     int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
     int waits; /* enum link_waits; its owner sees to it */
@@ -54,8 +54,8 @@ struct link_spec {
     int personality; /* enum usb_personality_id: the device it shows itself as, apart from vid, pid and serial */
     char udc[64];
     char serial[64]; /* empty: no serial number string */
-    int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest, */
-    char whose[300]; /* which needs this: what is the same when the head is started again */
+    int own_serial;  /* 1: serial is only the beginning of the number; drivers/usb/own_identity.h makes the rest */
+    char whose[300]; /* own_serial: a text that is the same whenever this head is started; the rest depends on it */
 };
 
 enum link_event_kind {
@@ -64,7 +64,7 @@ enum link_event_kind {
     LINK_READABLE, /* read() has something */
     LINK_WRITABLE, /* write() will take something; only for sessions in want_write */
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
-    LINK_REFUSED,  /* somebody was turned away: all sessions taken */
+    LINK_REFUSED,  /* a client was turned away: all sessions are taken, or no descriptor is left */
     LINK_NOTICE,   /* a message to the person who runs the head: the text is in peer */
     LINK_PLUGGED,  /* usb: a host has got the device, and will enumerate it once poll() is called again */
     LINK_SHUT,     /* tcp: the other side sends nothing more, and all of it was read; it may go on reading */
@@ -73,7 +73,7 @@ enum link_event_kind {
 struct link_event {
     enum link_event_kind kind;
     int session;    /* 0..max_sessions-1 */
-    char peer[200]; /* of LINK_OPENED, LINK_CLOSED, LINK_REFUSED: the other side's name, for the log */
+    char peer[200]; /* the other side's name, for the log; of LINK_NOTICE: the message */
 };
 
 /* Faults that can be injected into a link. */
@@ -81,7 +81,7 @@ enum link_fault {
     LINK_FAULT_DISCONNECT,        /* ends the session at once; what was not taken by the other side is lost */
     LINK_FAULT_UNPLUG,            /* ends all sessions, and the endpoint is not there until LINK_FAULT_PLUG */
     LINK_FAULT_CABLE,             /* nothing comes in or goes out until LINK_FAULT_PLUG; sessions stay */
-    LINK_FAULT_BUS_RESET,         /* usb */
+    LINK_FAULT_BUS_RESET,         /* usb: ends all sessions; the device stays configured */
     LINK_FAULT_ENDPOINT_STALL,    /* usb: the session's endpoint to the host is halted until the host clears it */
     LINK_FAULT_SHORT_PACKETS,     /* usb: each of the session's next n transfers ends early, in a short packet */
     LINK_FAULT_REFUSE,            /* ends the session before a byte went out; to be called at LINK_OPENED */

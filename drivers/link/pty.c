@@ -44,6 +44,7 @@ struct pty_link {
     struct pty_line line;
     int unplugged; /* there is no pair, and no symlink */
     int inotify, watch;
+    int is_deaf;                /* no new client can be seen: the next poll fails */
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
     int open_event_due;         /* that client is counted, but its open event may be still to come */
@@ -203,7 +204,7 @@ static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
                             {.fd = pty->inotify, .events = POLLIN},
                             {.fd = pty->open ? pty->device.master : -1, .events = POLLIN}};
     if ((want_write & 1u) != 0 || pty->line.n_out != 0) fds[2].events |= POLLOUT;
-    if (link_wait(fds, 3, events.n > 0 || !reported ? 0 : timeout_ms) != SH_OK) return SH_EIO;
+    if (pty->is_deaf || link_wait(fds, 3, events.n > 0 || !reported ? 0 : timeout_ms) != SH_OK) return SH_EIO;
     link_take_wake(&fds[0], &events);
     if ((fds[1].revents & POLLIN) != 0) pty_read_inotify(pty, 1);
     if (!pty_report(pty, &events) || !pty->open || fds[2].fd < 0) return events.n;
@@ -279,7 +280,8 @@ static int pty_cut(struct pty_link *pty)
     struct pty_device device = pty->device;
     const int renewed = pty_device_renew(&device) == SH_OK;
     pty_set_device(pty, &device);
-    return pty_wait_for_client(pty) == SH_OK && renewed ? SH_OK : SH_ESTATE;
+    pty->is_deaf = pty_wait_for_client(pty) != SH_OK;
+    return renewed && !pty->is_deaf ? SH_OK : SH_ESTATE;
 }
 
 static int pty_unplug(struct pty_link *pty)
@@ -299,7 +301,9 @@ static int pty_plug(struct pty_link *pty)
     if (pty_device_open(&fresh, pty->device.path, &err) != SH_OK) return SH_ESTATE;
     pty_set_device(pty, &fresh);
     pty->unplugged = 0;
-    return pty_wait_for_client(pty) == SH_OK ? SH_OK : SH_ESTATE;
+    if (pty_wait_for_client(pty) == SH_OK) return SH_OK;
+    pty_unplug(pty); /* else the next call would take it for plugged in, and no client would be seen */
+    return SH_ESTATE;
 }
 
 static int pty_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)

@@ -149,7 +149,7 @@ int pty_device_renew(struct pty_device *device)
     struct pty_device fresh = *device;
     if (pair_open(&fresh.master, fresh.slave, sizeof fresh.slave) != 0) return SH_EIO;
     int ours = device->path[0] != '\0' && link_is_ours(device);
-    /* The old slave exists until its master is closed, so the new link goes over the old one unlooked. */
+    /* The old slave exists until its master is closed, so link_look would refuse the path. */
     if (slave_rest(&fresh) != 0 || (ours && link_replace(fresh.path, fresh.slave) != 0)) {
         close(fresh.master);
         return SH_EIO;

@@ -35,7 +35,7 @@ struct tcp_link {
     int reserve_fd; /* given up for a moment to turn a client away when descriptors run out */
     int n_sessions, brief;
     uint64_t turns;
-    int port;      /* that it listens on */
+    int port;      /* of the listener */
     char host[64]; /* as the user named it */
     char name[80];
     struct tcp_session session[LINK_MAX_SESSIONS];
@@ -135,7 +135,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
             give_up_one(tcp);
             return;
         }
-        if (slot == tcp->n_sessions && tcp->brief) return; /* all have said something, and are answered at once */
+        if (slot == tcp->n_sessions && tcp->brief) return; /* all have asked something, and are answered soon */
         if (!socket_accept(tcp->listener, &tcp->reserve_fd, &fd, &from, &len))
             return; /* none left, or one that gave up before we came */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);
@@ -301,7 +301,7 @@ static int tcp_unplug(struct tcp_link *tcp)
 {
     if (tcp->listener < 0) return SH_ESTATE;
     tcp->is_silent = 0;   /* what is left of its sockets ends here */
-    close(tcp->listener); /* who waits there is turned away by the system */
+    close(tcp->listener); /* the system turns clients away that wait there */
     tcp->listener = -1;
     for (int s = 0; s < tcp->n_sessions; s++)
         tcp_cut(tcp, s);

@@ -51,15 +51,11 @@ static const char *host_of(const struct link_spec *spec)
 
 static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *to, socklen_t *len, struct sh_err *err)
 {
-    char service[8];
-    struct addrinfo hints = {.ai_socktype = SOCK_DGRAM, .ai_flags = AI_NUMERICSERV}, *list = NULL;
+    struct addrinfo *list;
     if (spec->port < 1 || spec->port > 65535)
         return sh_fail(err, SH_EINPUT, "link udp:%s:%d: allowed ports are 1 to 65535", host_of(spec), spec->port);
-    snprintf(service, sizeof service, "%d", spec->port & 0xffff);
-    int rc = getaddrinfo(host_of(spec), service, &hints, &list);
-    if (rc != 0)
-        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: no such address: %s", host_of(spec), spec->port,
-                       rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
+    const int rc = socket_resolve("link udp", host_of(spec), spec->port, SOCK_DGRAM, &list, err);
+    if (rc != SH_OK) return rc;
     memcpy(to, list->ai_addr, list->ai_addrlen);
     *len = list->ai_addrlen;
     freeaddrinfo(list);
@@ -101,12 +97,6 @@ static int find_network(const char *name, const struct sockaddr *to, struct netw
     return SH_OK;
 }
 
-static int is_multicast(const struct sockaddr *to)
-{
-    if (to->sa_family == AF_INET) return IN_MULTICAST(ntohl(ipv4_of(to)));
-    return IN6_IS_ADDR_MULTICAST(&((const struct sockaddr_in6 *)(const void *)to)->sin6_addr);
-}
-
 /* Broadcasts go out on the interface that is named, and on no other. `to` becomes that interface's broadcast address
  * where it was that of all networks. *broadcast: it is one. */
 static int check_receiver(const struct link_spec *spec, struct sockaddr *to, struct network *net, int *broadcast,
@@ -114,7 +104,7 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
 {
     const char *host = host_of(spec);
     const int named = spec->interface[0] != '\0', to_all = to->sa_family == AF_INET && ipv4_of(to) == INADDR_BROADCAST;
-    if (is_multicast(to) && !named)
+    if (socket_is_group(to) && !named)
         return sh_fail(err, SH_EINPUT, "link udp:%s:%d: multicast needs the key interface: the interface that sends it",
                        host, spec->port);
     int rc = find_network(named ? spec->interface : NULL, to, net, err);
@@ -141,7 +131,7 @@ static int set_way(int fd, const struct link_spec *spec, const struct sockaddr *
 {
     const int ttl = spec->ttl, is_v4 = to->sa_family == AF_INET;
     const int level = is_v4 ? IPPROTO_IP : IPPROTO_IPV6;
-    if (!is_multicast(to))
+    if (!socket_is_group(to))
         return ttl == 0 ? 0 : setsockopt(fd, level, is_v4 ? IP_TTL : IPV6_UNICAST_HOPS, &ttl, sizeof ttl);
     const int number = (int)if_nametoindex(spec->interface), hops = ttl != 0 ? ttl : 1;
     const struct ip_mreqn out = {.imr_ifindex = number};
@@ -164,7 +154,7 @@ static int is_same_place(const struct sockaddr_storage *a, const struct sockaddr
     return strcmp(text[0], text[1]) == 0;
 }
 
-/* The address that the system would choose. */
+/* Asks the system for the source that it would choose. */
 static int ask_source(const struct sockaddr_storage *to, socklen_t len, struct sockaddr_storage *from)
 {
     socklen_t from_len = sizeof *from;
@@ -188,7 +178,7 @@ static int is_own_machine(const struct sockaddr_storage *to, const struct sockad
 static int is_of_one(const struct sockaddr_storage *at)
 {
     struct ifaddrs *list;
-    if (is_multicast((const struct sockaddr *)at)) return 0;
+    if (socket_is_group((const struct sockaddr *)at)) return 0;
     if (at->ss_family != AF_INET)
         return !IN6_IS_ADDR_UNSPECIFIED(&((const struct sockaddr_in6 *)(const void *)at)->sin6_addr);
     const in_addr_t own = ipv4_of((const struct sockaddr *)at);
@@ -203,7 +193,7 @@ static int is_of_one(const struct sockaddr_storage *at)
     return ok;
 }
 
-/* Where packets come from, its port included. 0: from where the system says; 1: from there; -1: errno. */
+/* Finds the source of packets, with its port. Returns 0: the system chooses it; 1: it is *from; -1: errno. */
 static int find_source(const struct link_spec *spec, const struct sockaddr_storage *to, socklen_t len,
                        const struct network *net, struct sockaddr_storage *from)
 {
@@ -255,7 +245,7 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
     return 0;
 }
 
-/* Where packets go. */
+/* The receiver of packets, and the interface that leads to it. */
 struct receiver {
     struct sockaddr_storage at;
     socklen_t len;
@@ -276,12 +266,14 @@ static int connect_to(int fd, const struct link_spec *spec, const struct receive
     return connect(fd, (const struct sockaddr *)&to->at, to->len);
 }
 
-/* ", from 127.0.0.2:2368" for errors. */
+/* ", from 127.0.0.2:2368" or ", from port 2368" for errors. */
 static void source_text(const struct link_spec *spec, char *text, size_t size)
 {
     text[0] = '\0';
-    if (spec->source[0] != '\0' || spec->source_port != 0)
+    if (spec->source[0] != '\0')
         snprintf(text, size, ", from %s:%d", spec->source, spec->source_port);
+    else if (spec->source_port != 0)
+        snprintf(text, size, ", from port %d", spec->source_port);
 }
 
 static int udp_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -365,7 +357,7 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
         udp->refused += errno == ECONNREFUSED;
     }
     udp->refused++;
-    return (ssize_t)len; /* no cable, no route, no memory: gone as on any way */
+    return (ssize_t)len; /* without a cable, a route or memory the datagram is lost, as it may be on any way */
 }
 
 /* The socket stays, so that the source of the datagrams stays the same. What came meanwhile is dropped. */
@@ -387,7 +379,7 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
     if (what != LINK_FAULT_PLUG) return SH_ESTATE;
     const int was_away = udp->unplugged || udp->is_silent;
     for (int i = 0; i < DRAIN_READS && was_away && recv(udp->fd, nothing, sizeof nothing, MSG_DONTWAIT) >= 0; i++)
-        continue; /* who sends faster than this reads is not waited for */
+        continue; /* a sender that is faster than this is not waited for */
     udp->unplugged = udp->is_silent = 0;
     return SH_OK;
 }

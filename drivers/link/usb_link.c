@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The usb link: the head as a USB device, with the sessions of its look (drivers/usb/personalities.h): console and stream,
- * or one alone.
+/* The usb link: the head as a USB device, with the sessions of its USB identity (drivers/usb/personalities.h): console
+ * and stream, or one alone.
  *
  * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
  * until that has been reported: so a session begins or ends at most once between two polls. The end of a
@@ -19,7 +19,7 @@ struct usb_link {
     struct scanhead_usb head;
     const struct usb_backend_ops *ops;
     void *backend;
-    int n;                          /* sessions of the head's look */
+    int n;                          /* sessions of its USB identity */
     int reported[USB_MAX_SESSIONS]; /* the caller takes it to be open */
     uint32_t plugged;               /* attaches that the caller knows of */
     const char *news;               /* the back end's, until reported */

@@ -25,7 +25,8 @@ struct websockets_lib web_lws;
 
 void web_refused(struct web_link *web, const char *peer)
 {
-    snprintf(web->refused, sizeof web->refused, "%s", peer);
+    const int at = web->n_refused < WEB_AT_A_TIME ? web->n_refused : WEB_AT_A_TIME - 1;
+    snprintf(web->refused[at], sizeof web->refused[at], "%s", peer);
     web->n_refused++;
 }
 
@@ -140,7 +141,8 @@ void web_session_gone(struct web_conn *conn)
     struct web_session *s = conn->session;
     if (s == NULL) return;
     s->wsi = NULL;
-    s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED; /* nobody has heard of it yet, or somebody has to */
+    /* An owner that has not heard of the session need not hear of its end. */
+    s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED;
     conn->session = NULL;
     web_set_phase(conn, WEB_PARTING);
 }
@@ -271,8 +273,8 @@ static void report_session(struct web_session *s, int slot, uint32_t want_write,
 static void web_report(struct web_link *web, uint32_t want_write, struct link_events *events)
 {
     if (web->woken && link_events_push(events, LINK_WOKEN, 0, NULL)) web->woken = 0;
-    for (; web->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, web->refused); web->n_refused--)
-        continue;
+    for (; web->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, web->refused[0]); web->n_refused--)
+        memmove(web->refused[0], web->refused[1], sizeof web->refused - sizeof web->refused[0]);
     for (int s = 0; s < web->n_sessions; s++)
         report_session(&web->session[s], s, want_write, events);
 }

@@ -74,7 +74,7 @@ void web_linger(struct web_link *web, struct web_conn *conn)
         linger(conn);
 }
 
-/* ---- who comes in */
+/* ---- clients that come */
 
 /* A client with half a request gets the reason; others get nothing. One without a whole answer counts as refused. */
 static void web_accept_make_room(struct web_link *web, struct web_conn *conn)
@@ -107,7 +107,10 @@ static void welcome(struct web_link *web, int fd, const struct sockaddr_storage 
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     memset(conn, 0, sizeof *conn);
     conn->wsi = web_wait_for(web, fd, conn);
-    if (conn->wsi == NULL) return;
+    if (conn->wsi == NULL) {
+        web_refused(web, peer);
+        return;
+    }
     memcpy(conn->place.address, address, sizeof address);
     snprintf(conn->peer, sizeof conn->peer, "%s", peer);
     web_set_phase(conn, WEB_ASKING);
@@ -130,14 +133,19 @@ static void accept_some(struct web_link *web)
     }
 }
 
-/* ---- what is asked */
+/* ---- requests */
 
-/* Hands the connection to libwebsockets, which reads the new request at once, for its answer or its WebSocket. */
+/* Hands the connection to libwebsockets, which reads the new request at once, for its answer or its WebSocket. Without a
+ * descriptor for that, the client gets the reason. */
 static int hand_over(struct web_link *web, struct web_conn *conn)
 {
     char text[400] = "GET / HTTP/1.1\r\n\r\n";
-    const int fd = dup(web_lws.lws_get_socket_fd(conn->wsi)); /* the one at hand goes with what it was waited for by */
-    if (fd < 0) return -1;
+    const int own = web_lws.lws_get_socket_fd(conn->wsi), fd = dup(own); /* libwebsockets closes its own */
+    if (fd < 0) {
+        web_refused(web, conn->peer);
+        web_accept_say(own, 503, "the head has no file descriptor left for this connection", conn->request.head_only);
+        return linger(conn);
+    }
     if (conn->request.key[0] != '\0')
         snprintf(text, sizeof text,
                  "GET /ws HTTP/1.1\r\nHost: %s\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"

@@ -11,7 +11,7 @@ static void web_break(struct lws *wsi)
 {
     const int fd = web_lws.lws_get_socket_fd(wsi);
     if (wsi == web_link_of(wsi)->listening)
-        shutdown(fd, SHUT_RDWR); /* nobody is accepted any more, and who waits is turned away */
+        shutdown(fd, SHUT_RDWR); /* no client is accepted any more, and those that wait are turned away */
     else
         socket_break(fd);
 }
@@ -68,7 +68,7 @@ static int web_unplug(struct web_link *web)
 {
     if (web->listening == NULL) return SH_ESTATE;
     web->is_silent = 0;        /* what is left of its sockets ends here */
-    web_break(web->listening); /* first: who is cut off finds nobody there */
+    web_break(web->listening); /* first: a client that is cut off finds nobody there */
     web_break_all(web);
     web->listening = NULL;
     return SH_OK;

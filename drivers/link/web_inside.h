@@ -108,11 +108,11 @@ struct web_link {
     int listener, wake_fd, woken;
     int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
     int port, n_sessions, n_refused;
-    char refused[64]; /* the last client that was refused */
-    char at[72];      /* "127.0.0.1:40123" */
-    char host[64];    /* as the user named it */
+    char refused[WEB_AT_A_TIME][64]; /* n_refused clients, to be reported; the last place has the newest one */
+    char at[72];                     /* "127.0.0.1:40123" */
+    char host[64];                   /* as the user named it */
     const struct web_source *source;
-    struct web_conn *entering; /* whom libwebsockets is being given */
+    struct web_conn *entering; /* the one that libwebsockets is being given */
     struct web_conn conn[WEB_PLACES];
     struct web_session session[LINK_MAX_SESSIONS];
 };

@@ -27,7 +27,7 @@ enum web_phase {
 struct web_place {
     enum web_phase phase;
     unsigned char address[8]; /* web_address() */
-    int64_t since_us;         /* ANSWERING: when it last took something. Else: of the phase */
+    int64_t since_us;         /* ANSWERING: when it last took something. Else: when the phase began */
 };
 
 /* One address is: 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */

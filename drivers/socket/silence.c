@@ -42,7 +42,7 @@ int sockets_silence(const int *fds, int n)
     for (int i = 0; i < n; i++) {
         if (fds[i] < 0) continue;
         if (take_from(fds[i], MOST_HOPS) != SH_OK) {
-            sockets_speak(fds, i);
+            sockets_speak(fds, i + 1); /* of a socket of IPv6, one of the two may have been set */
             return SH_ESTATE;
         }
         setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &off, sizeof off);

@@ -9,8 +9,8 @@
 #ifndef DRIVERS_SOCKET_SILENCE_H
 #define DRIVERS_SOCKET_SILENCE_H
 
-/* Descriptors below 0 are left out. Waits up to 200 ms until the peers have confirmed what was sent; so long they are
- * still heard. Keep-alive probes stop, so that a connection lasts. 0, or SH_ESTATE: the system can't do it, and all
+/* Descriptors below 0 are left out. Waits up to 200 ms until the peers have confirmed what was sent, and still hears
+ * them meanwhile. Keep-alive probes stop, so that a connection lasts. 0, or SH_ESTATE: the system can't do it, and all
  * sockets are as before. */
 int sockets_silence(const int *fds, int n);
 /* Ends it: the connections go on. */

@@ -21,6 +21,25 @@ int socket_error_code(int error)
                                                                                                        : SH_EIO;
 }
 
+int socket_resolve(const char *what, const char *host, int port, int type, struct addrinfo **list, struct sh_err *err)
+{
+    char service[8];
+    snprintf(service, sizeof service, "%u", (unsigned)port & 0xffffu);
+    const struct addrinfo hints = {.ai_socktype = type, .ai_flags = AI_NUMERICSERV};
+    const int rc = getaddrinfo(host, service, &hints, list);
+    if (rc == 0) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s:%s:%d: no such address: %s", what, host, port,
+                   rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
+}
+
+int socket_is_group(const struct sockaddr *address)
+{
+    const struct sockaddr_in *v4 = (const void *)address;
+    const struct sockaddr_in6 *v6 = (const void *)address;
+    return address->sa_family == AF_INET6 ? IN6_IS_ADDR_MULTICAST(&v6->sin6_addr)
+                                          : IN_MULTICAST(ntohl(v4->sin_addr.s_addr));
+}
+
 static int start(int fd, const struct sockaddr *at, socklen_t len, int connecting)
 {
     const int one = 1;
@@ -92,13 +111,9 @@ static void name_socket(int fd, int connecting, char *name, size_t len)
 int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err)
 {
     const char *host = place->host[0] != '\0' ? place->host : "127.0.0.1";
-    char service[8];
-    snprintf(service, sizeof service, "%u", (unsigned)place->port & 0xffffu);
-    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *list = NULL;
-    int rc = getaddrinfo(host, service, &hints, &list);
-    if (rc != 0)
-        return sh_fail(err, SH_EINPUT, "%s:%s:%d: no such address: %s", place->what, host, place->port,
-                       rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
+    struct addrinfo *list;
+    const int rc = socket_resolve(place->what, host, place->port, SOCK_STREAM, &list, err);
+    if (rc != SH_OK) return rc;
     *fd = -1;
     for (const struct addrinfo *at = list; at != NULL && *fd < 0; at = at->ai_next)
         *fd = socket_open_at(at->ai_addr, at->ai_addrlen, place->connecting);

@@ -20,6 +20,13 @@ struct socket_place {
     int connecting;   /* 1: connects, 0: listens */
 };
 
+/* The addresses of a host and port: *list, which freeaddrinfo releases, is not empty. type: SOCK_STREAM or SOCK_DGRAM.
+ * Waits for names. SH_EINPUT. */
+struct addrinfo;
+int socket_resolve(const char *what, const char *host, int port, int type, struct addrinfo **list, struct sh_err *err);
+/* Whether an address of IPv4 or IPv6 is that of a multicast group. */
+int socket_is_group(const struct sockaddr *address);
+
 /* A listening or connected socket, not blocking. Waits for names and for the connection. name gets its own
  * address or, where it connects, that of its peer, as "127.0.0.1:40123" or "[::1]:40123". SH_EPERM, SH_EINPUT
  * (the address), SH_EIO. */

@@ -30,7 +30,8 @@ void stamped_enable(int fd)
     setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
 }
 
-/* The kernel's time or, where it gave none (see stamped_begin), the time of reading. */
+/* Returns the time in a note: when the kernel received the bytes or, if it stamped nothing then (stamped_begin), when
+ * they were read. */
 static int64_t time_of(const struct cmsghdr *c)
 {
     struct timespec t;
@@ -43,17 +44,6 @@ static int is_time(const struct cmsghdr *c)
     return c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_TIMESTAMPNS;
 }
 
-static int resolve(const char *what, const char *host, int port, int type, struct addrinfo **list, struct sh_err *err)
-{
-    char service[8];
-    snprintf(service, sizeof service, "%u", (unsigned)port & 0xffffu);
-    const struct addrinfo hints = {.ai_socktype = type, .ai_flags = AI_NUMERICSERV};
-    const int rc = getaddrinfo(host, service, &hints, list);
-    if (rc == 0) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s:%s:%d: no such address: %s", what, host, port,
-                   rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
-}
-
 /* ---- datagrams */
 
 static struct sockaddr_in *v4(void *address)
@@ -64,12 +54,6 @@ static struct sockaddr_in *v4(void *address)
 static struct sockaddr_in6 *v6(void *address)
 {
     return address;
-}
-
-static int is_group(struct sockaddr_storage *at)
-{
-    if (at->ss_family == AF_INET6) return IN6_IS_ADDR_MULTICAST(&v6(at)->sin6_addr);
-    return IN_MULTICAST(ntohl(v4(at)->sin_addr.s_addr));
 }
 
 static int is_broadcast(struct sockaddr_storage *at)
@@ -93,12 +77,12 @@ static int join(int fd, struct sockaddr_storage *at, unsigned interface)
 
 static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned interface)
 {
-    const int one = 1, size = RECEIVE_BUFFER_BYTES;
+    const int one = 1, size = RECEIVE_BUFFER_BYTES, is_group = socket_is_group((const struct sockaddr *)at);
     if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) != 0) /* needs CAP_NET_ADMIN */
         setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);           /* up to net.core.rmem_max */
     stamped_enable(fd);
     setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &one, sizeof one);
-    if (is_group(at) || is_broadcast(at)) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+    if (is_group || is_broadcast(at)) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (at->ss_family == AF_INET6) {
         setsockopt(fd, IPPROTO_IPV6, IPV6_V6ONLY, &one, sizeof one);
         setsockopt(fd, IPPROTO_IPV6, IPV6_RECVPKTINFO, &one, sizeof one);
@@ -106,7 +90,7 @@ static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned in
         setsockopt(fd, IPPROTO_IP, IP_PKTINFO, &one, sizeof one);
     }
     if (bind(fd, (const struct sockaddr *)at, len) != 0) return -1;
-    return is_group(at) ? join(fd, at, interface) : 0;
+    return is_group ? join(fd, at, interface) : 0;
 }
 
 /* "GROUP%INTERFACE" of IPv4, which getaddrinfo does not know. */
@@ -128,7 +112,7 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     struct addrinfo *list;
     *out = (struct stamped_socket){.fd = -1, .own_len = sizeof out->own};
     int rc = split_interface(host, address, &interface, err);
-    if (rc == SH_OK) rc = resolve("udp", address, port, SOCK_DGRAM, &list, err);
+    if (rc == SH_OK) rc = socket_resolve("udp", address, port, SOCK_DGRAM, &list, err);
     if (rc != SH_OK) return rc;
     memcpy(&out->own, list->ai_addr, list->ai_addrlen);
     out->fd = socket(list->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -249,7 +233,7 @@ static int connect_at(const struct addrinfo *at, int timeout_ms)
 int stamped_connect(const char *host, int port, int timeout_ms, int *fd, struct sh_err *err)
 {
     struct addrinfo *list;
-    const int rc = resolve("tcp", host, port, SOCK_STREAM, &list, err);
+    const int rc = socket_resolve("tcp", host, port, SOCK_STREAM, &list, err);
     if (rc != SH_OK) return rc;
     *fd = -1;
     for (const struct addrinfo *at = list; at != NULL && *fd < 0; at = at->ai_next)

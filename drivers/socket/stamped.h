@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Sockets that say when bytes came: datagrams and TCP streams with the time at which the kernel received them.
+/* Sockets that report when bytes came: datagrams and TCP streams with the time at which the kernel received them.
  *
- * Times are UTC, in ns since 1970. Nothing waits but stamped_connect. Errors: SH_E, as socket.h has them. Any thread. */
+ * Times are UTC, in ns since 1970. Only stamped_begin and stamped_connect wait, and stamped_open for a name. Errors:
+ * SH_E, as socket.h has them. Any thread. */
 #ifndef DRIVERS_SOCKET_STAMPED_H
 #define DRIVERS_SOCKET_STAMPED_H
 
@@ -39,8 +40,8 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
 uint64_t stamped_dropped(const struct stamped_socket *socket);
 void stamped_close(struct stamped_socket *socket);
 
-/* Waits until the kernel stamps what comes, a second at most: it begins some time after a socket first asked it to.
- * Earlier bytes have the time of reading. While `keeper` is open the kernel goes on stamping. Without a loopback it
+/* Waits until the kernel stamps what comes, about a second at most: it begins some time after a socket first asked it
+ * to. Earlier bytes have the time of reading. While `keeper` is open the kernel goes on stamping. Without a loopback it
  * does not wait. */
 void stamped_begin(struct stamped_socket *keeper);
 

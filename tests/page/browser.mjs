@@ -6,7 +6,7 @@ import {accessSync, constants, mkdirSync, writeFileSync} from 'node:fs';
 import {folder, forget, remember} from './work.mjs';
 
 const NAMES = ['chromium', 'chromium-browser', 'google-chrome'];
-const DEADLINE_MS = 300000; // only a hang reaches this, because a busy machine is many times slower than a quiet one
+const DEADLINE_MS = 300000; // only what waits for ever reaches this, since a busy machine may be many times slower
 
 /** Returns the browser's path, or null. $CHROMIUM names another browser. */
 export function findBrowser() {

@@ -5,7 +5,7 @@ import {createConnection} from 'node:net';
 import {forget, remember} from './work.mjs';
 
 export const PROGRAM = process.env.SCANHEAD || 'build/scanhead';
-const DEADLINE_MS = 300000; // only a hang reaches this
+const DEADLINE_MS = 300000; // only what waits for ever reaches this
 
 /** Starts the program (`run`, `view`) and waits for its ready line. The program ends with this one. */
 export async function start(args, {nice = 0} = {}) {

@@ -8,7 +8,7 @@ import {tableOf} from '../../drivers/link/web/view_colours.js';
 import {rampAt} from '../../drivers/link/web/view_ramps.js';
 import {Client, end, endpoint, run, start} from './head.mjs';
 import {pixelsOf} from './png8.mjs';
-import {CONFIG} from './rig.mjs';
+import {choose, CONFIG} from './rig.mjs';
 import {equal, folder, is, near, test} from './work.mjs';
 
 const ROOT = new URL('../..', import.meta.url).pathname;
@@ -74,13 +74,6 @@ const pointsAround = (share) => `(() => {
   return {from: all[0].t, to: all.at(-1).t, old: all[Math.floor(0.25 * all.length)], young: all[Math.floor(0.9 * all.length)]};
 })()`;
 
-const choose = (page, selector, value) => page.eval(`(() => {
-  const field = document.querySelector(${JSON.stringify(selector)});
-  field.value = ${JSON.stringify(value)};
-  field.dispatchEvent(new Event('input', {bubbles: true}));
-  field.dispatchEvent(new Event('change', {bubbles: true}));
-})()`);
-
 async function saved(ending) {
   const at = `${folder}/saved`;
   for (let tries = 0; tries < 400; tries++) {
@@ -110,11 +103,18 @@ export async function testInstrument(browser) {
   await test('a dark page is dark from its first picture on, and nothing in it jumps while it is filled', async () => {
     equal(await page.eval('firstTheme'), 'dark', 'theme before any module');
     await shifted(page, 'a page of 600 px');
-    for (const size of [[360, 740], [1280, 900]]) {
+    for (const size of [[1280, 900], [360, 740]]) {
       const one = await browser.open(endpoint(head, 'web'), {size, before: `(${watches})()`});
       await one.until('scanhead.head.isOpen && document.querySelector("#station-2-x_m")?.value && document.querySelector("#panel-plan td")');
       await shifted(one, `a page of ${size[0]} px`);
-      const wide = await one.eval('document.documentElement.scrollWidth');
+      const open = await one.eval('document.querySelectorAll(".panel[open]").length');
+      is(size[0] > 360 ? open > 5 : open === 2, `the first small page has few panels open, though a wide one had all: ${open}`);
+      const wide = await one.eval(`(() => { // with the longest of its figures
+        document.querySelector('#panel-figures').open = true;
+        document.querySelector('#figure-past').textContent = '2.31 M, 1.23 M older ones are gone, 12 345 stream frames not kept';
+        document.querySelector('#figure-time').textContent = '12:34:56 since power-up, PTP UNCALIBRATED, s0, −37 000 000 123 ns';
+        return document.documentElement.scrollWidth;
+      })()`);
       is(wide <= size[0], `nothing is wider than ${size[0]} px: ${wide}`);
       await one.close();
     }
@@ -213,6 +213,7 @@ export async function testInstrument(browser) {
 
   await test('the picture as a file, with its legend', async () => {
     await page.eval('scanhead.view.fit()');
+    equal(await page.eval('Promise.all([scanhead.view.picture(), scanhead.view.picture()]).then((all) => all.length)'), 2, 'pictures, asked for at once');
     await page.press('#screenshot');
     const {width, height, size, out} = pixelsOf(readFileSync(await saved('.png')));
     equal(JSON.stringify([width, height]), JSON.stringify(await page.eval('[scanhead.view.canvas.width, scanhead.view.canvas.height]')), 'its size');

@@ -26,6 +26,14 @@ export function recorded(name, settings, ...options) {
   return {...JSON.parse(text), file};
 }
 
+/** Gives a field another value, as its user does. */
+export const choose = (page, selector, value) => page.eval(`(() => {
+  const field = document.querySelector(${JSON.stringify(selector)});
+  field.value = ${JSON.stringify(value)};
+  field.dispatchEvent(new Event('input', {bubbles: true}));
+  field.dispatchEvent(new Event('change', {bubbles: true}));
+})()`);
+
 /** Returns the sum of two hashes, which is the hash of the records of both scans. */
 export function both(a, b) {
   const half = (at) => ((parseInt(a.slice(at, at + 8), 16) + parseInt(b.slice(at, at + 8), 16)) >>> 0).toString(16).padStart(8, '0');

@@ -2,6 +2,7 @@
 // It tests the tools of the picture on a head that has scanned: what they draw is read back from the screen.
 import {readFileSync} from 'node:fs';
 import {pixelsOf} from './png8.mjs';
+import {choose} from './rig.mjs';
 import {equal, folder, is, near, test} from './work.mjs';
 
 const SIZE = [1100, 560]; // the narrowest wide page: its picture has about 500 x 400 pixels
@@ -238,6 +239,57 @@ export async function testTools(browser, url, points) {
     back.share.forEach((v, k) => near(back.at[k], v, 1e-4, 'the cross'));
     await page.key('Escape');
     equal(await page.eval('document.querySelector("#panorama").hidden'), true, 'Escape leaves it');
+  });
+
+  await test('a trial beside the tools: points of a cloud keep their place, a click does one thing, times go along', async () => {
+    await page.eval('scanhead.view.times({from: -1e6, to: 1e6})');
+    await page.press('#tool-panorama');
+    await page.until(`${TOOLS}.panorama.panorama !== null`);
+    const [at, point] = await page.eval(`(() => {
+      const tool = ${TOOLS}.panorama, {width, height} = tool.panorama;
+      for (let y = height >> 1; y < height; y++) for (let x = 0; x < width; x++) if (tool.pointAt([x, y])) return [[x, y], tool.pointAt([x, y])];
+    })()`);
+    const before = await page.eval(`(scanhead.view.pointed.mark(${JSON.stringify(point)}), document.querySelector('#try').click(),
+      [${TOOLS}.panorama.pointAt([${at}]), scanhead.view.pointed.point])`);
+    equal(before.join(), ',', 'a point of what is not shown, in the panorama and marked'); // both are null
+    await page.until('!scanhead.trial.isBusy && scanhead.trial.cells && scanhead.trial.stations.every((s) => s.seen)');
+    await page.until(`${TOOLS}.panorama.panorama?.cloud === scanhead.view.cloud`, 'it is made again');
+    await page.press('#tool-panorama');
+    await page.eval(bare(true));
+    await choose(page, '#trial-paint', 'off');
+    is(await page.eval('scanhead.view.cloud.window !== null') && rows(await drawn(page), 0, 300).n > 500, 'tried points have no time: all are shown');
+    await page.eval(bare(false));
+    await page.press('#tool-measure');
+    await page.press('#trial-target');
+    const places = await page.eval(`(() => {
+      const {cloud, camera} = scanhead.view, {position, n} = cloud.blocks[0], all = [];
+      for (let i = 0; i < n; i++) {
+        const p = camera.project([0, 1, 2].map((a) => position[3 * i + a] + cloud.origin[a]));
+        if (p.x > 60 && p.y > 90 && p.x < 0.6 * camera.width && p.y < camera.height - 60) all.push([p.x, p.y]);
+      }
+      return [all[0], all.at(-1)];
+    })()`);
+    const measured = await page.eval(`${TOOLS}.measure.points.length`);
+    await page.clickAt(await onPage(page, places[0]));
+    await page.until(`document.querySelector('.targets li')`);
+    equal(await page.eval(`${TOOLS}.measure.points.length`), measured, 'picked points');
+    await page.clickAt(await onPage(page, places[1]));
+    await page.until(`${TOOLS}.measure.points.length === ${measured + 1}`);
+    await page.press('#trial-target');
+    await page.eval(`(() => { // each search takes more than one slice, as in a large cloud
+      const {now} = performance, {once} = scanhead.view, [x, y] = [${places[0]}];
+      let slow = 0;
+      performance.now = () => now.call(performance) + 100 * slow++;
+      for (let k = 0; k < 2; k++) once.tap({x, y});
+      performance.now = now;
+    })()`);
+    await page.until('scanhead.view.once === null');
+    equal(await page.eval('new Promise((done) => setTimeout(done)).then(() => scanhead.view.overlay.targets.length)'), 2, 'targets after a double click');
+    await choose(page, '#trial-paint', 'seen');
+    await choose(page, '#age-limit', '');
+    await page.press('#trial-end');
+    equal(await page.eval('[scanhead.view.cloud === scanhead.cloud, scanhead.cloud.window]').then(JSON.stringify), '[true,null]', 'no times at its end');
+    await page.press('#tool-measure');
   });
 
   await test('an empty field of a section is no number', async () => {

@@ -15,6 +15,7 @@ import {Cloud} from '../../drivers/link/web/cloud.js';
 import {Trial} from '../../drivers/link/web/trial.js';
 import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
 import {Section} from '../../drivers/link/web/section.js';
+import {drawLegend} from '../../drivers/link/web/picture.js';
 import {runTests, test} from './page_tap.mjs';
 
 const web = new URL('../../drivers/link/web/', import.meta.url);
@@ -54,6 +55,16 @@ for (const [name, colours] of Object.entries(themes)) {
     }
   });
 }
+
+test('a saved picture says how many items of a list its legend leaves out', () => {
+  for (const [n, last] of [[20, 'and 6 more'], [14, 's13']]) {
+    const texts = [], own = {fillText: (text) => texts.push(text)};
+    const context = new Proxy(own, {get: (_, name) => own[name] ?? (() => {}), set: () => true});
+    const items = Array.from({length: n}, (_, label) => ({label, colour: [1, 2, 3]}));
+    drawLegend({getContext: () => context}, {title: 'Surface', unit: '', items}, {ground: '', ink: ''}, ({label}) => `s${label}`);
+    equal(texts.at(-1), last, `${n} items`);
+  }
+});
 
 test('nothing inline, nothing from elsewhere', () => {
   equal(/\sstyle=|\son\w+=|<style|https?:\/\//.test(page), false, 'index.html');
@@ -369,7 +380,7 @@ test('a saved file: its number is in each request, another page\'s file is refus
   });
   answers(() => ({state: 'done', as: 'las', file: 4, bytes: 3, gone: 0, lost_frames: 2}));
   const saved = await fetchSaved('las');
-  equal([asked, saved.blob.size, savedWords(saved)], [['/save?as=las', '/saved?file=4&from=0'], 3, 'Saved, without 2 frames that were lost.']);
+  equal([asked, saved.blob.size, savedWords(saved)], [['/save?as=las', '/saved?file=4&from=0'], 3, 'Saved, without 2 stream frames that were lost.']);
   equal(savedWords({gone: 0, lost_frames: 0}), 'Saved.');
   answers((path) => (path === '/save' ? {state: 'done', as: 'ply', file: 5, bytes: 3} : {state: 'working', as: 'las', file: 4, bytes: 0}));
   let said = '';

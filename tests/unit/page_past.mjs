@@ -4,6 +4,7 @@
 // with a keeper of it that answers as the head's does.
 import {crc32c, LOCAL, Parser, REPEAT} from '../../drivers/link/web/native.js';
 import {Cloud} from '../../drivers/link/web/cloud.js';
+import {Head} from '../../drivers/link/web/head.js';
 import {Losses} from '../../drivers/link/web/losses.js';
 import {Past} from '../../drivers/link/web/past.js';
 import fs from 'node:fs';
@@ -260,6 +261,26 @@ test('of a head that has started again, the same number is another scan', () => 
   cloud.outdate(came);
   take(cloud, batch(4, 1, 1));
   equal(held(cloud), [[2, 2, 3], [1, 1, 8]], 'blocks');
+});
+
+// ---- the connection's end
+
+test('commands that wait fail when the worker does, since the replies of the next connection are not theirs', async () => {
+  let worker;
+  globalThis.Worker = class {
+    constructor() { worker = this; }
+    postMessage() {}
+    terminate() {}
+  };
+  const head = new Head('ws://head/ws', {worker: true}), closed = [];
+  delete globalThis.Worker;
+  head.addEventListener('close', ({detail}) => closed.push(detail.words));
+  worker.onmessage({data: {connection: 1, things: [['open', null]], figures: {}}});
+  const answer = head.command('HEAD:PRR?').catch(({text}) => text);
+  worker.onerror({});
+  equal(closed.join(), 'this page failed to read the stream', 'closed');
+  equal(await answer, closed[0], 'the command');
+  head.close();
 });
 
 runTests();

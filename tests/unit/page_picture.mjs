@@ -20,7 +20,6 @@ test('the oldest points go, whole blocks, and not below the capacity', () => {
   for (let k = 0; k < 5; k++) cloud.add(batch(50_000, (i) => [k, i, 0], {pulse0: 50_000 * k}));
   same(cloud.total, 250_000, 'total');
   same([cloud.gone, cloud.count], [131_072, 118_928], 'gone and count'); // two blocks of 65,536 are gone
-  same(cloud.boundsOfAll.min[0], 0, 'bounds of all');
   same(cloud.bounds.min[0], 2, 'bounds of those held'); // the 131,073rd point is of the third batch
   cloud.clear();
   same([cloud.total, cloud.count, cloud.bounds, cloud.origin], [0, 0, null, null], 'cleared');
@@ -229,6 +228,22 @@ test('a station that is dragged tells where it is, once it is let go', () => {
   same([told[0].station, told[0].z, told[0].heading_deg, stations.pending], [4, 0, 10, true], 'the rest');
   stations.set(stations.list); // it is refused, so all is as before
   same(stations.placeOf(stations.list[0]).at, [0, 0, 0], 'back');
+});
+
+test('Esc takes a drag back, also for whoever follows it, and further moves of the pointer do nothing', () => {
+  const told = [], followed = [];
+  const stations = new Stations(() => {}, (m) => told.push(m));
+  stations.set([{number: 4, name: 'a', x_m: 0, y_m: 0, z_m: 0, heading_deg: 10, tripod: null}]);
+  stations.dragged = ({x, y, heading_deg}) => followed.push([x, y, heading_deg]);
+  const c = camera({elevation: -0.6});
+  const from = c.project([0, 0, 0]), to = c.project([1, 0.5, 0]);
+  stations.grab(c, {number: 4, what: 'move'}, from.x, from.y);
+  stations.drag(c, to.x, to.y);
+  stations.key(c, 'Escape', false);
+  stations.drag(c, to.x + 20, to.y);
+  stations.drop();
+  same([followed.length, followed.at(-1), told, stations.dragging], [2, [0, 0, 10], [], false], 'taken back');
+  same(stations.placeOf(stations.list[0]).at, [0, 0, 0], 'where it is drawn');
 });
 
 test('outlines of fields: right, forward and up of a head that is turned', () => {

@@ -3,7 +3,9 @@
 // its expected errors, panoramas. It prints TAP on standard output.
 import {Cloud, pointOf} from '../../drivers/link/web/cloud.js';
 import {flatDepthOf, onPlane, radians} from '../../drivers/link/web/view_camera.js';
-import {nearest} from '../../drivers/link/web/view_pick.js';
+import {nearest, search} from '../../drivers/link/web/view_pick.js';
+import {Input} from '../../drivers/link/web/view_input.js';
+import {Stations} from '../../drivers/link/web/view_stations.js';
 import {lookDeep, lookFromSide} from '../../drivers/link/web/view_sides.js';
 import {alongLine, isWithin, Section} from '../../drivers/link/web/section.js';
 import {csvOf, decimalsOf, figureText, flatnessOf, KINDS, largestOf, placeOf, planeThrough, pointsOnFace, sigmaAlong, spacingAround, withError}
@@ -135,6 +137,42 @@ test('picking, in perspective and flat: the front point, and none that a section
     const third = c.project([3, 0, 0]);
     same(nearest(cloud, c, third.x, third.y, 8), null, 'one that is cut');
   }
+});
+
+test('a search that takes long: its point is right though its block is closed meanwhile, and none is of a cloud that was cleared', () => {
+  for (const flat of [false, true]) {
+    const cloud = new Cloud();
+    cloud.add(batch(1000, (i) => [0.125 * (i - 500), 0, 0]));
+    const steps = search(cloud, camera({flat}), 400, 300, 8);
+    steps.next();
+    cloud.cut(); // which changes the order of its points
+    const {block, i} = ended(steps);
+    same(pointOf(cloud, block, i).x, 0, 'the point in the middle');
+    const again = search(cloud, camera({flat}), 400, 300, 8);
+    again.next();
+    cloud.clear();
+    cloud.add(batch(1, () => [900, 0, 0]));
+    same(ended(again), null, 'after the cloud was cleared');
+  }
+});
+
+test('a turn of the wheel during a drag of a station zooms, and the station is let go all the same', () => {
+  const on = {}, told = [], view = {camera: camera({elevation: -0.6}), cloud: new Cloud(), movable: true, tool: null, once: null,
+    stations: new Stations(() => {}, (move) => told.push(move))};
+  for (const name of ['hover', 'touched', 'cameraMoved']) view[name] = () => {};
+  view.canvas = {style: {}, tabIndex: 0, focus() {}, setPointerCapture() {}, getBoundingClientRect: () => ({left: 0, top: 0}),
+    addEventListener(type, f) { on[type] = f; }};
+  view.stations.set([{number: 4, x_m: 0, y_m: 0, z_m: 0, heading_deg: 0, tripod: null}]);
+  new Input(view);
+  const {x, y} = view.camera.project([0, 0, 0]);
+  const send = (type, dx, more = {}) => on[type]({pointerId: 1, button: 0, clientX: x + dx, clientY: y, preventDefault() {}, ...more});
+  send('pointerdown', 0);
+  send('pointermove', 30);
+  send('wheel', 30, {deltaY: -100, deltaMode: 0});
+  send('pointermove', 60);
+  send('pointerup', 60);
+  same([view.camera.distance < 10, told.length, view.stations.dragging], [true, 1, false], 'nearer; let go');
+  same(told[0].x > 0, true, 'to the right');
 });
 
 test('a handle follows the pointer along its line, and not where the line points at the eye', () => {
@@ -326,6 +364,36 @@ test('flatness and spacing are of the points that the time line shows', () => {
   cloud.window = {from: 0, to: 2};
   same(ended(pointsOnFace(cloud, camera(), corners, 0.05)).places.length / 3, both / 2, 'half of the points');
   same(ended(spacingAround(cloud, [1.5, 1.5, 0], 0.5)) > 1.2 * near2, true, 'points are further apart'); // by the root of 2
+});
+
+test('a cloud that is cleared while it is measured gives no figures', () => {
+  const cleared = (steps) => {
+    const cloud = new Cloud();
+    for (const station of [1, 2]) cloud.add(batch(900, (i) => [0.1 * (i % 30), 0.1 * Math.floor(i / 30), 0], {station}));
+    const own = steps(cloud);
+    own.next();
+    cloud.clear();
+    cloud.add(batch(900, (i) => [900 + 0.1 * (i % 30), 0.1 * Math.floor(i / 30), 0]));
+    return ended(own);
+  };
+  const corners = [[0.45, 0.45], [2.45, 0.45], [2.45, 2.45], [0.45, 2.45]].map(([x, y]) => ({x, y, z: 0, error: null}));
+  same(cleared((cloud) => pointsOnFace(cloud, camera(), corners, 0.05)).places.length, 0, 'points on a face');
+  same(Number.isNaN(cleared((cloud) => spacingAround(cloud, [1.5, 1.5, 0], 0.001))), true, 'distance of points');
+  same(ended(pointsOnFace(new Cloud(), camera(), corners, 0.05)).places.length, 0, 'no points at all');
+  same(Number.isNaN(ended(spacingAround(new Cloud(), [0, 0, 0], 0.001))), true, 'distance of none');
+});
+
+test('a pixel at the side of a panorama has no neighbour at the other side', () => {
+  const cloud = new Cloud();
+  const places = [];
+  for (let a = -60; a <= 60; a += 0.5) {
+    for (let e = -30; e <= 30; e += 0.5) if (a > -59.3 || Math.abs(e) > 2) places.push(placeOf(toScene(STATION, 7, radians(e), radians(a))));
+  }
+  cloud.add(batch(places.length, (i) => places[i]));
+  const panorama = ended(new Panorama(cloud, STATION).make()), {width, height} = panorama;
+  same(120 / width > 0.71 && 120 / width < 1.2, true, `${width} pixels: only the first one of a row has none of the points left out`);
+  const [, share] = panorama.shareOf([0, 0]), y = Math.floor(share * height);
+  same([panorama.pointAt(0, y), panorama.pointAt(1, y) !== null, panorama.pointAt(width - 1, y - 1) !== null], [null, true, true], 'pixels');
 });
 
 test('pixels of a panorama are wider where lines are further apart than the points in them', () => {

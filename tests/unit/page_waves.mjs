@@ -79,7 +79,8 @@ test('the last waveforms of a scan are kept, up to a limit', () => {
   equal(`${waves.of(0, 1).length} ${waves.of(0, 2).length}`, '0 2', 'of a scan');
 });
 
-test('a page asks its wire for the waveform of a pulse', async () => {
+// Calls use(wire, socket, sent) with a wire that is connected by a socket of ours, and the messages that it sends.
+function withWire(use) {
   const real = globalThis.WebSocket, sent = [];
   let socket;
   globalThis.WebSocket = class {
@@ -87,16 +88,36 @@ test('a page asks its wire for the waveform of a pulse', async () => {
     close() {}
   };
   try {
-    const wire = new Wire((message) => sent.push(...message.things));
+    const wire = new Wire((message) => sent.push(message));
     wire.take({connect: 'ws://head/ws'});
-    socket.onmessage({data: new Uint8Array(stream).buffer});
-    wire.take({wavesOf: 1, scan: 1});
-    const [, answer] = sent.find(([name]) => name === 'waves');
-    equal(`${answer.pulse} ${answer.scan} ${answer.windows.length} ${answer.windows[0].samples.length}`, '1 1 1 6', 'answer');
+    socket.onopen();
+    use(wire, socket, sent);
     wire.take({close: true});
   } finally {
     globalThis.WebSocket = real;
   }
-});
+}
+
+test('a page asks its wire for the waveform of a pulse', () => withWire((wire, socket, sent) => {
+  socket.onmessage({data: new Uint8Array(stream).buffer});
+  wire.take({wavesOf: 1, scan: 1});
+  const [, answer] = sent.flatMap(({things}) => things).find(([name]) => name === 'waves');
+  equal(`${answer.pulse} ${answer.scan} ${answer.windows.length} ${answer.windows[0].samples.length}`, '1 1 1 6', 'answer');
+}));
+
+test('a page that takes nothing for long still gets its recording and the end of its connection', () => withWire((wire, socket, sent) => {
+  wire.take({keep: true});
+  for (let i = 0; i < 20000; i++) socket.onmessage({data: 'OK'});
+  socket.onmessage({data: new Uint8Array(stream).buffer});
+  wire.take({keep: false});
+  socket.onclose({code: 1006, reason: ''});
+  const before = sent.length;
+  wire.take({ack: true});
+  equal(sent.length, before + 1, 'messages after it takes one');
+  const names = sent.flatMap(({things}) => things.map(([name]) => name));
+  equal(`${names.filter((name) => name === 'text').length} ${names.slice(-2).join(' ')}`, '20000 kept close', 'things');
+  equal([...new Set(sent.map(({connection}) => connection))].join(), '1', 'connections');
+  equal(sent.at(-1).figures.dropped_things > 0, true, 'others are dropped, and counted');
+}));
 
 await runTests();

@@ -9,8 +9,18 @@
 #include <linux/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 
+#include "drivers/socket/silence.h"
 #include "tests/unit/web_rig.h"
+
+static int lacks_v6; /* the system can't set the option of IPv6 */
+
+int setsockopt(int fd, int level, int name, const void *value, socklen_t len)
+{
+    errno = ENOPROTOOPT;
+    return lacks_v6 && level == IPPROTO_IPV6 ? -1 : (int)syscall(SYS_setsockopt, fd, level, name, value, len);
+}
 
 static int fault(struct bench *bench, enum link_fault what, uint32_t n)
 {
@@ -116,6 +126,22 @@ static void test_tcp_v6(void **state)
     check_tcp("::1", AF_INET6);
 }
 
+/* Of the two options that a socket of IPv6 needs, the second one can't be set. Then neither is. */
+static void test_neither_option(void **state)
+{
+    (void)state;
+    const int fd = socket(AF_INET6, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    int least_ttl = -1;
+    socklen_t len = sizeof least_ttl;
+    if (fd < 0) skip();
+    lacks_v6 = 1;
+    assert_int_equal(sockets_silence(&fd, 1), SH_ESTATE);
+    lacks_v6 = 0;
+    assert_int_equal(getsockopt(fd, IPPROTO_IP, IP_MINTTL, &least_ttl, &len), 0);
+    assert_int_equal(least_ttl, 0);
+    close(fd);
+}
+
 /* A link that ends with its cable pulled ends its sessions as ever. So does one that loses power meanwhile. */
 static void test_ends(void **state)
 {
@@ -135,30 +161,36 @@ static void test_ends(void **state)
     }
 }
 
-/* A WebSocket and a page that is asked for: libwebsockets is silent, too. */
+/* A WebSocket and a client that asks for a file meanwhile: libwebsockets is silent, too. */
 static void test_web(void **state)
 {
     (void)state;
-    char place[64];
+    char place[64], request[200], answer[2000];
     struct bench bench = web_open(place);
     uint8_t frame[7];
+    snprintf(request, sizeof request, "GET /scene HTTP/1.1\r\nHost: %s\r\n\r\n", place);
     for (int resets = 0; resets < 2; resets++) {
-        const int fd = web_upgrade(&bench, place, "/ws", "");
+        const int fd = web_upgrade(&bench, place, "/ws", ""), other = web_dial(place);
         bench_expect(&bench, LINK_OPENED, 0);
+        for (int i = 0; i < 3; i++)
+            bench_poll(&bench, 0, 1);
         assert_int_equal(fault(&bench, LINK_FAULT_CABLE, 0), SH_OK);
         assert_int_equal(fault(&bench, LINK_FAULT_CABLE, 0), SH_ESTATE);
-        const uint32_t before = info_of(fd).tcpi_segs_in;
+        const uint32_t before = info_of(fd).tcpi_segs_in, before_other = info_of(other).tcpi_segs_in;
         web_send_frame(fd, 0x81, "*IDN?", 5);
+        assert_int_equal(send(other, request, strlen(request), MSG_NOSIGNAL), strlen(request));
         for (const int64_t end_ms = give_up_ms(); info_of(fd).tcpi_total_retrans < 2;) {
             assert_int_equal(bench_poll(&bench, 1, 10), 0);
             assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 0);
             if (now_ms() > end_ms) give_up("a repetition");
         }
         assert_int_equal(info_of(fd).tcpi_segs_in, before);
+        assert_int_equal(info_of(other).tcpi_segs_in, before_other);
         assert_int_equal(fault(&bench, LINK_FAULT_PLUG, (uint32_t)resets), SH_OK);
         if (resets) {
             bench_expect(&bench, LINK_CLOSED, 0);
             assert_int_equal(fd_read(fd, frame, 1), -1);
+            assert_int_equal(fd_read(other, frame, 1), -1);
         } else {
             char line[6];
             bench_read_all(&bench, 0, line, 6);
@@ -167,8 +199,11 @@ static void test_web(void **state)
             bench_expect(&bench, LINK_WRITABLE, 1);
             fd_read_all(fd, frame, 7);
             assert_memory_equal(frame, "\x81\x05hello", 7);
+            assert_true(web_listen_to(&bench, other, answer, sizeof answer) > 13);
+            assert_memory_equal(answer, "HTTP/1.1 200 ", 13);
         }
         close(fd);
+        close(other);
         if (!resets) bench_expect(&bench, LINK_CLOSED, 0);
     }
     bench_close(&bench);
@@ -213,8 +248,8 @@ static void test_udp(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tcp), cmocka_unit_test(test_tcp_v6),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tcp),  cmocka_unit_test(test_tcp_v6),
                                        cmocka_unit_test(test_ends), cmocka_unit_test(test_web),
-                                       cmocka_unit_test(test_udp)};
+                                       cmocka_unit_test(test_udp),  cmocka_unit_test(test_neither_option)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@ static void (*when_unwatched)(void); /* called once, after the watch is taken aw
 static void (*between_looks)(void);  /* called once, after poll has looked at all descriptors but the last */
 
 static int comes_early; /* a client opens the terminal just before it is watched for the first time */
+static int is_full;     /* the system has no more watches */
 
 static void call_once(void (**what)(void))
 {
@@ -25,7 +26,8 @@ int inotify_add_watch(int fd, const char *path, uint32_t mask)
 {
     if (comes_early) visitor = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
     comes_early = 0;
-    return (int)syscall(SYS_inotify_add_watch, fd, path, mask);
+    errno = ENOSPC;
+    return is_full ? -1 : (int)syscall(SYS_inotify_add_watch, fd, path, mask);
 }
 
 int inotify_rm_watch(int fd, int watch)
@@ -149,6 +151,39 @@ static void test_came_with_the_symlink(void **state)
     bench_close(&bench);
 }
 
+static int fault(enum link_fault what)
+{
+    return bench.ops->fault(bench.link, what, 0, 0, 0.0);
+}
+
+/* A port that can't be watched when it is to come back stays unplugged, until it can. */
+static void test_plugged_in_unwatched(void **state)
+{
+    (void)state;
+    bench = bench_open(&plain);
+    assert_int_equal(fault(LINK_FAULT_UNPLUG), SH_OK);
+    is_full = 1;
+    assert_int_equal(fault(LINK_FAULT_PLUG), SH_ESTATE);
+    is_full = 0;
+    assert_int_equal(fault(LINK_FAULT_PLUG), SH_OK);
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
+/* A client is cut off, and its next terminal can't be watched. The link says that it fails. */
+static void test_cut_off_unwatched(void **state)
+{
+    (void)state;
+    struct link_event events[LINK_MAX_EVENTS];
+    begin();
+    is_full = 1;
+    assert_int_equal(fault(LINK_FAULT_DISCONNECT), SH_ESTATE);
+    is_full = 0;
+    assert_int_equal(bench.ops->poll(bench.link, bench.wake, 0, 0, events, LINK_MAX_EVENTS), SH_EIO);
+    leave();
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -156,6 +191,8 @@ int main(void)
         cmocka_unit_test(test_next_after_written_and_gone),
         cmocka_unit_test(test_came_unwatched_left_between_looks),
         cmocka_unit_test(test_came_with_the_symlink),
+        cmocka_unit_test(test_plugged_in_unwatched),
+        cmocka_unit_test(test_cut_off_unwatched),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <arpa/inet.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <pthread.h>
 #include <sys/resource.h>
@@ -119,22 +120,73 @@ static void test_half_request(void **state)
     bench_close(&bench);
 }
 
+/* Leaves this process without a free descriptor. *before: the limit as it was. */
+static void take_descriptors(struct rlimit *before)
+{
+    const int next = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    assert_true(next >= 0);
+    close(next);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, before), 0);
+    const struct rlimit none = {.rlim_cur = (rlim_t)next, .rlim_max = before->rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
+}
+
 /* Without a descriptor for it, a connection is closed, so that it does not wake the link for ever. */
 static void test_no_descriptors(void **state)
 {
     (void)state;
     char place[64], byte;
     struct bench bench = web_open(place);
-    struct rlimit before, none;
+    struct rlimit before;
     bench_poll(&bench, 0, 0); /* which takes what it needs for itself */
     int fd = web_dial(place);
-    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
-    none = before;
-    none.rlim_cur = (rlim_t)fd + 1;
-    assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
+    take_descriptors(&before);
     size_t n = web_listen_to(&bench, fd, &byte, 1);
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
     assert_int_equal(n, 0);
+    close(fd);
+    bench_close(&bench);
+}
+
+/* Two clients find no descriptor before the owner hears of either. Each is reported by its own name. */
+static void test_refused_names(void **state)
+{
+    (void)state;
+    char place[64];
+    struct bench bench = web_open(place);
+    struct rlimit before;
+    bench_poll(&bench, 0, 0); /* which takes what it needs for itself */
+    const int fd[] = {web_dial_from(place, 1), web_dial_from(place, 2)};
+    take_descriptors(&before);
+    const struct link_event first = bench_expect(&bench, LINK_REFUSED, 0);
+    const struct link_event second = bench_expect(&bench, LINK_REFUSED, 0);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+    assert_memory_equal(first.peer, "127.0.0.1:", 10);
+    assert_memory_equal(second.peer, "127.0.0.2:", 10);
+    close(fd[0]);
+    close(fd[1]);
+    bench_close(&bench);
+}
+
+/* The descriptors run out before a request is whole. Its client gets the reason, and is reported. */
+static void test_descriptors_run_out(void **state)
+{
+    (void)state;
+    char place[64], rest[200], answer[2000] = "";
+    struct bench bench = web_open(place);
+    struct rlimit before;
+    const int fd = web_dial(place);
+    assert_int_equal(send(fd, "GET /scene", 10, MSG_NOSIGNAL), 10);
+    for (int i = 0; i < 3; i++)
+        bench_poll(&bench, 0, 1);
+    snprintf(rest, sizeof rest, " HTTP/1.1\r\nHost: %s\r\n\r\n", place);
+    assert_int_equal(send(fd, rest, strlen(rest), MSG_NOSIGNAL), strlen(rest));
+    take_descriptors(&before);
+    const size_t n = web_listen_to(&bench, fd, answer, sizeof answer - 1);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+    assert_true(n > 13);
+    assert_memory_equal(answer, "HTTP/1.1 503 ", 13);
+    bench_expect(&bench, LINK_REFUSED, 0);
     close(fd);
     bench_close(&bench);
 }
@@ -330,6 +382,7 @@ int main(void)
         cmocka_unit_test(test_who_asks),         cmocka_unit_test(test_session),
         cmocka_unit_test(test_one_request_each), cmocka_unit_test(test_half_request),
         cmocka_unit_test(test_no_descriptors),   cmocka_unit_test(test_goodbye),
+        cmocka_unit_test(test_refused_names),    cmocka_unit_test(test_descriptors_run_out),
         cmocka_unit_test(test_turned_down),      cmocka_unit_test(test_bad_messages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

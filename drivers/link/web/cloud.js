@@ -3,8 +3,8 @@
 // oldest blocks are dropped.
 //
 // Positions are Float32, relative to `origin` (Float64, scene frame), which is the place of the first point. So a
-// cloud at UTM
-// coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have 0.5 m.
+// cloud at UTM coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have
+// 0.5 m.
 //
 // In a closed block the first k points are spread evenly over the block, for any k: one point at random from each k-th
 // part of it. So a level of detail is a prefix of each block. Every k-th point would not do, since k may be the length
@@ -39,7 +39,7 @@ function mix(h) {
   return (h ^ (h >>> 16)) >>> 8;
 }
 
-const MODELLED = ['reflectance', 'amplitude']; // values not modelled are NaN; an empty block has no array
+const MODELLED = ['reflectance', 'amplitude']; // a block whose values are all NaN, not modelled, has no array
 
 class Block {
   n = 0;
@@ -164,8 +164,6 @@ export class Cloud {
   latest_s = -Infinity; // the time of the point that came last: device time, or that of a recording
   #scans = new Map(); // it has the newest scan of each station
   #outdated = 0; // the points before this one come from another run of the head
-  #gone_lo = [Infinity, Infinity, Infinity];
-  #gone_hi = [-Infinity, -Infinity, -Infinity];
 
   constructor({capacity = 10_000_000} = {}) {
     if (!(capacity >= 1)) throw new RangeError(`a cloud of ${capacity} points: at least 1`);
@@ -210,13 +208,7 @@ export class Cloud {
   }
 
   #count_gone(blocks) {
-    for (const block of blocks) {
-      this.gone += block.n;
-      for (let a = 0; a < 3; a++) {
-        this.#gone_lo[a] = Math.min(this.#gone_lo[a], block.lo[a]);
-        this.#gone_hi[a] = Math.max(this.#gone_hi[a], block.hi[a]);
-      }
-    }
+    for (const block of blocks) this.gone += block.n;
   }
 
   /** A scan replaces the earlier scans of its station, which may be from another place. Call it before add(). It
@@ -260,15 +252,12 @@ export class Cloud {
     this.total = this.gone = 0;
     this.latest_s = -Infinity;
     this.origin = null;
-    this.#gone_lo = [Infinity, Infinity, Infinity];
-    this.#gone_hi = [-Infinity, -Infinity, -Infinity];
     this.changed?.();
   }
 
-  // Returns {min, max} in the scene frame, of the stored points or of all that came; null without points.
-  #within(lo, hi) {
-    lo = [...lo];
-    hi = [...hi];
+  // Returns {min, max} of the stored points in the scene frame; null without points.
+  get bounds() {
+    const lo = [Infinity, Infinity, Infinity], hi = [-Infinity, -Infinity, -Infinity];
     for (const block of this.blocks) {
       for (let a = 0; a < 3; a++) {
         lo[a] = Math.min(lo[a], block.lo[a]);
@@ -278,9 +267,6 @@ export class Cloud {
     if (!(lo[0] <= hi[0])) return null;
     return {min: lo.map((v, a) => v + this.origin[a]), max: hi.map((v, a) => v + this.origin[a])};
   }
-
-  get bounds() { return this.#within([Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]); }
-  get boundsOfAll() { return this.#within(this.#gone_lo, this.#gone_hi); }
 }
 
 // Returns whether no point of a block is within a window of times. Points without a time are in all of them.

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This is the CRC-32C of RFC 3720 (reflected polynomial 0x82f63b78). It takes eight bytes a step: slicing by 8, after
-// Kounavis and Berry,
-// "Novel Table Lookup-Based Algorithms for High-Performance CRC Generation", IEEE Transactions on Computers 57 (2008).
+// Kounavis and Berry, "Novel Table Lookup-Based Algorithms for High-Performance CRC Generation", IEEE Transactions on
+// Computers 57 (2008).
 
 // Table k, from 256 k on, has the value that a byte adds to the register when k bytes follow it.
 const table = new Int32Array(8 * 256);

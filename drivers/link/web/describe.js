@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module reads descriptions of the head's settings: HELP:SETtings? lists the settings, HELP? describes each one.
-// A head without these
-// commands has MIN, MAX and DEF.
+// A head without these commands is asked for MIN, MAX and DEF.
 
 // Splits 'number,"Hz",1000,1200000,300000,0.000001,"all",""' into its fields; a field in quotes may hold commas.
 export function splitReply(reply) {

@@ -4,13 +4,10 @@
 import {bodyOf, byId, kept, make, say} from './page.js';
 import {ageRow} from './ages.js';
 import {Limits} from './limits.js';
-import {download, drawLegend, fileName} from './picture.js';
+import {css, download, drawLegend, fileName, MOST_ITEMS, moreItems} from './picture.js';
 
 const MODES = [['height', 'Height'], ['range', 'Range'], ['reflectance', 'Reflectance'], ['amplitude', 'Amplitude'],
   ['label', 'Surface'], ['echo', 'Echo'], ['station', 'Station'], ['age', 'Age'], ['rgb', 'Colours of the points']];
-const MOST_ITEMS = 14;
-
-const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
 
 export class Display {
   #view;
@@ -124,7 +121,7 @@ export class Display {
       patch.style.background = css(item.colour);
       return make('li', {}, patch, make('span', {}, this.#itemName(item)));
     });
-    if (items.length > MOST_ITEMS) rows.push(make('li', {}, `and ${items.length - MOST_ITEMS} more`));
+    if (items.length > MOST_ITEMS) rows.push(make('li', {}, moreItems(items.length - MOST_ITEMS)));
     return make('ul', {}, ...rows);
   }
 

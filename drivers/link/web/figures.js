@@ -16,11 +16,11 @@ const HEAD = [
 const PAGE = [
   ['received', 'Points a second', 'Received by this page'],
   ['bytes', 'Bytes a second'],
-  ['lost-frames', 'Frames lost on the way', 'Missing in the sequence: left out because this page was too slow, or damaged'],
-  ['repeated', 'Frames repeated', 'Came a second time, and were dropped'],
-  ['late-frames', 'Frames late', 'Came after newer ones, and were dropped; frames lost on the way has them, too'],
-  ['restarts', 'Restarts', 'The sequence of frames began anew, as when the head has started again'],
-  ['lost-pulses', 'Pulses left out', 'In the frames that the head left out because this page was too slow'],
+  ['lost-frames', 'Stream frames lost', 'Missing in the sequence: left out because this page was too slow, or damaged'],
+  ['repeated', 'Stream frames repeated', 'Came a second time, and were dropped'],
+  ['late-frames', 'Stream frames late', 'Came after newer ones, and were dropped; they are among the lost ones, too'],
+  ['restarts', 'Restarts', 'The sequence of stream frames began anew, as when the head has started again'],
+  ['lost-pulses', 'Pulses left out', 'In the stream frames that the head left out because this page was too slow'],
   ['dropped', 'Pulses dropped here', 'By the page itself, which could not take them'],
   ['unplaced', 'Pulses without a place', 'Came before their anchor or pose, as when a page joins a scan: counted, not drawn'],
   ['bad', 'Damaged bytes'],
@@ -151,11 +151,11 @@ export class Figures {
 
 const mark = (key, bad) => byId(`figure-${key}`)?.classList.toggle('bad', bad);
 
-// f has a head's figures.
+// Says what came from before, by a head's figures.
 function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}) {
   if (!points && !gone && !lost) return NONE;
   return [short(number(points)), gone > 0 && `${short(gone)} older ones are gone`,
-    lost > 0 && `${grouped(lost)} frames not kept`].filter(Boolean).join(', ');
+    lost > 0 && `${grouped(lost)} stream frames not kept`].filter(Boolean).join(', ');
 }
 
 // By the number of the port's state (drivers/protocol/EVENTS.md).

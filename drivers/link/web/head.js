@@ -8,7 +8,7 @@ import {Wire} from './wire.js';
 export {CommandError};
 const TIMEOUT_S = 5, FIRST_DELAY_S = 0.5, MAX_DELAY_S = 5, FULL_DELAY_S = 10, FULL = 1013;
 
-// Why a connection ended, for people.
+// Says why a connection ended.
 function closeWords(code, reason, wasOpen) {
   if (code === FULL) return reason || 'all places of this link are taken';
   if (reason) return reason;
@@ -18,7 +18,7 @@ function closeWords(code, reason, wasOpen) {
 
 const unquoted = (text) => text.replace(/^"|"$/g, '');
 
-/** Who took control, as a CONTROL event has it: kind of link and address. '': it doesn't say. */
+/** Returns the client that took control, as a CONTROL event names it: kind of link and address. '': it doesn't. */
 export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ? text : '');
 
 /**
@@ -119,15 +119,17 @@ export class Head extends EventTarget {
     this.#wire.end();
   }
 
-  /** Counts of this connection, by the words of COUNTS.md: - frames, bytes, points
-   * (records, shots without echo among them), pulses (received), empty - lost_frames: missing in the sequence; of these
-   * left_out_frames with left_out_pulses because this page was too slow - lost_pulses: lost by the head;
-   * missing_pulses: of all scans that ended here, delivered and not received - dropped_points, dropped_pulses: decoded,
-   * and dropped by the page itself - unplaced_points, unplaced_pulses: came before their anchor or their pose -
-   * past_points, past_pulses, past_hash: from before this connection, and in none of the other counts - past_gone:
-   * points that the head keeps no more; past_lost_frames: frames that it could not keep - repeated_frames, late_frames:
-   * came twice, or after newer ones, and were dropped - jumps_back: how often the sequence of frames began anew -
-   * bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash / */
+  /** Counts of this connection, by the words of COUNTS.md:
+   * - frames, bytes, points (records, shots without echo among them), pulses (received), empty
+   * - lost_frames: missing in the sequence; of these left_out_frames, with left_out_pulses, as this page was too slow
+   * - lost_pulses: lost by the head; missing_pulses: of all scans that ended here, delivered and not received
+   * - dropped_points, dropped_pulses: decoded, and dropped by the page itself
+   * - unplaced_points, unplaced_pulses: came before their anchor or their pose
+   * - past_points, past_pulses, past_hash: from before this connection, and in none of the other counts
+   * - past_gone: points that the head keeps no more; past_lost_frames: frames that it could not keep
+   * - repeated_frames, late_frames: came twice, or after newer ones, and were dropped
+   * - jumps_back: how often the sequence of frames began anew
+   * - bad_bytes, bad_payloads, refused; decode_ns_per_point; point_hash */
   figures() {
     const f = this.#figures, l = this.#losses;
     return {...f, pulses: f.shots, dropped_pulses: f.dropped_shots, unplaced_pulses: f.unplaced_shots,
@@ -148,11 +150,12 @@ export class Head extends EventTarget {
       this.#taken(data);
       worker.postMessage({ack: true});
     };
-    worker.onerror = (event) => { // it could not be loaded
+    worker.onerror = (event) => { // it could not be loaded, or has failed
       event.preventDefault?.();
       worker.terminate();
       this.#wire = this.#inPage();
-      this.#connect();
+      if (this.isOpen) this.#closed({code: 1006, reason: 'this page failed to read the stream'}); // which connects again
+      else this.#connect();
     };
     return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};
   }

@@ -119,10 +119,6 @@ export class Knobs extends EventTarget {
     this.#again();
   }
 
-  setting(header) {
-    return this.#knobs.get(header)?.setting;
-  }
-
   #loading = false;
   async load() {
     if (this.#loading) return;

@@ -22,7 +22,7 @@ export function eventWords(e) {
       + (ns(e.lost) > 0 ? `, ${grouped(ns(e.lost))} lost by the head` : ''), ns(e.lost) > 0 ? 'warn' : ''];
     case 'OVERRUN': return [`The head could not keep up: ${grouped(ns(e.lost))} pulses lost`, 'warn'];
     case 'READER_LOST': return ns(e.frames) > 0
-      ? [`This page could not follow: ${grouped(ns(e.frames))} frames with ${grouped(ns(e.pulses))} pulses lost`, 'warn'] : null;
+      ? [`This page could not follow: ${grouped(ns(e.frames))} stream frames with ${grouped(ns(e.pulses))} pulses lost`, 'warn'] : null;
     case 'CONTROL': return [e.session ? `${sessionWords(e.session, peerOf(e))} has control` : 'Nobody has control', ''];
     case 'ERROR': return ns(e.held_back) > 0
       ? [`${grouped(ns(e.held_back))} more errors, the last one ${e.number}`, 'bad']
@@ -40,7 +40,7 @@ export function eventWords(e) {
 export class Log {
   #list = make('ol', {class: 'log', tabindex: '0', 'aria-label': 'Events, the newest first'});
   #waiting = [];
-  #last = null; // each entry is {text, times, span}
+  #last = null; // the newest entry: {text, times, span, time}
   #timer = 0;
   #aside = byId('panel-log').querySelector('summary').appendChild(make('span', {class: 'aside'}));
   #gone = 0;

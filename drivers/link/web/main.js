@@ -29,8 +29,11 @@ function startPanels() {
   const few = ['panel-quality', 'panel-recording'];
   for (const panel of document.querySelectorAll('.panel')) {
     const was = kept.get(panel.id);
-    panel.open = was === null ? matchMedia(WIDE).matches || few.includes(panel.id) : was === 'open';
-    panel.addEventListener('toggle', () => kept.set(panel.id, panel.open ? 'open' : 'closed'));
+    let open = panel.open = was === null ? matchMedia(WIDE).matches || few.includes(panel.id) : was === 'open';
+    panel.addEventListener('toggle', () => { // also once for the line above, which is not the user's wish
+      if (panel.open !== open) kept.set(panel.id, panel.open ? 'open' : 'closed');
+      open = panel.open;
+    });
   }
 }
 

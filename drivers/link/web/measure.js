@@ -140,8 +140,10 @@ const FURTHER = 4; // points up to so many depths from the plane are counted, as
 
 // Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value
 // is {places (relative to the cloud's origin), plane, beyond}; `beyond` counts points a little further from the plane.
+// There are no places if the cloud has no points, or was cleared meanwhile.
 export function* pointsOnFace(cloud, camera, corners, depth_m) {
   const {origin, window} = cloud;
+  if (origin === null) return {plane: null, beyond: 0, places: new Float32Array(0)};
   const own = corners.map((p) => sub(placeOf(p), origin));
   const plane = planeThrough(own.flat());
   const across = unit(cross(Math.abs(plane.normal[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], plane.normal)), up = cross(plane.normal, across);
@@ -154,6 +156,7 @@ export function* pointsOnFace(cloud, camera, corners, depth_m) {
     if (isOutside(window, block) || [0, 1, 2].some((a) => block.lo[a] > plane.middle[a] + reach || block.hi[a] < plane.middle[a] - reach)) continue;
     takeOnFace(block, {plane, polygon, flat, section, window, depth_m, reach}, found);
     yield;
+    if (cloud.origin !== origin) return {plane, beyond: 0, places: new Float32Array(0)};
   }
   return {plane, beyond: found.beyond, places: found.places.subarray(0, 3 * found.n)};
 }
@@ -210,9 +213,11 @@ export function flatnessOf(places, corners, origin, eye) {
 const NEIGHBOURS = 8;
 
 // Steps towards the mean distance of the points around a place. It follows from the area of the k nearest points, which
-// has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m.
+// has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m, or the cloud was cleared.
 export function* spacingAround(cloud, place, first_m) {
-  const {window} = cloud, p = sub(place, cloud.origin);
+  const {window, origin} = cloud;
+  if (origin === null) return NaN;
+  const p = sub(place, origin);
   for (let r = Math.max(1e-4, first_m); r < 6; r *= 3) {
     const near = [];
     for (const block of [...cloud.blocks]) {
@@ -223,6 +228,7 @@ export function* spacingAround(cloud, place, first_m) {
         if (d2 <= r * r && !isPointOutside(window, block, i / 3)) near.push(d2);
       }
       yield;
+      if (cloud.origin !== origin) return NaN;
     }
     if (near.length > NEIGHBOURS) return Math.sqrt(near.sort((a, b) => a - b)[NEIGHBOURS] * Math.PI / (NEIGHBOURS - 1));
   }

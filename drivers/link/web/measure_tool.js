@@ -3,16 +3,11 @@
 // it; with keys, Enter takes the one in the middle of the picture.
 import {grouped, make, numberOf, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
+import {download} from './picture.js';
 import {runSlowly} from './view_pick.js';
 
 const PICK_PX = 12;
 const NAMES = ['first', 'second', 'third'];
-
-const download = (name, text) => {
-  const url = URL.createObjectURL(new Blob([text], {type: 'text/csv'}));
-  make('a', {href: url, download: name}).click();
-  setTimeout(() => URL.revokeObjectURL(url), 10000);
-};
 
 export class MeasureTool {
   id = 'measure';
@@ -47,7 +42,8 @@ export class MeasureTool {
       end: action('measure-end', 'End outline', 'A click on the first corner, or Enter on the last one, does the same', () => this.#endOutline()),
       undo: action('measure-undo', 'Undo', 'Takes the last point back (key Backspace)', () => this.#undo()),
       clear: action('measure-clear', 'Clear', 'Removes all measurements', () => this.#clear()),
-      csv: action('measure-csv', 'Points as CSV', 'Downloads the table of the picked points', () => download('points.csv', this.csv)),
+      csv: action('measure-csv', 'Points as CSV', 'Downloads the table of the picked points', () =>
+        download(new Blob([this.csv], {type: 'text/csv'}), 'points.csv')),
     };
     this.depthRow = make('div', {class: 'row'}, make('label', {for: 'measure-depth'}, 'Depth to each side'), this.#depth, make('span', {class: 'unit'}, 'm'));
     this.body = make('div', {}, make('div', {class: 'kinds', role: 'group', 'aria-label': 'Kind of measurement'}, ...kinds), this.depthRow,

@@ -207,8 +207,8 @@ export class Decoder {
     if (missing > 0) c.dropNaN(from);
   }
 
-  // The points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to another
-  // one.
+  // Returns the points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to
+  // another one.
   #besidePoints(frame, beside, after) {
     const l = this.last;
     const isOfIt = l !== null && frame.seq === (l.seq + after) >>> 0 && beside.pulse0_low === l.low &&

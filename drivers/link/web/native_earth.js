@@ -135,30 +135,28 @@ function sceneTurn(a, grid) {
 }
 
 /** A function from a place in the anchor's CRS, [x, y, z], to the scene frame, metres. Where the geoid's height is not
- * known (a head that moves, heights above the geoid), heights are taken as ellipsoidal: `exact` is false, and the
- * scene is too low or too high by the geoid's height, everywhere the same. `isFlat`: it is the anchor's axes,
- * transposed, and a shift. */
+ * known (a head that moves, heights above the geoid), heights are taken as ellipsoidal: the scene is then too low or too
+ * high by the geoid's height, everywhere the same. `isFlat`: it is the anchor's axes, transposed, and a shift. */
 export function toScene(a) {
   const shift = (p) => plus(a.station_m, transposedTimes(a.axes, minus(p, a.anchor)));
-  if (a.crs === 0) return {exact: true, isFlat: true, at: shift};
-  const exact = a.heights === 0 || (a.moving & 1) === 0;
-  const geoid_m = a.heights === 1 && exact ? a.height_m - a.anchor[2] : 0;
+  if (a.crs === 0) return {isFlat: true, at: shift};
+  const geoid_m = a.heights === 1 && (a.moving & 1) === 0 ? a.height_m - a.anchor[2] : 0;
   const own = gridOfScene(a), grid = a.crs === 2 ? gridOf(a.epsg) : null;
   const lift_m = a.station_m[2] - a.height_m; // of a scene that lies in a grid
-  if (own !== 0 && own === a.epsg) return {exact, at: (p) => [p[0], p[1], p[2] + geoid_m + lift_m]};
+  if (own !== 0 && own === a.epsg) return {at: (p) => [p[0], p[1], p[2] + geoid_m + lift_m]};
   const toEcef = (p) => {
     if (a.crs === 1) return p;
     const [lat_deg, lon_deg] = grid ? grid.inverse(p[0], p[1]) : p;
     return geodeticToEcef(lat_deg, lon_deg, p[2] + geoid_m);
   };
   if (own !== 0) {
-    return {exact, at: (p) => {
+    return {at: (p) => {
       const [lat_deg, lon_deg, height_m] = ecefToGeodetic(toEcef(p));
       return [...gridOf(own).forward(lat_deg, lon_deg), height_m + lift_m];
     }};
   }
   const home = geodeticToEcef(a.lat_deg, a.lon_deg, a.height_m), back = sceneTurn(a, grid);
-  return {exact, isFlat: a.crs === 1, at: (p) => plus(a.station_m, back(minus(toEcef(p), home)))};
+  return {isFlat: a.crs === 1, at: (p) => plus(a.station_m, back(minus(toEcef(p), home)))};
 }
 
 const plus = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];

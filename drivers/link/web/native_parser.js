@@ -89,7 +89,7 @@ export class Parser {
     this.#append(bytes.subarray(from));
   }
 
-  // How many of the n bytes are done with.
+  // Returns how many of the n bytes are done with.
   #parse(bytes, n, last) {
     const view = new DataView(bytes.buffer, bytes.byteOffset, n);
     this.from = this.stats.bytes - n; // where the first of them stands in all bytes
@@ -202,7 +202,7 @@ export class Parser {
     this.onText(String.fromCharCode(...bytes.subarray(at, at + length)));
   }
 
-  // Where the next sync byte stands.
+  // Counts bytes as bad up to the next sync byte, and returns its place.
   #skip(bytes, at, n) {
     const sync = bytes.indexOf(SYNC, at + 1);
     const to = sync < 0 || sync > n ? n : sync;

@@ -111,15 +111,13 @@ export function polarPlacer(descriptor, anchor) {
       to++;
     }
     c.n = to;
-    return pulse - pulse0 + 1;
   };
 }
 
-/** Does the same for a geo stream. `exact` is as for toScene. The range is the distance from the anchor, in the CRS
- * or, if that
- * is geodetic, straight through space. It is NaN where the head moves, since the anchor is not its place. */
+/** Does the same for a geo stream. The range is the distance from the anchor, in the CRS or, if that is geodetic,
+ * straight through space. It is NaN where the head moves, since the anchor is not its place. */
 export function geoPlacer(descriptor, anchor) {
-  const {at: exactAt, exact, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
+  const {at: exactAt, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
   let place = isFlat ? placeFlat(exactAt, anchor) : isGeodetic ? placeExactly(exactAt) : null;
   place ??= placeByCubic(exactAt, anchor, descriptor);
   const home = isGeodetic ? geodeticToEcef(...anchor.anchor) : null;
@@ -129,7 +127,7 @@ export function geoPlacer(descriptor, anchor) {
     const e = geodeticToEcef(ax + dx, ay + dy, az + dz);
     return Math.sqrt((e[0] - home[0]) ** 2 + (e[1] - home[1]) ** 2 + (e[2] - home[2]) ** 2);
   };
-  const placer = (c, view, n, pulse0, t0_ns) => {
+  return (c, view, n, pulse0, t0_ns) => {
     let to = c.n, pulse = pulse0 - 1, atStart = true;
     for (let i = 0, at = HEAD; i < n; i++, at += RECORD) {
       const tail = view.getUint32(at + 16, true);
@@ -144,10 +142,7 @@ export function geoPlacer(descriptor, anchor) {
       to++;
     }
     c.n = to;
-    return pulse - pulse0 + 1;
   };
-  placer.exact = exact;
-  return placer;
 }
 
 // Local and ECEF need a rotation and a shift.

@@ -51,8 +51,8 @@ export class Poses {
     return null;
   }
 
-  /** Points from..c.n of the columns, from the head's frame to the scene. `times` gives the ns of each since the
-   * scan's start. Those without a pose become NaN; how many. */
+  /** Moves points from..c.n of the columns from the head's frame to the scene. `times` gives the ns of each since the
+   * scan's start. Points without a pose become NaN; it returns how many. */
   place(c, from, times) {
     let now = null, missing = 0;
     for (let i = from; i < c.n; i++) {

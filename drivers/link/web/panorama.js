@@ -148,10 +148,10 @@ export class Panorama {
   // none.
   #shown(pixel) {
     if (this.#block[pixel] !== EMPTY) return pixel;
-    for (const step of [1, this.width]) {
-      if (this.#block[pixel - step] !== EMPTY && this.#block[pixel + step] !== EMPTY && pixel >= step && pixel + step < this.#block.length) return pixel - step;
-    }
-    return null;
+    const column = pixel % this.width, row = Math.floor(pixel / this.width);
+    const hasBoth = (step, at, n) => at > 0 && at < n - 1 && this.#block[pixel - step] !== EMPTY && this.#block[pixel + step] !== EMPTY;
+    if (hasBoth(1, column, this.width)) return pixel - 1;
+    return hasBoth(this.width, row, this.height) ? pixel - this.width : null;
   }
 
   // Returns {block, i} of the point of a pixel, or null. It is null, too, once the block was closed

@@ -2,7 +2,10 @@
 // This module makes pictures to keep: the canvases with the legend, as a PNG file.
 
 const FONT = 'system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
-const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
+export const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
+
+export const MOST_ITEMS = 14; // of a list that a legend shows
+export const moreItems = (n) => `and ${n} more`;
 
 // Returns a 2D canvas with these canvases over each other, of the size of the first one.
 export function copyOf(...layers) {
@@ -15,8 +18,9 @@ export function copyOf(...layers) {
 
 // Draws a legend (view.legend()) into the upper left corner. colours: {ground, ink}; nameOf(item) names a list's items.
 export function drawLegend(canvas, legend, colours, nameOf, scale = 1) {
-  const c = canvas.getContext('2d'), rows = legend.items?.slice(0, 14) ?? [];
-  const width = 214, height = legend.items ? 28 + 18 * rows.length : 62;
+  const c = canvas.getContext('2d'), rows = legend.items?.slice(0, MOST_ITEMS) ?? [];
+  const more = (legend.items?.length ?? 0) - rows.length;
+  const width = 214, height = legend.items ? 28 + 18 * (rows.length + (more > 0 ? 1 : 0)) : 62;
   c.save();
   c.scale(scale, scale);
   c.translate(10, 10);
@@ -31,6 +35,7 @@ export function drawLegend(canvas, legend, colours, nameOf, scale = 1) {
   c.font = `12px ${FONT}`;
   if (legend.items) drawItems(c, rows, nameOf, colours);
   else drawRamp(c, legend, colours);
+  if (more > 0) c.fillText(moreItems(more), 26, 33 + 18 * rows.length);
   c.restore();
 }
 

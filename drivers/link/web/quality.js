@@ -21,7 +21,7 @@ const DEVIATION = [
 ];
 const WIDTH = 300, HEIGHT = 92, BASE = 74;
 
-const NEAR_M = 1e-3; // the page's points are this near to the head's, or far away
+const NEAR_M = 1e-3; // the page's point that is this near to the head's is the same one
 const LOOK_M = 3;
 
 export class Quality {

@@ -177,7 +177,7 @@ export class Recording {
 
   #later = atMostEvery(250, () => this.#show());
 
-  // Returns the triangles within the filter, which are the beginning of the sorted list.
+  // Shows the triangles within the filter, which are the beginning of the sorted list.
   #show() {
     const m = this.#mesh;
     if (!m) {

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This class sends command lines and assigns the replies, by COMMANDS.md: each line has one reply, in the order of the
-// lines. A reply that did
-// not come in time may still come. So the head is then asked *IDN?, and all replies before the answer to that are
-// dropped (*Coming into step*).
+// lines. A reply that did not come in time may still come. So the head is then asked *IDN?, and all replies before the
+// answer to that are dropped (*Coming into step*).
 
 /** A command that the head refused. number: SCPI's, text: the head's words. */
 export class CommandError extends Error {
@@ -45,8 +44,8 @@ export class Replies {
   }
 
   /** Returns a promise of the reply to one line. The head answers one line after the other, so the time counts from
-   * when all
-   * lines before it have their replies. It throws CommandError; number 0: no reply came, or the line is none. */
+   * when all lines before it have their replies. It throws CommandError; number 0: no reply came, or the line is no
+   * command. */
   ask(line, timeout_s) {
     return new Promise((resolve, reject) => {
       if (!/^[ -~]{1,256}$/.test(line) || line.trim() === '') {

@@ -13,8 +13,8 @@ async function get(path) {
   return answer;
 }
 
-// Returns {blob, gone, lost_frames}: the file, how many points it lacks, and the frames that did not reach the head's store. Another
-// page may begin a file of its own as soon as this one is done.
+// Returns {blob, gone, lost_frames}: the file, how many points it lacks, and the frames that did not reach the head's
+// store. Another page may begin a file of its own as soon as this one is done.
 export async function fetchSaved(as) {
   let status = await (await get(`/save?as=${as}`)).json();
   const {file} = status;
@@ -37,7 +37,7 @@ export async function fetchSaved(as) {
 export function savedWords({gone, lost_frames}) {
   const lacks = [];
   if (gone > 0) lacks.push(`${grouped(gone)} older points, which the head no longer keeps`);
-  if (lost_frames > 0) lacks.push(`${grouped(lost_frames)} frames that were lost`);
+  if (lost_frames > 0) lacks.push(`${grouped(lost_frames)} stream frames that were lost`);
   return lacks.length > 0 ? `Saved, without ${lacks.join(', and ')}.` : 'Saved.';
 }
 

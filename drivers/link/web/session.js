@@ -23,15 +23,15 @@ export function why(error) {
 }
 
 export class Session extends EventTarget {
-  link = 'opening'; // it is this, 'open' or 'closed'
-  state = null;     // it is a word of the protocol
+  link = 'opening'; // 'opening', 'open' or 'closed'
+  state = null;     // a word of the protocol
   scan = 0;
-  pace = '';        // it is that of the configuration; '': not known
-  owner = 0;        // this session has control; 0: nobody has it
-  who = '';         // it is that session in words, for a sentence's beginning
+  pace = '';        // of the configuration; '': not known
+  owner = 0;        // the session that has control; 0: nobody has it
+  who = '';         // that session in words, for a sentence's beginning
   mine = false;     // this page has control
-  since = null;     // it says when the connection ended, and why
-  words = '';
+  since = null;     // the time at which the connection ended
+  words = '';       // why it ended
   wasOpen = false;  // there was a connection
 
   constructor(head) {
@@ -60,7 +60,7 @@ export class Session extends EventTarget {
     if (this.link !== 'open') return 'The head is not connected.';
     if (!this.mine) return this.owner ? `${this.who} has control and has to give it back first.` : 'Take control first.';
     if (states === 'all' || states.split(' ').includes(this.state)) return '';
-    return `Not while the head is ${stateWord(this.state ?? 'off').toLowerCase()}.`;
+    return `Not in the state ${stateWord(this.state ?? 'off')}.`;
   }
 
   command(line, options) {

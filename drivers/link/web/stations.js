@@ -92,7 +92,7 @@ export class Stations extends EventTarget {
     const button = (name, click, title) => make('button', {type: 'button', click, title}, name);
     const buttons = {
       move: make('button', {type: 'submit', class: 'main'}, 'Move'),
-      back: button('As it was', () => this.#fill(this.#of(number), true), 'The place that holds'),
+      back: button('As it was', () => this.#fill(this.#of(number), true), 'Writes the present place into the fields again'),
       home: button('Power-up place', () => this.#send(number, `${number}, DEF`)),
       use: button('Put the head here', () => this.#use(number), 'Its next scan is from here: press Start'),
       look: button('Look from here', () => this.#view?.lookFrom(number)),
@@ -169,7 +169,7 @@ export class Stations extends EventTarget {
     const station = this.#of(number);
     const not = this.#session ? this.#session.whyNot('idle') : 'A recording’s stations stay where they were.';
     if (!station || not) {
-      this.#view.setStations(this.list);
+      this.#place();
       if (not) this.#tell(`Station ${number} stays where it is: ${not}`);
       return;
     }
@@ -197,7 +197,7 @@ export class Stations extends EventTarget {
   #allow() {
     const not = this.#session ? this.#session.whyNot('idle') : '';
     say(this.#note, !this.#session ? 'Places are those of the recording.'
-      : not ? `${not.replace('control first', 'control to move stations')}${not.startsWith('Not') ? ' Stations are moved while it is idle.' : ''}` : 'Edit the numbers and press Move, or drag a station in the picture.');
+      : not ? `${not.replace('control first', 'control to move stations')}${not.startsWith('Not') ? ' Stations are moved while the head is idle.' : ''}` : 'Edit the numbers and press Move, or drag a station in the picture.');
     if (this.#view) this.#view.movable = this.trial !== null || (this.#session !== null && not === '');
     const now = Number(this.#knobs?.value('HEAD:STATION'));
     for (const [number, {item, fields, says, time, buttons, error, busy, began}] of this.#items) {

@@ -37,7 +37,7 @@ export class Trial extends EventTarget {
   #scans = 0;
   #ended = new AbortController();
   #asksReach = false;
-  #renewed = 0; // so often all was renewed for one suggestion
+  #renewed = 0; // how often the stations were asked for again, for one suggestion
 
   // cloud gets the points; list has the stations as /head has them.
   constructor(cloud, list, step_deg = 2) {

@@ -9,6 +9,7 @@ import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
 import {hasBit, seenWithin} from './previews.js';
 import {TargetList} from './trial_targets.js';
+import {css} from './picture.js';
 import {SEEN_COLOURS} from './view_paint.js';
 import {tableOf} from './view_colours.js';
 
@@ -22,7 +23,6 @@ const NAMES = {step_deg: 'Step, °', far_m: 'Farthest, m', line0_deg: 'Line from
 const GHOST = 0; // the number of the suggested station in the picture; others begin at 1
 const SUGGEST_MS = 250; // a suggestion waits so long for another change
 
-const css = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
 const shown = (value) => (value === null ? '' : String(Math.round(value * 1e4) / 1e4));
 const patch = (colour) => {
   const i = make('i', {class: 'patch'});

@@ -54,7 +54,7 @@ export class TargetList {
     this.element.append(make('div', {class: 'actions'}, this.#put), this.#list, this.#says);
   }
 
-  // While one is to be put, clicks and these keys are its own, also where a tool is open.
+  // While a target is to be put, it takes clicks and these keys, also where a tool is open.
   tap({x, y}) {
     this.#at(x, y);
     return true;
@@ -88,7 +88,7 @@ export class TargetList {
   #at(x, y) {
     const {cloud, camera} = this.#view, trial = this.#trial;
     searchSlowly(cloud, camera, x, y, 16, (found) => {
-      if (trial !== this.#trial || !trial?.cells) return;
+      if (trial !== this.#trial || !trial?.cells || !this.#armed) return; // a second click came before the first was found
       const at = found && camera.at(x, y, found.w), cell = at && cellAt(trial.cells, at);
       this.#arm(false);
       if (cell === null) return say(this.#says, 'There is no point of a surface.');

@@ -20,7 +20,6 @@ const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from
 
 export class View extends EventTarget {
   static keys = KEYS; // these are [[keys, their effect]], for a help text
-  static modes = MODES;
   movable = true; // stations can be dragged
   camera = new Camera();
   tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}, each returns whether it has used it
@@ -126,6 +125,7 @@ export class View extends EventTarget {
   useCloud(cloud) {
     cloud.window = this.cloud.window;
     this.cloud.changed = null;
+    this.pointed.at(null); // a point of the other cloud is not in this one
     this.cloud = this.#points.cloud = cloud;
     this.#scale.use(cloud);
     this.#watchCloud();
@@ -180,7 +180,7 @@ export class View extends EventTarget {
     if (isMoving) this.cameraMoved();
   }
 
-  // It returns the legend; see legendOf in view_colours.js.
+  // Returns the legend, as legendOf in view_colours.js makes it.
   legend() { return this.#scale.legend(); }
 
   pointSize(px) {
@@ -238,7 +238,7 @@ export class View extends EventTarget {
 
   // ---- what follows from the cloud
 
-  // True: too many drawn points are gone, or the colours' limits have changed.
+  // Returns whether too many drawn points are gone, or the colours' limits have changed.
   #follow() {
     const {cloud} = this;
     const gone = cloud.gone;

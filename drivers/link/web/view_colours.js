@@ -58,7 +58,7 @@ const echoClass = (packed) => {
 };
 
 // Returns the numbers of points from..to of a block; for rgb four bytes a point in the same buffer.
-export function valuesOf(block, mode, from, to, base = 0) {
+export function valuesOf(block, mode, from, to) {
   const n = to - from;
   const out = new Float32Array(n);
   const numbers = {range: block.range, reflectance: block.reflectance, amplitude: block.amplitude}[mode];
@@ -75,7 +75,7 @@ export function valuesOf(block, mode, from, to, base = 0) {
   else if (mode === 'label') for (let i = 0; i < n; i++) out[i] = block.label[from + i] === 0xffff ? NONE : block.label[from + i];
   else if (mode === 'echo') for (let i = 0; i < n; i++) out[i] = echoClass(block.echo[from + i]);
   else if (mode === 'station') out.fill(block.station);
-  else if (mode === 'age') for (let i = 0; i < n; i++) out[i] = block.first - base + (block.order ? block.order[from + i] : from + i);
+  else if (mode === 'age') for (let i = 0; i < n; i++) out[i] = block.first + (block.order ? block.order[from + i] : from + i);
   else if (numbers) for (let i = 0; i < n; i++) out[i] = Number.isNaN(numbers[from + i]) ? NONE : numbers[from + i];
   else out.fill(NONE);
   return out;
@@ -125,13 +125,13 @@ export function ticks([lo, hi], most = 6) {
   return out;
 }
 
-// Returns the legend for panels: {mode, title, unit, none}. A ramp adds {stops: colours, from, to, ticks: [{at,
-// text}]}, a list
-// {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names the item. A colour is
-// [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of their own.
+// Returns the legend for panels: {mode, title, unit}. A ramp adds {stops: colours, from, to, ticks: [{at,
+// text}]}. A list adds {items: [{label, name, colour}]}, the most frequent first; if name is undefined, the page names
+// the item. A colour is [r, g, b] of 255. null for rgb, which needs no legend unless the points have no colours of
+// their own.
 export function legendOf(mode, {limits, offset = 0, sample = [], hasColours = true, scale = 'usual', oldest_s = NaN}) {
   const {title, unit, kind} = MODES[mode], ramp = rampOf(mode, scale);
-  const legend = {mode, title, unit, none: GREY};
+  const legend = {mode, title, unit};
   const unknown = {stops: [GREY, GREY], from: 'not known', to: '', ticks: []};
   if (kind === 'rgb') return hasColours ? null : {...legend, ...unknown};
   if (kind === 'list' && sample.length === 0) return {...legend, ...unknown};

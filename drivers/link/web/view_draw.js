@@ -42,8 +42,7 @@ export function shares(parts, more) {
 }
 
 // Does the same for a view that rests: first a share of each, then one part after the other. A part that is `whole` is
-// drawn
-// at once, since later it is not known which of its elements a share has left out.
+// drawn at once, since later it is not known which of its elements a share has left out.
 export function restShares(parts, more) {
   if (progress(parts).drawn < EVENLY) {
     return shares(parts, more).map((upTo, i) => (parts[i].whole && !parts[i].skip && more > 0 ? parts[i].n : upTo));
@@ -58,9 +57,9 @@ export function restShares(parts, more) {
 }
 
 // There are three targets: one that is shown, one that is drawn into (the same, or one that replaces it once it has
-// enough points), and one for the page. Those of a moving view are smaller. A frame for the page is drawn aside, and
-// put onto the
-// canvas only once the GPU has it: a browser that composes in software waits for the canvas, and the page waits, too.
+// enough points), and one for the page. Those of a moving view may be smaller. A picture for the page is drawn aside,
+// and put onto the canvas only once the GPU has finished it: a browser that composes in software waits for the canvas,
+// and the page waits, too.
 export class Painter {
   moving = new Budget(MOVE_MS, 150_000);
   resting = new Budget(STEP_MS, 150_000);

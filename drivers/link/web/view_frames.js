@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// These are the frames of a view: when what is drawn, and when it comes onto the page. While the view moves they have a
-// level of detail, as much as a picture's time allows. At rest the other points are added, a slice at a time.
+// This class decides when the parts of a picture are drawn, and when the picture comes onto the page. While the view
+// moves, a picture has as many points as its time allows. At rest the other points are added, a slice at a time.
 
 import {Camera} from './view_camera.js';
 import {Painter, progress, shares} from './view_draw.js';
@@ -34,11 +34,12 @@ export class Frames {
   #made = null; // it is {target, camera} of a frame that is not on the page yet
   #grown = false; // more is drawn than on the page
   #showEvery = SHOW_MS;
-  #photo = null; // it takes the next picture on the page
+  #photos = []; // these take the next picture on the page
   #seen; // it is the camera of the picture on the page
 
-  // contents is what is drawn, {parts, aim(scale), follow, fit, under(shown), over(camera)}: parts of the stored picture;
-  // what goes over it, each time it is shown; layers over the canvas. follow() returns whether all is to be drawn again.
+  // contents is {parts, aim(scale), follow, fit, under(shown), over(camera)}. parts() are those of the stored picture;
+  // under() draws over that picture each time it is shown, and over() on the canvas over it. follow() returns whether
+  // all is to be drawn again.
   constructor(view, gl, contents) {
     this.#view = view;
     this.#gl = gl;
@@ -73,7 +74,7 @@ export class Frames {
     this.schedule();
   }
 
-  // The same as 'restart', but the old picture stays until the new one has as many points.
+  // Draws all again like 'restart', but the old picture stays until the new one has as many points.
   restartLater() {
     this.#want.restart ??= 'later';
     this.schedule();
@@ -83,7 +84,7 @@ export class Frames {
   async picture() {
     await this.ready();
     return new Promise((resolve) => {
-      this.#photo = resolve;
+      this.#photos.push(resolve);
       this.ask('show');
     });
   }
@@ -96,7 +97,7 @@ export class Frames {
 
   get state() {
     const {drawn, left} = progress(this.#parts());
-    return {drawn, left, moving: this.#moving, frames_per_s: this.#fps, budget: this.#painter.moving.points, lost: this.#lost};
+    return {drawn, left, moving: this.#moving, frames_per_s: this.#fps};
   }
 
   schedule() {
@@ -206,8 +207,8 @@ export class Frames {
     target.toPage(width, height);
     this.#seen = camera;
     this.#over();
-    this.#photo?.(copyOf(this.#view.canvas, this.#view.overlay.canvas)); // a WebGL canvas can be read in the task that drew it
-    this.#photo = null;
+    // A WebGL canvas can be read in the task that drew it.
+    for (const photo of this.#photos.splice(0)) photo(copyOf(this.#view.canvas, this.#view.overlay.canvas));
     if (moving) {
       if (this.#lastFrame > 0 && now - this.#lastFrame < 1000) {
         const fps = 1000 / Math.max(1, now - this.#lastFrame);

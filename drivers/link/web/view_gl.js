@@ -216,7 +216,7 @@ export class Programs {
     for (const kind of ['points', 'mesh']) this.#of(kind, []);
   }
 
-  // A kind that is made when it is used.
+  // Adds a kind of program, which is compiled when it is first used.
   add(kind, source) { this.#sources[kind] = source; }
 
   #of(kind, defines) {

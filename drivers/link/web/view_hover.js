@@ -54,8 +54,7 @@ export class Hover {
   // Calls then(point) with the point at a place of the canvas, or with null. The function returned stops it.
   find(p, radius_px, then) {
     const {cloud, camera} = this.#view;
-    return searchSlowly(cloud, camera, p.x, p.y, radius_px, (found) =>
-      then(found && cloud.origin ? pointOf(cloud, found.block, found.i) : null));
+    return searchSlowly(cloud, camera, p.x, p.y, radius_px, (found) => then(found && pointOf(cloud, found.block, found.i)));
   }
 
   mark(point, isAsked = false) {

@@ -25,7 +25,8 @@ const TAP_PX = 6;
 export class Input {
   #view;
   #down = new Map(); // it maps a pointer's id to {x, y}
-  #gesture = null;
+  #gesture = null; // of the pointers that are down
+  #wheeled = null; // of the wheel, which may turn meanwhile
   #moved = 0;
   #tap = {time: 0, x: 0, y: 0};
 
@@ -170,14 +171,14 @@ export class Input {
     const lines = e.deltaMode === 1 ? 30 : e.deltaMode === 2 ? 400 : 1;
     const factor = Math.exp(Math.max(-300, Math.min(300, e.deltaY * lines)) * 0.0016);
     const now = performance.now();
-    const g = this.#gesture;
+    const w = this.#wheeled;
     // One turn of the wheel keeps one place.
-    if (g?.kind !== 'wheel' || now - g.time > 400 || Math.hypot(p.x - g.x, p.y - g.y) > 4) {
-      this.#gesture = {kind: 'wheel', ...p, place: camera.inside ? null : grip(cloud, camera, p.x, p.y)};
+    if (w === null || now - w.time > 400 || Math.hypot(p.x - w.x, p.y - w.y) > 4) {
+      this.#wheeled = {...p, place: camera.inside ? null : grip(cloud, camera, p.x, p.y)};
     }
-    this.#gesture.time = now;
+    this.#wheeled.time = now;
     view.touched();
-    camera.zoom(factor, this.#gesture.place);
+    camera.zoom(factor, this.#wheeled.place);
     view.cameraMoved();
   }
 

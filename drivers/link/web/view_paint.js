@@ -47,7 +47,7 @@ void main() {
 #endif
   gl_FragDepth = depth_of(v_seen.z, 1.001);
   if (gl_FrontFacing == u_turned) discard;
-  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1; // of what nobody sees every other pixel is left out
+  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1; // a cell that nobody sees has every other pixel
   if (v_colour.a == 0.0 && odd) discard;
   vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
 #ifdef FLAT

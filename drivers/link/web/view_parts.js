@@ -13,9 +13,9 @@ class BlockPart {
   weight = 1;
   drawn = 0;
   skip = false;
-  #held = 0; // it has the positions on the GPU
-  #timed = 0; // it has the times on the GPU
-  #valued = 0; // it has the numbers on the GPU, for
+  #held = 0; // so many of its positions are on the GPU
+  #timed = 0; // so many of its times
+  #valued = 0; // so many of its numbers, those of #mode
   #mode = null;
   #closed = false;
   #capacity = 0;
@@ -65,7 +65,7 @@ class BlockPart {
   }
 
   #upload() {
-    const {gl, mode, base} = this.points;
+    const {gl, mode} = this.points;
     const {block} = this;
     if (block.closed && !this.#closed) { // they are in another order now
       this.#closed = true;
@@ -88,7 +88,7 @@ class BlockPart {
     }
     if (this.#valued < block.n) {
       gl.bindBuffer(gl.ARRAY_BUFFER, this.value);
-      gl.bufferSubData(gl.ARRAY_BUFFER, 4 * this.#valued, valuesOf(block, mode, this.#valued, block.n, base));
+      gl.bufferSubData(gl.ARRAY_BUFFER, 4 * this.#valued, valuesOf(block, mode, this.#valued, block.n));
       this.#valued = block.n;
     }
   }
@@ -132,7 +132,6 @@ export class Points {
   parts = [];
   mode = 'height';
   limits = [0, 1];
-  base = 0; // the point of this number counts as 0 in the mode age
   size = 2; // pixels
   scale = 1; // it is the ratio of the target's pixels to those of the page
   #using = null; // it is the program
@@ -257,7 +256,7 @@ export class Mesh {
     return array;
   }
 
-  // Returns it as a part of the stored picture; `look` and `camera` are set before.
+  // Draws some triangles into the stored picture; `look` and `camera` are set before.
   draw(from, to) {
     useMesh(this.gl, this.programs, this.camera, this.origin, this.look);
     this.triangles(from, to);

@@ -22,76 +22,42 @@ function meets(block, eye, forward, slope, beside_m) {
   return across <= r * Math.hypot(1, slope) + Math.max(0, along) * slope + beside_m;
 }
 
-// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null.
-// limit is the number of points of each block that it tests.
+// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null. It is null,
+// too, if the cloud was cleared meanwhile: places in its blocks would be relative to another origin.
+// limit is the number of points of each block that it tests. The rays of a flat view are parallel: there w may be less
+// than 0, and a depth of a tenth of the target's distance counts as much as a tenth in a view with perspective.
 export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
-  if (cloud.origin === null) return null;
-  if (camera.flat) return yield* searchFlat(cloud, camera, x, y, radius_px, limit);
-  const eye = sub(camera.eye, cloud.origin);
-  const ray = camera.ray(x, y);
-  const length = Math.hypot(...ray);
+  const {origin} = cloud, {flat, distance} = camera;
+  if (origin === null) return null;
+  const from = sub(camera.from(x, y), origin), ray = camera.ray(x, y), length = Math.hypot(...ray);
   const f = ray.map((c) => c / length);
-  const k = camera.focal * length; // these are pixels per slope, near the ray
-  const slope = radius_px / k;
-  const slope2 = slope * slope;
-  const section = camera.section?.relativeTo(cloud.origin) ?? null;
+  const k = flat ? camera.focal / distance : camera.focal * length; // pixels per metre; with perspective per slope
+  const reach = radius_px / k; // a length; with perspective a slope
+  const section = camera.section?.relativeTo(origin) ?? null;
   let best = null;
   let least = Infinity;
   for (const block of [...cloud.blocks]) {
     const {window} = cloud;
-    if (!meets(block, eye, f, slope, 0) || isOutside(window, block)) continue;
-    const p = block.position;
-    const n = Math.min(block.n, limit);
-    for (let i = 0, at = 0; i < n; i++, at += 3) {
-      const dx = p[at] - eye[0], dy = p[at + 1] - eye[1], dz = p[at + 2] - eye[2];
-      const w = dx * f[0] + dy * f[1] + dz * f[2];
-      if (w <= 1e-3) continue;
-      const off2 = dx * dx + dy * dy + dz * dz - w * w;
-      if (off2 > slope2 * w * w) continue;
-      if (isPointOutside(window, block, i)) continue;
-      if (section !== null && !isWithin(section, p[at], p[at + 1], p[at + 2])) continue;
-      const px = Math.sqrt(Math.max(0, off2)) / w * k;
-      const score = px + PIXELS_PER_DEPTH * Math.log(w);
-      if (score < least) {
-        least = score;
-        best = {block, i, w: w / length, px};
-      }
-    }
-    yield;
-  }
-  return best;
-}
-
-// Does the same in a flat view, whose rays are parallel: w may be less than 0. A depth of a tenth of the target's
-// distance counts as much as a tenth in a view with perspective.
-function* searchFlat(cloud, camera, x, y, radius_px, limit) {
-  const from = sub(camera.from(x, y), cloud.origin);
-  const f = camera.forward;
-  const k = camera.focal / camera.distance;
-  const radius_m = radius_px / k, per_m = PIXELS_PER_DEPTH / camera.distance;
-  const section = camera.section?.relativeTo(cloud.origin) ?? null;
-  let best = null;
-  let least = Infinity;
-  for (const block of [...cloud.blocks]) {
-    if (!meets(block, from, f, 0, radius_m) || isOutside(cloud.window, block)) continue;
+    if (!meets(block, from, f, flat ? 0 : reach, flat ? reach : 0) || isOutside(window, block)) continue;
+    yield; // not after the last block: points that come meanwhile would close it, which changes the order of its own
     const p = block.position;
     const n = Math.min(block.n, limit);
     for (let i = 0, at = 0; i < n; i++, at += 3) {
       const dx = p[at] - from[0], dy = p[at + 1] - from[1], dz = p[at + 2] - from[2];
       const w = dx * f[0] + dy * f[1] + dz * f[2];
-      const off2 = dx * dx + dy * dy + dz * dz - w * w;
-      if (off2 > radius_m * radius_m || isPointOutside(cloud.window, block, i)) continue;
+      if (!flat && w <= 1e-3) continue;
+      const off2 = dx * dx + dy * dy + dz * dz - w * w, most = flat ? reach : reach * w;
+      if (off2 > most * most || isPointOutside(window, block, i)) continue;
       if (section !== null && !isWithin(section, p[at], p[at + 1], p[at + 2])) continue;
-      const px = Math.sqrt(Math.max(0, off2)) * k;
-      const score = px + per_m * w;
+      const px = Math.sqrt(Math.max(0, off2)) * k / (flat ? 1 : w);
+      const score = px + PIXELS_PER_DEPTH * (flat ? w / distance : Math.log(w));
       if (score < least) {
         least = score;
-        best = {block, i, w, px};
+        best = {block, i, w: w / length, px};
       }
     }
-    yield;
   }
-  return best;
+  return cloud.origin === origin ? best : null;
 }
 
 export function nearest(cloud, camera, x, y, radius_px, limit) {

@@ -81,7 +81,7 @@ export class Stations {
       {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
   }
 
-  // Returns the ring around a station: its radius in metres is at least 46 px on the screen; null: it is out of sight.
+  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: it is out of sight.
   ring(camera, station) {
     const {at, heading_deg} = this.placeOf(station);
     const {w} = camera.project(at);
@@ -166,11 +166,11 @@ export class Stations {
   drop(cancelled = false) {
     const {began, number} = this.#hold ?? {};
     const suggested = this.get(number)?.suggested;
+    if (began && cancelled) return this.cancel();
     this.#hold = null;
     if (suggested && !cancelled) this.#tell({station: number, taken: true}); // a click takes it
-    if (!began) return;
-    if (cancelled) this.cancel();
-    else this.letGo();
+    if (began) this.letGo();
+    return undefined;
   }
 
   get dragging() { return this.#hold !== null; }
@@ -211,8 +211,13 @@ export class Stations {
     this.#changed();
   }
 
+  // What follows a drag goes back, too. The pointer may still be down: its further moves do nothing.
   cancel() {
+    const station = this.moved && this.get(this.moved.number);
+    const wasDragged = this.#hold !== null;
+    this.#hold = null;
     this.#forget();
+    if (station && wasDragged) this.dragged?.({number: station.number, x: station.x_m, y: station.y_m, z: station.z_m, heading_deg: station.heading_deg});
     this.#changed();
   }
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module has the picture's colours for shaders and overlay. Ground, ink and accent are the page's (CSS
-// variables); the page's
-// scheme, light or dark, selects the set of the others.
+// variables). The others are one of two sets, by whether the page is light or dark.
 
 let probe = null;
 

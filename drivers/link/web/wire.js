@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // A Wire decodes one connection with a head. It runs in the page's worker (wire_worker.js), or in the page itself if
-// it has
-// no workers. It passes on frames and replies, many in one message, and reads no further until its owner has taken
-// these (`ack`).
+// that has no workers. It passes on frames and replies, many in one message, and reads no further until its owner has
+// taken these (`ack`).
 //
-// There are two ways to read. A WebSocketStream is read when there is room: what isn't read stays with the head, which
-// leaves
+// There are two ways to read. A WebSocketStream is read when there is room. The rest stays with the head, which leaves
 // out whole frames for this reader and says how many, or waits, as its link is set. A plain WebSocket can't be told to
 // wait: the bytes would pile up in the browser. So it is always decoded at once, and batches that have no room are
 // dropped here, and counted (dropped_points, dropped_shots).
@@ -15,11 +13,12 @@ import {Past} from './past.js';
 
 const SUBPROTOCOL = 'scanhead-native-1';
 const MAX_UNTAKEN = 3; // so many messages may be without the owner's `ack`
-const MESSAGE_POINTS = 65536, MESSAGE_THINGS = 4096; // a message goes out when it has so many,
-const MESSAGE_MS = 30; // or it goes out after so long
+const MESSAGE_POINTS = 65536, MESSAGE_THINGS = 4096; // a message goes out once it has so many
+const MESSAGE_MS = 30; // or after so long
 const ANSWER_S = 10; // a head may take so long to answer
 const OPENING_MS = 100; // a link may take so long to refuse a connection that it has accepted
 const MAX_POINTS = 1 << 20; // so many wait for a message, if the reading can't stop
+const ALWAYS = ['open', 'close', 'text', 'waves', 'kept']; // somebody waits for these: they are never dropped
 
 export class Wire {
   #post;
@@ -30,8 +29,8 @@ export class Wire {
   #timer = 0;
   #untaken = 0;
   #room = null; // it resolves when the owner has taken enough
-  #opening = 0; // a timer, as
-  #limit = 0;
+  #opening = 0; // the timer after which a connection counts as open; 0: it is open, or there is none
+  #limit = 0; // the timer of ANSWER_S
   #number = 0; // it numbers the connection, so that late events of an older one are ignored
   #past = new Past({give: (batch) => this.#addPast(batch), hasRoom: () => this.#untaken < MAX_UNTAKEN});
   #pastUrl = null;
@@ -79,7 +78,7 @@ export class Wire {
     this.#pastUrl = past;
     this.#number++;
     const number = this.#number;
-    const mine = (act) => (...values) => number === this.#number && act(...values);
+    const mine = (act) => (...values) => number === this.#number && this.#socket !== null && act(...values);
     const on = {
       open: mine(() => {
         clearTimeout(this.#limit);
@@ -127,7 +126,6 @@ export class Wire {
     this.parser.end();
     this.decoder.flush(true);
     this.#addNow('close', {code, reason});
-    this.#number++;
   }
 
   // ---- what comes
@@ -153,10 +151,10 @@ export class Wire {
     this.#send();
   }
 
-  // It follows the points that came before it.
+  // Queues a thing after the points that came before it.
   #add(name, value) {
     this.decoder.flush();
-    if (this.#things.length >= 4 * MESSAGE_THINGS && name !== 'text' && name !== 'close') this.dropped.dropped_things++;
+    if (this.#things.length >= 4 * MESSAGE_THINGS && !ALWAYS.includes(name)) this.dropped.dropped_things++;
     else this.#things.push([name, value]);
     this.#later();
   }
@@ -216,7 +214,7 @@ export class Wire {
     }
   }
 
-  // Resolves at once unless the owner is behind.
+  // Returns null where there is room, else a promise that resolves once there is.
   #hasRoom() {
     if (this.#untaken < MAX_UNTAKEN) return null;
     return new Promise((resolve) => {
@@ -230,7 +228,7 @@ export class Wire {
     return {...p, ...d, ...this.dropped, ...past, past_hash: this.#past.pointHash,
       unplaced_points: d.unplaced_points + unplaced.points, unplaced_shots: d.unplaced_shots + unplaced.shots,
       kept_bytes: this.#keeper.bytes, kept_full: this.#keeper.isFull, point_hash: this.decoder.pointHash, waiting_points: this.#points,
-      decode_ms: this.busy_ms, decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
+      decode_ns_per_point: d.points > 0 ? (1e6 * this.busy_ms) / d.points : 0};
   }
 }
 
