@@ -13,7 +13,7 @@ static void scanner_report_warn(void *ctx, const char *text)
     while (i < w->n && strcmp(w->one[i].text, text) != 0)
         i++;
     if (i < w->n && w->are_said) return;
-    if (i == w->n && (w->are_said || w->n == SITE_MAX_SAID || (w->one[i].text = strdup(text)) == NULL)) {
+    if (i == w->n && (w->are_said || w->n == SITE_MAX_WARNINGS || (w->one[i].text = strdup(text)) == NULL)) {
         sh_warn(r->to, "scanner of station %u: %s", r->station, text);
         return;
     }
@@ -42,8 +42,8 @@ void scanner_report_set_up(struct scanner_report *report, const struct sh_report
 
 static int was_said(const struct site *first, const char *text)
 {
-    for (uint32_t i = 0; first != NULL && i < first->said.n; i++)
-        if (strcmp(first->said.text[i], text) == 0) return 1;
+    for (uint32_t i = 0; first != NULL && i < first->warnings.n; i++)
+        if (strcmp(first->warnings.text[i], text) == 0) return 1;
     return 0;
 }
 

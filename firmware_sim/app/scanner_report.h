@@ -13,7 +13,7 @@ struct scanner_warnings {
     struct {
         char *text;
         uint8_t is_of[CONFIG_MAX_STATIONS]; /* by the scanner's first station, from 0 */
-    } one[SITE_MAX_SAID];
+    } one[SITE_MAX_WARNINGS];
     int are_said; /* from now on only a new warning is printed, at once */
 };
 

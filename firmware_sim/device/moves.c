@@ -230,7 +230,7 @@ void device_take_move(struct device *device, int64_t t_ns, struct command_result
     write_journal(device, t_ns);
     out->changes = 1;
     snprintf(out->reply, sizeof out->reply, "OK");
-    device_push_event(&device->events, NATIVE_EV_SITE, plan->station + 1, device->site->said.n_new, 0,
+    device_push_event(&device->events, NATIVE_EV_SITE, plan->station + 1, device->site->warnings.n_new, 0,
                       device->site->station[plan->station].station->name);
 }
 

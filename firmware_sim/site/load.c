@@ -204,7 +204,7 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
     struct site *site = *out = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     struct site_listener heard;
-    site_listen(&heard, report, &site->said, purpose == SITE_MOVED ? &other->said : NULL);
+    site_listen(&heard, report, &site->warnings, purpose == SITE_MOVED ? &other->warnings : NULL);
     site->cfg = cfg;
     site->measures = purpose == SITE_FOR_PLAN;
     site->planned_frames = cfg->head.settings.frames;
@@ -266,7 +266,7 @@ void site_free(struct site *site)
     site_free_waves(site);
     free(site->legs);
     surface_colours_free(&site->colours.surfaces);
-    site_free_warnings(&site->said);
+    site_free_warnings(&site->warnings);
     free(site->own_cfg);
     free(site);
 }

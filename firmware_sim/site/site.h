@@ -117,9 +117,9 @@ struct site_stretch {
 };
 
 /* Warnings given while loading, so that a site beside this one only gives new ones. */
-enum { SITE_MAX_SAID = 64 };
+enum { SITE_MAX_WARNINGS = 64 };
 struct site_warnings {
-    char *text[SITE_MAX_SAID];
+    char *text[SITE_MAX_WARNINGS];
     uint32_t n;
     uint32_t n_new;  /* warnings that the site before did not have */
     char first[160]; /* the first of these */
@@ -128,7 +128,7 @@ struct site_warnings {
 struct site {
     const struct config *cfg;
     struct config *own_cfg; /* of site_load_moved; else NULL */
-    struct site_warnings said;
+    struct site_warnings warnings;
     struct emitter emitter; /* the profile's, with its list of directions */
     struct emitter_firing *direction;
     struct site_world *world;
@@ -211,7 +211,7 @@ struct site_station_move {
 /* Makes the site beside `from` in which the station stands at its new place. The result is as from a configuration with
  * that place. Maps of from's stations that still hold are kept; all others that are planned are made. Meshes and BVHs
  * are shared. from and move->first may be cast from meanwhile; sites of one world are loaded and freed by one thread at
- * a time. report gets the warnings that loading `from` did not give; out->said counts them. SH_EINPUT: no head can
+ * a time. report gets the warnings that loading `from` did not give; out->warnings counts them. SH_EINPUT: no head can
  * stand there. */
 int site_load_moved(const struct site *from, const struct site_station_move *move, const struct sh_report *report,
                     struct site **out, struct sh_err *err);

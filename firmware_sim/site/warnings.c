@@ -7,10 +7,10 @@
 #include "firmware_sim/site/warnings.h"
 #include "firmware_sim/site/site.h"
 
-static int has(const struct site_warnings *said, const char *text)
+static int has(const struct site_warnings *given, const char *text)
 {
-    for (uint32_t i = 0; said != NULL && i < said->n; i++)
-        if (strcmp(said->text[i], text) == 0) return 1;
+    for (uint32_t i = 0; given != NULL && i < given->n; i++)
+        if (strcmp(given->text[i], text) == 0) return 1;
     return 0;
 }
 
@@ -18,10 +18,10 @@ static int has(const struct site_warnings *said, const char *text)
 static void warnings_warn(void *ctx, const char *text)
 {
     struct site_listener *listener = ctx;
-    struct site_warnings *said = listener->said;
-    if (said->n < SITE_MAX_SAID && (said->text[said->n] = strdup(text)) != NULL) said->n++;
+    struct site_warnings *given = listener->given;
+    if (given->n < SITE_MAX_WARNINGS && (given->text[given->n] = strdup(text)) != NULL) given->n++;
     if (has(listener->before, text)) return;
-    if (said->n_new++ == 0) snprintf(said->first, sizeof said->first, "%s", text);
+    if (given->n_new++ == 0) snprintf(given->first, sizeof given->first, "%s", text);
     sh_warn(listener->to, "%s", text);
 }
 
@@ -37,14 +37,14 @@ static int loading_stops(void *ctx)
     return sh_stopped(listener->to);
 }
 
-void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_warnings *said,
+void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_warnings *given,
                  const struct site_warnings *before)
 {
-    *listener = (struct site_listener){{listener, warnings_warn, progress, loading_stops}, to, said, before};
+    *listener = (struct site_listener){{listener, warnings_warn, progress, loading_stops}, to, given, before};
 }
 
-void site_free_warnings(struct site_warnings *said)
+void site_free_warnings(struct site_warnings *given)
 {
-    for (uint32_t i = 0; i < said->n; i++)
-        free(said->text[i]);
+    for (uint32_t i = 0; i < given->n; i++)
+        free(given->text[i]);
 }

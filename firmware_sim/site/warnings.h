@@ -10,12 +10,12 @@ struct site_warnings;
 struct site_listener {
     struct sh_report report; /* pass this one to the steps of loading */
     const struct sh_report *to;
-    struct site_warnings *said;
+    struct site_warnings *given;
     const struct site_warnings *before;
 };
-/* Warnings go into `said`, and to `to` unless they are in `before` (NULL: it has none). */
-void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_warnings *said,
+/* Warnings go into `given`, and to `to` unless they are in `before` (NULL: it has none). */
+void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_warnings *given,
                  const struct site_warnings *before);
-void site_free_warnings(struct site_warnings *said);
+void site_free_warnings(struct site_warnings *given);
 
 #endif
