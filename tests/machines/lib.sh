@@ -64,7 +64,7 @@ in_root() {
 copy_tree() {
     mkdir -p "$1"
     find "$1" -mindepth 1 -maxdepth 1 ! -name build -exec rm -rf {} +
-    tar -c $(ls -d Makefile README.md LICENSE config core drivers firmware_sim tests 2>/dev/null) | tar -x -C "$1"
+    tar -c $(ls -d Makefile README.md CHANGELOG.md LICENSE config core drivers firmware_sim tests 2>/dev/null) | tar -x -C "$1"
 }
 
 # built HOW FILE: notes a build that went well. FILE has the text that make printed.

@@ -366,7 +366,9 @@ static void a_map_conversion_goes_before_a_site(void **state)
     site = NULL;
     clear_warned();
     ok(config_load(config_path, NULL, 0, cfg, &err));
-    ok(site_load(cfg, &report, &site, &err));
+    const int rc = site_load(cfg, &report, &site, &err);
+    if (rc != SH_OK && strstr(err.text, "Unrecognized file schema: IFC4") != NULL) skip(); /* Assimp 5.4 of Debian 13 */
+    ok(rc);
     /* 3 along x and 2 along y, turned by 30 deg; 0.03 % of grid scale on 3.6 m are 1.1 mm, 1e-8 deg. */
     const double c = cos(M_PI / 6), grid_m[3] = {691000 + 3 * c - 2 * 0.5, 5334000 + 3 * 0.5 + 2 * c, 522};
     ok(georef_locate_utm(32, 1, grid_m, &want, &err));
