@@ -17,7 +17,7 @@ enum {
     COLA_MAX_NAME = 32,
 };
 
-/* Who is logged in. */
+/* Levels of access. */
 enum cola_level { COLA_RUN = 1, COLA_MAINTENANCE = 2, COLA_CLIENT = 3, COLA_SERVICE = 4 };
 
 /* Settings of the client. They begin as at power-up, and do so again after a reboot. */
@@ -46,7 +46,7 @@ struct cola {
     _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
-    int started;             /* LMCstartmeas was called since */
+    int started;             /* LMCstartmeas was called after the last LMCstopmeas */
     int reboots;             /* it reboots once the answer is sent */
     struct planar_head head; /* a head with geometries: the geometry of its next scan */
     struct {
@@ -56,7 +56,7 @@ struct cola {
         uint32_t steps;
     } next;
     uint32_t field;  /* number in the name of the request at hand, field012 */
-    int outputs_due; /* LIDoutputstate is sent once, behind the answer */
+    int outputs_due; /* LIDoutputstate is sent once, after the answer */
     struct {         /* which of their changes are sent, and the set of fields that is watched */
         int results, outputs, inputs;
         uint8_t by_telegram; /* FieldSetSelectionMethod */
@@ -104,7 +104,7 @@ uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
 
 /* cola_lmd.c */
 
-/* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
+/* Writes the values of LMDscandata after the head of the telegram. There is a last scan. */
 void cola_put_scan(const struct cola *self, struct cola_out *out);
 
 /* cola_checksum.c: for protocol_ops of the same names */

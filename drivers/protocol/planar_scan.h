@@ -63,7 +63,7 @@ struct planar_scan {
     struct planar_turn turn[2];     /* last: large, and not touched before a turn begins */
 };
 
-/* What one frame did. `whole` and `broken` may concern different turns. */
+/* The effects of one frame. `whole` and `broken` may concern different turns. */
 struct planar_news {
     int begun, whole; /* a turn began; one is whole */
     uint32_t broken;  /* turns */

@@ -4,7 +4,7 @@
 
 #include "drivers/protocol/scip_session.h"
 
-/* Hokuyo's SCIP 2.0 and 2.2, the sensor's side: see SCIP.md. Here: the session, and bytes into lines. */
+/* Hokuyo's SCIP 2.0 and 2.2, the sensor's side: see SCIP.md. This file has the session, and cuts bytes into lines. */
 
 static int scip_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {

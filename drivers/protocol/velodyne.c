@@ -310,7 +310,7 @@ static void nothing_at(void *protocol, int64_t t_ns)
     (void)t_ns;
 }
 
-/* A UDP link has no input. On another link what comes is no part of this protocol. */
+/* A UDP link has no input. On another link, bytes that come are no part of this protocol. */
 static void input(void *protocol, const uint8_t *bytes, size_t len)
 {
     const struct velodyne *v = protocol;

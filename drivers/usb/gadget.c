@@ -28,7 +28,7 @@ static void unmount(const char *name)
     fclose(mounts);
 }
 
-/* Removes everything of that name, in the order that configfs allows. What is not there is skipped. */
+/* Removes everything of that name, in the order that configfs allows. Parts that are not there are skipped. */
 static void remove_all(const char *name)
 {
     static const struct {
