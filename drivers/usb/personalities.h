@@ -9,8 +9,8 @@
  *
  * Sources. URG series: ids, strings and "no serial number" as heads of several years report them to Linux
  * (UrgNetwork/urg_library issue 29; udev rules in use name the strings). TiM: `lsusb -v` of a TiM571
- * (uos/sick_tim issue 29); endpoints as sick_tim uses them. The endpoints' numbers and sizes of the URG, and the power that
- * it asks for, are not known: they are taken from the native identity. */
+ * (uos/sick_tim issue 29); endpoints as sick_tim uses them. The endpoints' numbers and sizes of the URG, and the power
+ * that it asks for, are not known: they are taken from the native identity. */
 #ifndef DRIVERS_USB_PERSONALITIES_H
 #define DRIVERS_USB_PERSONALITIES_H
 
