@@ -24,7 +24,7 @@ static int scip_create(const struct protocol_spec *spec, void **protocol, struct
 
 void scip_power_up(struct scip *s)
 {
-    s->laser = s->time_mode = s->speed_changed = s->asleep = 0;
+    s->laser = s->time_mode = s->asleep = 0;
     s->bit_rate = s->model->bit_rate;
     s->rb_ns = s->reboot_ns = INT64_MIN;
     s->stream.active = s->single.active = 0;
