@@ -168,7 +168,7 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
         len -= n;
         for (int found; (found = cola_input_next(&self->input, &request, &lost)) != 0;)
             if (!cola_understands(self, found < 0 ? COLA_A : request.form))
-                lost += found < 0 ? (uint64_t)COLA_MAX_REQUEST : request.len; /* as any other garbage */
+                lost += self->input.used; /* as any other garbage; 0 for an overlong one, which is counted already */
             else if (found < 0)
                 cola_refuse(self, COLA_A, COLA_TOO_LONG);
             else
@@ -185,7 +185,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
     if (e->steps < COLA_MIN_STEPS)
         return sh_fail(err, SH_EINPUT, "%u steps a turn; allowed are %d and more, of 6.5535 degrees at most", e->steps,
                        (int)COLA_MIN_STEPS);
-    return planar_scan_check(d, e, INT32_MAX / 2, err);
+    return planar_scan_check(d, e, PLANAR_MAX_TURN, err);
 }
 
 const struct protocol_ops protocol_cola = {

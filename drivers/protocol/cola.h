@@ -125,8 +125,13 @@ struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_h
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
     cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
 
+/* The numbers of LMDscandatacfg in its order, but for the last one, `every`. */
+enum { COLA_CFG_BYTES = 11 };
+void cola_list_cfg(struct cola_settings *s, uint8_t *bytes[COLA_CFG_BYTES]);
 /* Whether the model has these channels, and all values are allowed. */
 int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s);
+/* Whether the model has that FREchoFilter. */
+int cola_filter_fits(const struct cola *self, uint32_t filter);
 
 /* cola_stored.c */
 
