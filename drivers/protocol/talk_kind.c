@@ -182,7 +182,8 @@ static int scip_answers(const uint8_t *request, size_t request_len, const uint8_
 static size_t scip_count_at(const uint8_t *request, size_t len)
 {
     const size_t mark = len != 0 && request[0] == '%';
-    if (len < mark + 15 || strchr("MN", request[mark]) == NULL || strchr("DSE", request[mark + 1]) == NULL) return 0;
+    if (len < mark + 15 || memchr("MN", request[mark], 2) == NULL || memchr("DSE", request[mark + 1], 3) == NULL)
+        return 0;
     return mark + 13;
 }
 
@@ -257,7 +258,7 @@ const struct talk_kind *talk_kind_of(const uint8_t *bytes, size_t len)
     if (is_scip(bytes, len) && scip_request_len(bytes, len) != 0) return &talk_scip;
     if (line == 0) return &talk_bytes;
     for (size_t i = 0; i < line; i++)
-        if ((bytes[i] < 0x20 || bytes[i] > 0x7e) && strchr("\t\r\n", bytes[i]) == NULL) return &talk_bytes;
+        if ((bytes[i] < 0x20 || bytes[i] > 0x7e) && memchr("\t\r\n", bytes[i], 3) == NULL) return &talk_bytes;
     return &talk_lines;
 }
 
