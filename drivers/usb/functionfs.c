@@ -173,9 +173,10 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
+    /* Reading makes poll(2) wait for the next change. It comes first, so that no change is missed between both reads. */
+    if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
     const int was = usb_device_configuration(self->device) != 0;
     const int is = gadget_is_configured(&self->gadget, was);
-    if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return; /* read: poll(2) waits for the next change */
     if (was && (hung_up || !is)) disable(self, !gadget_is_on_bus(&self->gadget));
     if (is && (hung_up || !was)) enable(self);
 }
