@@ -56,7 +56,6 @@ struct scip {
 };
 
 /* scip.c */
-void scip_power_up(struct scip *s);
 uint32_t scip_time_ms(const struct scip *s, int64_t t_ns);
 uint64_t scip_time_us(const struct scip *s, int64_t t_ns);
 /* Sends the reply at hand, after ending it. */

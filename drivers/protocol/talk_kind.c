@@ -121,14 +121,14 @@ static size_t cola_error(const uint8_t *request, size_t len, uint8_t *to)
     return COLA_B_HEAD + 6;
 }
 
-const struct talk_kind talk_cola = {.name = "CoLa",
-                                    .request_len = cola_len,
-                                    .answer_len = cola_len,
-                                    .answers = cola_answers,
-                                    .streams = cola_streams,
-                                    .stops = cola_stops,
-                                    .error = cola_error,
-                                    .n_words = 2};
+static const struct talk_kind talk_cola = {.name = "CoLa",
+                                           .request_len = cola_len,
+                                           .answer_len = cola_len,
+                                           .answers = cola_answers,
+                                           .streams = cola_streams,
+                                           .stops = cola_stops,
+                                           .error = cola_error,
+                                           .n_words = 2};
 
 /* ---- lines */
 
@@ -138,7 +138,7 @@ static size_t line_len(const uint8_t *bytes, size_t len)
     return end != NULL ? (size_t)(end - bytes) + 1 : 0;
 }
 
-const struct talk_kind talk_lines = {.name = "lines", .request_len = line_len, .n_words = 1};
+static const struct talk_kind talk_lines = {.name = "lines", .request_len = line_len, .n_words = 1};
 const struct talk_kind talk_bytes = {.name = "bytes"};
 
 /* ---- Hokuyo SCIP: a line, and an answer that begins with it and ends with an empty line (SCIP.md) */
@@ -214,14 +214,14 @@ static size_t scip_error(const uint8_t *request, size_t len, uint8_t *to)
     return n + sizeof status - 1;
 }
 
-const struct talk_kind talk_scip = {.name = "SCIP",
-                                    .request_len = scip_request_len,
-                                    .answer_len = scip_answer_len,
-                                    .answers = scip_answers,
-                                    .streams = scip_streams,
-                                    .stops = scip_stops,
-                                    .error = scip_error,
-                                    .n_words = 1};
+static const struct talk_kind talk_scip = {.name = "SCIP",
+                                           .request_len = scip_request_len,
+                                           .answer_len = scip_answer_len,
+                                           .answers = scip_answers,
+                                           .streams = scip_streams,
+                                           .stops = scip_stops,
+                                           .error = scip_error,
+                                           .n_words = 1};
 
 /* ---- which it is */
 
