@@ -15,6 +15,7 @@ enum {
      * as hexadecimal (5 bytes each), and less than 1000 bytes around them. */
     COLA_MAX_UNIT = 4 * 5 * PLANAR_MAX_STEPS + 1000,
     COLA_MAX_NAME = 32,
+    COLA_MOST_WAITING = 100,
 };
 
 /* Levels of access. */
@@ -77,8 +78,8 @@ struct cola {
     enum cola_form stream_form; /* of telegrams without a request */
     int pending;                /* a scan is done and not yet looked at */
     uint32_t since_sent;        /* scans since one was sent */
-    uint32_t n_waiting;         /* sRN LMDscandata before there was a scan; answered with the first */
-    enum cola_form waiting_form;
+    uint32_t n_waiting;         /* sRN LMDscandata before there was a scan; answered with the first, in their forms: */
+    uint8_t waiting_form[COLA_MOST_WAITING];
     uint16_t telegrams; /* counter of LMDscandata */
     struct cola_input input;
     struct planar_scan scan;

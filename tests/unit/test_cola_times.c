@@ -286,6 +286,21 @@ static void a_poll_gets_the_last_scan(void **state)
     cola_expect("sRN LMDscandata", "sFA 4");
 }
 
+/* Two polls wait for the first scan: each answer has the form of its request. */
+static void waiting_polls_keep_their_forms(void **state)
+{
+    (void)state;
+    uint8_t frame[64];
+    cola_open_lms();
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    cola_input(frame, cola_frame_b(frame, "sRN LMDscandata", 15));
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.n_units, 2);
+    assert_memory_equal(cola.bytes, "\2sRA", 4);
+    assert_memory_equal(cola.bytes + cola.end[0], "\2\2\2\2", 4);
+}
+
 static void every_nth_scan_on_request(void **state)
 {
     (void)state;
@@ -349,6 +364,7 @@ int main(void)
         CASE(what_nobody_asked_for_is_not_lost),
         CASE(a_client_that_does_not_read_loses_whole_scans),
         CASE(a_poll_gets_the_last_scan),
+        CASE(waiting_polls_keep_their_forms),
         CASE(every_nth_scan_on_request),
         CASE(the_stream_has_the_chosen_form),
     };
