@@ -5,7 +5,7 @@
 
 #include "drivers/protocol/cola.h"
 
-enum { TRY_NS = 100000000, MOST_WAITING = 100, COLA_MIN_STEPS = 55 };
+enum { TRY_NS = 100000000, COLA_MIN_STEPS = 55 };
 
 int cola_power_up(struct cola *self, struct sh_err *err)
 {
@@ -71,8 +71,9 @@ static void send_scan(struct cola *self, const char *head, enum cola_form form)
 
 static void deliver_scan(struct cola *self)
 {
-    for (; self->n_waiting != 0; self->n_waiting--)
-        send_scan(self, "sRA LMDscandata", self->waiting_form);
+    for (uint32_t i = 0; i < self->n_waiting; i++)
+        send_scan(self, "sRA LMDscandata", (enum cola_form)self->waiting_form[i]);
+    self->n_waiting = 0;
     if (!self->streams || !self->measures || ++self->since_sent < self->set.every) return;
     self->since_sent = 0;
     send_scan(self, "sSN LMDscandata", self->stream_form);
@@ -137,9 +138,8 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
         self->telegrams++;
         return COLA_OK;
     }
-    if (self->n_waiting == MOST_WAITING || cola_start_scan(self) != 0) return COLA_CONDITION;
-    self->n_waiting++;
-    self->waiting_form = out->form;
+    if (self->n_waiting == COLA_MOST_WAITING || cola_start_scan(self) != 0) return COLA_CONDITION;
+    self->waiting_form[self->n_waiting++] = (uint8_t)out->form;
     return COLA_LATER;
 }
 
@@ -168,7 +168,7 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
         len -= n;
         for (int found; (found = cola_input_next(&self->input, &request, &lost)) != 0;)
             if (!cola_understands(self, found < 0 ? COLA_A : request.form))
-                lost += found < 0 ? (uint64_t)COLA_MAX_REQUEST : request.len; /* as any other garbage */
+                lost += self->input.used; /* as any other garbage; 0 for an overlong one, which is counted already */
             else if (found < 0)
                 cola_refuse(self, COLA_A, COLA_TOO_LONG);
             else
@@ -185,7 +185,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
     if (e->steps < COLA_MIN_STEPS)
         return sh_fail(err, SH_EINPUT, "%u steps a turn; allowed are %d and more, of 6.5535 degrees at most", e->steps,
                        (int)COLA_MIN_STEPS);
-    return planar_scan_check(d, e, INT32_MAX / 2, err);
+    return planar_scan_check(d, e, PLANAR_MAX_TURN, err);
 }
 
 const struct protocol_ops protocol_cola = {

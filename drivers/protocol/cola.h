@@ -15,9 +15,10 @@ enum {
      * as hexadecimal (5 bytes each), and less than 1000 bytes around them. */
     COLA_MAX_UNIT = 4 * 5 * PLANAR_MAX_STEPS + 1000,
     COLA_MAX_NAME = 32,
+    COLA_MOST_WAITING = 100,
 };
 
-/* Who is logged in. */
+/* Levels of access. */
 enum cola_level { COLA_RUN = 1, COLA_MAINTENANCE = 2, COLA_CLIENT = 3, COLA_SERVICE = 4 };
 
 /* Settings of the client. They begin as at power-up, and do so again after a reboot. */
@@ -46,7 +47,7 @@ struct cola {
     _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
-    int started;             /* LMCstartmeas was called since */
+    int started;             /* LMCstartmeas was called after the last LMCstopmeas */
     int reboots;             /* it reboots once the answer is sent */
     struct planar_head head; /* a head with geometries: the geometry of its next scan */
     struct {
@@ -56,7 +57,7 @@ struct cola {
         uint32_t steps;
     } next;
     uint32_t field;  /* number in the name of the request at hand, field012 */
-    int outputs_due; /* LIDoutputstate is sent once, behind the answer */
+    int outputs_due; /* LIDoutputstate is sent once, after the answer */
     struct {         /* which of their changes are sent, and the set of fields that is watched */
         int results, outputs, inputs;
         uint8_t by_telegram; /* FieldSetSelectionMethod */
@@ -77,8 +78,8 @@ struct cola {
     enum cola_form stream_form; /* of telegrams without a request */
     int pending;                /* a scan is done and not yet looked at */
     uint32_t since_sent;        /* scans since one was sent */
-    uint32_t n_waiting;         /* sRN LMDscandata before there was a scan; answered with the first */
-    enum cola_form waiting_form;
+    uint32_t n_waiting;         /* sRN LMDscandata before there was a scan; answered with the first, in their forms: */
+    uint8_t waiting_form[COLA_MOST_WAITING];
     uint16_t telegrams; /* counter of LMDscandata */
     struct cola_input input;
     struct planar_scan scan;
@@ -104,7 +105,7 @@ uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
 
 /* cola_lmd.c */
 
-/* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
+/* Writes the values of LMDscandata after the head of the telegram. There is a last scan. */
 void cola_put_scan(const struct cola *self, struct cola_out *out);
 
 /* cola_checksum.c: for protocol_ops of the same names */
@@ -125,8 +126,13 @@ struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_h
 cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
     cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
 
+/* The numbers of LMDscandatacfg in its order, but for the last one, `every`. */
+enum { COLA_CFG_BYTES = 11 };
+void cola_list_cfg(struct cola_settings *s, uint8_t *bytes[COLA_CFG_BYTES]);
 /* Whether the model has these channels, and all values are allowed. */
 int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s);
+/* Whether the model has that FREchoFilter. */
+int cola_filter_fits(const struct cola *self, uint32_t filter);
 
 /* cola_stored.c */
 

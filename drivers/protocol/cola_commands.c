@@ -195,7 +195,7 @@ void cola_carry_out(struct cola *self, const struct cola_request *request)
 {
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
     const uint16_t telegrams = self->telegrams;
-    cola_deliver(self);
+    cola_deliver(self); /* a scan from before the request still has the form from before it */
     cola_look_at_head(self);
     self->stream_form = request->form;
     const enum cola_error error = carry_out(self, request, &out);

@@ -171,10 +171,13 @@ int cola_start_scan(struct cola *self)
 {
     char reply[MAX_REPLY];
     const enum cola_head_state head = cola_ask_state(self);
-    self->wants_scan = head != COLA_HEAD_IDLE && head != COLA_HEAD_FAULT &&
-                       head != COLA_HEAD_UNKNOWN; /* one that scans may be about to stop */
-    if (self->wants_scan) return 0;
-    return head != COLA_HEAD_IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
+    if (head == COLA_HEAD_IDLE) {
+        const int refused = self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
+        self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before */
+        return refused;
+    }
+    self->wants_scan = head != COLA_HEAD_FAULT && head != COLA_HEAD_UNKNOWN; /* one that scans may be about to stop */
+    return !self->wants_scan;
 }
 
 /* u8 0: measures */

@@ -5,7 +5,7 @@
  * telegrams have no finer ones. A field that a client writes is evaluated as its record says, and read back as it was
  * written. Lengths of a record are counts of `scale` millimetres; angles are counts of `step_e4` from `first_e4`.
  *
- * COLA.md draws the record, with its sources. Pure. */
+ * FIELDS.md draws the record, with its sources. Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_FIELD_H
 #define DRIVERS_PROTOCOL_COLA_FIELD_H
 

@@ -8,7 +8,8 @@
 /* Forms of LIDinputstate and LIDoutputstate. */
 enum cola_ports {
     COLA_PORTS_TIM, /* version 0, no time of day; no event comes */
-    COLA_PORTS_LMS, /* version 1, ports that are not used say so, outputs have a time of day; one event when asked for */
+    COLA_PORTS_LMS, /* version 1, ports that are not used say so, outputs have a time of day; asked for, it sends one
+                     * event */
 };
 
 struct cola_model {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fields, inputs and outputs, in the form of the real scanners. COLA.md draws it. */
+/* Telegrams of fields, inputs and outputs, in the form of the real scanners. FIELDS.md draws them. */
 #include <stdio.h>
 #include <string.h>
 

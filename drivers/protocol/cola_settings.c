@@ -65,14 +65,21 @@ enum cola_error cola_write_output_range(struct cola *self, struct cola_args *arg
 /* ---- LMDscandatacfg: 2 x u8 channels, u8 RSSI, u8 16 bit, u8 unit, 2 x u8 encoder, u8 position, u8 name, u8 comment,
  * u8 time, u16 every so many-th scan */
 
+void cola_list_cfg(struct cola_settings *s, uint8_t *bytes[COLA_CFG_BYTES])
+{
+    uint8_t *const list[COLA_CFG_BYTES] = {&s->channels[0], &s->channels[1], &s->rssi,       &s->rssi_16bit,
+                                           &s->unit,        &s->encoder[0],  &s->encoder[1], &s->position,
+                                           &s->name,        &s->comment,     &s->time};
+    memcpy(bytes, list, sizeof list);
+}
+
 enum cola_error cola_read_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const struct cola_settings *s = &self->set;
-    const uint8_t bytes[] = {s->channels[0], s->channels[1], s->rssi, s->rssi_16bit, s->unit, s->encoder[0],
-                             s->encoder[1],  s->position,    s->name, s->comment,    s->time};
-    for (size_t i = 0; i < sizeof bytes; i++)
-        cola_put_u(out, 1, bytes[i]);
-    cola_put_u(out, 2, s->every);
+    uint8_t *bytes[COLA_CFG_BYTES];
+    cola_list_cfg(&self->set, bytes);
+    for (int i = 0; i < COLA_CFG_BYTES; i++)
+        cola_put_u(out, 1, *bytes[i]);
+    cola_put_u(out, 2, self->set.every);
     return cola_args_end(args);
 }
 
@@ -87,10 +94,10 @@ int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s)
 enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct cola_settings s = self->set;
-    uint8_t *const bytes[] = {&s.channels[0], &s.channels[1], &s.rssi, &s.rssi_16bit, &s.unit, &s.encoder[0],
-                              &s.encoder[1],  &s.position,    &s.name, &s.comment,    &s.time};
+    uint8_t *bytes[COLA_CFG_BYTES];
     (void)out;
-    for (size_t i = 0; i < sizeof bytes / sizeof bytes[0]; i++)
+    cola_list_cfg(&s, bytes);
+    for (int i = 0; i < COLA_CFG_BYTES; i++)
         *bytes[i] = (uint8_t)cola_arg_u(args, 1);
     s.every = (uint16_t)cola_arg_u(args, 2);
     const enum cola_error error = cola_args_end(args);
@@ -108,13 +115,18 @@ enum cola_error cola_read_filter(struct cola *self, struct cola_args *args, stru
     return cola_args_end(args);
 }
 
+int cola_filter_fits(const struct cola *self, uint32_t filter)
+{
+    return filter <= COLA_FILTER_LAST && (filter != COLA_FILTER_ALL || self->model->echoes > 1);
+}
+
 enum cola_error cola_write_filter(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const uint32_t filter = cola_arg_u(args, 1);
     const enum cola_error error = cola_args_end(args);
     (void)out;
     if (error != COLA_OK) return error;
-    if (filter > COLA_FILTER_LAST || (filter == COLA_FILTER_ALL && self->model->echoes < 2)) return COLA_INVALID_DATA;
+    if (!cola_filter_fits(self, filter)) return COLA_INVALID_DATA;
     self->set.filter = (uint8_t)filter;
     return COLA_OK;
 }

@@ -6,24 +6,15 @@
 
 #include "drivers/protocol/cola.h"
 
-enum { MAX_REPLY = 512, CFG_NUMBERS = 12 };
-
-/* The numbers of LMDscandatacfg without the last one. */
-static void list_cfg(struct cola_settings *s, uint8_t *bytes[CFG_NUMBERS - 1])
-{
-    uint8_t *const list[CFG_NUMBERS - 1] = {&s->channels[0], &s->channels[1], &s->rssi,       &s->rssi_16bit,
-                                            &s->unit,        &s->encoder[0],  &s->encoder[1], &s->position,
-                                            &s->name,        &s->comment,     &s->time};
-    memcpy(bytes, list, sizeof list);
-}
+enum { MAX_REPLY = 512 };
 
 static void put_lines(const struct cola *self, char *text, size_t cap)
 {
     struct cola_settings s = self->set;
-    uint8_t *bytes[CFG_NUMBERS - 1];
+    uint8_t *bytes[COLA_CFG_BYTES];
     size_t n = (size_t)snprintf(text, cap, "LMDscandatacfg");
-    list_cfg(&s, bytes);
-    for (int i = 0; i < CFG_NUMBERS - 1; i++)
+    cola_list_cfg(&s, bytes);
+    for (int i = 0; i < COLA_CFG_BYTES; i++)
         n += (size_t)snprintf(text + n, cap - n, " %u", *bytes[i]);
     n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\n", s.every, s.filter,
                           s.scale);
@@ -51,13 +42,13 @@ enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola
 
 static int take_cfg(struct cola_settings *s, const char *at)
 {
-    uint8_t *bytes[CFG_NUMBERS - 1];
+    uint8_t *bytes[COLA_CFG_BYTES];
     unsigned v;
     int n;
-    list_cfg(s, bytes);
-    for (int i = 0; i < CFG_NUMBERS; i++, at += n) {
-        if (sscanf(at, " %5u%n", &v, &n) != 1 || v > (i < CFG_NUMBERS - 1 ? UINT8_MAX : UINT16_MAX)) return 0;
-        if (i < CFG_NUMBERS - 1)
+    cola_list_cfg(s, bytes);
+    for (int i = 0; i <= COLA_CFG_BYTES; i++, at += n) {
+        if (sscanf(at, " %5u%n", &v, &n) != 1 || v > (i < COLA_CFG_BYTES ? UINT8_MAX : UINT16_MAX)) return 0;
+        if (i < COLA_CFG_BYTES)
             *bytes[i] = (uint8_t)v;
         else
             s->every = (uint16_t)v;
@@ -92,7 +83,8 @@ static int cola_stored_take_line(struct cola *self, const char *line)
     const int is_filter = strcmp(name, "FREchoFilter") == 0, is_scale = strcmp(name, "LMDscandatascalefactor") == 0,
               is_framing = strcmp(name, "EIHstCola") == 0;
     if (!is_filter && !is_scale && !is_framing) return 0;
-    if (!cola_stored_take_number(at, is_framing ? COLA_B : 2, &v)) return 0;
+    if (!cola_stored_take_number(at, is_framing ? COLA_B : 2, &v) || (is_filter && !cola_filter_fits(self, v)))
+        return 0;
     if (is_filter) s->filter = (uint8_t)v;
     if (is_scale) s->scale = v;
     if (is_framing) s->framing = (uint8_t)v;
@@ -104,7 +96,7 @@ int cola_restore(struct cola *self, struct sh_err *err)
     char line[256];
     for (const char *at = self->stored; *at != '\0'; at += strcspn(at, "\n") + 1) {
         const size_t len = strcspn(at, "\n");
-        if (len < sizeof line) snprintf(line, sizeof line, "%.*s", (int)len, at);
+        snprintf(line, sizeof line, "%.*s", (int)len, at);
         if (len >= sizeof line || !cola_stored_take_line(self, line))
             return sh_fail(err, SH_EINPUT,
                            "head.settings_file: '%.60s' is no setting that cola stores; correct it, or remove the file",

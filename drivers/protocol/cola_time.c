@@ -46,7 +46,7 @@ static int set_clock(struct cola *self, int64_t ns)
 
 /* The settings of TIME:SERVer, in SOPAS' numbers. */
 struct cola_server {
-    uint32_t role, interface, address[4], update_s, zone; /* zone: h, ahead of UTC by 12 less */
+    uint32_t role, interface, address[4], update_s, zone; /* zone: hours ahead of UTC, and 12 more */
 };
 
 static const char *const roles[N_ROLES] = {"NONE", "CLIENT", "SERVER"}, *const interfaces[N_INTERFACES] = {"ETH",

@@ -36,7 +36,8 @@ struct native_names {
     void (*name)(void *ctx, uint32_t label, const char **object, const char **material);
     void *ctx;
 };
-/* Encodes as many names as fit into one frame with at most max_payload bytes of payload. `names` then holds the rest. */
+/* Encodes as many names as fit into one frame with at most max_payload bytes of payload. `names` then holds the
+ * rest. */
 size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, struct native_names *names, int64_t t_ns);
 
 /* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's

@@ -24,7 +24,7 @@ static void remember(struct native_sequence *s, const struct native_seen *frame)
     s->seen[s->n_seen++ % NATIVE_SEEN] = *frame;
 }
 
-/* Among the last `most` frames. */
+/* Whether it is among the last `most` frames. */
 static int has_come(const struct native_sequence *s, const struct native_seen *frame, uint32_t most)
 {
     for (uint32_t i = 1; i <= most && i <= s->n_seen; i++)

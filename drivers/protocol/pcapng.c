@@ -240,7 +240,8 @@ int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, 
     if (why != NULL) return pcapng_fail(reader, err, why);
     const uint32_t type = le_get32(bytes), size = le_get32(bytes + 4);
     if (size < LEAST_BLOCK || size % 4 != 0 || size > PCAPNG_MAX_BLOCK)
-        return pcapng_fail(reader, err, "a block's length is not possible");
+        return sh_fail(err, SH_EFORMAT, "at byte %llu: a block of %u bytes; allowed are multiples of 4 from %d to %d",
+                       (unsigned long long)reader->at_byte, size, (int)LEAST_BLOCK, (int)PCAPNG_MAX_BLOCK);
     reader->needed = size;
     if (len < size) return PCAPNG_MORE;
     if (le_get32(bytes + size - 4) != size) return pcapng_fail(reader, err, "the two lengths of a block differ");

@@ -39,7 +39,7 @@ static void take_head(struct planar_scan *s)
     const struct native_emitter *e = &s->emitter;
     struct planar_head *h = &s->head;
     const int64_t n = (int64_t)e->last_step - e->first_step + 1;
-    h->known = e->kind == NATIVE_EMIT_PLANAR && e->steps <= INT32_MAX / 4 && e->first_step >= 0 && n > 0 &&
+    h->known = e->kind == NATIVE_EMIT_PLANAR && e->steps <= PLANAR_MAX_TURN && e->first_step >= 0 && n > 0 &&
                n <= PLANAR_MAX_STEPS && (uint32_t)e->last_step < e->steps && e->front_step >= 0 &&
                (uint32_t)e->front_step < e->steps && s->pan_counts >= 1;
     if (!h->known) return;

@@ -16,8 +16,9 @@
 #include "drivers/protocol/native.h"
 
 enum {
-    PLANAR_MAX_STEPS = 3000, /* that are cast in a turn */
-    PLANAR_ECHOES = 4,       /* kept of a step: where it has more, the first three and the last */
+    PLANAR_MAX_STEPS = 3000,         /* that are cast in a turn */
+    PLANAR_MAX_TURN = INT32_MAX / 4, /* steps of a turn: quarters of them have 32 bits */
+    PLANAR_ECHOES = 4,               /* kept of a step: where it has more, the first three and the last */
     PLANAR_UNSEEN = 0xff,
 };
 
@@ -63,7 +64,7 @@ struct planar_scan {
     struct planar_turn turn[2];     /* last: large, and not touched before a turn begins */
 };
 
-/* What one frame did. `whole` and `broken` may concern different turns. */
+/* The effects of one frame. `whole` and `broken` may concern different turns. */
 struct planar_news {
     int begun, whole; /* a turn began; one is whole */
     uint32_t broken;  /* turns */

@@ -87,12 +87,11 @@ struct protocol_host {
     /* Ends the session once what was sent has gone out. A pty or a USB device has no way to end it: there nothing
      * happens. */
     void (*hang_up)(void *ctx);
-    /* Device time at which the receiver's first fix at or after t_ns is known; INT64_MAX: it has none. Where that lies
-     * ahead, a later answer may be later. */
+    /* Device time at which the receiver's first fix at or after t_ns is known; INT64_MAX: it has none. A time that lies
+     * ahead may still change: asked again, the answer may be a later time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
     /* State of the receiver's pulses per second at a device time, and the head's time since the top of the hour then,
-     * as far as pulses and sentences have set it; else since power-up. May be NULL: locked and UTC, where that is
-     * known. */
+     * as far as pulses and sentences have set it; else since power-up. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
      * set it, it is UTC, or the time since power-up. */

@@ -4,7 +4,18 @@
 
 #include "drivers/protocol/scip_session.h"
 
-/* Hokuyo's SCIP 2.0 and 2.2, the sensor's side: see SCIP.md. Here: the session, and bytes into lines. */
+/* Hokuyo's SCIP 2.0 and 2.2, the sensor's side: see SCIP.md. This file has the session, and cuts bytes into lines. */
+
+static void scip_power_up(struct scip *s)
+{
+    s->laser = s->time_mode = s->asleep = 0;
+    s->bit_rate = s->model->bit_rate;
+    s->rb_ns = s->reboot_ns = INT64_MIN;
+    s->stream.active = s->single.active = 0;
+    s->simulation = (struct scip_simulation){0};
+    s->n_line = 0;
+    s->is_over = s->foul = 0;
+}
 
 static int scip_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
@@ -20,17 +31,6 @@ static int scip_create(const struct protocol_spec *spec, void **protocol, struct
     scip_power_up(s);
     *protocol = s;
     return SH_OK;
-}
-
-void scip_power_up(struct scip *s)
-{
-    s->laser = s->time_mode = s->speed_changed = s->asleep = 0;
-    s->bit_rate = s->model->bit_rate;
-    s->rb_ns = s->reboot_ns = INT64_MIN;
-    s->stream.active = s->single.active = 0;
-    s->simulation = (struct scip_simulation){0};
-    s->n_line = 0;
-    s->is_over = s->foul = 0;
 }
 
 static void open_session(void *protocol, int64_t t_ns)

@@ -38,14 +38,6 @@ void scip_content(const uint8_t *unit, size_t len, uint8_t *mask)
             if (unit[i] >= 0x30 && unit[i] <= 0x6f) mask[i] = 0x0f;
 }
 
-static uint8_t sum_of(const uint8_t *bytes, size_t len)
-{
-    uint32_t sum = 0;
-    for (size_t i = 0; i < len; i++)
-        sum += bytes[i];
-    return (uint8_t)((sum & 0x3f) + 0x30);
-}
-
 /* The sum of a key line leaves out the ';' before it. Data may have such a character, too. */
 void scip_reseal(uint8_t *unit, size_t len)
 {
@@ -54,6 +46,6 @@ void scip_reseal(uint8_t *unit, size_t len)
         uint8_t *bytes = unit + line.at;
         if (line.number == ECHO || line.len < 2) continue;
         const int is_key = line.number > STATUS && !is_scan(unit) && bytes[line.len - 2] == ';';
-        bytes[line.len - 1] = sum_of(bytes, line.len - (is_key ? 2 : 1));
+        bytes[line.len - 1] = (uint8_t)scip_sum(bytes, line.len - (is_key ? 2 : 1));
     }
 }

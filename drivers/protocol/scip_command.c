@@ -38,15 +38,22 @@ static void quit(struct scip *s, const char *line, size_t len)
     scip_answer(s, line, len, "00");
 }
 
+/* The speed is the sensor's: another session, which is over by now, may have changed it. */
+static void reset_speed(struct scip *s)
+{
+    char reply[512];
+    if ((s->features & SCIP_MOTOR_SPEED) != 0 &&
+        scip_lines_uhz(s, "HEAD:LINES?") != scip_lines_uhz(s, "HEAD:LINES? DEF"))
+        s->host.command(s->host.ctx, "HEAD:LINES DEF", reply, sizeof reply);
+}
+
 /* RT: RS without the timer and the bit rate. */
 static void reset(struct scip *s, const char *line, size_t len)
 {
-    char reply[512];
     scip_laser_off(s);
     s->time_mode = s->asleep = 0;
     s->simulation = (struct scip_simulation){0};
-    if (s->speed_changed) s->host.command(s->host.ctx, "HEAD:LINES DEF", reply, sizeof reply);
-    s->speed_changed = 0;
+    reset_speed(s);
     if (line[1] == 'S') {
         s->epoch_ns = s->epoch_us_ns = s->now_ns;
         s->bit_rate = s->model->bit_rate;
@@ -124,13 +131,12 @@ static const char *motor_speed(struct scip *s, int32_t level)
     if (level < 0) return "01";
     if (level > 10 && level != 99) return "02";
     const uint64_t now_uhz = scip_lines_uhz(s, "HEAD:LINES?"), normal_uhz = scip_lines_uhz(s, "HEAD:LINES? DEF");
-    const uint64_t wanted_uhz = normal_uhz / 100 * (level == 99 ? 100u : 100u - (uint32_t)level);
+    const uint64_t wanted_uhz = normal_uhz * (level == 99 ? 100u : 100u - (uint32_t)level) / 100;
     if (wanted_uhz == now_uhz) return "03";
     snprintf(command, sizeof command, "HEAD:LINES %llu.%06llu", (unsigned long long)(wanted_uhz / 1000000),
              (unsigned long long)(wanted_uhz % 1000000));
     const int error = s->host.command(s->host.ctx, command, reply, sizeof reply);
     if (error != 0) return error == -222 || error == -221 ? "04" : "10";
-    s->speed_changed = wanted_uhz != normal_uhz;
     return "00";
 }
 

@@ -5,7 +5,7 @@
 
 #include "drivers/protocol/scip_session.h"
 
-/* VV, PP, II: key lines. %ST: a number. */
+/* VV, PP and II are answered with key lines, %ST with a number. */
 
 uint64_t scip_lines_uhz(struct scip *s, const char *query)
 {

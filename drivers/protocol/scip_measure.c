@@ -104,6 +104,7 @@ void scip_measure(struct scip *s, const char *line, size_t len)
         return;
     }
     s->stream = request;
+    s->simulation.n_waiting = 0; /* a new stream has all phases of DB, from the first on */
     scip_answer(s, line, len, "00");
 }
 

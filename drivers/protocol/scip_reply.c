@@ -16,17 +16,17 @@ static void scip_reply_put(struct scip_reply *r, const char *text, size_t len)
     r->len += len;
 }
 
-static uint32_t sum_of(const char *text, size_t len)
+char scip_sum(const void *text, size_t len)
 {
     uint32_t sum = 0;
     for (size_t i = 0; i < len; i++)
-        sum += (uint8_t)text[i];
-    return sum;
+        sum += ((const uint8_t *)text)[i];
+    return sum_char(sum);
 }
 
 void scip_reply_line(struct scip_reply *r, const char *text, size_t len)
 {
-    const char tail[2] = {sum_char(sum_of(text, len)), '\n'};
+    const char tail[2] = {scip_sum(text, len), '\n'};
     scip_reply_put(r, text, len);
     scip_reply_put(r, tail, sizeof tail);
 }
@@ -49,7 +49,7 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
     vsnprintf(line + n_key, sizeof line - (size_t)n_key, fmt, args);
     va_end(args);
     const size_t len = strlen(line);
-    const char tail[3] = {';', sum_char(sum_of(line, len)), '\n'};
+    const char tail[3] = {';', scip_sum(line, len), '\n'};
     scip_reply_put(r, line, len);
     scip_reply_put(r, tail, sizeof tail);
 }

@@ -41,7 +41,7 @@ struct scip {
     int64_t epoch_ns, epoch_us_ns; /* when the time stamp is 0, and when the one in microseconds is */
     int64_t laser_ns;              /* since when the laser is on */
     int64_t try_ns;                /* when to look at the head again for a request that waits for its first scan */
-    int laser, time_mode, speed_changed, asleep;
+    int laser, time_mode, asleep;
     uint32_t bit_rate;
     int64_t rb_ns, reboot_ns; /* time of the last single RB; time of the reboot that RB RB asked for; INT64_MIN: none */
     struct scip_request stream, single;
@@ -56,7 +56,6 @@ struct scip {
 };
 
 /* scip.c */
-void scip_power_up(struct scip *s);
 uint32_t scip_time_ms(const struct scip *s, int64_t t_ns);
 uint64_t scip_time_us(const struct scip *s, int64_t t_ns);
 /* Sends the reply at hand, after ending it. */

@@ -73,7 +73,8 @@ struct talk_kind {
     int n_words; /* of a request, that name its kind; 0: it has no words */
 };
 
-extern const struct talk_kind talk_cola, talk_scip, talk_lines, talk_bytes;
+/* A protocol whose messages nobody knows. */
+extern const struct talk_kind talk_bytes;
 
 /* The kind of a connection, by the first bytes that a client sent in it. */
 const struct talk_kind *talk_kind_of(const uint8_t *bytes, size_t len);

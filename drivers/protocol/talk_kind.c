@@ -121,14 +121,14 @@ static size_t cola_error(const uint8_t *request, size_t len, uint8_t *to)
     return COLA_B_HEAD + 6;
 }
 
-const struct talk_kind talk_cola = {.name = "CoLa",
-                                    .request_len = cola_len,
-                                    .answer_len = cola_len,
-                                    .answers = cola_answers,
-                                    .streams = cola_streams,
-                                    .stops = cola_stops,
-                                    .error = cola_error,
-                                    .n_words = 2};
+static const struct talk_kind talk_cola = {.name = "CoLa",
+                                           .request_len = cola_len,
+                                           .answer_len = cola_len,
+                                           .answers = cola_answers,
+                                           .streams = cola_streams,
+                                           .stops = cola_stops,
+                                           .error = cola_error,
+                                           .n_words = 2};
 
 /* ---- lines */
 
@@ -138,7 +138,7 @@ static size_t line_len(const uint8_t *bytes, size_t len)
     return end != NULL ? (size_t)(end - bytes) + 1 : 0;
 }
 
-const struct talk_kind talk_lines = {.name = "lines", .request_len = line_len, .n_words = 1};
+static const struct talk_kind talk_lines = {.name = "lines", .request_len = line_len, .n_words = 1};
 const struct talk_kind talk_bytes = {.name = "bytes"};
 
 /* ---- Hokuyo SCIP: a line, and an answer that begins with it and ends with an empty line (SCIP.md) */
@@ -182,7 +182,8 @@ static int scip_answers(const uint8_t *request, size_t request_len, const uint8_
 static size_t scip_count_at(const uint8_t *request, size_t len)
 {
     const size_t mark = len != 0 && request[0] == '%';
-    if (len < mark + 15 || strchr("MN", request[mark]) == NULL || strchr("DSE", request[mark + 1]) == NULL) return 0;
+    if (len < mark + 15 || memchr("MN", request[mark], 2) == NULL || memchr("DSE", request[mark + 1], 3) == NULL)
+        return 0;
     return mark + 13;
 }
 
@@ -213,14 +214,14 @@ static size_t scip_error(const uint8_t *request, size_t len, uint8_t *to)
     return n + sizeof status - 1;
 }
 
-const struct talk_kind talk_scip = {.name = "SCIP",
-                                    .request_len = scip_request_len,
-                                    .answer_len = scip_answer_len,
-                                    .answers = scip_answers,
-                                    .streams = scip_streams,
-                                    .stops = scip_stops,
-                                    .error = scip_error,
-                                    .n_words = 1};
+static const struct talk_kind talk_scip = {.name = "SCIP",
+                                           .request_len = scip_request_len,
+                                           .answer_len = scip_answer_len,
+                                           .answers = scip_answers,
+                                           .streams = scip_streams,
+                                           .stops = scip_stops,
+                                           .error = scip_error,
+                                           .n_words = 1};
 
 /* ---- which it is */
 
@@ -257,7 +258,7 @@ const struct talk_kind *talk_kind_of(const uint8_t *bytes, size_t len)
     if (is_scip(bytes, len) && scip_request_len(bytes, len) != 0) return &talk_scip;
     if (line == 0) return &talk_bytes;
     for (size_t i = 0; i < line; i++)
-        if ((bytes[i] < 0x20 || bytes[i] > 0x7e) && strchr("\t\r\n", bytes[i]) == NULL) return &talk_bytes;
+        if ((bytes[i] < 0x20 || bytes[i] > 0x7e) && memchr("\t\r\n", bytes[i], 3) == NULL) return &talk_bytes;
     return &talk_lines;
 }
 

@@ -37,30 +37,23 @@ struct velodyne {
     uint32_t n_firings; /* in it; 0: none is begun */
     int64_t t0_ns;      /* device time of its first one */
     uint64_t next_pulse;
-    int in_step; /* 1: next_pulse is the one that has to come */
+    int in_step;      /* 1: next_pulse is the one that has to come */
+    int is_left_over; /* pulses up to the next firing sequence are unsent, since the head left out others before them */
     uint8_t packet[VELODYNE_DATA_LEN];
     uint8_t reflectivity[N_REFL];
 };
 
 uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns)
 {
-    const int64_t whole_ns = 3600000000000;
     int64_t hour_ns;
-    if (host->pps != NULL) {
-        host->pps(host->ctx, t_ns, &hour_ns);
-    } else {
-        const int64_t utc_ns = host->utc_ns(host->ctx, t_ns);
-        hour_ns = (utc_ns == INT64_MIN ? t_ns : utc_ns) % whole_ns;
-        if (hour_ns < 0) hour_ns += whole_ns;
-    }
+    host->pps(host->ctx, t_ns, &hour_ns);
     return (uint32_t)(hour_ns / 1000);
 }
 
 enum protocol_pps velodyne_pps(const struct protocol_host *host, int64_t t_ns)
 {
     int64_t hour_ns;
-    if (host->pps != NULL) return host->pps(host->ctx, t_ns, &hour_ns);
-    return host->utc_ns(host->ctx, t_ns) == INT64_MIN ? PROTOCOL_PPS_ABSENT : PROTOCOL_PPS_LOCKED;
+    return host->pps(host->ctx, t_ns, &hour_ns);
 }
 
 uint8_t velodyne_reflectivity(int refl_cdb)
@@ -90,6 +83,7 @@ static void fall_out_of_step(struct velodyne *v)
 {
     v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);
     v->n_firings = 0;
+    if (v->in_step) v->is_left_over = 1;
     v->in_step = 0;
 }
 
@@ -242,14 +236,19 @@ static void velodyne_take_points(struct velodyne *v, const uint8_t *payload, siz
         return;
     }
     if (v->in_step && head.pulse0 != v->next_pulse) fall_out_of_step(v);
-    uint64_t pulse = head.pulse0;
+    uint64_t pulse = head.pulse0, unsent = 0;
     for (uint32_t i = 0, n; i < head.n_points; i += n, pulse++) {
         n = points_of_pulse(payload, i, head.n_points);
-        if (!v->in_step && pulse % VELODYNE_BEAMS != 0) continue;
+        if (!v->in_step && pulse % VELODYNE_BEAMS != 0) {
+            unsent += (uint64_t)v->is_left_over;
+            continue;
+        }
         v->in_step = 1;
+        v->is_left_over = 0;
         add_firing(v, payload, i, n, frame_t_ns);
     }
     v->next_pulse = pulse;
+    v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, unsent);
 }
 
 static void velodyne_take_event(struct velodyne *v, const uint8_t *payload, size_t len)
@@ -279,6 +278,7 @@ static void gap(void *protocol, uint32_t n_frames)
     if (v->n_firings != 0) v->host.count(v->host.ctx, PROTOCOL_UNITS_LOST, 1);
     v->n_firings = 0;
     fall_out_of_step(v);
+    v->is_left_over = 0; /* they are part of that loss */
 }
 
 /* Readers take elevations and times of firing from the model's number. */
@@ -310,7 +310,7 @@ static void nothing_at(void *protocol, int64_t t_ns)
     (void)t_ns;
 }
 
-/* A UDP link has no input. On another link what comes is no part of this protocol. */
+/* A UDP link has no input. On another link, bytes that come are no part of this protocol. */
 static void input(void *protocol, const uint8_t *bytes, size_t len)
 {
     const struct velodyne *v = protocol;

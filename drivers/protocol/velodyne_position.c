@@ -33,7 +33,8 @@ enum { MOST_AT_ONCE = 64 };
 
 struct position {
     struct protocol_host host;
-    int64_t next_ns; /* device time of the next packet */
+    int64_t power_ns; /* device time of power-up, with which its converters were calibrated */
+    int64_t next_ns;  /* device time of the next packet */
 };
 
 static int velodyne_position_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
@@ -41,6 +42,7 @@ static int velodyne_position_create(const struct protocol_spec *spec, void **pro
     struct position *p = calloc(1, sizeof *p);
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne position packets");
     p->host = spec->host;
+    p->power_ns = spec->power_ns;
     *protocol = p;
     return SH_OK;
 }
@@ -69,7 +71,7 @@ static void send_packet(const struct position *p, int64_t t_ns)
     packet[AT_BOTTOM] = BOTTOM_DEGC;
     packet[AT_ADC] = ADC_DEGC;
     le_put16(packet + AT_CHANGE, TOP_DEGC - ADC_DEGC);
-    le_put32(packet + AT_CALIBRATED_S, (uint32_t)(t_ns / 1000000000));
+    le_put32(packet + AT_CALIBRATED_S, (uint32_t)((t_ns - p->power_ns) / 1000000000));
     packet[AT_REASON] = REASON_POWER_ON;
     le_put32(packet + AT_TIME, velodyne_hour_us(&p->host, t_ns));
     packet[AT_PPS] = (uint8_t)velodyne_pps(&p->host, t_ns);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Back ends: the ways between a host and the device core (usb.h). What a host does goes in, the core's
- * answers come out.
+/* Back ends: the ways between a host and the device core (usb.h). Acts of a host go in, the core's answers
+ * come out.
  *
  * One ops struct and one file each; backend.c has the list. A back end is driven by its owner's poll(2): it
  * has no threads, and nothing blocks. */

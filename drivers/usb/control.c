@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Control requests: chapter 9, strictly. Requests that the specification leaves open stall.
  *
- * Not supported, and said so by stalling: remote wake-up, latency tolerance messages, test modes (there is no
+ * These are not supported, and stall, too: remote wake-up, latency tolerance messages, test modes (there is no
  * transceiver to test), SET_DESCRIPTOR, SYNCH_FRAME (no isochronous endpoints). */
 
 #include "core/bytes.h"

@@ -19,7 +19,7 @@
 #include "drivers/usb/functionfs_private.h"
 
 /* MAX_TAKEN: completions before ep0 is looked at again, and MAX_EVENTS: events of ep0 within one call.
- * Whatever the kernel's answers are, both get their turn, and so does the owner. */
+ * Both get their turn at any answers of the kernel, and so does the owner. */
 enum { CLOSE_WAIT_MS = 500, MAX_TAKEN = 2 * FFS_SLOTS * FFS_MAX_PIPES, MAX_EVENTS = 64 };
 
 static void on_complete(void *ctx, struct usb_transfer *transfer)
@@ -173,9 +173,10 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
+    /* Reading makes poll(2) wait for the next change. It comes first, so that no change is missed between both reads. */
+    if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
     const int was = usb_device_configuration(self->device) != 0;
     const int is = gadget_is_configured(&self->gadget, was);
-    if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return; /* read: poll(2) waits for the next change */
     if (was && (hung_up || !is)) disable(self, !gadget_is_on_bus(&self->gadget));
     if (is && (hung_up || !was)) enable(self);
 }

@@ -67,8 +67,8 @@ uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given);
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
- * and ends when the host has taken none of the waiting bytes for one or two seconds. What the tty then still
- * holds can't be taken back. The next reader gets it first, cut within a stream frame, and then a frame of its
+ * and ends when the host has taken none of the waiting bytes for one or two seconds. Bytes that the tty then
+ * still holds can't be taken back. The next reader gets it first, cut within a stream frame, and then a frame of its
  * own that brings it into step. */
 struct ffs_console {
     struct usb_device *device;

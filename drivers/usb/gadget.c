@@ -28,7 +28,7 @@ static void unmount(const char *name)
     fclose(mounts);
 }
 
-/* Removes everything of that name, in the order that configfs allows. What is not there is skipped. */
+/* Removes everything of that name, in the order that configfs allows. Parts that are not there are skipped. */
 static void remove_all(const char *name)
 {
     static const struct {
@@ -172,11 +172,12 @@ static int write_string(const char *dir, const char *file, const struct usb_mode
     return index != 0 ? sysfile_write(dir, file, "%s", model->string[index - 1]) : 0;
 }
 
+/* Here and below the first failure ends it: each step needs those before it, and errno is its own. */
 static int write_os_descriptors(const char *dir, const struct usb_model *model)
 {
-    return sysfile_write(dir, "os_desc/use", "1") |
-           sysfile_write(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
-           sysfile_write(dir, "os_desc/qw_sign", "MSFT100") | sysfile_link(dir, "configs/c.1", "os_desc/c.1");
+    return sysfile_write(dir, "os_desc/use", "1") ||
+           sysfile_write(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) ||
+           sysfile_write(dir, "os_desc/qw_sign", "MSFT100") || sysfile_link(dir, "configs/c.1", "os_desc/c.1");
 }
 
 static int write_identity(const struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id)
@@ -184,25 +185,25 @@ static int write_identity(const struct gadget *gadget, const struct usb_model *m
     const char *dir = gadget->dir;
     if (sysfile_write(dir, "max_speed", "%s-speed", gadget_rate_name(id->highest)) != 0 && errno != ENOENT)
         return -1; /* since 5.12 */
-    return sysfile_write(dir, "idVendor", "0x%04x", id->vid) | sysfile_write(dir, "idProduct", "0x%04x", id->pid) |
-           sysfile_write(dir, "bcdUSB", usb_describe_ms_os(model, NULL, 0) != 0 ? "0x0210" : "0x0200") |
-           sysfile_write(dir, "bcdDevice", "0x%04x", model->bcd_device) |
-           sysfile_write(dir, "bDeviceClass", "0x%02x", model->class) |
-           sysfile_write(dir, "bDeviceSubClass", "0x%02x", model->subclass) |
-           sysfile_write(dir, "bDeviceProtocol", "0x%02x", model->protocol) | sysfile_mkdir(dir, "strings/0x409") |
-           write_string(dir, "strings/0x409/manufacturer", model, model->manufacturer) |
-           write_string(dir, "strings/0x409/product", model, model->product) |
+    return sysfile_write(dir, "idVendor", "0x%04x", id->vid) || sysfile_write(dir, "idProduct", "0x%04x", id->pid) ||
+           sysfile_write(dir, "bcdUSB", usb_describe_ms_os(model, NULL, 0) != 0 ? "0x0210" : "0x0200") ||
+           sysfile_write(dir, "bcdDevice", "0x%04x", model->bcd_device) ||
+           sysfile_write(dir, "bDeviceClass", "0x%02x", model->class) ||
+           sysfile_write(dir, "bDeviceSubClass", "0x%02x", model->subclass) ||
+           sysfile_write(dir, "bDeviceProtocol", "0x%02x", model->protocol) || sysfile_mkdir(dir, "strings/0x409") ||
+           write_string(dir, "strings/0x409/manufacturer", model, model->manufacturer) ||
+           write_string(dir, "strings/0x409/product", model, model->product) ||
            (id->serial[0] != '\0' ? sysfile_write(dir, "strings/0x409/serialnumber", "%s", id->serial) : 0);
 }
 
 static int write_configuration(const struct gadget *gadget, const struct usb_model *model)
 {
     const char *dir = gadget->dir;
-    return sysfile_mkdir(dir, "configs/c.1") |
-           sysfile_write(dir, "configs/c.1/bmAttributes", "0x%02x", usb_is_self_powered(model) ? 0xc0 : 0x80) |
-           sysfile_write(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) |
-           (model->configuration != 0 ? sysfile_mkdir(dir, "configs/c.1/strings/0x409") : 0) |
-           write_string(dir, "configs/c.1/strings/0x409/configuration", model, model->configuration) |
+    return sysfile_mkdir(dir, "configs/c.1") ||
+           sysfile_write(dir, "configs/c.1/bmAttributes", "0x%02x", usb_is_self_powered(model) ? 0xc0 : 0x80) ||
+           sysfile_write(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) ||
+           (model->configuration != 0 ? sysfile_mkdir(dir, "configs/c.1/strings/0x409") : 0) ||
+           write_string(dir, "configs/c.1/strings/0x409/configuration", model, model->configuration) ||
            (usb_describe_ms_os(model, NULL, 0) != 0 ? write_os_descriptors(dir, model) : 0);
 }
 

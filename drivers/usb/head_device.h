@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The head as a USB device, with one of its USB identities, called looks (personalities.h). Requests and data of the host begin
- * and end sessions; requests to a CDC-ACM port are answered.
+/* The head as a USB device, with one of its USB identities (personalities.h). Requests and data of the host begin and
+ * end sessions; requests to a CDC-ACM port are answered.
  *
  * Native: both the console and the stream take commands and give replies and stream frames. Sessions end when their
- * interface goes away; personalities.h says what else ends them. The request that begins the stream ends an open one first. */
+ * interface goes away; personalities.h says what else ends them. The request that begins the stream ends an open one
+ * first. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 

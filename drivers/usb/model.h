@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A USB device as data, and its descriptors.
  *
- * In: tables of interfaces, endpoints and strings. Out: descriptors as they go over the bus, for the core (usb.h) and for
- * back ends that hand them to a kernel. Formats: USB 2.0 and 3.2, chapter 9; Microsoft OS 2.0 Descriptors
+ * In: tables of interfaces, endpoints and strings. Out: descriptors as they go over the bus, for the core (usb.h) and
+ * for back ends that hand them to a kernel. Formats: USB 2.0 and 3.2, chapter 9; Microsoft OS 2.0 Descriptors
  * Specification. Numbers in structs are in host order. Pure; any thread. */
 #ifndef DRIVERS_USB_MODEL_H
 #define DRIVERS_USB_MODEL_H
@@ -53,7 +53,7 @@ struct usb_function_row {
 struct usb_model {
     uint8_t class, subclass, protocol; /* of the device */
     uint16_t bcd_device;
-    uint8_t self_powered; /* though it takes max_power_ma from the bus; 0 mA say so as well */
+    uint8_t self_powered; /* 1: though it takes max_power_ma from the bus; without such power it is in any case */
     uint16_t max_power_ma;
     const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
     uint8_t manufacturer, product; /* indices, 0 none; the serial number's is the one after the list */
@@ -78,8 +78,8 @@ struct usb_identity {
     enum usb_rate highest; /* fastest rate it can do */
 };
 
-/* ---- descriptors. Each writes at most `room`
- * bytes and returns the length of the whole, or 0 where the device has no such descriptor at this rate. */
+/* ---- descriptors. Each function writes at most `room` bytes and returns the length of the whole, or 0 where the
+ * device has no such descriptor at this rate. */
 
 size_t usb_describe_device(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
                            uint8_t *out, size_t room);

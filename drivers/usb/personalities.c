@@ -6,7 +6,7 @@
 /* bInterfaceProtocol: not 1, which means AT commands. Modem managers send these to every port of protocol 1. */
 enum { PORT_PROTOCOL = USB_CDC_PROTO_NONE };
 
-/* ---- a CDC-ACM port, on interfaces 0 and 1: the console of the native look, all of the hokuyo look */
+/* ---- a CDC-ACM port, on interfaces 0 and 1: the console of the native identity, all of the hokuyo identity */
 
 /* clang-format off */
 static const uint8_t port_extra[] = {

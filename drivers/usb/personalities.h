@@ -9,8 +9,8 @@
  *
  * Sources. URG series: ids, strings and "no serial number" as heads of several years report them to Linux
  * (UrgNetwork/urg_library issue 29; udev rules in use name the strings). TiM: `lsusb -v` of a TiM571
- * (uos/sick_tim issue 29); endpoints as sick_tim uses them. Not known of the URG, and so taken from the native look,
- * are the endpoints' numbers and sizes, and the power it asks for. */
+ * (uos/sick_tim issue 29); endpoints as sick_tim uses them. The endpoints' numbers and sizes of the URG, and the power
+ * that it asks for, are not known: they are taken from the native identity. */
 #ifndef DRIVERS_USB_PERSONALITIES_H
 #define DRIVERS_USB_PERSONALITIES_H
 
@@ -26,13 +26,13 @@ enum {
     SCANHEAD_USB_PROTOCOL = 0x48,
 };
 
-/* Numbers of the native look. The port of the hokuyo look has those of the console. */
+/* Numbers of the native identity. The port of the hokuyo identity has those of the console. */
 enum { CONSOLE_INTERFACE, CONSOLE_DATA_INTERFACE, STREAM_INTERFACE };
 enum { CONSOLE_NOTIFY = 0x82, CONSOLE_IN = 0x81, CONSOLE_OUT = 0x01, STREAM_IN = 0x83, STREAM_OUT = 0x03 };
-/* Numbers of the sick look. */
+/* Numbers of the sick identity. */
 enum { TELEGRAM_INTERFACE = 0, TELEGRAM_IN = 0x81, TELEGRAM_OUT = 0x02 };
 
-/* What begins a session. */
+/* Events that begin a session. */
 enum usb_begins {
     USB_BEGINS_DTR = 1 << 0,     /* of a CDC-ACM port: the host raises DTR; dropping it ends the session */
     USB_BEGINS_REQUEST = 1 << 1, /* SCANHEAD_USB_STREAM, wValue 1; wValue 0 ends it */
@@ -62,6 +62,6 @@ struct usb_personality {
 /* NULL for an unknown id. */
 const struct usb_personality *usb_personality_get(enum usb_personality_id id);
 
-extern const struct usb_model scanhead_usb_model; /* of the native look */
+extern const struct usb_model scanhead_usb_model; /* of the native identity */
 
 #endif

@@ -16,6 +16,10 @@ int sysfile_write(const char *dir, const char *file, const char *fmt, ...)
     va_start(ap, fmt);
     int len = vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
+    if (len < 0 || (size_t)len >= sizeof text) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
     snprintf(path, sizeof path, "%s/%s", dir, file);
     int fd = open(path, O_WRONLY | O_CLOEXEC);
     if (fd < 0) return -1;

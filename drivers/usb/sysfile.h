@@ -5,6 +5,7 @@
 
 #include <stddef.h>
 
+/* At most 127 bytes. */
 int sysfile_write(const char *dir, const char *file, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 /* The first line, without its end. */
 int sysfile_read(const char *dir, const char *file, char *text, size_t len);

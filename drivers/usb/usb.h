@@ -72,8 +72,8 @@ struct usb_hooks {
 
 struct usb_device;
 
-/* model, identity's content and hooks as above; complete(host_ctx, transfer) is the back end's and set with
- * usb_device_attach. SH_EINPUT when the model contradicts itself. */
+/* Makes a device, which is not plugged in yet. The model and ctx outlive it; identity and hooks are copied. SH_EINPUT
+ * when the model contradicts itself. */
 int usb_device_create(const struct usb_model *model, const struct usb_identity *id, const struct usb_hooks *hooks,
                       void *ctx, struct usb_device **out, struct sh_err *err);
 /* Detaches first. */
@@ -132,7 +132,8 @@ double usb_device_slow_ms(const struct usb_device *device);
 /* Makes the configuration descriptor claim n bytes more than it has, with back ends that ask the core for it. */
 void usb_device_lengthen(struct usb_device *device, uint32_t n);
 
-/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
+/* ---- for functions. An endpoint that is not there, or is halted, has no room and nothing to read. A suspended device
+ * has no room. */
 
 /* Bytes taken by waiting IN transfers, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);

@@ -50,7 +50,7 @@ static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_sta
 
 static void stop_pipe(struct usb_device *device, struct usb_pipe *pipe)
 {
-    pipe->row = NULL;
+    pipe->row = NULL; /* before the flush: a transfer that complete() submits again ends at once */
     pipe->halted = pipe->zero_due = 0;
     pipe->shorten = 0;
     pipe->gone_due = 0;
@@ -76,7 +76,7 @@ void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why
     const int n = device->model->n_interfaces;
     enum usb_state before = device->state;
     device->state = state;
-    device->end = why;
+    device->end = why; /* before interfaces end: their hook asks for it */
     for (int i = 0; i < n && before == USB_CONFIGURED; i++)
         set_interface(device, (unsigned)i, 0);
     memset(device->alt, 0, sizeof device->alt);

@@ -164,7 +164,8 @@ static int sweep(struct usbip *self)
 static int attach_again(struct usbip *self)
 {
     struct sh_err err = {0, ""};
-    if (attach_here(self, &err) == SH_OK) return usb_retry_done(&self->retry);
+    const int is_attached = self->conn[0].fd >= 0; /* the end of an injected fault has plugged it in meanwhile */
+    if (is_attached || attach_here(self, &err) == SH_OK) return usb_retry_done(&self->retry);
     usb_retry_failed(&self->retry, err.text);
     return SH_OK;
 }

@@ -41,7 +41,7 @@ void usbip_queue_clear(struct usbip_conn *conn);
 
 /* ---- usbip_ops.c */
 
-/* Number of bytes that the operation needs, as far as those in conn->head tell. */
+/* Number of bytes that the operation needs, as far as those in conn->head say it. */
 uint32_t usbip_op_need(const struct usbip_conn *conn);
 /* Carries out the operation, whose bytes are all in conn->head. */
 void usbip_op_take(struct usbip_conn *conn);

@@ -143,7 +143,7 @@ static void on_bulk(void *priv, uint64_t id, struct usb_redir_bulk_packet_header
     usb_device_submit(self->device, &transfer->transfer);
 }
 
-/* OUT only; IN is received as started. The model has none so far, and then it is refused as not there. */
+/* The packet is an OUT; IN packets are received as started. No model has such an endpoint, so each is refused. */
 static void on_interrupt(void *priv, uint64_t id, struct usb_redir_interrupt_packet_header *header, uint8_t *data,
                          int len)
 {

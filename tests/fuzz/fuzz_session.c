@@ -78,6 +78,14 @@ static int64_t next_fix_ns(void *ctx, int64_t t_ns)
     return (t_ns + 999999999) / 1000000000 * 1000000000;
 }
 
+static enum protocol_pps pps(void *ctx, int64_t t_ns, int64_t *hour_ns)
+{
+    (void)ctx;
+    const int has_utc = rig.utc0_ns != INT64_MIN;
+    *hour_ns = ((has_utc ? rig.utc0_ns : 0) + t_ns) % INT64_C(3600000000000);
+    return has_utc ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
+}
+
 /* Opens a session without clearing the rig's megabytes. */
 static void open_session(enum protocol_id id, unsigned how)
 {
@@ -101,7 +109,7 @@ static void open_session(enum protocol_id id, unsigned how)
     snprintf(rig.identity.name, sizeof rig.identity.name, "rig");
     rig.spec = (struct protocol_spec){
         .identity = &rig.identity,
-        .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns, NULL, date_ns},
+        .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns},
         .session = 1,
         .fixes_hz = 1,
         .near_wrap = how & 64 ? 3 : 0,

@@ -29,6 +29,8 @@ static void test_kinds(void **state)
         assert_string_equal(kind_of(lines[i]), "lines");
     assert_string_equal(kind_of("GET / HTTP/1.1\r\nHost: x\r\n\r\n"), "bytes");
     assert_string_equal(kind_of("HEAD /CR0 HTTP/1.0\r\n\r\n"), "bytes");
+    assert_string_equal(talk_kind_of((const uint8_t *)"\0\0\0\5\n", 5)->name, "bytes");
+    assert_string_equal(talk_kind_of((const uint8_t *)"a\0b\n", 4)->name, "bytes"); /* NUL is no text */
 }
 
 /* A client that sends nothing gets nothing. */

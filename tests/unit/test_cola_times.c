@@ -286,6 +286,53 @@ static void a_poll_gets_the_last_scan(void **state)
     cola_expect("sRN LMDscandata", "sFA 4");
 }
 
+/* Somebody stops the head before the first scan has come: it is started again, since a poll waits. After that scan a
+ * stop is meant. Where the start is refused, it is tried once. */
+static void a_waiting_poll_starts_the_head_again(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply refused[] = {
+        {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
+    cola_open_lms();
+    cola_head_state("idle");
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    assert_string_equal(cola.line[1], "SCAN:START");
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 1000000000);
+    assert_int_equal(cola.n_lines, 2);
+    assert_string_equal(cola.line[1], "SCAN:START");
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 1001000000);
+    assert_int_equal(cola.n_lines, 0); /* ten times a second at most */
+    cola_turn(41, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 9000000000);
+    assert_int_equal(cola.n_lines, 0);
+    cola_close();
+    cola_open_lms();
+    cola.replies = refused;
+    cola_expect("sRN LMDscandata", "sFA 4");
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 1000000000);
+    assert_int_equal(cola.n_lines, 0);
+}
+
+/* Two polls wait for the first scan: each answer has the form of its request. */
+static void waiting_polls_keep_their_forms(void **state)
+{
+    (void)state;
+    uint8_t frame[64];
+    cola_open_lms();
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    cola_input(frame, cola_frame_b(frame, "sRN LMDscandata", 15));
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.n_units, 2);
+    assert_memory_equal(cola.bytes, "\2sRA", 4);
+    assert_memory_equal(cola.bytes + cola.end[0], "\2\2\2\2", 4);
+}
+
 static void every_nth_scan_on_request(void **state)
 {
     (void)state;
@@ -349,6 +396,8 @@ int main(void)
         CASE(what_nobody_asked_for_is_not_lost),
         CASE(a_client_that_does_not_read_loses_whole_scans),
         CASE(a_poll_gets_the_last_scan),
+        CASE(a_waiting_poll_starts_the_head_again),
+        CASE(waiting_polls_keep_their_forms),
         CASE(every_nth_scan_on_request),
         CASE(the_stream_has_the_chosen_form),
     };

@@ -370,6 +370,7 @@ static void heads_that_it_can_t_read(void **state)
                 {16, 0, 15, 16, 0, 65536},       {16, 0, 15, -1, 0, 65536},
                 {16, 0, 15, 15, 1, 65536},       {16, 0, 15, 6, 0, 0},
                 {0x20000000, 0, 9, 6, 0, 65536}, {16, INT32_MIN, INT32_MAX, 6, 0, 9}};
+    struct sh_err err;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         open_head(-1, 0);
         protocol_rig_planar(&rig, rows[i].steps, rows[i].first, rows[i].last, rows[i].front, -1, 10);
@@ -377,6 +378,8 @@ static void heads_that_it_can_t_read(void **state)
         rig.descriptor.pan_counts_per_turn = rows[i].pan_counts;
         protocol_rig_describe(&rig, 0);
         assert_int_equal(scan.head.known, rows[i].known);
+        if (protocol_ops_get(PROTOCOL_COLA)->check_head(&rig.descriptor, &rig.emitter, NULL, &err) == SH_OK)
+            assert_int_equal(rows[i].known, 1);
         part(0, 0, 3);
         line_end(0, 0);
         if (!rows[i].known) expect(0, 0, 0);

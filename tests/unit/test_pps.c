@@ -56,6 +56,9 @@ static void absent_without_a_first_pulse(void **state)
     pps_power_up(&pps, at(0), 0, 1);
     expect(&pps, SECOND + PPS_TOLERANCE_NS, PROTOCOL_PPS_SYNCHRONISING, SECOND + PPS_TOLERANCE_NS);
     expect(&pps, SECOND + PPS_TOLERANCE_NS + 1, PROTOCOL_PPS_ABSENT, SECOND + PPS_TOLERANCE_NS + 1);
+    pps_power_up(&pps, at(2 * SECOND), -1, 0); /* UTC from before 1970: the hour begins where UTC's does */
+    expect(&pps, 2 * SECOND, PROTOCOL_PPS_ABSENT, 3600 * SECOND - 1);
+    expect(&pps, 2 * SECOND + 1, PROTOCOL_PPS_ABSENT, 0);
     pps_power_up(&pps, at(2 * SECOND), 0, 0);
     expect(&pps, 2 * SECOND, PROTOCOL_PPS_ABSENT, 0);
     pps_take(&pps, at(3 * SECOND));

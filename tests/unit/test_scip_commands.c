@@ -255,6 +255,7 @@ static void motor_speed(void **state)
                                            at9[] = {{"HEAD:LINES? DEF", "10", 0},
                                                     {"HEAD:LINES?", "9.1", 0},
                                                     {NULL, NULL, 0}},
+                                           thirds[] = {{"HEAD:LINES?", "33.333333", 0}, {NULL, NULL, 0}},
                                            narrow[] = {
                                                {"HEAD:LINES?", "10", 0}, {"HEAD:LINES ", "ERR", -222}, {NULL, NULL, 0}};
     scip_open("URG-04LX");
@@ -277,12 +278,38 @@ static void motor_speed(void **state)
     rig.bytes[rig.len] = 0;
     assert_non_null(strstr((char *)rig.bytes, "\nSCSP:Initial(546[rpm]);"));
     protocol_rig_clear(&rig);
-    protocol_rig_input(&rig, "RS\nRS\n");
-    assert_int_equal(rig.n_lines, 1); /* once is enough */
-    assert_string_equal(rig.line[0], "HEAD:LINES DEF");
-    scip_expect("RS\n00P\n\nRS\n00P\n\n");
+    rig.replies = thirds; /* a rate that 100 does not divide */
+    scip_ask("CR00\n", "CR00\n03S\n\n");
+    protocol_rig_input(&rig, "CR01\n");
+    assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:LINES 32.999999");
+    scip_expect("CR01\n00P\n\n");
     rig.replies = narrow;
     scip_ask("CR10\n", "CR10\n04T\n\n");
+    scip_close();
+}
+
+/* RS and RT bring the speed back, also one that an earlier session has set. */
+static void speed_is_reset(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply at10[] = {{"HEAD:LINES?", "10", 0}, {NULL, NULL, 0}},
+                                           at9[] = {{"HEAD:LINES? DEF", "10", 0},
+                                                    {"HEAD:LINES?", "9.1", 0},
+                                                    {NULL, NULL, 0}};
+    scip_open("URG-04LX");
+    rig.replies = at9;
+    protocol_rig_input(&rig, "RS\n");
+    assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:LINES DEF");
+    scip_expect("RS\n00P\n\n");
+    rig.replies = at10;
+    protocol_rig_input(&rig, "RS\n");
+    for (uint32_t i = 0; i < rig.n_lines; i++)
+        assert_string_not_equal(rig.line[i], "HEAD:LINES DEF");
+    scip_close();
+    scip_open("UTM-30LX"); /* it has no CR, and so another speed is not this client's affair */
+    rig.replies = at9;
+    scip_ask("RS\n", "RS\n00P\n\n");
+    assert_int_equal(rig.n_lines, 0);
     scip_close();
 }
 
@@ -355,6 +382,7 @@ int main(void)
         cmocka_unit_test(time_adjustment),
         cmocka_unit_test(bit_rate),
         cmocka_unit_test(motor_speed),
+        cmocka_unit_test(speed_is_reset),
         cmocka_unit_test(reset_and_reboot),
         cmocka_unit_test(heads_that_dont_fit),
     };

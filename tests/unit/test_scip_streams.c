@@ -32,7 +32,6 @@ static void skipped_scans(void **state)
     check_turns("MD0000108000999", "9:98 ");
 }
 
-/* A turn that is left out may as well be broken. */
 /* Another client stops the head, and a client asks for scans while the last ones still come. */
 static void asked_while_it_stops(void **state)
 {
@@ -60,6 +59,7 @@ static void asked_while_it_stops(void **state)
     scip_close();
 }
 
+/* A turn that is left out may as well be broken. */
 static void skipped_and_broken(void **state)
 {
     (void)state;
@@ -408,6 +408,12 @@ static void played_malfunctions(void **state)
     turns_of_a_stream(&line, 25);
     check_played("00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:50 ");
     scip_ask("RS\nBM\n", "RS\n00P\n\nBM\n00P\n\n");
+    scip_ask("DB03\nMD0000108000000\n", "DB03\n00P\n\nMD0000108000000\n00P\n\n");
+    turns_of_a_stream(&line, 14); /* it ends within the second phase, and the next one has all three */
+    protocol_rig_clear(&rig);
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    turns_of_a_stream(&line, 21);
+    check_played("00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:21 00:98 ");
     scip_close();
 }
 

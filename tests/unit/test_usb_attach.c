@@ -96,6 +96,25 @@ static void test_usbip_refused(void **state)
     assert_non_null(strstr(err.text, "no such module"));
 }
 
+/* Within the time between two attempts an injected fault unplugs the device and plugs it in. It is plugged in once:
+ * vhci_attach fails the test where the end before was not taken. */
+static void test_unplugged_meanwhile(void **state)
+{
+    (void)state;
+    struct bench bench = open_attached(1);
+    struct client c = host_of(&bench);
+    const int attempts = vhci.attempts;
+    close(c.fd);
+    assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
+    expect_notice(&bench, "detached");
+    assert_int_equal(bench.ops->fault(bench.link, LINK_FAULT_UNPLUG, 0, 0, 0.0), 0);
+    assert_int_equal(bench.ops->fault(bench.link, LINK_FAULT_PLUG, 0, 0, 0.0), 0);
+    expect_notice(&bench, "plugged in again");
+    assert_int_equal(vhci.attempts, attempts + 1);
+    close(host_of(&bench).fd);
+    bench_close(&bench);
+}
+
 /* Between attempts nothing spins: the head's owner may stop it, and the processor rests. */
 static void test_pace(void **state)
 {
@@ -117,6 +136,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_usbip),
         cmocka_unit_test(test_usbip_refused),
+        cmocka_unit_test(test_unplugged_meanwhile),
         cmocka_unit_test(test_pace),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -218,27 +218,11 @@ static void test_packet_rate(void **state)
     }
 }
 
-static int64_t before_1970(void *ctx, int64_t t_ns)
-{
-    (void)ctx;
-    return t_ns - INT64_C(7200000000000) - 1;
-}
-
-/* The epoch may be any: the hour begins where UTC's does. */
-static void test_before_1970(void **state)
-{
-    (void)state;
-    const struct protocol_host host = {.utc_ns = before_1970};
-    assert_int_equal(velodyne_hour_us(&host, 0), 3599999999);
-    assert_int_equal(velodyne_hour_us(&host, 1001), 1);
-}
-
 static const struct CMUnitTest tests[] = {
     cmocka_unit_test_setup_teardown(test_bytes_of_a_packet, setup, teardown),
     cmocka_unit_test_setup_teardown(test_client_gets_what_was_measured, setup, teardown),
     cmocka_unit_test_setup_teardown(test_azimuth_wraps, setup, teardown),
     cmocka_unit_test_setup_teardown(test_times_over_an_hour, setup, teardown),
-    cmocka_unit_test(test_before_1970),
     cmocka_unit_test_setup_teardown(test_time_of_the_first_firing, setup, teardown),
     cmocka_unit_test_setup_teardown(test_packet_rate, setup, teardown),
 };

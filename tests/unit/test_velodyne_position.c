@@ -160,6 +160,17 @@ static void test_without_utc(void **state)
         assert_int_equal(packet(0)[i], 0);
 }
 
+/* After a power cycle the seconds since the calibration, whose reason is power-on, count from its end. */
+static void test_after_power_cycle(void **state)
+{
+    (void)state;
+    rig.spec.power_ns = INT64_C(5000000000);
+    open_again(rig.spec.power_ns);
+    rig.ops->time(rig.protocol, INT64_C(7500000000)); /* the last packet before it is at 7.487521 s */
+    assert_int_equal(packet(rig.n_units - 1)[0xc4], 1);
+    assert_int_equal(u32(packet(rig.n_units - 1) + 0xc0), 2);
+}
+
 /* UTC is known, but the receiver gives no position: locked, without a sentence. */
 static void test_without_fix(void **state)
 {
@@ -216,9 +227,15 @@ static void test_after_a_long_silence(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_fields),           TEST(test_pulses_per_second),    TEST(test_rate),
-        TEST(test_without_utc),      TEST(test_without_fix),          TEST(test_fix_of_the_packet),
-        TEST(test_longest_sentence), TEST(test_after_a_long_silence),
+        TEST(test_fields),
+        TEST(test_pulses_per_second),
+        TEST(test_rate),
+        TEST(test_without_utc),
+        TEST(test_after_power_cycle),
+        TEST(test_without_fix),
+        TEST(test_fix_of_the_packet),
+        TEST(test_longest_sentence),
+        TEST(test_after_a_long_silence),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,11 +7,13 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "drivers/usb/sysfile.h"
 #include "drivers/usb/vhci.h"
 
 static const char STATUS[] = "hub port sta spd dev      sockfd local_busid\n"
@@ -98,11 +100,30 @@ static void test_refusals(void **state)
     assert_null(strchr(err.text, '\n'));
 }
 
+/* A value for such a file is written whole or not at all: half of a name would be another one. */
+static void test_long_values(void **state)
+{
+    (void)state;
+    char text[256], back[256];
+    memset(text, 'x', sizeof text);
+    for (size_t len = 127; len < 130; len++) {
+        put("status", "");
+        text[len] = '\0';
+        errno = 0;
+        assert_int_equal(sysfile_write(dir, "status", "%s", text), len == 127 ? 0 : -1);
+        if (len > 127) assert_int_equal(errno, ENAMETOOLONG);
+        assert_int_equal(sysfile_read(dir, "status", back, sizeof back), 0);
+        assert_int_equal(strlen(back), len == 127 ? 127 : 0);
+        text[len] = 'x';
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_attach, setup, teardown),
         cmocka_unit_test_setup_teardown(test_refusals, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_long_values, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -145,8 +145,8 @@ local KINDS = {
   text = {nil, ProtoField.string},
 }
 
--- A table of the protocol's pages: {name, kind, title, unit or names of values, count}. The fourth is the width for a text; for
--- `hex` and `zero` it gives the known bits: the bits above them are reserved.
+-- A table of the protocol's pages: {name, kind, title, unit or names of values, count}. The fourth is the width for a
+-- text; for `hex` and `zero` it gives the known bits: the bits above them are reserved.
 local function rows_of(prefix, rows)
   local at = 0
   for _, row in ipairs(rows) do
@@ -334,7 +334,8 @@ local COLOUR_FIELDS = {add_field("colour.red", ProtoField.uint8, "Red"),
                        add_field("colour.green", ProtoField.uint8, "Green"),
                        add_field("colour.blue", ProtoField.uint8, "Blue")}
 local WAVE_FIELDS = {}
-for i, row in ipairs({{"pulse", ProtoField.uint64, "Pulse"}, {"dt_ns", ProtoField.uint32, "Fired after the points' first"},
+for i, row in ipairs({{"pulse", ProtoField.uint64, "Pulse"},
+                      {"dt_ns", ProtoField.uint32, "Fired after the points' first"},
                       {"first", ProtoField.uint32, "First sample"}, {"n", ProtoField.uint16, "Samples"},
                       {"range_m", real("m"), "Range of the first sample"},
                       {"line_deg", real("°"), "Line angle"}, {"pan_deg", real("°"), "Pan angle"},
@@ -1048,7 +1049,8 @@ local function put_payload(tree, tvb, bytes, at, h, m)
     tree:add_proto_expert_info(E.type_unknown)
     return
   end
-  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at, m.has_deviations) end -- it was not there at the first look
+  -- At the first look it was not there.
+  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at, m.has_deviations) end
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
   if h.type == TELEMETRY and h.length >= 104 then put_rows(tree, ROWS.lost_lines, tvb, at + 96, 8) end
