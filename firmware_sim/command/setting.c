@@ -74,7 +74,7 @@ static uint32_t insert(int64_t *value, uint32_t n, int64_t another)
     return n + 1;
 }
 
-/* The line rates at the present step, or the steps at the present line rate. */
+/* Lists the line rates at the present step, or the steps at the present line rate. */
 static uint32_t fixed_geometries(const struct command_call *call, int64_t *value)
 {
     const struct head_limits *l = &call->dev->limits;
@@ -117,7 +117,7 @@ static int64_t rate_of_lines(const struct command_call *call)
     return call->dev->settings.lines_uhz * head_line_pulses(&call->dev->limits, &call->dev->settings);
 }
 
-/* Moves the ends inward: MIN and MAX must be stations of this head. */
+/* Moves the ends of a range inward, since MIN and MAX must be stations of this head. */
 static void narrow_to_stations(const struct command_call *call, int64_t *min, int64_t *max)
 {
     while (*min < *max && head_is_elsewhere(&call->dev->limits, *min))
@@ -336,8 +336,8 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || !can_vary));
 }
 
-/* Whether a value beyond MAX is the step of DEF. The rates of power-up may give two different steps, and the coarser
- * one may be beyond MAX. As a number it does what DEF does, if DEF gives this step. */
+/* Whether a step beyond MAX is that of DEF. The rates of power-up may give two different steps, in the line and of the
+ * pan, and the coarser one may be beyond MAX. Such a number does what DEF does. */
 static int is_default_beyond(const struct command_call *call, int64_t value)
 {
     struct head_settings then = call->dev->defaults;

@@ -17,7 +17,7 @@ static const struct {
     double most; /* of its absolute value */
 } parts[6] = {{"x", 1e9}, {"y", 1e9}, {"z", 1e9}, {"roll", 360.0}, {"pitch", 90.0}, {"heading", 360.0}};
 
-/* The number at text, up to a comma or the end; returns what follows, or NULL. */
+/* Reads the number at text, which a comma or the end follows. Returns the place after it; NULL: there is no number. */
 static const char *step_pose_take_number(const char *text, double *value)
 {
     struct command_decimal decimal;

@@ -2,7 +2,7 @@
 /* `TIME:SHIFt` and `TIME:SERVer`: the clock of a scanner that keeps a date of its own, and the time server that sets
  * it.
  *
- *   TIME:SHIFt ns                             sets what the clock is ahead of that of power-up
+ *   TIME:SHIFt ns                             sets how far the clock is ahead of that of power-up
  *   TIME:SERVer role,address,update,zone,interface
  *                                             NONE, CLIENT or SERVER; a numeric IPv4 address; s; h; ETH or CAN
  *   TIME:SERVer?                              the same

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks that concern more than one key, or files: limits of the head profile, order of angles, files, keys of
- * links and platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
+/* Checks that concern more than one key, or files: limits of the head profile, order of angles, meshes, output, beam,
+ * time. cfg_check has the order of these checks and of those in the other files. */
 #include "firmware_sim/config/check.h"
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/check_head.h"

@@ -56,7 +56,7 @@ int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
     return -1;
 }
 
-/* ", as line 12 has it", where a key is given. buf holds 40. */
+/* Writes " (line 12)" or " (--set)": where a key, or else its section, is given. buf holds 40. */
 static const char *link_protocol_place_of(const struct cfg_reader *rd, const char *path, char *buf)
 {
     int line = cfg_where(rd, cfg_find(&rd->table, path), 0);

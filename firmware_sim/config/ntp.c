@@ -32,6 +32,7 @@ void cfg_check_ntp(struct cfg_reader *rd, const struct config *cfg)
         CFG_SOUND(rd, 0, "ntp.role", "links[].protocol"))
         cfg_fail_key(rd, "ntp.role", 0, "client, but no link sends dates; allowed with a link of protocol: cola");
     if (ntp->role == NTP_ROLE_CLIENT && cfg->loop.pace != PACE_REALTIME && CFG_SOUND(rd, 0, "ntp.role", "loop.pace"))
-        cfg_fail_key(rd, "ntp.role", 0, "client, but loop.pace is %s; allowed with realtime, since a server's time is",
+        cfg_fail_key(rd, "ntp.role", 0,
+                     "client, but loop.pace is %s; allowed with realtime, as a server's time runs on",
                      cfg_word(rd, "loop.pace", (int)cfg->loop.pace));
 }

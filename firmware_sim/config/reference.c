@@ -29,7 +29,7 @@ static const char *type_name(const struct cfg_key *key)
     return names[key->type];
 }
 
-/* Within 100 columns; each line begins with `indent` blanks and `mark`. */
+/* Prints a text within 100 columns; each line begins with `indent` blanks and `mark`. */
 static void print_wrapped(const char *text, int indent, const char *mark, FILE *out)
 {
     enum { WIDTH = 100 };

@@ -80,7 +80,7 @@ int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
     return code;
 }
 
-/* The key, or a section around it, is bad. */
+/* Whether the key, or a section around it, is bad. */
 static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
 {
     char path[CFG_PATH_MAX];
@@ -92,7 +92,7 @@ static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
     return 0;
 }
 
-/* A key below the section is bad; in a list, a key of this item. */
+/* Whether a key below the section is bad; in a list, a key of this item. */
 static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
 {
     const size_t len = strlen(section);
@@ -146,8 +146,8 @@ const char *cfg_show(const char *text, char *buf)
     return buf;
 }
 
-/* A known key that the writer may have meant: in this section one that differs in a letter or two or is cut short, or
- * the same word in another section. */
+/* Finds the known key that the writer may have meant. In this section it differs in a letter or two, or one of the two
+ * words begins the other. In another section it is the same word. NULL: there is none. */
 static const struct cfg_key *suggest(const struct cfg_table *table, const char *parent, const char *word)
 {
     const struct cfg_key *best = NULL;

@@ -73,8 +73,8 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
     forget_row(rd, key);
 }
 
-/* With a profile of its own, the scanner drops the file's settings of the head and the errors of its instrument: they
- * belong to another head. */
+/* Where the scanner has a profile of its own, the file's settings of the head and errors of its instrument are dropped:
+ * they belong to another head. */
 void cfg_end_scanner(struct cfg_reader *rd)
 {
     if (!rd->own[cfg_row(rd, cfg_find(&rd->table, "head.profile"))]) return;

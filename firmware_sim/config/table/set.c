@@ -21,8 +21,8 @@ struct set {
     int has_item;
 };
 
-/* An element number, "[2]" or ".2", at p: its end, or NULL when there is none. Numbers above the lists'
- * limits come out as CFG_MAX_ITEMS. */
+/* Reads an element number, "[2]" or ".2", at p. Returns its end, or NULL where there is none. A number above the
+ * limits of all lists becomes CFG_MAX_ITEMS. */
 static const char *scan_item(const char *p, uint32_t *item)
 {
     int bracket = *p == '[';
@@ -147,7 +147,7 @@ static int enter_scanner(struct cfg_reader *rd, struct set *set)
     return 0;
 }
 
-/* A value of YAML replaces the list or the section; keys that it doesn't name get their defaults. */
+/* Replaces a list or a section by a value of YAML. Keys that the value doesn't name get their defaults. */
 static void replace(struct cfg_reader *rd, struct cfg_document *doc, const struct set *set, const struct cfg_key *key,
                     const char *text, int n_before)
 {

@@ -95,7 +95,7 @@ double cfg_real_figure(const struct config_profile *profile, const char *path)
     return value;
 }
 
-/* A limit that a profile gives: its own figure, or, without a profile, the limit of all profiles. */
+/* Writes the limit that a profile gives: its figure, or, without a profile, the limit of all profiles. */
 static void profile_limit(const char *path, double any, const struct config_profile *profile, char *buf)
 {
     if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? 1e-6 * (double)cfg_figure(profile, path) : any);
@@ -225,7 +225,7 @@ static int store_word(const struct place *at, void *dst, const char *text)
     return refuse(at, text, "not known");
 }
 
-/* For the command line; libyaml checks files. */
+/* libyaml checks files; this is for values of the command line. */
 static int is_utf8(const char *text)
 {
     yaml_document_t doc;
@@ -252,7 +252,7 @@ static int store_text(const struct place *at, char *dst, const char *text, const
     return SH_OK;
 }
 
-/* "[1, 2, 3]", "1,2,3": from --set and defaults. */
+/* Stores "[1, 2, 3]" or "1,2,3", as --set and defaults have them. */
 static int store_vec3_text(struct place *at, const char *text)
 {
     const int last = cfg_axes(at->key) - 1;
