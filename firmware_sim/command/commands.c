@@ -242,7 +242,7 @@ static int act_reset(struct command_call *call)
 {
     if (act_event(call, COMMAND_RESET) != 0) return -1;
     call->dev->settings = call->dev->defaults;
-    call->dev->server = call->dev->server_default;
+    command_server_set(call->dev, &call->dev->server_default);
     return 0;
 }
 

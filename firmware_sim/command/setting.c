@@ -200,14 +200,17 @@ static int check_has(struct command_call *call)
     return why == NULL ? 0 : command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
 }
 
+int command_setting_is_known(const struct command_call *call)
+{
+    const struct command_setting *setting = call->row->setting;
+    const int64_t unknown = setting->is_u32 ? (int64_t)COMMAND_NOT_RECORDED_U32 : COMMAND_NOT_RECORDED;
+    return call->dev->recorded == NULL || setting->derived != NULL || read_value(call, &call->dev->settings) != unknown;
+}
+
 /* Fails with -221 where a recording is replayed that does not have the setting. */
 static int check_known(struct command_call *call)
 {
-    const struct command_setting *setting = call->row->setting;
-    if (call->dev->recorded == NULL || setting->derived != NULL) return 0;
-    if (read_value(call, &call->dev->settings) !=
-        (setting->is_u32 ? (int64_t)COMMAND_NOT_RECORDED_U32 : COMMAND_NOT_RECORDED))
-        return 0;
+    if (command_setting_is_known(call)) return 0;
     return command_fail(call, CMD_E_SETTINGS, "%s: the recording does not have this value", call->row->header);
 }
 

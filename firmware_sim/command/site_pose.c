@@ -47,7 +47,7 @@ static int site_pose_take_number(struct command_call *call, int i, const char *f
         return command_fail(call, CMD_E_SUFFIX, "'%s'; %s of %s takes %s", clip, parts[i].name, call->row->header,
                             parts[i].unit);
     }
-    *value = strtod(field, NULL) + 0.0; /* without -0 */
+    *value = command_decimal_to_double(&decimal) + 0.0; /* without -0 */
     if (fabs(*value) <= parts[i].most) return 0;
     return command_fail(call, CMD_E_RANGE, "%s: %s %.9g, allowed %.10g to %.10g %s", call->row->header, parts[i].name,
                         *value, -parts[i].most, parts[i].most, parts[i].unit[0] == 'M' ? "m" : "deg");

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The pose that a step may carry. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/vec3.h"
@@ -24,7 +23,7 @@ static const char *step_pose_take_number(const char *text, double *value)
     text += strspn(text, " \t");
     const char *end = command_parse_decimal(text, &decimal);
     if (end == NULL || (*end != ',' && *end != '\0')) return NULL;
-    *value = strtod(text, NULL);
+    *value = command_decimal_to_double(&decimal);
     return end;
 }
 

@@ -19,5 +19,9 @@ int command_shift_query(struct command_call *call);
 int command_shift_change(struct command_call *call);
 int command_server_query(struct command_call *call);
 int command_server_change(struct command_call *call);
+struct command_device;
+struct command_time_server;
+/* Gives a scanner another time server; n_roles goes on counting. */
+void command_server_set(struct command_device *dev, const struct command_time_server *server);
 
 #endif
