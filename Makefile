@@ -398,10 +398,13 @@ CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight char
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
-# Effects that are configured and not needed cost at most 5 % beside the plain cast.
-bench-plain: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
-	@$(BUILD)/tests/bench/plain
+# Each of these runs one program. plain: effects that are configured and not needed cost at most 5 % beside the plain
+# cast. copies: a forest of copies, its memory, and what a ray costs beside one tree. velodyne: the encoder of VLP-16
+# data packets, ns a firing. waves: waveforms on the wire, ns a window.
+#? bench-waveform    samples of full waveforms: ns a pulse by spread and window
+bench-plain bench-copies bench-velodyne bench-waves bench-waveform: bench-%: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/$*
+	@$(BUILD)/tests/bench/$*
 # A panorama of 0.1 degrees to files on one processor, beside Embree alone; last, PLY with coordinates as float alone.
 PANORAMA = taskset -c $(shell expr $(JOBS) - 1) $(BUILD)/tests/bench/panorama --set loop.threads=1
 bench-panorama: deps-build
@@ -417,18 +420,6 @@ bench-page: deps-build deps-browser
 page-pictures: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
 	@SCANHEAD=$(BUILD)/scanhead node tests/page/pictures.mjs --out $(BUILD)/pictures
-# A forest of copies: its memory, and what a ray costs beside one tree.
-bench-copies: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/copies
-	@$(BUILD)/tests/bench/copies
-# The encoder of VLP-16 data packets, ns a firing.
-bench-velodyne: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
-	@$(BUILD)/tests/bench/velodyne
-# Waveforms on the wire, ns a window.
-bench-waves: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waves
-	@$(BUILD)/tests/bench/waves
 # The arithmetic around the cast, ns a pulse: as on this CPU, and as x86 has it without AVX-512.
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
@@ -515,6 +506,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-waveform bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)
