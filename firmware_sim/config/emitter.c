@@ -15,15 +15,13 @@
 
 static const double PRR_MOST_HZ = 1e7;
 
-/* "planar, beams" */
+/* Writes "planar, beams". */
 static const char *words_of(unsigned emitters, char *buf, size_t len)
 {
     const char *const *names = cfg_find(&cfg_profile_table, "emitter")->names;
-    size_t used = 0;
     buf[0] = '\0';
-    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS && used < len; kind++)
-        if (emitters & CFG_KIND(kind))
-            used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", names[kind]);
+    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
+        if (emitters & CFG_KIND(kind)) cfg_list_add(buf, len, names[kind]);
     return buf;
 }
 
@@ -77,8 +75,7 @@ static void set_planar(struct cfg_reader *rd, struct config_profile *p)
         cfg_fail_key(rd, "front_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->front_step,
                      c->steps_per_turn, c->steps_per_turn - 1);
     else {
-        emitter_set_planar(&p->emitter, c->steps_per_turn, c->first_step, c->last_step, c->front_step,
-                           c->step_direction == TURN_CLOCKWISE ? 1 : -1);
+        config_set_steps(p, c->steps_per_turn);
         p->fov_min_udeg = emitter_step_udeg(&p->emitter, c->first_step);
         p->fov_max_udeg = emitter_step_udeg(&p->emitter, c->last_step);
         set_rates(rd, "steps_per_turn", p);

@@ -211,11 +211,11 @@ static const struct cfg_key config_keys[] = {
      WORDS([LINK_WAITS_BY_TYPE] = "by-type", [LINK_WAITS_YES] = "yes", [LINK_WAITS_NO] = "no"),
      .help = "Whether a slow reader holds back the head in the paces fast and step. yes: it does; no: it loses "
              "frames, as in real time; by-type: readers of web links lose frames, all others hold back."},
-    {LINK(latency_ms), CFG_COUNT, "ms", "0", 0, 20,
+    {LINK(latency_ms), CFG_COUNT, "ms", "0", 0, 20, .of = ~(CFG_KIND(LINK_NULL) | CFG_KIND(LINK_FILE)),
      .help = "How long a stream frame may wait for later ones in real time, so that one wake-up and one write serve "
              "several ticks. That takes less processor time. 0: a frame goes out with its tick. A frame never waits "
              "longer than an eighth of loop.queue_ms. Null and file links have no such key: their frames always wait "
-             "that long."},
+             "that eighth."},
     {LINK(backend), CFG_ENUM, .def = "usbip",
      WORDS([USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs"),
      .of = CFG_KIND(LINK_USB),

@@ -110,9 +110,7 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
         return;
     }
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
-        if ((ops->emitters & 1u << kind) != 0)
-            snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",
-                     allowed[0] != '\0' ? ", " : "", emitter_names[kind]);
+        if ((ops->emitters & 1u << kind) != 0) cfg_list_add(allowed, sizeof allowed, emitter_names[kind]);
     link_protocol_place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,

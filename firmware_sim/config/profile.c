@@ -62,45 +62,44 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
         if (dirs->dir[dirs->n][0] != '\0') dirs->n++;
 }
 
-static int is_yaml(const char *name)
+int cfg_is_yaml(const char *name)
 {
     size_t len = strlen(name);
     return len > 5 && strcmp(name + len - 5, ".yaml") == 0;
 }
 
-static int is_profile(const struct dirent *entry)
+static int is_shown(const struct dirent *entry)
 {
-    return is_yaml(entry->d_name) && entry->d_name[0] != '.';
+    return cfg_is_yaml(entry->d_name) && entry->d_name[0] != '.';
 }
 
-/* Is name one of "a, b, c"? */
-static int is_listed(const char *list, const char *name)
+/* Finds the YAML files of a folder, sorted, but not hidden ones. Returns how many; -1: the folder can't be read. */
+static int list_yaml(const char *dir, struct dirent ***entries)
 {
-    size_t len = strlen(name);
-    for (const char *p = list; (p = strstr(p, name)) != NULL; p += len)
-        if ((p == list || p[-1] == ' ') && (p[len] == ',' || p[len] == '\0')) return 1;
-    return 0;
+    *entries = NULL;
+    return scandir(dir, entries, is_shown, alphasort);
 }
 
-/* "a, b, c": the profiles of all directories, as far as buf reaches. */
+void cfg_name_yaml(const char *dir, char *buf, size_t len)
+{
+    struct dirent **entries;
+    const int n = list_yaml(dir, &entries);
+    for (int i = 0; i < n; i++) {
+        char *name = entries[i]->d_name;
+        name[strlen(name) - 5] = '\0';
+        if (!cfg_list_has(buf, name)) cfg_list_add(buf, len, name);
+        free(entries[i]);
+    }
+    free(entries);
+}
+
+/* Lists the profiles of all directories, as far as buf reaches. */
 static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t len)
 {
-    size_t used = 0;
     buf[0] = '\0';
-    for (int d = 0; d < dirs->n; d++) {
-        struct dirent **entries = NULL;
-        int n = scandir(dirs->dir[d], &entries, is_profile, alphasort);
-        for (int i = 0; i < n; i++) {
-            int stem = (int)strlen(entries[i]->d_name) - 5;
-            char name[sizeof entries[i]->d_name];
-            snprintf(name, sizeof name, "%.*s", stem, entries[i]->d_name);
-            if (used < len && !is_listed(buf, name))
-                used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", name);
-            free(entries[i]);
-        }
-        if (n >= 0) free(entries);
-    }
-    if (used == 0) snprintf(buf, len, "none found");
+    for (int d = 0; d < dirs->n; d++)
+        cfg_name_yaml(dirs->dir[d], buf, len);
+    if (buf[0] == '\0') snprintf(buf, len, "none found");
 }
 
 /* ---- one profile */
@@ -193,7 +192,7 @@ static int read_profile(struct cfg_reader *rd, const char *file, struct config_p
 
 static int fail_lookup(struct cfg_reader *rd, struct config *cfg, const struct profile_dirs *dirs)
 {
-    char known[300], shown[CFG_SHOW_MAX];
+    char known[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
     known_profiles(dirs, known, sizeof known);
     return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; allowed %s", cfg_show(cfg->profile_file, shown),
                         known);
@@ -205,7 +204,7 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
     char path[2 * CONFIG_PATH_LEN], base[CONFIG_PATH_LEN];
     int from_set = cfg_where(rd, cfg_find(&rd->table, "head.profile"), 0) == CFG_FROM_SET;
     find_dirs(cfg->file, &dirs);
-    int by_path = is_yaml(cfg->profile_file);
+    int by_path = cfg_is_yaml(cfg->profile_file);
     if (!by_path && strchr(cfg->profile_file, '/') != NULL) return fail_lookup(rd, cfg, &dirs);
     for (int i = 0; i < (by_path ? 1 : dirs.n); i++) {
         if (!by_path)
@@ -238,7 +237,7 @@ int config_load_profile(const char *name, const char *config_file, struct config
     struct profile_dirs dirs;
     struct cfg_reader rd;
     struct config_faults faults = {0};
-    char path[2 * CONFIG_PATH_LEN], known[300];
+    char path[2 * CONFIG_PATH_LEN], known[CFG_ALLOWED_MAX];
     find_dirs(config_file, &dirs);
     for (int i = 0; i < dirs.n; i++) {
         snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
@@ -275,8 +274,8 @@ int config_list_profiles(const char *dir, FILE *out, struct sh_err *err)
             if (access(dirs.dir[i], R_OK) == 0) dir = dirs.dir[i];
         if (dir == NULL) return sh_fail(err, SH_EINPUT, "no directory of head profiles found; set SCANHEAD_HEADS");
     }
-    struct dirent **entries = NULL;
-    int n = scandir(dir, &entries, is_profile, alphasort), code = SH_OK;
+    struct dirent **entries;
+    int n = list_yaml(dir, &entries), code = SH_OK;
     if (n < 0) return sh_fail(err, SH_EINPUT, "%s: cannot be read; a directory of head profiles is needed", dir);
     for (int i = 0; i < n; i++) {
         if (code == SH_OK) code = list_profile(dir, entries[i]->d_name, out, err);

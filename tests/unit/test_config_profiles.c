@@ -163,6 +163,8 @@ static void profiles_are_looked_up_in_order(void **state)
     assert_string_equal(cfg->profile_file, path);
     assert_loads(load_edited("any-rate\n  prr_hz: 500000", "heads/mine.yaml")); /* relative to the file */
     assert_string_equal(cfg->profile.name, "mine");
+    assert_int_equal(load_edited("any-rate", "nosuch"), SH_EINPUT);
+    assert_says("zf-imager-5016, mine"); /* the list of names is whole */
     snprintf(env, sizeof env, "%s", getenv("SCANHEAD_HEADS"));
     snprintf(path, sizeof path, "%s/first", dir);
     mkdir(path, 0700);

@@ -8,7 +8,8 @@
 #include <string.h>
 
 const char cfg_sections_of_scanner[] =
-    "sections head (without station, start), beam, cast, plan, noise, signal, surfaces, optics, instrument";
+    "sections head (without station, start), beam, cast (without sight_mib), plan, noise, signal, surfaces, optics, "
+    "instrument";
 
 int cfg_is_of_scanner(const char *path)
 {

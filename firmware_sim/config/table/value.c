@@ -123,9 +123,9 @@ static void allowed_range(const struct cfg_key *key, const struct config_profile
 
 static void allowed_words(const struct cfg_key *key, char *buf)
 {
-    int used = snprintf(buf, CFG_ALLOWED_MAX, "allowed ");
-    for (size_t i = 0; key->names[i] != NULL && used < CFG_ALLOWED_MAX; i++)
-        used += snprintf(buf + used, CFG_ALLOWED_MAX - (size_t)used, "%s%s", i > 0 ? ", " : "", key->names[i]);
+    snprintf(buf, CFG_ALLOWED_MAX, "allowed %s", key->names[0]);
+    for (size_t i = 1; key->names[i] != NULL; i++)
+        cfg_list_add(buf, CFG_ALLOWED_MAX, key->names[i]);
 }
 
 const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf)

@@ -24,7 +24,7 @@ int cfg_store_point(struct cfg_reader *rd, const struct cfg_key *key, uint32_t i
                     const char *text);
 /* The values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of all
  * profiles. */
-enum { CFG_ALLOWED_MAX = 900 }; /* room for the longest list of words, the kinds of faults */
+enum { CFG_ALLOWED_MAX = 900 }; /* room for the longest lists, the kinds of faults and the keys of a profile */
 const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);

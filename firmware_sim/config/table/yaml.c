@@ -158,14 +158,14 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     const char *const *words = part == FIGURE_FROM         ? cfg_from_names
                                : part == FIGURE_DEFINITION ? key->definitions
                                                            : NULL;
-    char allowed[CFG_ALLOWED_MAX] = "a text in one line";
-    for (size_t i = 0, used = 0; words != NULL && words[i] != NULL && used < sizeof allowed; i++)
-        used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", words[i]);
+    char allowed[CFG_ALLOWED_MAX] = "";
+    for (size_t i = 0; words != NULL && words[i] != NULL; i++)
+        cfg_list_add(allowed, sizeof allowed, words[i]);
     cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must say %s; allowed %s", figure_parts[part],
                    part == FIGURE_FROM         ? "where the figure is from"
                    : part == FIGURE_DEFINITION ? "how the width is defined"
                                                : "it in words",
-                   allowed);
+                   words != NULL ? allowed : "a text in one line");
 }
 
 static int is_line_of_text(const yaml_node_t *node)
