@@ -12,13 +12,6 @@
 #include "firmware_sim/config/table/row.h"
 #include "firmware_sim/config/table/value.h"
 
-/* A link, back end or platform, and its name in errors. */
-struct owner {
-    int is_backend, kind;
-    uint32_t item;
-    const char *name;
-};
-
 /* Lists the keys of the section that the kind has. */
 static void list_keys(const struct cfg_reader *rd, const char *section, int kind, char *list, size_t len)
 {
@@ -30,18 +23,20 @@ static void list_keys(const struct cfg_reader *rd, const char *section, int kind
     }
 }
 
-/* Reports each key of the section that is given although the kind does not have it. Returns whether there is none. */
-static int check_owned(struct cfg_reader *rd, const char *section, const struct owner *owner)
+/* Reports each key of the section that is given although a kind of link, back end or platform does not have it. `name`
+ * is that of the kind, in errors. Returns whether there is none. */
+static int check_owned(struct cfg_reader *rd, const char *section, uint32_t item, int is_backend, int kind,
+                       const char *name)
 {
     char allowed[CFG_ALLOWED_MAX] = "without it";
     int fits = 1;
-    if (!owner->is_backend) list_keys(rd, section, owner->kind, allowed, sizeof allowed);
+    if (!is_backend) list_keys(rd, section, kind, allowed, sizeof allowed);
     for (size_t i = 0; i < rd->table.n; i++) {
         const struct cfg_key *key = &rd->table.keys[i];
-        const unsigned kinds = owner->is_backend ? key->of_backend : key->of;
-        if (kinds == 0 || (kinds & CFG_KIND(owner->kind)) || cfg_word_below(key->path, section) == NULL) continue;
-        if (!cfg_is_given(rd, key->path, owner->item)) continue;
-        cfg_fail_key(rd, key->path, owner->item, "%s has no such key; allowed %s", owner->name, allowed);
+        const unsigned kinds = is_backend ? key->of_backend : key->of;
+        if (kinds == 0 || (kinds & CFG_KIND(kind)) || cfg_word_below(key->path, section) == NULL) continue;
+        if (!cfg_is_given(rd, key->path, item)) continue;
+        cfg_fail_key(rd, key->path, item, "%s has no such key; allowed %s", name, allowed);
         fits = 0;
     }
     return fits;
@@ -57,7 +52,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
-    if (!check_owned(rd, "links[]", &(struct owner){1, link->backend, i, owner})) return;
+    if (!check_owned(rd, "links[]", i, 1, link->backend, owner)) return;
     if (has_path && (has_port || has_address))
         cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
     else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
@@ -74,7 +69,7 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
     snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
-    if (!check_owned(rd, "links[]", &(struct owner){0, (int)link->type, i, owner})) return;
+    if (!check_owned(rd, "links[]", i, 0, (int)link->type, owner)) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
         cfg_fail_key(rd, "links[].path", i, "missing; a file link requires the path of the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
@@ -96,5 +91,5 @@ int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform 
 {
     char owner[64];
     snprintf(owner, sizeof owner, "a %s platform", cfg_word(rd, "platform.kind", (int)p->kind));
-    return check_owned(rd, "platform", &(struct owner){0, (int)p->kind, 0, owner});
+    return check_owned(rd, "platform", 0, 0, (int)p->kind, owner);
 }

@@ -131,12 +131,12 @@ static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
 /* Checks the figures of a mirror and a pan. */
 static void check_line_head(struct cfg_reader *rd, const struct config_profile *p)
 {
-    const double lines_min_hz = 1e-6 * (double)p->lines_min_uhz, prr_max_hz = 1e-6 * (double)p->prr_max_uhz;
-    const double pan_min_deg = 1e-6 * (double)p->pan_min_udeg, pan_max_deg = 1e-6 * (double)p->pan_max_udeg;
-    check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, "prr_max_hz", prr_max_hz, 0);
+    const double lines_min_hz = from_micro(p->lines_min_uhz), prr_max_hz = from_micro(p->prr_max_uhz);
+    const double pan_min_deg = from_micro(p->pan_min_udeg), pan_max_deg = from_micro(p->pan_max_udeg);
+    check_order(rd, "prr_min_hz", from_micro(p->prr_min_uhz), "prr_max_hz", prr_max_hz, 0);
     if (prr_max_hz < lines_min_hz && CFG_SOUND(rd, 0, "prr_max_hz", "lines_min_hz"))
         cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
-    check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, "fov_max_deg", 1e-6 * (double)p->fov_max_udeg, 1);
+    check_order(rd, "fov_min_deg", from_micro(p->fov_min_udeg), "fov_max_deg", from_micro(p->fov_max_udeg), 1);
     if ((p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000) &&
         CFG_SOUND(rd, 0, "pan_min_deg", "pan_max_deg"))
         cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
@@ -148,8 +148,7 @@ static void check_profile(struct cfg_reader *rd, struct config_profile *p)
 {
     cfg_check_emitter(rd, p);
     if (p->arrangement.kind == EMITTER_LINE && CFG_SOUND(rd, 0, "emitter")) check_line_head(rd, p);
-    check_order(rd, "lines_min_hz", 1e-6 * (double)p->lines_min_uhz, "lines_max_hz", 1e-6 * (double)p->lines_max_uhz,
-                0);
+    check_order(rd, "lines_min_hz", from_micro(p->lines_min_uhz), "lines_max_hz", from_micro(p->lines_max_uhz), 0);
     check_order(rd, "range_min_m", p->range_min_m, "range_max_m", p->range_max_m, 1);
     check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, "range_sigma_m", p->range_sigma_m, 0);
     cfg_convert_widths(rd, p);

@@ -200,7 +200,7 @@ static const char *value_of(const struct cfg_key *key, const struct config_profi
         if (key->type == CFG_REAL)
             snprintf(buf, len, "%.15g", cfg_real_figure(profile, text + 1));
         else
-            snprintf(buf, len, "%.15g", 1e-6 * (double)cfg_figure(profile, text + 1));
+            snprintf(buf, len, "%.15g", from_micro(cfg_figure(profile, text + 1)));
     } else if (key->type == CFG_PATH && is_needed(key) && cfg_find_shared(text, shared) &&
                (whole = realpath(shared, NULL)) != NULL) {
         snprintf(buf, len, "%s", whole);

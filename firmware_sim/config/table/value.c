@@ -98,7 +98,7 @@ double cfg_real_figure(const struct config_profile *profile, const char *path)
 /* Writes the limit that a profile gives: its figure, or, without a profile, the limit of all profiles. */
 static void profile_limit(const char *path, double any, const struct config_profile *profile, char *buf)
 {
-    if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? 1e-6 * (double)cfg_figure(profile, path) : any);
+    if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? from_micro(cfg_figure(profile, path)) : any);
 }
 
 static void allowed_range(const struct cfg_key *key, const struct config_profile *profile, char *buf)
