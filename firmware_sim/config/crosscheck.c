@@ -264,11 +264,11 @@ static void check_target(struct cfg_reader *rd, const struct config *cfg)
 
 void cfg_check(struct cfg_reader *rd, struct config *cfg)
 {
-    cfg_check_emitter_settings(rd, cfg);
+    cfg_check_emitter_settings(rd, cfg); /* first, since it sets the rates, and their limits, that follow from others */
     cfg_check_rate(rd, cfg);
     check_limits(rd, cfg);
     check_head(rd, cfg);
-    cfg_limit_range(rd, cfg);
+    cfg_limit_range(rd, cfg); /* before check_output, whose scale must hold the ranges that are left */
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         check_mesh(rd, &cfg->scene.mesh[i], i);
     cfg_check_copies(rd, cfg);
@@ -291,5 +291,5 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_faults(rd, &cfg->faults);
     cfg_check_fault_links(rd, cfg, &cfg->faults);
     cfg_check_fault_beams(rd, cfg, &cfg->faults);
-    cfg_take_scan_settings(cfg);
+    cfg_take_scan_settings(cfg); /* last, since it copies values that the checks derive */
 }
