@@ -155,7 +155,8 @@ ALWAYS:
 # All modules for the program and the tests, and the client library alone.
 $(BUILD)/modules.a: $(OBJ) $(BUILD)/modules.members
 $(BUILD)/head.a: $(HEAD_OBJ) $(BUILD)/head.members
-$(BUILD)/modules.a $(BUILD)/head.a:
+ARCHIVES = $(patsubst %,$(BUILD)/%.a,modules head libscanhead client common benches)
+$(ARCHIVES):
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $(filter %.o,$^)
@@ -166,10 +167,6 @@ $(BUILD)/libscanhead.o: $(LIBOBJ) $(BUILD)/library.members
 	$(Q)$(OBJCOPY) --wildcard --keep-global-symbol='scanhead_*' $@
 $(BUILD)/libscanhead.a: $(BUILD)/libscanhead.o
 $(BUILD)/client.a: $(LIBOBJ) $(BUILD)/library.members
-$(BUILD)/libscanhead.a $(BUILD)/client.a:
-	@rm -f $@
-	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $(filter %.o,$^)
 $(BUILD)/libscanhead.so: $(LIBOBJ) $(BUILD)/library.members drivers/host/libscanhead.map
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) $(LDFLAGS) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
@@ -204,10 +201,6 @@ PAIRS = $(eval PAIRS := $$(shell sh tests/rigs.sh))$(PAIRS)
 RIGS = $(patsubst $(1):%,$(BUILD)/%.o,$(filter $(1):%,$(PAIRS)))
 $(BUILD)/common.a: $(COMMON:%=$(BUILD)/%.o) $(BUILD)/common.members
 $(BUILD)/benches.a: $(BENCHES:%=$(BUILD)/%.o) $(BUILD)/benches.members
-$(BUILD)/common.a $(BUILD)/benches.a:
-	@rm -f $@
-	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $(filter %.o,$^)
 $(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o
 $(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
 $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
