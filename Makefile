@@ -160,7 +160,7 @@ $(ARCHIVES):
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $(filter %.o,$^)
-# The archive has one object, in which all names are local but those of the interface: no client meets the others.
+# The library's archive has one object, in which all names are local but those of the interface: no client meets the others.
 $(BUILD)/libscanhead.o: $(LIBOBJ) $(BUILD)/library.members
 	@echo "  LD    $@"
 	$(Q)$(CC) -r -nostdlib -o $@ $(LIBOBJ)
