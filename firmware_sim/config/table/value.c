@@ -253,7 +253,7 @@ static int store_text(const struct place *at, char *dst, const char *text, const
 }
 
 /* Stores "[1, 2, 3]" or "1,2,3", as --set and defaults have them. */
-static int store_vec3_text(struct place *at, const char *text)
+static int store_vec3_text(const struct place *at, double *dst, const char *text)
 {
     const int last = cfg_axes(at->key) - 1;
     const char *wrong = last == 1 ? "not [low, high]" : "not [x, y, z]";
@@ -270,21 +270,14 @@ static int store_vec3_text(struct place *at, const char *text)
         p += len;
         p += strspn(p, " ");
         if (axis < last && *p++ != ',') return refuse(at, text, wrong);
-        int code = cfg_store_vec3(at->rd, at->key, at->item, at->line, axis, part);
+        int code = store_real(at, dst + axis, part);
         if (code != SH_OK) return code;
     }
     return strcmp(p, closed ? "]" : "") == 0 ? SH_OK : refuse(at, text, wrong);
 }
 
-int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
-                   const char *text)
-{
-    struct place at = {rd, key, item, line};
-    return store_real(&at, (double *)cfg_address(rd, key, item) + axis, text);
-}
-
-int cfg_store_point(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
-                    const char *text)
+int cfg_store_number(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
+                     const char *text)
 {
     struct place at = {rd, key, item, line};
     return store_real(&at, dst, text);
@@ -309,7 +302,7 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
         return store_text(&at, dst, text, base_dir);
     case CFG_VEC3:
     case CFG_PAIR:
-        return store_vec3_text(&at, text);
+        return store_vec3_text(&at, dst, text);
     default:
         return refuse(&at, text, "not what belongs here");
     }

@@ -92,6 +92,7 @@ static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item
 
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
+    double *dst = cfg_address(w->rd, key, item);
     char allowed[CFG_ALLOWED_MAX];
     if (node->type != YAML_SEQUENCE_NODE) {
         wrong_kind(w, key, item, node);
@@ -106,7 +107,7 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
     for (int axis = 0; axis < cfg_axes(key); axis++) {
         const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
         if (check_scalar(w, key, item, number) == SH_OK)
-            cfg_store_vec3(w->rd, key, item, line_of(w, number), axis, text_of(number));
+            cfg_store_number(w->rd, key, item, line_of(w, number), dst + axis, text_of(number));
     }
 }
 
@@ -135,7 +136,7 @@ static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item
         for (uint32_t axis = 0; axis < 2; axis++) {
             const yaml_node_t *number = yaml_document_get_node(w->doc, pair->data.sequence.items.start[axis]);
             if (check_scalar(w, key, item, number) == SH_OK)
-                cfg_store_point(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
+                cfg_store_number(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
         }
     }
 }
