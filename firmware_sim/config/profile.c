@@ -93,13 +93,16 @@ void cfg_name_yaml(const char *dir, char *buf, size_t len)
     free(entries);
 }
 
-/* Lists the profiles of all directories, as far as buf reaches. */
-static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t len)
+/* Says in buf which profiles the directories have. */
+static void allow_profiles(const struct profile_dirs *dirs, char *buf, size_t len)
 {
-    buf[0] = '\0';
+    char known[CFG_ALLOWED_MAX] = "";
     for (int d = 0; d < dirs->n; d++)
-        cfg_name_yaml(dirs->dir[d], buf, len);
-    if (buf[0] == '\0') snprintf(buf, len, "none found");
+        cfg_name_yaml(dirs->dir[d], known, sizeof known);
+    if (known[0] != '\0')
+        snprintf(buf, len, "allowed %s", known);
+    else
+        snprintf(buf, len, "no profiles were found at all; SCANHEAD_HEADS can name their directory");
 }
 
 /* ---- one profile */
@@ -191,10 +194,9 @@ static int read_profile(struct cfg_reader *rd, const char *file, struct config_p
 
 static int fail_lookup(struct cfg_reader *rd, struct config *cfg, const struct profile_dirs *dirs)
 {
-    char known[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
-    known_profiles(dirs, known, sizeof known);
-    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; allowed %s", cfg_show(cfg->profile_file, shown),
-                        known);
+    char allowed[CFG_ALLOWED_MAX + 16], shown[CFG_SHOW_MAX];
+    allow_profiles(dirs, allowed, sizeof allowed);
+    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; %s", cfg_show(cfg->profile_file, shown), allowed);
 }
 
 static int find_profile(struct cfg_reader *rd, struct config *cfg)
@@ -236,7 +238,7 @@ int config_load_profile(const char *name, const char *config_file, struct config
     struct profile_dirs dirs;
     struct cfg_reader rd;
     struct config_faults faults = {0};
-    char path[2 * CONFIG_PATH_LEN], known[CFG_ALLOWED_MAX];
+    char path[2 * CONFIG_PATH_LEN], allowed[CFG_ALLOWED_MAX + 16];
     find_dirs(config_file, &dirs);
     for (int i = 0; i < dirs.n; i++) {
         snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
@@ -244,9 +246,8 @@ int config_load_profile(const char *name, const char *config_file, struct config
         if (read_profile(&rd, path, profile, &faults)) return SH_OK;
         return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
     }
-    known_profiles(&dirs, known, sizeof known);
-    return sh_fail(err, SH_EINPUT, "no head profile %s; found were: %s; SCANHEAD_HEADS can name their directory", name,
-                   known);
+    allow_profiles(&dirs, allowed, sizeof allowed);
+    return sh_fail(err, SH_EINPUT, "no head profile \"%s\"; %s", name, allowed);
 }
 
 /* ---- listing */

@@ -175,6 +175,21 @@ static void profiles_are_looked_up_in_order(void **state)
     setenv("SCANHEAD_HEADS", env, 1);
 }
 
+static void an_error_without_profiles_says_where_to_look(void **state)
+{
+    (void)state;
+    static struct config_profile profile;
+    char env[256], cwd[512];
+    snprintf(env, sizeof env, "%s", getenv("SCANHEAD_HEADS"));
+    assert_non_null(getcwd(cwd, sizeof cwd));
+    unsetenv("SCANHEAD_HEADS");
+    assert_int_equal(chdir("/"), 0);
+    config_load_profile("any-rate", NULL, &profile, &err);
+    assert_int_equal(chdir(cwd), 0);
+    setenv("SCANHEAD_HEADS", env, 1);
+    assert_says("no head profile \"any-rate\"; no profiles were found at all; SCANHEAD_HEADS can name their directory");
+}
+
 static int is_yaml_file(const struct dirent *entry)
 {
     const char *dot = strrchr(entry->d_name, '.');
@@ -239,6 +254,7 @@ int main(void)
         cmocka_unit_test(a_range_beyond_its_bits_is_refused),
         cmocka_unit_test(a_slow_pulse_rate_needs_slow_lines),
         cmocka_unit_test(profiles_are_looked_up_in_order),
+        cmocka_unit_test(an_error_without_profiles_says_where_to_look),
         cmocka_unit_test(profiles_are_listed),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
