@@ -250,7 +250,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(loop.tick_hz), CFG_REAL, "Hz", "1000", 100, 10000,
      .allowed = "a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000",
      .help = "Rate of the loop. Its ticks cut the stream into frames: another rate gives another hash of the stream. "
-             "The points are the same, except on a live platform, which has one pose per tick."},
+             "The points are the same, except on a live platform, which has one pose per tick, and with meshes that "
+             "move, which stand still during each tick where they are at its start."},
     {KEY(loop.ahead_ms), CFG_REAL, "ms", "64", 2, 90,
      .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam."},
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,
