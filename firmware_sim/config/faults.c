@@ -224,7 +224,8 @@ int config_add_scenario(struct config *cfg, const char *name, struct config_faul
     config_name_scenarios(known, sizeof known);
     int code = SH_OK;
     if (!is_there)
-        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed the path of a file, or one of these: %s", known);
+        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed the path of a file, or one of these: %s",
+                             known);
     else if (list == NULL)
         code = cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory");
     else
