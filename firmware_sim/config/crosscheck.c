@@ -9,6 +9,7 @@
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/config/table/given.h"
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
@@ -291,5 +292,5 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_faults(rd, &cfg->faults);
     cfg_check_fault_links(rd, cfg, &cfg->faults);
     cfg_check_fault_beams(rd, cfg, &cfg->faults);
-    cfg_take_scan_settings(cfg); /* last, since it copies values that the checks derive */
+    if (rd->faults->n == 0) cfg_take_scan_settings(cfg); /* last, since it copies values that the checks derive */
 }
