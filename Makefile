@@ -3,8 +3,8 @@
 # `make demo` and `make test` install what is missing (Debian; sudo when not root), build and run.
 BUILD ?= build
 PREFIX ?= /usr/local
-# For another machine: CROSS_COMPILE=aarch64-linux-gnu-, or a compiler whose name or --target says it. Whatever tool is not
-# given has the same prefix.
+# For another machine: CROSS_COMPILE=aarch64-linux-gnu-, or a compiler whose name or --target says it. Tools that are
+# not given have the same prefix.
 ifeq ($(origin CC),default)
 CROSS_COMPILE ?=
 CC = $(CROSS_COMPILE)gcc
@@ -26,12 +26,12 @@ V ?= 0
 Q_0 = @
 Q = $(Q_$(V))
 
-# What a fresh Debian 12 needs. Building and the demo:
+# A fresh Debian 12 needs these packages for building and the demo,
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libproj-dev libyaml-dev libpng-dev \
 	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev libjansson-dev libwebp-dev libtiff-dev \
 	libmeshoptimizer-dev assimp-testmodels \
 	$(if $(shell command -v npm),,nodejs npm)
-# and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
+# and these for the tests, with the second compiler and its sanitizers, clients and readers that are not ours.
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang clang-format libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
 	llvm parallel tshark tcpreplay
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
@@ -46,7 +46,7 @@ ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELL
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
 PKG_LIBS = $(eval PKG_LIBS := $$(filter-out $$(LATE:%=-l%),$$(call ask_pkg_config,--libs)))$(PKG_LIBS)
-# These are loaded when they are asked for (core/late.h), by the name that a program linked with them would have.
+# These are loaded when they are needed (core/late.h), by the name that a program linked with them would have.
 LATE = proj assimp tiff websockets
 find_soname = $(or $(shell readelf -d $$($(CC) -print-file-name=lib$(1).so) | sed -n 's/.*SONAME.*\[\(.*\)\]/\1/p'),$(error no \
 	lib$(1).so for $(CC): make deps-build))
@@ -57,7 +57,7 @@ find_embree = $(or $(firstword $(foreach v,$(filter 3 4,$(or $(EMBREE),3 4)),$(c
 	Embree $(or $(EMBREE),3 or 4) for $(CC); allowed 3 and 4: make deps-build, or EMBREE= for the one that is there))
 EMBREE_VERSION = $(eval EMBREE_VERSION := $$(call find_embree))$(EMBREE_VERSION)
 OPT ?= -O3 $(VEC_WIDTH)
-# Whole vectors where there are 512 bits; gcc and clang both know the option on x86 alone.
+# Vectors are whole where there are 512 bits; gcc and clang both know the option on x86 alone.
 VEC_WIDTH = $(if $(filter x86_64-%,$(TARGET)),-mprefer-vector-width=512)
 # Named whole numbers are figures, too; clang 19 would warn of that.
 WARN = -Wall -Wextra -Wconversion -Wshadow -Wno-enum-float-conversion
@@ -65,13 +65,13 @@ CWARN = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 # `make test` turns warnings into errors; a user's newer compiler may warn in peace.
 WERROR ?=
 SAN ?=
-# No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
+# Without contraction to FMA numbers are the same on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
 SCENES_DIR = $(PREFIX)/share/scanhead/scenes
 FAULTS_DIR = $(PREFIX)/share/scanhead/faults
 CAMPAIGN_DIR = $(PREFIX)/share/scanhead/campaign
-# Where libraries are, below PREFIX; a distribution may have another folder for each machine.
+# LIB is the folder of libraries below PREFIX; a distribution may have one for each machine.
 LIB = lib
 IFC_DIR = $(PREFIX)/share/scanhead/ifc
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
@@ -79,7 +79,7 @@ UNIT_DIR = $(PREFIX)/lib/systemd/system
 PC_DIR = $(PREFIX)/$(LIB)/pkgconfig
 MAN_DIR = $(PREFIX)/share/man
 COMPLETION_DIR = $(PREFIX)/share/bash-completion/completions
-# Prints manual pages and the completion: for another machine a program that runs here.
+# PRINTER prints manual pages and the completion. In a build for another machine it is a program that runs here.
 PRINTER = $(BUILD)/scanhead
 WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
@@ -98,8 +98,8 @@ HEAD_OBJ = $(filter-out $(STUDIO:%=$(BUILD)/%),$(OBJ))
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
 UNIT = $(call PROGRAMS,unit)
-# Unit tests of what computes run as shipped, too, and those that do less with sanitizers; the others with sanitizers alone
-# (`make test`; tests/run_all.sh, which asks for the same), or as shipped alone (`make test-unit`).
+# In `make test` (and tests/run_all.sh) all unit tests run with sanitizers. Those of core, and those that do less with
+# sanitizers, run as shipped, too. In `make test-unit` all run as shipped alone.
 SHIPPED = $(patsubst tests/%.c,$(BUILD)/tests/%,$(shell sh tests/shipped.sh))
 TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
 # JOIN says which programs are linked at once: all, the unit tests, or all but those of them that don't run as shipped.
@@ -125,8 +125,8 @@ $(BUILD)/%.cpp.o: %.cpp $(BUILD)/flags
 	@mkdir -p $(@D)
 	@echo "  CXX   $<"
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
-# What a build is made of, a file for each: all is built again once the tools or flags have changed, and an archive once a
-# source has come or gone. ccache and -Werror change nothing of an object.
+# Stamps hold what a build is made of. Everything is built again once the tools or flags have changed, and an archive
+# once a source has come or gone. ccache and -Werror change nothing of an object.
 STAMPS = $(patsubst %,$(BUILD)/%,flags modules.members head.members library.members common.members benches.members joined.members sonames)
 $(BUILD)/flags: NOW = $(filter-out ccache %/ccache -Werror,$(CC) $(CXX) $(AR) $(OBJCOPY) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(ALL_CXXFLAGS) \
 	$(CORE_OPT) $(TEST_WARN) $(LDFLAGS) $(LDLIBS))
@@ -155,21 +155,18 @@ ALWAYS:
 # All modules for the program and the tests, and the client library alone.
 $(BUILD)/modules.a: $(OBJ) $(BUILD)/modules.members
 $(BUILD)/head.a: $(HEAD_OBJ) $(BUILD)/head.members
-$(BUILD)/modules.a $(BUILD)/head.a:
+ARCHIVES = $(patsubst %,$(BUILD)/%.a,modules head libscanhead client common benches)
+$(ARCHIVES):
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $(filter %.o,$^)
-# In the archive, too, what is not the library's interface is nobody else's to meet: one object, its other names local.
+# The library's archive has one object, in which all names are local but those of the interface: no client meets the others.
 $(BUILD)/libscanhead.o: $(LIBOBJ) $(BUILD)/library.members
 	@echo "  LD    $@"
 	$(Q)$(CC) -r -nostdlib -o $@ $(LIBOBJ)
 	$(Q)$(OBJCOPY) --wildcard --keep-global-symbol='scanhead_*' $@
 $(BUILD)/libscanhead.a: $(BUILD)/libscanhead.o
 $(BUILD)/client.a: $(LIBOBJ) $(BUILD)/library.members
-$(BUILD)/libscanhead.a $(BUILD)/client.a:
-	@rm -f $@
-	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $(filter %.o,$^)
 $(BUILD)/libscanhead.so: $(LIBOBJ) $(BUILD)/library.members drivers/host/libscanhead.map
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) $(LDFLAGS) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
@@ -204,10 +201,6 @@ PAIRS = $(eval PAIRS := $$(shell sh tests/rigs.sh))$(PAIRS)
 RIGS = $(patsubst $(1):%,$(BUILD)/%.o,$(filter $(1):%,$(PAIRS)))
 $(BUILD)/common.a: $(COMMON:%=$(BUILD)/%.o) $(BUILD)/common.members
 $(BUILD)/benches.a: $(BENCHES:%=$(BUILD)/%.o) $(BUILD)/benches.members
-$(BUILD)/common.a $(BUILD)/benches.a:
-	@rm -f $@
-	@echo "  AR    $@"
-	$(Q)$(AR) rcs $@ $(filter %.o,$^)
 $(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o
 $(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
 $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
@@ -219,11 +212,11 @@ $(BUILD)/tests/bench/live: private override LDFLAGS += -Wl,--as-needed
 $(BUILD)/tests/bench/live: private override LDLIBS += -lcmocka
 # stb_image_write shifts into the sign bit.
 $(BUILD)/tests/common/chart.c.o: private override SAN =
-# What computes, with sanitizers: a sixth of the code, which takes most of the time.
+# With sanitizers core has flags of its own: it is a sixth of the code, and takes most of the time.
 $(BUILD)/core/%.o: private override OPT += $(CORE_OPT)
-# What only calls others: without warnings where sanitizers leave out parts of the tests.
+# Tests have no warnings where sanitizers leave out parts of them.
 $(BUILD)/tests/%.o: private override CWARN += $(TEST_WARN)
-# What computes little itself is built in half the time.
+# These compute little themselves, and are built in half the time.
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
 # Some 500 programs are linked, twenty at a time; gold takes two thirds of the time.
 # clang's sanitizers need its own: gold has doubts about their symbols.
@@ -244,12 +237,12 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/$(LIMIT)
 	@echo "  TEST  $@"
 	@rm -f $@
 	$(Q)$(LINK_TEST) -o $@ $^ $(TEST_LIBS)
-# What runs in the guest has the client library alone, with its inside: it starts faster there.
+# Programs of the guest have the client library alone, with its inside, so that they start faster there.
 $(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/client.a
 	@echo "  TEST  $@"
 	$(Q)$(CC) $(SAN) $(LINK_LIMIT) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
 
-# ---- what is missing, and only that; DEPS=no installs nothing
+# ---- packages: only missing ones are installed; DEPS=no installs nothing
 DEPS ?= yes
 define install_missing
 	@[ '$(DEPS)' != no ] || exit 0; missing=; for p in $(1); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
@@ -260,7 +253,7 @@ define install_missing
 		$$sudo apt-get update -qq && $$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
 	fi
 endef
-# The readers for LAS and E57 are npm's, in the versions of the lock file. Without npm's registry their tests are skipped.
+# The readers for LAS and E57 are npm's, in the versions of the lock file. Without its registry their tests are skipped.
 READERS = $(BUILD)/readers
 #? deps              install what building, the demo and the tests need (Debian)
 deps: deps-test $(READERS)/installed
@@ -304,12 +297,12 @@ demo: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh config/demo.sh $(BUILD)/scanhead $(BUILD)/demo
 
-# ---- tests. Warnings are errors. Two builds: all with gcc, as it is shipped; and with clang, for its warnings, the unit
-# tests with sanitizers, and the fuzz targets, whose marks of coverage cost a tenth. clang takes a third of the time at -O0
-# that it takes at -O1 (gcc with sanitizers: two thirds); core alone is worth -O1. Without clang gcc does it.
-# -g1, the lines alone, is an eighth less to compile.
+# ---- tests. Warnings are errors. There are two builds. One has everything with gcc, as it is shipped. The other has the
+# unit tests with sanitizers and the fuzz targets, with clang and its warnings; without clang gcc builds them. Marks of
+# coverage for the fuzz targets cost a tenth. clang takes a third of the time at -O0 that it takes at -O1 (gcc with
+# sanitizers: two thirds); core alone is worth -O1. -g1, the lines alone, is an eighth less to compile.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
-# What was compiled before, in whatever checkout, is not compiled again.
+# A file that was compiled before, in any checkout, is not compiled again.
 CACHED = $(if $(findstring ccache,$(CC)),,$(if $(shell command -v ccache),ccache ))
 export CCACHE_BASEDIR ?= $(CURDIR)
 export CCACHE_NOHASHDIR ?= 1
@@ -323,7 +316,7 @@ ASAN = WERROR=-Werror BUILD=$(BUILD)/asan $(if $(HAS_CLANG),$(ASAN_CC) OPT=-O0 C
 	TEST_WARN=-w CPPFLAGS=-DSH_SANITIZE SAN="$(ASAN_FLAGS)"
 SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
 RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
-# `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_kernel_usbip.
+# `make test T=test_ring` builds and runs that one alone, of any folder. A script does as well: T=check_includes.
 T ?=
 #? test              all tests; T=test_ring one alone, THOROUGH=1 in full depth, DEPS=no installs nothing
 ifeq ($(T),)
@@ -349,21 +342,21 @@ test-unit test-wire test-accuracy test-stability test-guest: deps
 	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test test-programs
 	@$(RUN) sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 
-# The other end of a usbredir channel goes, comes back and resets 1,000 times (`make test`: 20).
+# The other end of a usbredir channel goes, comes back and resets 1,000 times (in `make test` 20 times).
 #? soak-usb          1,000 times a USB cable is pulled and put back
 soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@TEST_LIMIT_S=7200 USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
-# Recorders that are killed, and disks that are full, at N random moments for each format (`make test`: one of
-# each): some minutes.
+# This kills recorders and fills disks at N random moments for each format (`make test`: one of each). It takes some
+# minutes.
 N ?= 200
 #? repair            N=200 killed recorders and full disks for each format
 repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
 	@TEST_LIMIT_S=7200 REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
-# 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
+# This reads 600 broken meshes, with and without sanitizers, in half a minute. `make test` tries every tenth with them.
 #? test-hostile      600 broken meshes
 test-hostile: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files
@@ -371,13 +364,13 @@ test-hostile: deps
 	@TEST_LIMIT_S=7200 HOSTILE_EVERY=1 $(BUILD)/test/tests/unit/test_hostile_files
 	@TEST_LIMIT_S=7200 HOSTILE_EVERY=1 $(BUILD)/asan/tests/unit/test_hostile_files
 
-# What a station sees, by its map and by the BVH, in 50,000 random scenes: some minutes.
+# This compares what a station sees, by its map and by the BVH, in 50,000 random scenes. It takes some minutes.
 #? test-sight        50,000 random scenes: what a station sees, by its map and by the BVH
 test-sight: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/accuracy/test_sight
 	@TEST_LIMIT_S=7200 SIGHT_SCENES=50000 $(BUILD)/test/tests/accuracy/test_sight
 
-# A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
+# A million pulses over each kind of USB have the hash that TCP gives. It takes some minutes in an emulated machine.
 #? test-usb-million  a million pulses over each kind of USB
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
@@ -394,15 +387,17 @@ bench: deps-build
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam waveform waveform_detect)
-# Footprints: cost, and error against 1,000 sub-rays; a few minutes.
+# This measures footprints: cost, and error against 1,000 sub-rays. It takes a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
-# Effects that are named and not needed: by the plain cast, within 5 %.
-bench-plain: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
-	@$(BUILD)/tests/bench/plain
-# The encoder of VLP-16 data packets, ns a firing.
+# Each of these runs one program. plain: effects that are configured and not needed cost at most 5 % beside the plain
+# cast. copies: a forest of copies, its memory, and what a ray costs beside one tree. velodyne: the encoder of VLP-16
+# data packets, ns a firing. waves: waveforms on the wire, ns a window.
+#? bench-waveform    samples of full waveforms: ns a pulse by spread and window
+bench-plain bench-copies bench-velodyne bench-waves bench-waveform: bench-%: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/$*
+	@$(BUILD)/tests/bench/$*
 # A panorama of 0.1 degrees to files on one processor, beside Embree alone; last, PLY with coordinates as float alone.
 PANORAMA = taskset -c $(shell expr $(JOBS) - 1) $(BUILD)/tests/bench/panorama --set loop.threads=1
 bench-panorama: deps-build
@@ -423,18 +418,6 @@ bench-page: deps-build deps-browser
 page-pictures: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
 	@SCANHEAD=$(BUILD)/scanhead node tests/page/pictures.mjs --out $(BUILD)/pictures
-# A forest of copies: its memory, and what a ray costs beside one tree.
-bench-copies: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/copies
-	@$(BUILD)/tests/bench/copies
-
-bench-velodyne: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
-	@$(BUILD)/tests/bench/velodyne
-# Waveforms on the wire, ns a window.
-bench-waves: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/waves
-	@$(BUILD)/tests/bench/waves
 # The arithmetic around the cast, ns a pulse: as on this CPU, and as x86 has it without AVX-512.
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
@@ -472,14 +455,14 @@ objects: $(EVERYTHING)
 test-unit-programs test-programs: $(BUILD)/tests/joined
 test-programs: all $(BUILD)/bench $(call PROGRAMS,guest) $(FIGURES)
 
-# What takes long and proves much is described where it stands.
+# Long tests and measurements have rules beside them.
 include $(wildcard tests/*/*.mk config/*/*.mk)
 
 # The readers of IFC, without what only browsers need. Builds below build/ use those of build/.
 IFC_BUILT = $(patsubst %/installed,%,$(firstword $(wildcard $(IFC_READERS)/installed $(BUILD)/../ifc/installed)))
 IFC_FILES = $(addprefix node_modules/web-ifc/,package.json LICENSE.md web-ifc-api-node.js web-ifc-node.wasm) \
 	$(addprefix node_modules/@ifc-lite/wasm/,package.json LICENSE pkg/ifc-lite.js pkg/ifc-lite_bg.wasm)
-# BUILT=yes installs what is there, however it was built: with `make CFLAGS=...`, or for another user than root.
+# BUILT=yes installs existing files, whatever flags they were built with and by whichever user.
 BUILT ?= no
 #? install           into PREFIX=/usr/local, below DESTDIR; BUILT=yes builds nothing
 install: $(if $(filter yes,$(BUILT)),,all)
@@ -521,6 +504,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama bench-helios chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-waveform bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama bench-helios chart install format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

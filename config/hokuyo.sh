@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: MIT
 # Records scans of the head of hokuyo.yaml with rawlog-grabber, which runs until it has saved some.
 #   sh config/hokuyo.sh INI PREFIX        PREFIX: the rawlog_prefix that INI names
-# It gives up where an answer takes more than 0.1 s (TCP) or 0.2 s (serial), as on a busy machine, and asks no more where
-# the head was still booting. It is started again when it has saved nothing in 10 s; after ten minutes no more.
+# The grabber gives up where an answer takes more than 0.1 s (TCP) or 0.2 s (serial), as on a busy machine, or where the
+# head is still booting. Where it has saved nothing in 10 s it is started again, for up to ten minutes.
 set -eu
 ini=$1
 prefix=$2
 end_s=$(($(date +%s) + 600))
 while [ "$(date +%s)" -lt $end_s ]; do
     rm -f "$prefix"_*.rawlog "$prefix.said"
-    # What it reads is a key that ends it, and comes once it has said how it goes.
+    # The loop waits until the grabber has saved scans or failed. Then the pipe's end counts as a key, which ends it.
     for _ in 1 2 3 4 5 6 7 8 9 10; do
         sleep 1
         ! grep -qs 'Saved\|Error in response' "$prefix.said" || break

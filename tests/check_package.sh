@@ -47,6 +47,13 @@ sources_are_all() {
     printf '%s\n' $listed | sort | diff "$work/tracked" -
 }
 
+# The developers' package has all pages that the protocol's first page names.
+pages_agree() {
+    for page in PROTOCOL.md $(grep -oE '\]\([A-Z_]+\.md' drivers/protocol/PROTOCOL.md | cut -c 3- | sort -u); do
+        grep -qx "drivers/protocol/$page" $packaging/debian/libscanhead-dev.docs || { echo "$page is in no package"; return 1; }
+    done
+}
+
 # Each library that the program is linked with has a line in the README, with its licence.
 licences_are_named() {
     for library in $(readelf -d "${SCANHEAD:-build/scanhead}" | sed -n 's/.*(NEEDED).*\[lib\([A-Za-z]*\).*/\1/p'); do
@@ -88,6 +95,7 @@ example_passes() {
 check "symbols of the library: as libscanhead1.symbols has them" symbols_agree
 check "each installed file is in a package" files_agree
 check "a release has all that stands at the top" sources_are_all
+check "the pages of the protocol are in the package of the library's developers" pages_agree
 check "licences of the libraries are named; LICENSE and copyright are the same" licences_are_named
 check "the service's limits are what real time takes" limits_agree
 check "the scripts of the packages" scripts_are_sound

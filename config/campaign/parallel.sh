@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# A campaign by GNU parallel: so many shards at a time, on this machine or on several; then all files checked.
+# This runs a campaign by GNU parallel: some shards at a time, on this machine or on several. Then it checks all files.
 #
 #   sh parallel.sh CONFIG -o DIR [options of scanhead batch]
 #
-# SCANHEAD: the program (default: scanhead of PATH). SHARDS: into how many the campaign is cut (default: the processors of
-# this machine). JOBS: how many at a time on a machine (default: one per processor). THREADS: of each (default: 1).
+# SCANHEAD: the program (default: scanhead of PATH). SHARDS: the number of shards (default: one per processor of this
+# machine). JOBS: shards at a time on a machine (default: one per processor). THREADS: threads of a shard (default: 1).
 # MACHINES: a file with a line for each machine, as --sshloginfile has it.
 set -eu
 

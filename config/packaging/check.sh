@@ -24,18 +24,18 @@ root=$debs/root
 work=$debs/check
 rm -rf "$work" && mkdir -p "$work" || exit 1
 . "$project/tests/tap.sh"
-# What is mounted below the root belongs to this mount namespace, and goes with it.
+# Mounts below the root belong to this mount namespace, and go with it.
 [ -n "${DEB_CHECK_APART:-}" ] || exec env DEB_CHECK_APART=1 unshare --mount --propagation private bash "$0" "$@"
 
 packages="scanhead libscanhead1 libscanhead-dev python3-scanhead"
 inside() {
     chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"
 }
-# As a user who has no rights, and no file of his own but in /tmp.
+# Runs a command as a user who has no rights, and no file of his own but in /tmp.
 as_nobody() {
     inside setpriv --reuid=65534 --regid=65534 --clear-groups --no-new-privs --bounding-set=-all "$@"
 }
-# The head has real time beside that: by the limits of the service where they can be set here, else by two rights.
+# Runs a head as that user, with real time: by the limits of the service where they can be set here, else by two rights.
 as_head() {
     if [ "$limits" = yes ]; then
         as_nobody "$@"
@@ -60,7 +60,7 @@ make_root() {
         printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d" && chmod +x "$root/usr/sbin/policy-rc.d"
 }
 
-# All packages of Debian that ours ask for, and a compiler: so that what comes next is by ours alone.
+# Installs Debian's packages that ours ask for, and a compiler, so that all later changes are by ours alone.
 install_others() {
     inside apt-get update -qq && inside apt-get install -qq --no-install-recommends gcc libc6-dev pkg-config man-db \
         groff-base bash-completion systemd >/dev/null &&
@@ -69,8 +69,8 @@ install_others() {
         inside apt-get install -qq --no-install-recommends $(cat "$work/others") >/dev/null
 }
 
-# Every file with its kind, rights and owner, in /etc and /var/lib/systemd with what is in it; users and groups; but what
-# apt and dpkg write about themselves, and caches.
+# Prints every file with its kind, rights and owner, those of /etc with a checksum; users and groups; and packages.
+# Caches, and what apt and dpkg write about themselves, are left out.
 picture() {
     (cd "$root" && find . -xdev \( -path ./proc -o -path ./sys -o -path ./run -o -path ./packages -o -path ./tmp -o -path ./var/cache \
         -o -path ./var/log -o -path ./var/lib/apt -o -path ./var/lib/dpkg/info/format -o -path './var/lib/dpkg/*-old' \) \
@@ -93,7 +93,7 @@ versions_agree() {
         grep -q "\"$version\"" "$root/usr/include/scanhead.h"
 }
 
-# The service's example, for a head and a recording.
+# Checks, records and reports the service's example.
 records() {
     few="--set head.pan_stop_deg=40"
     as_nobody scanhead check /etc/scanhead/example.yaml --set 'links[0].port=0' &&
@@ -102,7 +102,7 @@ records() {
         as_nobody scanhead list | grep -q riegl-vz400i
 }
 
-# A head; its port is in $port.
+# Starts a head; its port is then in $port.
 start_head() {
     rm -f "$root/tmp/ready" && mkfifo -m 666 "$root/tmp/ready" || return
     as_head sh -c 'exec scanhead run /etc/scanhead/example.yaml --set "links[0].port=0" \
@@ -136,7 +136,7 @@ END
     as_nobody python3 /tmp/client.py "tcp:127.0.0.1:$port"
 }
 
-# The README's client, by pkg-config, with the library of the package: shared, then as an archive.
+# Builds and runs the README's client, by pkg-config, with the library of the package: shared, then as an archive.
 client_in_c() {
     sed -n '/^```c /,/^```$/p' "$project/README.md" | sed '/^```/d' >"$root/tmp/client.c"
     inside sh -c 'cd /tmp && cc -Wall -Werror client.c $(pkg-config --cflags --libs libscanhead) -o client &&
@@ -171,7 +171,7 @@ unit_is_sound() {
     ! grep -i scanhead "$work/verify"
 }
 
-# Linked to be started, as the administrator did; used, as the manager did.
+# Enables the service, as an administrator does, and makes the folders that its manager makes.
 use_like_a_service() {
     mkdir -p "$root/etc/systemd/system/multi-user.target.wants" "$root/var/lib/private/scanhead/example"
     ln -s private/scanhead "$root/var/lib/scanhead" &&
@@ -190,7 +190,7 @@ nothing_is_left() {
     diff "$work/before" "$work/after" && ! grep -i scanhead "$work/after"
 }
 
-# The service, in the same root, booted: what it is at work, what its client gets, and how it ends.
+# Boots the same root, and writes down the service's rights and state, what its client gets, and how it ends.
 boots() {
     command -v systemd-nspawn >/dev/null || { echo "no systemd-nspawn (package systemd-container)"; return 1; }
     install_ours || return

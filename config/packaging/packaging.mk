@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-# make deb: packages for Debian, in build/deb. make deb-check: installs, tries and removes them in a new root (needs root).
+# make deb: packages for Debian, in build/deb. make deb-check: installs, tries and removes them in a new root, as root.
 DEPS_DEB = debhelper fakeroot lintian
 DEPS_DEB_CHECK = mmdebstrap systemd-container
 DEB_DIR = $(BUILD)/deb
 DEB_TREE = $(DEB_DIR)/scanhead
 RELEASE = $(shell sed -n 's/^\#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' drivers/host/scanhead.h)
-# What a release consists of: all that is at the top.
+# A release consists of all that is at the top.
 DEB_SOURCES = Makefile README.md CHANGELOG.md LICENSE config core drivers firmware_sim tests
 # The changelog's date: that of the commit, else of the header that has the version.
 DEB_TIME = $${SOURCE_DATE_EPOCH:-$$(git log -1 --format=%ct 2>/dev/null || stat -c %Y drivers/host/scanhead.h)}

@@ -2,9 +2,9 @@
 /* The command set: one SCPI-style line in, one reply line out, and the error queue of SCPI-99 (21.8).
  *
  *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?  HELP:SETtings?
- *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:LOST?  SYSTem:VERSion?  SYSTem:PLAN?
- *             SYSTem:CONTrol?  SYSTem:CONTrol:RELease
- *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:STORe
+ *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:LOST?  SYSTem:VERSion?  SYSTem:PLAN?  SYSTem:SESSion?
+ *             SYSTem:CONTrol?  SYSTem:CONTrol:WHO?  SYSTem:CONTrol:TAKE  SYSTem:CONTrol:RELease
+ *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?  HEAD:STORe  HEAD:REBoot
  *             HEAD:RANGe:MIN  HEAD:RANGe:MAX  HEAD:NOISe  HEAD:NOISe:ANGLe  HEAD:NOISe:SIGMa  HEAD:NOISe:BALL
  *             HEAD:PHASe  HEAD:PHASe:LOCK  HEAD:PHASe:EDGE?
  *   scan      SCAN:STARt  SCAN:STOP  SCAN:COUNt?  SCAN:FRAMes  SCAN:ECHoes  SCAN:WAVeform
@@ -21,9 +21,9 @@
  * MIN and MAX are the limits as the profile and the other settings leave them now, so they are never refused.
  * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as in SCPI); DEG; DEG/S; M, MM, KM; for a step of time NS (the
  * default), US, MS, S. Numbers are taken exactly or refused, never rounded; only SCAN:STEP sets the nearest rates,
- * and its reply is the step that they give. SCAN:ECHoes takes ALL, FIRSt,
- * LAST, STRongest or DEF: which echoes of a pulse are sent. On a head with fixed pulse rates HEAD:PRR takes only these;
- * another rate is -222 with the list of them.
+ * and its reply is the step that they give. SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: these echoes of a
+ * pulse are sent. On a head with fixed pulse rates HEAD:PRR takes only these; another rate is -222 with the list of
+ * them.
  *
  * Ranges, noise, and the step of a sphere hold from the next scan on, and can't change within one.
  *
@@ -126,27 +126,29 @@ struct command_time_server {
     uint32_t interface; /* 0: Ethernet; 1: CAN, where no server is asked */
     uint8_t address[4];
     uint32_t update_s; /* from request to request */
-    int32_t zone_h;    /* what local time is ahead of UTC */
-    uint32_t n_roles;  /* how often the role has changed: whoever looks now and then may miss that it did */
+    int32_t zone_h;    /* how far local time is ahead of UTC */
+    uint32_t n_roles;  /* how often the role has changed: a reader that looks only now and then may miss a change */
 };
 /* Its answers since power-up. */
 struct command_time_answers {
-    int64_t max_offset_ns;       /* the clock once set, an answer farther from it is refused */
+    int64_t max_offset_ns;       /* once the clock is set, an answer that is farther from it is refused */
     int64_t offset_ns, delay_ns; /* of the last answer that set the clock */
     uint64_t good, refused, none;
     const char *state; /* one word; NULL: OFF */
 };
 
-/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. [0] is unused. */
+/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. There are 8 sessions on
+ * each of 9 links (one is the observer's), which count from 1. */
 enum { COMMAND_PEERS = 73, COMMAND_PEER_LEN = 80 };
 struct command_peers {
     char name[COMMAND_PEERS][COMMAND_PEER_LEN];
 };
 
-/* The phase of a rotor by the last pulse per second. */
+/* The phase of a rotor at the last pulse per second. */
 struct command_phase {
-    int is_known, is_held; /* a pulse has come since it turns; it was within 0.01 degree of the lock's azimuth */
-    int64_t edge_udeg;     /* its azimuth then */
+    int is_known;      /* 1: a pulse has come since the rotor turns */
+    int is_held;       /* 1: the rotor was then within 0.01 degree of the lock's azimuth */
+    int64_t edge_udeg; /* its azimuth then */
 };
 
 /* The recording that is replayed. Times count from its first frame. */
@@ -195,12 +197,12 @@ struct command_device {
     struct command_time_server server, server_default, server_configured; /* now; at power-up; of the configuration */
     int asks_server; /* 1: TIME:SERVer may be CLIENT: there is somebody who asks */
     struct command_time_answers answers;
-    int64_t shift_ns;                      /* what the scanner's clock is ahead of that of power-up (scanner_clock.h) */
-    int keeps;                             /* 1: the head can keep settings without power */
-    int step_allowed;                      /* 1 when the pace is `step` */
-    int pose_allowed;                      /* 1 when the platform is live: a step may carry a pose */
-    double pose_centre_m[3], pose_reach_m; /* the pose must be within pose_reach_m of the centre; scene frame */
-    const struct command_place *place;     /* [limits.n_stations] as they are now; NULL: not known */
+    int64_t shift_ns;                        /* how far the scanner's clock is ahead of that of power-up */
+    int keeps;                               /* 1: the head can keep settings without power */
+    int step_allowed;                        /* 1 when the pace is `step` */
+    int pose_allowed;                        /* 1 when the platform is live: a step may carry a pose */
+    double pose_centre_m[3], pose_reach_m;   /* the pose must be within pose_reach_m of the centre; scene frame */
+    const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */
     struct command_replay replay;
     const char *recorded; /* a recording is replayed: why no setting changes; NULL: none is */
@@ -223,7 +225,7 @@ enum command_effect {
     COMMAND_FAULTS,  /* faults were added or taken out */
     COMMAND_CLOCK,   /* the scanner's clock was set */
     COMMAND_SERVER,  /* its time server has changed */
-    COMMAND_REPLAY,  /* a recording goes on elsewhere, or otherwise */
+    COMMAND_REPLAY,  /* a recording goes on at another time or speed, or repeats otherwise */
     COMMAND_RELEASE, /* control was given back */
 };
 

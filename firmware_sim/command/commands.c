@@ -136,7 +136,8 @@ static int query_state(struct command_call *call)
     return command_reply(call, "%s", head_state_name(call->dev->state));
 }
 
-/* Whether the lock holds it, and its azimuth at the last pulse per second; no such pulse since it turns is no error. */
+/* Replies with whether the lock holds the rotor, and its azimuth at the last pulse per second. It is no error where no
+ * such pulse has come since the rotor turns. */
 static int query_phase_edge(struct command_call *call)
 {
     const struct command_phase *phase = &call->dev->phase;
@@ -155,7 +156,7 @@ static int query_time(struct command_call *call)
     return command_reply(call, "%lld", (long long)call->dev->t_ns);
 }
 
-/* An empty text: the head does not know it. */
+/* An empty text means that the head does not know the time. */
 static int reply_time_of_day(struct command_call *call, const char *text, const char *needs)
 {
     if (text[0] == '\0')
@@ -241,7 +242,7 @@ static int act_reset(struct command_call *call)
 {
     if (act_event(call, COMMAND_RESET) != 0) return -1;
     call->dev->settings = call->dev->defaults;
-    call->dev->server = call->dev->server_default;
+    command_server_set(call->dev, &call->dev->server_default);
     return 0;
 }
 
@@ -252,7 +253,8 @@ static int act_reboot(struct command_call *call)
     return act_event(call, COMMAND_REBOOT);
 }
 
-/* The power-up values; the device writes them to its file. Station and frames are no such settings (stored.h). */
+/* Makes the settings those of power-up; the device writes them to its file. Station and frames are left out
+ * (stored.h). */
 static int act_store(struct command_call *call)
 {
     struct command_device *dev = call->dev;

@@ -4,6 +4,7 @@
 #include "firmware_sim/command/error_queue.h"
 
 #include <stdio.h>
+#include <string.h>
 
 static const struct {
     int number;
@@ -45,7 +46,9 @@ const char *command_error_text(int number)
 void command_error_compose(char *buf, size_t len, int number, const char *text)
 {
     const int has_text = text != NULL && text[0] != '\0';
-    snprintf(buf, len, "%s%s%s", command_error_text(number), has_text ? "; " : "", has_text ? text : "");
+    const int whole =
+        snprintf(buf, len, "%s%s%s", command_error_text(number), has_text ? "; " : "", has_text ? text : "");
+    if (whole >= (int)len) memcpy(buf + len - 4, "...", 3);
     for (char *p = buf; *p != '\0'; p++) {
         if (*p == '"') *p = '\'';
         if (*p < 0x20 || *p > 0x7e) *p = '~';

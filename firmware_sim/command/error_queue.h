@@ -9,8 +9,8 @@
 
 enum { COMMAND_TEXT_LEN = sizeof(((struct command_queue *)0)->entry[0].text) };
 
-/* Composes `standard text; text`. Bytes that are not printable ASCII become '~', and '"' becomes '\''. Cut at its end
- * to fit. */
+/* Composes `standard text; text`. Bytes that are not printable ASCII become '~', and '"' becomes '\''. A text that does
+ * not fit is cut, and ends with "...". len is 4 at least. */
 void command_error_compose(char *buf, size_t len, int number, const char *text);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* FAULt: the command lines for injected faults. The owner of the faults reads and keeps them. */
+/* FAULt: the command lines for injected faults. The owner of the faults parses and stores them. */
 #include <stdio.h>
 #include <string.h>
 

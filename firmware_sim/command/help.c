@@ -58,18 +58,19 @@ static void add_states(struct command_call *call)
     add(call, "\"%s\"", n == HEAD_N_STATES ? "all" : list);
 }
 
-/* min,max,default,step */
+/* Adds min,max,default,step. Each may be empty. */
 static void add_numbers(struct command_call *call)
 {
     const int decimals = call->row->unit->decimals;
     const struct command_setting *setting = call->row->setting;
+    const int known = command_setting_is_known(call); /* a query of another one would put an error into the queue */
     struct command_call ask = *call;
     struct command_result answer;
     char number[32];
     ask.out = &answer;
     for (int kind = COMMAND_VALUE_MIN; kind <= COMMAND_VALUE_DEF; kind++) {
         ask.value.kind = (enum command_value_kind)kind;
-        if (command_setting_query(&ask) == 0 && (setting->words == NULL || kind == COMMAND_VALUE_DEF))
+        if (known && (setting->words == NULL || kind == COMMAND_VALUE_DEF) && command_setting_query(&ask) == 0)
             add(call, "%s", answer.reply);
         add(call, ",");
     }

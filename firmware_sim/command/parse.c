@@ -5,6 +5,7 @@
 #include "firmware_sim/command/parse.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -155,6 +156,14 @@ enum command_fit command_decimal_to_int(const struct command_decimal *decimal, i
     if (magnitude > INT64_MAX) return COMMAND_FIT_BIG;
     *value = decimal->negative ? -(int64_t)magnitude : (int64_t)magnitude;
     return COMMAND_FIT_EXACT;
+}
+
+double command_decimal_to_double(const struct command_decimal *decimal)
+{
+    char text[COMMAND_MAX_LINE + 32];
+    snprintf(text, sizeof text, "%s0%.*se%d", decimal->negative ? "-" : "", decimal->n_digits, decimal->digits,
+             decimal->exponent);
+    return strtod(text, NULL);
 }
 
 const char *command_take_field(const char *text, char field[COMMAND_FIELD_LEN], size_t *len)

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/command/scan_replay.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/command/call.h"
@@ -35,7 +34,7 @@ static int take_number(struct command_call *call, const char *name, const char *
     command_clip(clip, field, strlen(field));
     if (end == NULL || *end != '\0')
         return command_fail(call, CMD_E_DATA_TYPE, "%s: the %s is not a number: '%s'", call->row->header, name, clip);
-    *value = strtod(field, NULL);
+    *value = command_decimal_to_double(&decimal);
     if (*value >= 0.0 && *value <= most) return 0;
     return command_fail(call, CMD_E_RANGE, "%s: %s %s, allowed 0 to %.10g", call->row->header, name, clip, most);
 }
@@ -70,6 +69,9 @@ int command_replay_change(struct command_call *call)
     for (int i = 0; i < 3 && rest != NULL; i++) {
         size_t len;
         rest = command_take_field(rest, field[i], &len);
+        if (len >= COMMAND_FIELD_LEN)
+            return command_fail(call, CMD_E_RANGE, "%s: a value has %zu characters, allowed up to %d",
+                                call->row->header, len, COMMAND_FIELD_LEN - 1);
     }
     if (rest != NULL)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes a time, a speed, and ON or OFF", call->row->header);

@@ -74,7 +74,7 @@ static uint32_t insert(int64_t *value, uint32_t n, int64_t another)
     return n + 1;
 }
 
-/* The line rates at the present step, or the steps at the present line rate. */
+/* Lists the line rates at the present step, or the steps at the present line rate. */
 static uint32_t fixed_geometries(const struct command_call *call, int64_t *value)
 {
     const struct head_limits *l = &call->dev->limits;
@@ -117,7 +117,7 @@ static int64_t rate_of_lines(const struct command_call *call)
     return call->dev->settings.lines_uhz * head_line_pulses(&call->dev->limits, &call->dev->settings);
 }
 
-/* Moves the ends inward: MIN and MAX must be stations of this head. */
+/* Moves the ends of a range inward, since MIN and MAX must be stations of this head. */
 static void narrow_to_stations(const struct command_call *call, int64_t *min, int64_t *max)
 {
     while (*min < *max && head_is_elsewhere(&call->dev->limits, *min))
@@ -200,14 +200,17 @@ static int check_has(struct command_call *call)
     return why == NULL ? 0 : command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
 }
 
+int command_setting_is_known(const struct command_call *call)
+{
+    const struct command_setting *setting = call->row->setting;
+    const int64_t unknown = setting->is_u32 ? (int64_t)COMMAND_NOT_RECORDED_U32 : COMMAND_NOT_RECORDED;
+    return call->dev->recorded == NULL || setting->derived != NULL || read_value(call, &call->dev->settings) != unknown;
+}
+
 /* Fails with -221 where a recording is replayed that does not have the setting. */
 static int check_known(struct command_call *call)
 {
-    const struct command_setting *setting = call->row->setting;
-    if (call->dev->recorded == NULL || setting->derived != NULL) return 0;
-    if (read_value(call, &call->dev->settings) !=
-        (setting->is_u32 ? (int64_t)COMMAND_NOT_RECORDED_U32 : COMMAND_NOT_RECORDED))
-        return 0;
+    if (command_setting_is_known(call)) return 0;
     return command_fail(call, CMD_E_SETTINGS, "%s: the recording does not have this value", call->row->header);
 }
 
@@ -336,8 +339,8 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || !can_vary));
 }
 
-/* Whether a value beyond MAX is the step of DEF. The rates of power-up may give two different steps, and the coarser
- * one may be beyond MAX. As a number it does what DEF does, if DEF gives this step. */
+/* Whether a step beyond MAX is that of DEF. The rates of power-up may give two different steps, in the line and of the
+ * pan, and the coarser one may be beyond MAX. Such a number does what DEF does. */
 static int is_default_beyond(const struct command_call *call, int64_t value)
 {
     struct head_settings then = call->dev->defaults;

@@ -51,6 +51,8 @@ int command_setting_change(struct command_call *call);
 
 /* The present range: as the profile and other settings leave it. */
 void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max);
+/* 0: a recording is replayed that does not have the setting. */
+int command_setting_is_known(const struct command_call *call);
 /* The index of the last word that the head takes. */
 uint32_t command_setting_last_word(const struct command_call *call);
 /* The only values that a setting takes, rising: pulse rates of programs, rates or steps of geometries. Returns how

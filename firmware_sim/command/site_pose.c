@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* SITE:POSE: reports where a station stands, and moves it. */
+/* SITE:POSE: reports where a station stands, and moves it. Also the pose that TIME:STEP may carry. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
+#include "core/vec3.h"
 #include "firmware_sim/command/call.h"
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/command/decimal.h"
@@ -15,14 +16,17 @@
 
 const struct command_unit command_unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}};
 
-/* The limits are those of a station's keys (stations[] in firmware_sim/config/place_rows.h). */
-static const struct {
+enum { PARTS = 6 };
+
+struct part {
     const char *name, *unit;
     double most; /* of its absolute value */
-} parts[6] = {{"x", "M", 1e9},           {"y", "M", 1e9},      {"z", "M", 1e9},
-              {"heading", "DEG", 360.0}, {"pitch", "DEG", 90}, {"roll", "DEG", 180.0}};
-
-enum { PARTS = 6 };
+};
+/* The limits are those of a station's keys (stations[] in firmware_sim/config/place_rows.h). */
+static const struct part parts[PARTS] = {{"x", "M", 1e9},           {"y", "M", 1e9},      {"z", "M", 1e9},
+                                         {"heading", "DEG", 360.0}, {"pitch", "DEG", 90}, {"roll", "DEG", 180.0}};
+static const struct part of_step[PARTS] = {{"x", "M", 1e9},        {"y", "M", 1e9},      {"z", "M", 1e9},
+                                           {"roll", "DEG", 360.0}, {"pitch", "DEG", 90}, {"heading", "DEG", 360.0}};
 
 static int fail_number(struct command_call *call, const char *name, const char *field)
 {
@@ -32,25 +36,26 @@ static int fail_number(struct command_call *call, const char *name, const char *
 }
 
 /* 63 characters have room for 17 digits, a sign, a point, an exponent and a unit. */
-static int site_pose_take_number(struct command_call *call, int i, const char *field, size_t len, double *value)
+static int site_pose_take_number(struct command_call *call, const struct part *part, const char *field, size_t len,
+                                 double *value)
 {
     struct command_decimal decimal;
     if (len >= COMMAND_FIELD_LEN)
         return command_fail(call, CMD_E_RANGE, "%s: %s has %zu characters, allowed up to %d", call->row->header,
-                            parts[i].name, len, COMMAND_FIELD_LEN - 1);
+                            part->name, len, COMMAND_FIELD_LEN - 1);
     const char *unit = command_parse_decimal(field, &decimal);
-    if (unit == NULL) return fail_number(call, parts[i].name, field);
-    if (*unit != '\0' && strcasecmp(unit, parts[i].unit) != 0) {
+    if (unit == NULL) return fail_number(call, part->name, field);
+    if (*unit != '\0' && strcasecmp(unit, part->unit) != 0) {
         char clip[COMMAND_CLIP_LEN];
-        if (strchr("+-.0123456789", *unit) != NULL) return fail_number(call, parts[i].name, field);
+        if (strchr("+-.0123456789", *unit) != NULL) return fail_number(call, part->name, field);
         command_clip(clip, unit, strlen(unit));
-        return command_fail(call, CMD_E_SUFFIX, "'%s'; %s of %s takes %s", clip, parts[i].name, call->row->header,
-                            parts[i].unit);
+        return command_fail(call, CMD_E_SUFFIX, "'%s'; %s of %s takes %s", clip, part->name, call->row->header,
+                            part->unit);
     }
-    *value = strtod(field, NULL) + 0.0; /* without -0 */
-    if (fabs(*value) <= parts[i].most) return 0;
-    return command_fail(call, CMD_E_RANGE, "%s: %s %.9g, allowed %.10g to %.10g %s", call->row->header, parts[i].name,
-                        *value, -parts[i].most, parts[i].most, parts[i].unit[0] == 'M' ? "m" : "deg");
+    *value = command_decimal_to_double(&decimal) + 0.0; /* without -0 */
+    if (fabs(*value) <= part->most) return 0;
+    return command_fail(call, CMD_E_RANGE, "%s: %s %.9g, allowed %.10g to %.10g %s", call->row->header, part->name,
+                        *value, -part->most, part->most, part->unit[0] == 'M' ? "m" : "deg");
 }
 
 static int take_station(struct command_call *call, const char *field, size_t len, uint32_t *station)
@@ -134,7 +139,7 @@ static int take_parameters(struct command_call *call)
             out->to_first = 1;
             break;
         }
-        if (site_pose_take_number(call, i, field, len, &out->place.v[i]) != 0) return -1;
+        if (site_pose_take_number(call, &parts[i], field, len, &out->place.v[i]) != 0) return -1;
     }
     if (rest == NULL) return 0;
     return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes station, x, y, z, heading, pitch, roll, or station, DEF",
@@ -157,4 +162,26 @@ int command_place_change(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s: station %u is being moved", header, dev->moving);
     call->out->effect = COMMAND_MOVE;
     return command_reply(call, "OK");
+}
+
+int command_take_pose(struct command_call *call)
+{
+    const char *header = call->row->header, *rest = call->pose;
+    struct command_result *out = call->out;
+    char field[COMMAND_FIELD_LEN];
+    size_t len;
+    if (!call->dev->pose_allowed)
+        return command_fail(call, CMD_E_SETTINGS, "a pose in %s needs platform.kind: live", header);
+    for (int i = 0; i < PARTS && rest != NULL; i++) {
+        rest = command_take_field(rest, field, &len);
+        if (site_pose_take_number(call, &of_step[i], field, len, &out->pose[i]) != 0) return -1;
+        if ((rest != NULL) != (i + 1 < PARTS))
+            return command_fail(call, rest == NULL ? CMD_E_MISSING : CMD_E_NOT_ALLOWED,
+                                "%s takes a time, or a time and x, y, z, roll, pitch, heading", header);
+    }
+    if (vec3_distance(out->pose, call->dev->pose_centre_m) > call->dev->pose_reach_m)
+        return command_fail(call, CMD_E_RANGE, "%s: the pose is more than platform.reach_m, %g m, from the station",
+                            header, call->dev->pose_reach_m);
+    out->have_pose = 1;
+    return 0;
 }

@@ -106,7 +106,7 @@ static int64_t most_of_both(const struct command_device *dev, int64_t most)
 
 /* ---- spheres: a step has to divide half a turn */
 
-/* The nearest such step at or above a step (up: 1), or at or below it. */
+/* Returns the nearest such step at or above a step (up: 1), or at or below it. */
 static int64_t whole_part(int64_t step_udeg, int up)
 {
     int64_t n = HALF_UDEG / step_udeg;

@@ -67,9 +67,16 @@ static uint32_t find_word(const char *const words[], uint32_t n, const char *wor
     return i;
 }
 
+void command_server_set(struct command_device *dev, const struct command_time_server *server)
+{
+    const uint32_t n_roles = dev->server.n_roles + (server->role != dev->server.role);
+    dev->server = *server;
+    dev->server.n_roles = n_roles;
+}
+
 int command_server_change(struct command_call *call)
 {
-    struct command_time_server s;
+    struct command_time_server s = {0};
     unsigned a[4], update_s;
     char role[8], interface[8];
     int end = 0, zone_h;
@@ -93,8 +100,7 @@ int command_server_change(struct command_call *call)
         s.address[i] = (uint8_t)a[i];
     s.update_s = update_s;
     s.zone_h = zone_h;
-    s.n_roles = call->dev->server.n_roles + (s.role != call->dev->server.role);
-    call->dev->server = s;
+    command_server_set(call->dev, &s);
     call->out->effect = COMMAND_SERVER;
     return command_reply(call, "OK");
 }

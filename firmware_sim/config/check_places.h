@@ -15,7 +15,7 @@ void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg);
 /* Keys that only some kinds of platform have. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
-/* The platform's keys with each other. Sets seconds from frames. */
+/* The platform's keys against each other. Converts frames to seconds. */
 void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
 
 #endif

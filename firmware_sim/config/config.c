@@ -54,6 +54,7 @@ static int load_once(const char *const *sets, int n_sets, uint32_t station, stru
     find_scanner(&rd, cfg, station);
     read_scanner(&rd, doc, sets, n_sets);
     cfg_close_file(doc);
+    /* The profile comes after --set and the scanner, which may name it, and before defaults, which are its figures. */
     cfg_load_profile(&rd, cfg);
     cfg_fill_defaults(&rd, &cfg->profile);
     cfg_check(&rd, cfg);

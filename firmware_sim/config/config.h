@@ -263,11 +263,11 @@ double config_cast_hz(const struct config *cfg);
 /* Threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
-/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. An adaptive beam
- * needs that. */
+/* Says why the beams of a scan do not all begin at one place of a scene that stands still, as an adaptive beam needs;
+ * NULL: they do. */
 const char *config_beam_moves(const struct config *cfg);
 
-/* Why rays do not all begin at the head's station; NULL: they do. A visibility map (core/sight.h) needs that. */
+/* Says why rays do not all begin at the head's station, as a visibility map (core/sight.h) needs; NULL: they do. */
 const char *config_rays_move(const struct config *cfg);
 
 #endif

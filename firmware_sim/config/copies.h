@@ -10,7 +10,7 @@
 struct cfg_reader;
 
 extern const struct cfg_table cfg_copy_table;
-/* A reader for the next copy, below the key `name`. */
+/* Begins the next copy of a mesh, and a reader for it. `name` stands before its keys in errors. */
 void cfg_begin_copy(struct cfg_reader *rd, const struct cfg_reader *of, uint32_t mesh, const char *name, int line);
 /* Removes copies: all of them (scene, scene.meshes), or those of one mesh. */
 void cfg_forget_copies(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks that concern more than one key, or files: limits of the head profile, order of angles, files, keys of
- * links and platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
+/* Checks that concern more than one key, or files: limits of the head profile, order of angles, meshes, output, beam,
+ * time. cfg_check has the order of these checks and of those in the other files. */
 #include "firmware_sim/config/check.h"
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/check_head.h"
@@ -9,6 +9,7 @@
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 #include "firmware_sim/config/table/given.h"
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
@@ -264,11 +265,11 @@ static void check_target(struct cfg_reader *rd, const struct config *cfg)
 
 void cfg_check(struct cfg_reader *rd, struct config *cfg)
 {
-    cfg_check_emitter_settings(rd, cfg);
+    cfg_check_emitter_settings(rd, cfg); /* first, since it sets the rates, and their limits, that follow from others */
     cfg_check_rate(rd, cfg);
     check_limits(rd, cfg);
     check_head(rd, cfg);
-    cfg_limit_range(rd, cfg);
+    cfg_limit_range(rd, cfg); /* before check_output, whose scale must hold the ranges that are left */
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         check_mesh(rd, &cfg->scene.mesh[i], i);
     cfg_check_copies(rd, cfg);
@@ -291,5 +292,5 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_faults(rd, &cfg->faults);
     cfg_check_fault_links(rd, cfg, &cfg->faults);
     cfg_check_fault_beams(rd, cfg, &cfg->faults);
-    cfg_take_scan_settings(cfg);
+    if (rd->faults->n == 0) cfg_take_scan_settings(cfg); /* last, since it copies values that the checks derive */
 }

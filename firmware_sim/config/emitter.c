@@ -15,15 +15,13 @@
 
 static const double PRR_MOST_HZ = 1e7;
 
-/* "planar, beams" */
+/* Writes "planar, beams". */
 static const char *words_of(unsigned emitters, char *buf, size_t len)
 {
     const char *const *names = cfg_find(&cfg_profile_table, "emitter")->names;
-    size_t used = 0;
     buf[0] = '\0';
-    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS && used < len; kind++)
-        if (emitters & CFG_KIND(kind))
-            used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", names[kind]);
+    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
+        if (emitters & CFG_KIND(kind)) cfg_list_add(buf, len, names[kind]);
     return buf;
 }
 
@@ -52,12 +50,12 @@ static void check_owners(struct cfg_reader *rd, unsigned emitter)
 static void set_rates(struct cfg_reader *rd, const char *key, struct config_profile *p)
 {
     const uint32_t n = p->emitter.steps;
-    const double most_hz = 1e-6 * (double)p->lines_max_uhz * n;
+    const double most_hz = from_micro(p->lines_max_uhz) * n;
     p->prr_min_uhz = p->lines_min_uhz * n;
     p->prr_max_uhz = p->lines_max_uhz * n;
     if (most_hz > PRR_MOST_HZ && CFG_SOUND(rd, 0, "lines_max_hz"))
         cfg_fail_key(rd, key, 0, "%u pulses a line and lines_max_hz %.10g make %.10g pulses/s; allowed up to %.10g", n,
-                     1e-6 * (double)p->lines_max_uhz, most_hz, PRR_MOST_HZ);
+                     from_micro(p->lines_max_uhz), most_hz, PRR_MOST_HZ);
 }
 
 static void set_planar(struct cfg_reader *rd, struct config_profile *p)
@@ -77,8 +75,7 @@ static void set_planar(struct cfg_reader *rd, struct config_profile *p)
         cfg_fail_key(rd, "front_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->front_step,
                      c->steps_per_turn, c->steps_per_turn - 1);
     else {
-        emitter_set_planar(&p->emitter, c->steps_per_turn, c->first_step, c->last_step, c->front_step,
-                           c->step_direction == TURN_CLOCKWISE ? 1 : -1);
+        config_set_steps(p, c->steps_per_turn);
         p->fov_min_udeg = emitter_step_udeg(&p->emitter, c->first_step);
         p->fov_max_udeg = emitter_step_udeg(&p->emitter, c->last_step);
         set_rates(rd, "steps_per_turn", p);
@@ -95,7 +92,7 @@ static void set_beams(struct cfg_reader *rd, struct config_profile *p)
     if (!CFG_SOUND(rd, 0, "firing_ns", "beams", "step_direction")) return;
     for (uint32_t i = 0; i < c->n_beams; i++)
         beam[i] = (struct emitter_beam){c->beam[i].elevation_udeg, c->beam[i].azimuth_udeg, c->beam[i].offset_ns};
-    const double firing_ns = 1e-6 * (double)c->firing_fs, lines_max_hz = 1e-6 * (double)p->lines_max_uhz;
+    const double firing_ns = from_micro(c->firing_fs), lines_max_hz = from_micro(p->lines_max_uhz);
     if (c->firing_fs % FS_PER_PS != 0)
         cfg_fail_key(rd, "firing_ns", 0, "%.15g is too fine; allowed multiples of 0.001 ns", firing_ns);
     else if (emitter_set_beams(&p->emitter, beam, c->n_beams, (uint64_t)(c->firing_fs / FS_PER_PS),
@@ -253,7 +250,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
         cfg_fail_key(rd, "head.prr_hz", 0,
                      "%.15g, but a line of head profile %s has %u pulses; allowed %.15g, or none: it follows from "
                      "head.lines_hz",
-                     1e-6 * (double)s->prr_uhz, cfg->profile.name, n, 1e-6 * (double)prr_uhz);
+                     from_micro(s->prr_uhz), cfg->profile.name, n, from_micro(prr_uhz));
     s->prr_uhz = prr_uhz;
 }
 

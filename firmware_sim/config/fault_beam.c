@@ -4,6 +4,7 @@
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/value.h"
 
 static void check_mirror(struct cfg_reader *rd, const struct config *cfg, const struct fault *f, uint32_t i)
 {
@@ -27,8 +28,8 @@ static void check_mirror(struct cfg_reader *rd, const struct config *cfg, const 
 
 static void check_factor(struct cfg_reader *rd, const struct config *cfg, const struct fault *f, uint32_t i)
 {
-    const double lines_hz = 1e-6 * (double)cfg->head.settings.lines_uhz;
-    const double most_hz = 1e-6 * (double)cfg->profile.lines_max_uhz;
+    const double lines_hz = from_micro(cfg->head.settings.lines_uhz);
+    const double most_hz = from_micro(cfg->profile.lines_max_uhz);
     if (f->factor > 1.0 && f->factor * lines_hz > most_hz)
         cfg_fail_key(rd, "faults[].factor", i,
                      "%.10g times %.10g lines per second are more than head profile %s can have; allowed up to %.10g",

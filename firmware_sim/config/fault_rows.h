@@ -22,8 +22,10 @@
     {FAULT(at), CFG_COUNT, NULL, "0", 0, 1e15,
      .help = "At this frame (reply, connection) alone, counted from 1 in each session (connections: on the link). 0: "
              "not used; from, until and every apply."},
-    {FAULT(from), CFG_COUNT, NULL, "1", 1, 1e15, .help = "From this frame (reply, connection) on, counted in the same way."},
-    {FAULT(until), CFG_COUNT, NULL, "0", 0, 1e15, .help = "Up to this frame (reply, connection), included; 0: without end."},
+    {FAULT(from), CFG_COUNT, NULL, "1", 1, 1e15,
+     .help = "From this frame (reply, connection) on, counted in the same way."},
+    {FAULT(until), CFG_COUNT, NULL, "0", 0, 1e15,
+     .help = "Up to this frame (reply, connection), included; 0: without end."},
     {FAULT(every), CFG_COUNT, NULL, "1", 1, 1e15, .help = "At every n-th, beginning with `from`."},
     {FAULT(probability), CFG_REAL, NULL, "1", 0, 1, .help = "Random choice: the share of the frames that the other "
                                                             "keys select."},
@@ -41,10 +43,10 @@
      .help = "Seed of its random numbers. They also depend on its place in the list and on the link."},
     {FAULT(n), CFG_COUNT, NULL, "0", 0, 1e9,
      .help = "Number. duplicate: additional copies, up to 100; reorder: most frames that overtake it, up to 1000; "
-             "truncate: missing bytes, up to 1e6 (0: any number); flip: bits, up to 1000; split: writes, up to 64; "
+             "truncate: missing bytes, up to 1e6 (0: a random number); flip: bits, up to 1000; split: writes, up to 64; "
              "merge: frames, up to 64; garbage: bytes, up to 1024; short_packets: transfers, up to 1e6; "
-             "descriptor_length: additional bytes, up to 1000; counters_high: counts below the wrap. 0 stands for 1; "
-             "of split and merge for 2, of garbage for 16."},
+             "descriptor_length: additional bytes, up to 1000; counters_high: counts below the wrap. Otherwise 0 "
+             "stands for 1; of split and merge for 2, of garbage for 16."},
     {FAULT(byte), CFG_COUNT, NULL, "", 0, 1e9, .example = "30",
      .help = "flip: byte of the frame whose bits are changed, counted from 0; when not given, any byte."},
     {FAULT(reseal), CFG_BOOL, .def = "off",
@@ -52,7 +54,8 @@
              "measured data are changed; in native frames the payload. Without reseal a datagram (udp) is not sent: "
              "its reader's system would drop it."},
     {FAULT(for_ms), CFG_REAL, "ms", "0", 0, 1e8,
-     .help = "Duration; jitter: the largest one. On the wire it is time of the clock, in the head device time. "
+     .help = "Duration; jitter: the largest one. A fault on the wire lasts that long by the clock, one in the head by device "
+             "time. "
              "pps_jitter: how late every second pulse is, up to 400; nmea_late: how late sentences are, up to 5000, and "
              "several together up to 10000."},
     {FAULT(reset), CFG_BOOL, .def = "off",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults: checks of their keys against each other, the links and the head; scenarios, and faults that commands
- * add. (Diagnostics of a configuration are in fault.c.) */
+ * add. (Diagnostics of a configuration are in table/diagnostics.c.) */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -97,15 +97,6 @@ static const struct {
     [FAULT_NTP_STEP] = {"jump_s", 0, 0},
 };
 
-/* Whether a list of words has the word. */
-static int has_word(const char *list, const char *word)
-{
-    const size_t len = strlen(word);
-    for (const char *at = list; at != NULL && (at = strstr(at, word)) != NULL; at += len)
-        if ((at == list || at[-1] == ' ') && (at[len] == '\0' || at[len] == ',')) return 1;
-    return 0;
-}
-
 static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
 {
     const enum fault_place place = fault_place_of(f->kind);
@@ -119,7 +110,7 @@ static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
     for (size_t k = 0; k < CFG_LEN(what); k++) {
         char path[CFG_PATH_MAX];
         snprintf(path, sizeof path, "faults[].%s", what[k]);
-        if (cfg_is_given(rd, path, i) && !has_word(keys, what[k]))
+        if (cfg_is_given(rd, path, i) && !cfg_list_has(keys, what[k]))
             cfg_fail_key(rd, path, i, "%s has no such key; allowed %s", name,
                          keys != NULL ? keys : "only keys that say when and where");
     }
@@ -233,7 +224,8 @@ int config_add_scenario(struct config *cfg, const char *name, struct config_faul
     config_name_scenarios(known, sizeof known);
     int code = SH_OK;
     if (!is_there)
-        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed the path of a file, or %s", known);
+        code = cfg_fail_file(&rd, SH_EINPUT, 0, "no such scenario; allowed the path of a file, or one of these: %s",
+                             known);
     else if (list == NULL)
         code = cfg_fail_file(&rd, SH_ENOMEM, 0, "no memory");
     else

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The table of a configuration's keys; profile_keys.c has that of head profiles. A row has the key's path,
  * type, unit, default, limits and member of struct config. Parsing, defaults, errors, --set and `scanhead
- * check --help` come from the rows alone; checks of more than one key are in crosscheck.c, places.c
- * and measurement.c. */
+ * check --help` come from the rows alone. Checks of more than one key are in the files that check.h and check_*.h
+ * name. */
 #include "core/cast.h"
 #include "drivers/protocol/protocol.h"
 #include "drivers/usb/backend.h"
@@ -145,7 +145,7 @@ static const struct cfg_key config_keys[] = {
              "limits; reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit; "
              "without a texture the mesh's colour, without a colour grey."},
     {KEY(output.colour_rgb), CFG_VEC3, NULL, "[255, 255, 255]", 0, 255,
-     .help = "The colour of colour: solid: red, green and blue, whole numbers."},
+     .help = "solid: the colour, as red, green and blue, whole numbers."},
     {KEY(output.colour_limits), CFG_PAIR, NULL, "", -1e9, 1e9, .example = "[0, 30]",
      .help = "Limits of colour: range (m), height (m, z of the scene's frame) or frame. Not given: a stream takes the "
              "head's range limits, the scene's lowest and highest point, the first and last frame of the trajectory; "
@@ -184,8 +184,7 @@ static const struct cfg_key config_keys[] = {
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
      .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 "
-             "when "
-             "not given."},
+             "when not given."},
     {LINK(port), CFG_COUNT, NULL, "0", 0, 65535,
      .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's "
@@ -212,11 +211,11 @@ static const struct cfg_key config_keys[] = {
      WORDS([LINK_WAITS_BY_TYPE] = "by-type", [LINK_WAITS_YES] = "yes", [LINK_WAITS_NO] = "no"),
      .help = "Whether a slow reader holds back the head in the paces fast and step. yes: it does; no: it loses "
              "frames, as in real time; by-type: readers of web links lose frames, all others hold back."},
-    {LINK(latency_ms), CFG_COUNT, "ms", "0", 0, 20,
+    {LINK(latency_ms), CFG_COUNT, "ms", "0", 0, 20, .of = ~(CFG_KIND(LINK_NULL) | CFG_KIND(LINK_FILE)),
      .help = "How long a stream frame may wait for later ones in real time, so that one wake-up and one write serve "
              "several ticks. That takes less processor time. 0: a frame goes out with its tick. A frame never waits "
              "longer than an eighth of loop.queue_ms. Null and file links have no such key: their frames always wait "
-             "that long."},
+             "that eighth."},
     {LINK(backend), CFG_ENUM, .def = "usbip",
      WORDS([USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs"),
      .of = CFG_KIND(LINK_USB),
@@ -251,7 +250,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(loop.tick_hz), CFG_REAL, "Hz", "1000", 100, 10000,
      .allowed = "a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000",
      .help = "Rate of the loop. Its ticks cut the stream into frames: another rate gives another hash of the stream. "
-             "The points are the same, except on a live platform, which has one pose per tick."},
+             "The points are the same, except on a live platform, which has one pose per tick, and with meshes that "
+             "move, which stand still during each tick where they are at its start."},
     {KEY(loop.ahead_ms), CFG_REAL, "ms", "64", 2, 90,
      .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam."},
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,
@@ -278,7 +278,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(time.jump_at_s), CFG_REAL, "s", "0", 0, 1e8, .help = "Time of the jump, after power-up."},
     {"time.ptp", .type = CFG_MAP,
      .help = "A PTP follower that disciplines the head's clock. No PTP messages are on any network: master and path "
-             "are staged. It needs time.epoch."},
+             "are simulated. It needs time.epoch."},
     {KEY(time.ptp.follower), CFG_BOOL, .def = "off", .help = "The head's clock follows a PTP master, which has the "
                                                             "true time."},
     {KEY(time.ptp.grandmaster), CFG_COUNT, NULL, "0x00b0aefffe000001", 1, 18446744073709551615.0, .flags = CFG_HEX,
@@ -326,7 +326,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(gnss.pps), CFG_BOOL, .def = "on",
      .help = "Its pulses per second reach the head. off: none ever does; the fault pps_lost has a begin and an end."},
     {KEY(gnss.nmea), CFG_BOOL, .def = "on",
-     .help = "It sends sentences. off: none ever; the fault nmea_lost has a begin and an end."},
+     .help = "It sends sentences. off: it never does; the fault nmea_lost has a begin and an end."},
     {KEY(gnss.nmea_late_ms), CFG_REAL, "ms", "0", 0, 5000,
      .help = "How long after its second a sentence arrives, also at the head."},
     {KEY(gnss.cold), CFG_BOOL, .def = "off",

@@ -56,7 +56,7 @@ int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
     return -1;
 }
 
-/* ", as line 12 has it", where a key is given. buf holds 40. */
+/* Writes " (line 12)" or " (--set)": where a key, or else its section, is given. buf holds 40. */
 static const char *link_protocol_place_of(const struct cfg_reader *rd, const char *path, char *buf)
 {
     int line = cfg_where(rd, cfg_find(&rd->table, path), 0);
@@ -110,9 +110,7 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
         return;
     }
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
-        if ((ops->emitters & 1u << kind) != 0)
-            snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",
-                     allowed[0] != '\0' ? ", " : "", emitter_names[kind]);
+        if ((ops->emitters & 1u << kind) != 0) cfg_list_add(allowed, sizeof allowed, emitter_names[kind]);
     link_protocol_place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,

@@ -13,15 +13,9 @@
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
 
-static const char *const sections[] = {"links", "loop", "faults"};
-
-static int is_one(const char *path)
+static int is_taken(const char *path)
 {
-    for (size_t i = 0; i < CFG_LEN(sections); i++) {
-        const size_t n = strlen(sections[i]);
-        if (strncmp(path, sections[i], n) == 0 && (path[n] == '\0' || path[n] == '.' || path[n] == '[')) return 1;
-    }
-    return 0;
+    return cfg_is_in(path, "links") || cfg_is_in(path, "loop") || cfg_is_in(path, "faults");
 }
 
 int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
@@ -36,7 +30,7 @@ int config_load_links(const char *text, const char *name, const char *const *set
     memset(faults, 0, sizeof *faults);
     snprintf(cfg->file, sizeof cfg->file, "%s", name);
     for (size_t i = 0; i < cfg_config_table.n; i++)
-        if (is_one(cfg_config_table.keys[i].path)) keys[table.n++] = cfg_config_table.keys[i];
+        if (is_taken(cfg_config_table.keys[i].path)) keys[table.n++] = cfg_config_table.keys[i];
     cfg_reader_init(&rd, cfg->file, &table, cfg, faults);
     if (cfg_open_text(&rd, (const unsigned char *)text, strlen(text), &doc) != SH_OK) return faults->fault[0].code;
     cfg_apply_sets(&rd, doc, sets, n_sets);

@@ -40,7 +40,7 @@ int config_load_links(const char *text, const char *name, const char *const *set
 int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
 /* "a, b, c": the scenarios that come with the program, as many as buf holds. */
 void config_name_scenarios(char *buf, size_t len);
-/* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 200 KiB of
+/* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 270 KiB of
  * stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
 /* Whether faults of the kind can strike on the link. */

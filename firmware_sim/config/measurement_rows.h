@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rows of the table of keys: from the beam to what is measured. Private to keys.c, whose macros they are written with. */
+/* Rows of the table of keys: from the beam to the instrument. Private to keys.c, whose macros they are written with. */
 /* clang-format off */
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
     {KEY(beam.mode), CFG_ENUM, .def = "single",
@@ -52,7 +52,7 @@
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},
-    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, 
+    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0,
      .help = "Seed of the random numbers. Noise also differs by station, and by scan since power-up at a station."},
     {"noise.ball", .type = CFG_MAP, .help = "Ball-shaped noise: each point moves to anywhere in a ball around it."},
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
@@ -103,8 +103,8 @@
      .help = "pulse: asymmetric: the time in which the pulse falls, over the time in which it rises. The larger it is, "
              "the finer sample_ns must be: up to 0.37 of the pulse's width with 1.5, 0.2 with 2, 0.09 with 3."},
     {KEY(waveform.bandwidth_mhz), CFG_REAL, "MHz", "0", 0, 100000,
-     .help = "Bandwidth of the receiver, at -3 dB, from 1 on; 0: no limit. It lowers the pulse's peak, and with it the level of "
-             "waveform.echoes, but not the noise: below 5 times the noise many echoes are of noise alone."},
+     .help = "Bandwidth of the receiver, at -3 dB, from 1 on; 0: no limit. It lowers the pulse's peak, and with it the "
+             "level of waveform.echoes, but not the noise: below 5 times the noise many echoes are of noise alone."},
     {KEY(waveform.sample_ns), CFG_REAL, "ns", "1", 0.05, 100,
      .help = "Time from sample to sample, in whole picoseconds."},
     {KEY(waveform.bits), CFG_COUNT, NULL, "12", 8, 14, .help = "Bits of a sample."},

@@ -6,17 +6,6 @@
 #include "firmware_sim/config/check_ntp.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
-#include "firmware_sim/config/table/reader.h"
-#include "firmware_sim/config/table/row.h"
-#include "firmware_sim/config/table/value.h"
-
-/* Scanners with dates are those that speak cola. */
-static int has_dates(const struct config *cfg)
-{
-    for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].protocol == PROTOCOL_COLA) return 1;
-    return 0;
-}
 
 void cfg_check_ntp(struct cfg_reader *rd, const struct config *cfg)
 {
@@ -28,10 +17,11 @@ void cfg_check_ntp(struct cfg_reader *rd, const struct config *cfg)
                      cfg_show(ntp->address, shown));
     if (floor(ntp->zone_h) != ntp->zone_h)
         cfg_fail_key(rd, "ntp.zone_h", 0, "%.10g; allowed whole hours from -12 to 12", ntp->zone_h);
-    if (ntp->role == NTP_ROLE_CLIENT && !cfg->links_are_not_here && !has_dates(cfg) &&
+    if (ntp->role == NTP_ROLE_CLIENT && !cfg->links_are_not_here && !config_speaks(cfg, PROTOCOL_COLA) &&
         CFG_SOUND(rd, 0, "ntp.role", "links[].protocol"))
         cfg_fail_key(rd, "ntp.role", 0, "client, but no link sends dates; allowed with a link of protocol: cola");
     if (ntp->role == NTP_ROLE_CLIENT && cfg->loop.pace != PACE_REALTIME && CFG_SOUND(rd, 0, "ntp.role", "loop.pace"))
-        cfg_fail_key(rd, "ntp.role", 0, "client, but loop.pace is %s; allowed with realtime, since a server's time is",
+        cfg_fail_key(rd, "ntp.role", 0,
+                     "client, but loop.pace is %s; allowed with realtime, as a server's time runs on",
                      cfg_word(rd, "loop.pace", (int)cfg->loop.pace));
 }

@@ -10,24 +10,33 @@
 #include "firmware_sim/config/table/given.h"
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
-/* A link, back end or platform, and what errors say of it. */
-struct owner {
-    int is_backend, kind;
-    uint32_t item;
-    const char *name, *allowed;
-};
-
-/* Reports each key of the section that is given although the kind does not have it. Returns whether there is none. */
-static int check_owned(struct cfg_reader *rd, const char *section, const struct owner *owner)
+/* Lists the keys of the section that the kind has. */
+static void list_keys(const struct cfg_reader *rd, const char *section, int kind, char *list, size_t len)
 {
-    int fits = 1;
+    list[0] = '\0';
     for (size_t i = 0; i < rd->table.n; i++) {
         const struct cfg_key *key = &rd->table.keys[i];
-        const unsigned kinds = owner->is_backend ? key->of_backend : key->of;
-        if (kinds == 0 || (kinds & CFG_KIND(owner->kind)) || cfg_word_below(key->path, section) == NULL) continue;
-        if (!cfg_is_given(rd, key->path, owner->item)) continue;
-        cfg_fail_key(rd, key->path, owner->item, "%s has no such key; allowed %s", owner->name, owner->allowed);
+        const char *word = cfg_word_below(key->path, section);
+        if (word != NULL && (key->of == 0 || (key->of & CFG_KIND(kind)) != 0)) cfg_list_add(list, len, word);
+    }
+}
+
+/* Reports each key of the section that is given although a kind of link, back end or platform does not have it. `name`
+ * is that of the kind, in errors. Returns whether there is none. */
+static int check_owned(struct cfg_reader *rd, const char *section, uint32_t item, int is_backend, int kind,
+                       const char *name)
+{
+    char allowed[CFG_ALLOWED_MAX] = "without it";
+    int fits = 1;
+    if (!is_backend) list_keys(rd, section, kind, allowed, sizeof allowed);
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const struct cfg_key *key = &rd->table.keys[i];
+        const unsigned kinds = is_backend ? key->of_backend : key->of;
+        if (kinds == 0 || (kinds & CFG_KIND(kind)) || cfg_word_below(key->path, section) == NULL) continue;
+        if (!cfg_is_given(rd, key->path, item)) continue;
+        cfg_fail_key(rd, key->path, item, "%s has no such key; allowed %s", name, allowed);
         fits = 0;
     }
     return fits;
@@ -43,7 +52,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
-    if (!check_owned(rd, "links[]", &(struct owner){1, link->backend, i, owner, "without it"})) return;
+    if (!check_owned(rd, "links[]", i, 1, link->backend, owner)) return;
     if (has_path && (has_port || has_address))
         cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
     else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
@@ -56,20 +65,11 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
 
 static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
-    static const char *const has[] = {
-        [LINK_NULL] = "type, waits, protocol",
-        [LINK_FILE] = "type, path, waits, protocol",
-        [LINK_PTY] = "type, path, baud, latency_ms, waits, protocol",
-        [LINK_TCP] = "type, address, port, max_sessions, latency_ms, waits, protocol",
-        [LINK_USB] = ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
-                      "latency_ms, waits, protocol"),
-        [LINK_UDP] = "type, address, port, interface, source, source_port, ttl, latency_ms, waits, protocol",
-        [LINK_WEB] = "type, address, port, max_sessions, latency_ms, waits, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
     snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
-    if (!check_owned(rd, "links[]", &(struct owner){0, (int)link->type, i, owner, has[link->type]})) return;
+    if (!check_owned(rd, "links[]", i, 0, (int)link->type, owner)) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
         cfg_fail_key(rd, "links[].path", i, "missing; a file link requires the path of the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
@@ -89,14 +89,7 @@ void cfg_check_links(struct cfg_reader *rd, struct config *cfg)
 
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *p)
 {
-    static const char *const has[] = {
-        [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
-        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, end_s, at_end, mount_...",
-        [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
-        [PLATFORM_STOPS] =
-            "file or waypoints, start_s, end_s, step_s, frames_per_s, first_frame, last_frame, frame_step, mount_...",
-    };
     char owner[64];
     snprintf(owner, sizeof owner, "a %s platform", cfg_word(rd, "platform.kind", (int)p->kind));
-    return check_owned(rd, "platform", &(struct owner){0, (int)p->kind, 0, owner, has[p->kind]});
+    return check_owned(rd, "platform", 0, 0, (int)p->kind, owner);
 }

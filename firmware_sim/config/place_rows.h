@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Rows of the table of keys: the scene, the stations in it, and what the head stands on. Private to keys.c, whose macros
- * they are written with. */
+/* Rows of the table of keys: the scene, the stations in it, and the platform. Private to keys.c, whose macros they are
+ * written with. */
 /* clang-format off */
     {"scene", .type = CFG_MAP, .help = "What is scanned."},
     {KEY(scene.tolerance_m), CFG_REAL, "m", "", 1e-9, 1, .example = "1e-4",
@@ -13,8 +13,8 @@
              "time."},
     {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
      .help = "Memory that the reader of a mesh may take, or each reader of an .ifc (all formats but .obj, .ply and "
-             ".stl); more is an error. Readers run in their own processes, since broken files make them crash, hang "
-             "or take all memory."},
+             ".stl); more is an error. Readers run in their own processes, since broken files make them crash, run "
+             "without end or take all memory."},
     {"scene.import_s", IN_CONFIG(scene.import.time_s), CFG_REAL, "s", "300", 0.1, 1e6,
      .help = "Time that a reader may take for one mesh; more is an error."},
     {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
@@ -54,7 +54,7 @@
     {MESH(cycle_s), CFG_REAL, "s", "0", 0, 86400,
      .help = "The motion goes back and forth with this period; 0: it continues."},
 
-    {"scene.target", .type = CFG_MAP, .help = "The objects that are scanned; without any, all."},
+    {"scene.target", .type = CFG_MAP, .help = "The objects that are scanned. Without this section all are."},
     {"scene.target.objects", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_OBJECTS,
      LIST_OF(scene.target.object, scene.target.n_objects), .help = "Objects by name."},
     {"scene.target.objects[]", 0, SCENE_NAME_LEN, CFG_TEXT, .def = "", .example = "Wall*",
@@ -123,9 +123,8 @@
      .help = "Tripod of the head. Its legs open as the head is lowered; the area below the head between them is "
              "hidden."},
     {TRIPOD(leg_m), CFG_REAL, "m", "", 0.01, 100, .example = "1.8",
-     .help = "Length of a leg. Required with the other keys. Opening, from the vertical: its cosine is the top's "
-             "height above "
-             "the ground divided by leg_m."},
+     .help = "Length of a leg. Required with the other keys. The cosine of the opening, from the vertical, is the "
+             "top's height above the ground divided by leg_m."},
     {TRIPOD(opening_min_deg), CFG_REAL, "deg", "15", 0, 89,
      .help = "Smallest opening. Where the head is higher than the legs reach with it, the tripod hovers, which gives "
              "a warning."},

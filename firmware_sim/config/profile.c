@@ -62,45 +62,47 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
         if (dirs->dir[dirs->n][0] != '\0') dirs->n++;
 }
 
-static int is_yaml(const char *name)
+int cfg_is_yaml(const char *name)
 {
     size_t len = strlen(name);
     return len > 5 && strcmp(name + len - 5, ".yaml") == 0;
 }
 
-static int is_profile(const struct dirent *entry)
+static int is_shown(const struct dirent *entry)
 {
-    return is_yaml(entry->d_name) && entry->d_name[0] != '.';
+    return cfg_is_yaml(entry->d_name) && entry->d_name[0] != '.';
 }
 
-/* Is name one of "a, b, c"? */
-static int is_listed(const char *list, const char *name)
+/* Finds the YAML files of a folder, sorted, but not hidden ones. Returns how many; -1: the folder can't be read. */
+static int list_yaml(const char *dir, struct dirent ***entries)
 {
-    size_t len = strlen(name);
-    for (const char *p = list; (p = strstr(p, name)) != NULL; p += len)
-        if ((p == list || p[-1] == ' ') && (p[len] == ',' || p[len] == '\0')) return 1;
-    return 0;
+    *entries = NULL;
+    return scandir(dir, entries, is_shown, alphasort);
 }
 
-/* "a, b, c": the profiles of all directories, as far as buf reaches. */
-static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t len)
+void cfg_name_yaml(const char *dir, char *buf, size_t len)
 {
-    size_t used = 0;
-    buf[0] = '\0';
-    for (int d = 0; d < dirs->n; d++) {
-        struct dirent **entries = NULL;
-        int n = scandir(dirs->dir[d], &entries, is_profile, alphasort);
-        for (int i = 0; i < n; i++) {
-            int stem = (int)strlen(entries[i]->d_name) - 5;
-            char name[sizeof entries[i]->d_name];
-            snprintf(name, sizeof name, "%.*s", stem, entries[i]->d_name);
-            if (used < len && !is_listed(buf, name))
-                used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", name);
-            free(entries[i]);
-        }
-        if (n >= 0) free(entries);
+    struct dirent **entries;
+    const int n = list_yaml(dir, &entries);
+    for (int i = 0; i < n; i++) {
+        char *name = entries[i]->d_name;
+        name[strlen(name) - 5] = '\0';
+        if (!cfg_list_has(buf, name)) cfg_list_add(buf, len, name);
+        free(entries[i]);
     }
-    if (used == 0) snprintf(buf, len, "none found");
+    free(entries);
+}
+
+/* Says in buf which profiles the directories have. */
+static void allow_profiles(const struct profile_dirs *dirs, char *buf, size_t len)
+{
+    char known[CFG_ALLOWED_MAX] = "";
+    for (int d = 0; d < dirs->n; d++)
+        cfg_name_yaml(dirs->dir[d], known, sizeof known);
+    if (known[0] != '\0')
+        snprintf(buf, len, "allowed %s", known);
+    else
+        snprintf(buf, len, "no profiles were found at all; SCANHEAD_HEADS can name their directory");
 }
 
 /* ---- one profile */
@@ -132,12 +134,12 @@ static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
 /* Checks the figures of a mirror and a pan. */
 static void check_line_head(struct cfg_reader *rd, const struct config_profile *p)
 {
-    const double lines_min_hz = 1e-6 * (double)p->lines_min_uhz, prr_max_hz = 1e-6 * (double)p->prr_max_uhz;
-    const double pan_min_deg = 1e-6 * (double)p->pan_min_udeg, pan_max_deg = 1e-6 * (double)p->pan_max_udeg;
-    check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, "prr_max_hz", prr_max_hz, 0);
+    const double lines_min_hz = from_micro(p->lines_min_uhz), prr_max_hz = from_micro(p->prr_max_uhz);
+    const double pan_min_deg = from_micro(p->pan_min_udeg), pan_max_deg = from_micro(p->pan_max_udeg);
+    check_order(rd, "prr_min_hz", from_micro(p->prr_min_uhz), "prr_max_hz", prr_max_hz, 0);
     if (prr_max_hz < lines_min_hz && CFG_SOUND(rd, 0, "prr_max_hz", "lines_min_hz"))
         cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
-    check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, "fov_max_deg", 1e-6 * (double)p->fov_max_udeg, 1);
+    check_order(rd, "fov_min_deg", from_micro(p->fov_min_udeg), "fov_max_deg", from_micro(p->fov_max_udeg), 1);
     if ((p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000) &&
         CFG_SOUND(rd, 0, "pan_min_deg", "pan_max_deg"))
         cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
@@ -149,8 +151,7 @@ static void check_profile(struct cfg_reader *rd, struct config_profile *p)
 {
     cfg_check_emitter(rd, p);
     if (p->arrangement.kind == EMITTER_LINE && CFG_SOUND(rd, 0, "emitter")) check_line_head(rd, p);
-    check_order(rd, "lines_min_hz", 1e-6 * (double)p->lines_min_uhz, "lines_max_hz", 1e-6 * (double)p->lines_max_uhz,
-                0);
+    check_order(rd, "lines_min_hz", from_micro(p->lines_min_uhz), "lines_max_hz", from_micro(p->lines_max_uhz), 0);
     check_order(rd, "range_min_m", p->range_min_m, "range_max_m", p->range_max_m, 1);
     check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, "range_sigma_m", p->range_sigma_m, 0);
     cfg_convert_widths(rd, p);
@@ -193,10 +194,9 @@ static int read_profile(struct cfg_reader *rd, const char *file, struct config_p
 
 static int fail_lookup(struct cfg_reader *rd, struct config *cfg, const struct profile_dirs *dirs)
 {
-    char known[300], shown[CFG_SHOW_MAX];
-    known_profiles(dirs, known, sizeof known);
-    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; allowed %s", cfg_show(cfg->profile_file, shown),
-                        known);
+    char allowed[CFG_ALLOWED_MAX + 16], shown[CFG_SHOW_MAX];
+    allow_profiles(dirs, allowed, sizeof allowed);
+    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; %s", cfg_show(cfg->profile_file, shown), allowed);
 }
 
 static int find_profile(struct cfg_reader *rd, struct config *cfg)
@@ -205,7 +205,7 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
     char path[2 * CONFIG_PATH_LEN], base[CONFIG_PATH_LEN];
     int from_set = cfg_where(rd, cfg_find(&rd->table, "head.profile"), 0) == CFG_FROM_SET;
     find_dirs(cfg->file, &dirs);
-    int by_path = is_yaml(cfg->profile_file);
+    int by_path = cfg_is_yaml(cfg->profile_file);
     if (!by_path && strchr(cfg->profile_file, '/') != NULL) return fail_lookup(rd, cfg, &dirs);
     for (int i = 0; i < (by_path ? 1 : dirs.n); i++) {
         if (!by_path)
@@ -238,7 +238,7 @@ int config_load_profile(const char *name, const char *config_file, struct config
     struct profile_dirs dirs;
     struct cfg_reader rd;
     struct config_faults faults = {0};
-    char path[2 * CONFIG_PATH_LEN], known[300];
+    char path[2 * CONFIG_PATH_LEN], allowed[CFG_ALLOWED_MAX + 16];
     find_dirs(config_file, &dirs);
     for (int i = 0; i < dirs.n; i++) {
         snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
@@ -246,9 +246,8 @@ int config_load_profile(const char *name, const char *config_file, struct config
         if (read_profile(&rd, path, profile, &faults)) return SH_OK;
         return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
     }
-    known_profiles(&dirs, known, sizeof known);
-    return sh_fail(err, SH_EINPUT, "no head profile %s; found were: %s; SCANHEAD_HEADS can name their directory", name,
-                   known);
+    allow_profiles(&dirs, allowed, sizeof allowed);
+    return sh_fail(err, SH_EINPUT, "no head profile \"%s\"; %s", name, allowed);
 }
 
 /* ---- listing */
@@ -275,8 +274,8 @@ int config_list_profiles(const char *dir, FILE *out, struct sh_err *err)
             if (access(dirs.dir[i], R_OK) == 0) dir = dirs.dir[i];
         if (dir == NULL) return sh_fail(err, SH_EINPUT, "no directory of head profiles found; set SCANHEAD_HEADS");
     }
-    struct dirent **entries = NULL;
-    int n = scandir(dir, &entries, is_profile, alphasort), code = SH_OK;
+    struct dirent **entries;
+    int n = list_yaml(dir, &entries), code = SH_OK;
     if (n < 0) return sh_fail(err, SH_EINPUT, "%s: cannot be read; a directory of head profiles is needed", dir);
     for (int i = 0; i < n; i++) {
         if (code == SH_OK) code = list_profile(dir, entries[i]->d_name, out, err);

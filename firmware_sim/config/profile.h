@@ -102,11 +102,8 @@ void config_fill_spec(const struct config_profile *profile, const struct head_se
 /* Sets the steps of a turn of a planar head, which are those of one of its geometries. */
 void config_set_steps(struct config_profile *profile, uint32_t steps);
 
-/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
+/* Reads the profile NAME. It is looked for in $SCANHEAD_HEADS, in heads/ beside the configuration config_file, beside
+ * the program (installed or in its build folder), and in config/heads of the working directory. */
 int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
-
-/* Finds the directory of profiles: $SCANHEAD_HEADS, heads/ beside the configuration, beside the program
- * (installed or in its build folder), or config/heads in the working directory. `head.profile` is a NAME that is
- * looked up there, or a path that ends in .yaml. */
 
 #endif

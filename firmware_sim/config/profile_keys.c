@@ -45,9 +45,8 @@ static const struct cfg_key profile_keys[] = {
 
     {"emitter", IN_PROFILE(arrangement.kind), CFG_ENUM, .def = "line", .names = emitter_names,
      .help = "How the pulses are arranged. line: a mirror sweeps lines, the pan turns. planar: one plane, in steps. "
-             "beams: "
-             "a firing sequence of several beams, which turns about the vertical. sphere: rings from pole to pole. "
-             "directions: a list."},
+             "beams: a firing sequence of several beams, which turns about the vertical. sphere: rings from pole to "
+             "pole. directions: a list."},
     {EMITTER(steps_per_turn), CFG_COUNT, NULL, OWNED, 1, EMITTER_MAX_STEPS, FIGURE,
      NEEDED_BY(EMITTER_PLANAR),
      .help = "planar: steps of a turn, each a pulse. The pulse rate is that many times the line rate."},

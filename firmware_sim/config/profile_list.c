@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* `5 to 20`, or `25` where both are the same. */
+/* Writes `5 to 20`, or `25` where both are the same. */
 static const char *span(double low, double high, char buf[64])
 {
     snprintf(buf, 64, low < high ? "%.10g to %.10g" : "%.10g", low, high);
@@ -67,7 +67,7 @@ static void put_programs(const struct config_profile *p, FILE *out)
 
 /* ---- beam and accuracy */
 
-/* `3.5 mm FWHM, 5.95 mm at 1/e2`: the maker's width, then the program's. */
+/* Prints `3.5 mm FWHM (5.95 mm at 1/e2)`: the maker's width, then this program's. */
 static void put_width(const struct cfg_reader *rd, const char *key, double given, double at_1_e2, FILE *out)
 {
     const struct cfg_key *row = cfg_find(&rd->table, key);
@@ -115,7 +115,7 @@ static int has_grade(const struct cfg_reader *rd, size_t row, int grade)
     return 0;
 }
 
-/* `grade  N: key, key, ...`, within 110 columns. */
+/* Prints `grade  N: key, key, ...`, within 110 columns. */
 static void put_figures(const struct cfg_reader *rd, int grade, FILE *out)
 {
     enum { WIDTH = 110, INDENT = 13 };

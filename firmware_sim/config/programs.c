@@ -197,12 +197,12 @@ void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;
     const int64_t rate = cfg->head.settings.prr_uhz;
-    char rates[200] = "";
+    char rates[200] = "", rate_hz[32];
     if (!cfg_has_profile(rd) || p->n_programs == 0) return;
     if (p->program[config_program_of(p, rate)].prr_uhz == rate) return;
     for (uint32_t i = 0; i < p->n_programs; i++) {
-        const size_t used = strlen(rates);
-        snprintf(rates + used, sizeof rates - used, "%s%.15g", i > 0 ? ", " : "", from_micro(p->program[i].prr_uhz));
+        snprintf(rate_hz, sizeof rate_hz, "%.15g", from_micro(p->program[i].prr_uhz));
+        cfg_list_add(rates, sizeof rates, rate_hz);
     }
     cfg_fail_key(rd, "head.prr_hz", 0, "%.15g is not a pulse rate of head profile %s; allowed %s Hz", from_micro(rate),
                  p->name, rates);

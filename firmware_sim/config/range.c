@@ -3,6 +3,7 @@
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/value.h"
 
 #include <math.h>
 
@@ -27,8 +28,8 @@ static void limit_program(struct cfg_reader *rd, const struct config *cfg, struc
     const int is_min = cfg_is_given(rd, "head.range_min_m", 0) && cfg->head.range_min_m >= most_m;
     cfg_fail_key(rd, is_min ? "head.range_min_m" : "head.range_max_m", 0,
                  "%.10g excludes all of the %.10g to %.10g m that the head measures at %.15g Hz; allowed %s %.10g m",
-                 is_min ? cfg->head.range_min_m : cfg->head.range_max_m, least_m, most_m,
-                 1e-6 * (double)program->prr_uhz, is_min ? "below" : "above", is_min ? most_m : least_m);
+                 is_min ? cfg->head.range_min_m : cfg->head.range_max_m, least_m, most_m, from_micro(program->prr_uhz),
+                 is_min ? "below" : "above", is_min ? most_m : least_m);
 }
 
 void cfg_limit_range(struct cfg_reader *rd, struct config *cfg)

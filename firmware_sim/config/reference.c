@@ -29,18 +29,17 @@ static const char *type_name(const struct cfg_key *key)
     return names[key->type];
 }
 
-/* Within 100 columns; each line begins with `indent` blanks and `mark`. */
+/* Prints a text within 100 columns; each line begins with `indent` blanks and `mark`. */
 static void print_wrapped(const char *text, int indent, const char *mark, FILE *out)
 {
     enum { WIDTH = 100 };
-    const int begin = indent + (int)strlen(mark);
     int column = 0;
     while (*text != '\0') {
         int n = (int)strcspn(text, " ");
         if (column != 0 && column + 1 + n <= WIDTH)
             column += fprintf(out, " %.*s", n, text);
         else
-            column = begin + fprintf(out, "%s%*s%s%.*s", column != 0 ? "\n" : "", indent, "", mark, n, text) - begin;
+            column = fprintf(out, "%s%*s%s%.*s", column != 0 ? "\n" : "", indent, "", mark, n, text);
         text += n + (text[n] == ' ');
     }
     fputc('\n', out);
@@ -131,12 +130,11 @@ static int fail_section(const char *section, struct sh_err *err)
     const char *near = NULL;
     for (size_t i = 0; i < cfg_config_table.n; i++) {
         const char *path = cfg_config_table.keys[i].path;
-        const size_t used = strlen(known);
         if (cfg_word_below(path, "") == NULL) continue;
-        snprintf(known + used, sizeof known - used, "%s, ", path);
+        cfg_list_add(known, sizeof known, path);
         if (near == NULL && nearest_is_near(section, path)) near = path;
     }
-    return sh_fail(err, SH_EINPUT, "no section \"%s\"%s%s%s; allowed %s%s", cfg_show(section, shown),
+    return sh_fail(err, SH_EINPUT, "no section \"%s\"%s%s%s; allowed %s, %s", cfg_show(section, shown),
                    near != NULL ? ", did you mean " : "", near != NULL ? near : "", near != NULL ? "?" : "", known,
                    PROFILE);
 }
@@ -202,7 +200,7 @@ static const char *value_of(const struct cfg_key *key, const struct config_profi
         if (key->type == CFG_REAL)
             snprintf(buf, len, "%.15g", cfg_real_figure(profile, text + 1));
         else
-            snprintf(buf, len, "%.15g", 1e-6 * (double)cfg_figure(profile, text + 1));
+            snprintf(buf, len, "%.15g", from_micro(cfg_figure(profile, text + 1)));
     } else if (key->type == CFG_PATH && is_needed(key) && cfg_find_shared(text, shared) &&
                (whole = realpath(shared, NULL)) != NULL) {
         snprintf(buf, len, "%s", whole);

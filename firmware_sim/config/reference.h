@@ -34,7 +34,7 @@ int config_print_section(const char *section, FILE *out, struct sh_err *err);
 int config_print_example(FILE *out, struct sh_err *err);
 
 /* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. dir NULL: the
- * first directory that exists of the lookup below, without a configuration. */
+ * first directory that exists of those of config_load_profile (profile.h), without a configuration's. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 #endif

@@ -8,7 +8,7 @@
 struct config;
 struct config_faults;
 
-/* Loads for the scanner of a station, from 1; 0: of head.station. Diagnostics are added to those in the list. */
+/* Loads for the scanner of a station, from 1; 0: of head.station. The list of diagnostics begins anew. */
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                  struct config_faults *faults);
 /* Loads the scanners of the other stations, adds their diagnostics, and notes in cfg which station has which. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Full waveforms: checks that concern more than one key. Limits of the digitiser's and the pulse's figures by themselves
- * are in core/waveform, that of the stream's rate is in ../site. */
+/* Full waveforms: checks that concern more than one key. Limits of single figures of the digitiser and the pulse are in
+ * core/waveform, that of the stream's rate is in ../site. */
 #include <math.h>
 
 #include "core/light.h"
@@ -51,7 +51,7 @@ static void check_margins(struct cfg_reader *rd, const struct config_waveform *w
     const double most_ns = 0.5 * WAVEFORM_MAX_SAMPLES * w->sample_ns;
     if (w->before_ns + w->after_ns <= most_ns) return;
     cfg_fail_key(rd, cfg_is_given(rd, "waveform.after_ns", 0) ? "waveform.after_ns" : "waveform.before_ns", 0,
-                 "%.10g ns before an echo and %.10g ns behind it; allowed together up to %.10g, %d samples",
+                 "%.10g ns before an echo and %.10g ns after it; allowed together up to %.10g, %d samples",
                  w->before_ns, w->after_ns, most_ns, WAVEFORM_MAX_SAMPLES / 2);
 }
 

@@ -24,7 +24,8 @@ struct fault_board;
 /* truth_path NULL: no file; else *lost counts the lines that are not in it (truth.h). list may be empty. */
 int fault_board_create(const struct fault_list *list, const char *truth_path, _Atomic uint64_t *lost,
                        struct fault_board **out, struct sh_err *err);
-/* Closes the file of the truth; the first error in writing it. Nothing is injected any more. board may be NULL. */
+/* Closes the file of the truth, once nothing is injected any more. Returns the first error in writing it. board may be
+ * NULL. */
 int fault_board_close(struct fault_board *board, struct sh_err *err);
 /* 1: the truth's file is behind; callers that can wait should. */
 int fault_board_is_filling(const struct fault_board *board);

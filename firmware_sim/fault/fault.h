@@ -99,7 +99,7 @@ struct fault {
     uint64_t from, until; /* numbers; until 0: no end */
     uint64_t every;       /* from `from` on */
     double probability;
-    uint64_t count; /* most times (frames, replies: in a session; acts of the link: on the link); 0: no limit */
+    uint64_t count; /* it strikes at most so often: in a session, or, as an act of the link, on the link; 0: no limit */
     uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
     double from_s, until_s;           /* until 0: no end */
     uint64_t seed;

@@ -49,7 +49,7 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
     const enum link_fault what = link_fault_of(kind);
     const double for_ms = act->for_ms;
     const uint32_t n = act->n;
-    struct fault_note note = *wire_act_note(act);
+    struct fault_note note = *wire_act_note(act); /* wire_pop frees the act */
     const int rc = f->inner->fault(f->link, what, session, n, for_ms);
     wire_pop(wire);
     if (what == LINK_FAULT_BUS_RESET) f->plug_ns = in_ms(0.0); /* a reset may unplug, and fail to plug in again */

@@ -39,7 +39,7 @@ struct faulty_link {
     struct faulty_connections connections;
     int64_t plug_ns;          /* clock: when an unplugged link is there again; 0: it is */
     struct fault_note pulled; /* the cable that was pulled last; once it is in again, `ended` and the time of that */
-    int resets;               /* and what was connected is reset after it */
+    int resets;               /* 1: what was connected is reset once that cable is in again */
     int plug_failed;          /* it could not come back so far, and that was reported */
     int64_t refuse_until_ns;  /* clock: until then clients are turned away */
 };

@@ -71,7 +71,7 @@ static void faulty_link_put(struct faulty_link *f, int session, const uint8_t *b
     }
 }
 
-/* Bytes that go out without a wire: a wire that begins later must know where it begins, and what was answered. */
+/* Follows bytes that go out without a wire: one that begins later must know where it begins, and what was answered. */
 static void faulty_link_follow(struct faulty_link *f, int session, const uint8_t *bytes, size_t len, size_t written)
 {
     struct faulty_session *s = &f->session[session];

@@ -28,7 +28,7 @@ struct faulty_spec {
     void *owner;
     int64_t (*time_ns)(void *owner);                            /* device time now */
     int (*is_off)(void *owner);                                 /* the head has no power now */
-    void (*say)(void *owner, const char *text);                 /* to the person who runs the head */
+    void (*say)(void *owner, const char *text);                 /* prints a line for the person who runs the head */
     void *source;                                               /* source.h */
     void (*report)(void *source, int number, const char *text); /* into the error queue */
 };
@@ -68,7 +68,7 @@ struct faulty_state faulty_look(const struct faulty_link *link, int session);
 struct faulty_unwritten {
     uint64_t frames, pulses;
 };
-/* The session is over, or begins anew: drops what waits for it. */
+/* Drops what waits for a session that is over, or begins anew. Returns what was dropped. */
 struct faulty_unwritten faulty_forget(struct faulty_link *link, int session);
 
 #endif

@@ -139,7 +139,9 @@ void truth_text(const struct fault_note *note, char text[TRUTH_TEXT_LEN])
         note->t_ns);
     if (note->link != 0) add(text, ", link %" PRIu32, note->link);
     if (note->session != 0) add(text, ", session %" PRIu32, note->session);
-    if (note->number != 0) add(text, ", %s %" PRIu64, of_names[note->of], note->number);
+    if (note->number != 0)
+        add(text, ", %s %" PRIu64,
+            fault_place_of(note->kind) == FAULT_AT_CONNECTION ? "connection" : of_names[note->of], note->number);
     if (note->has_seq) add(text, ", seq %" PRIu32, note->seq);
     if (note->has_pulse) add(text, ", pulse %" PRIu64, note->pulse);
     if (note->byte >= 0) add(text, ", byte %" PRId64, note->byte);

@@ -2,8 +2,8 @@
 /* The truth: a file that says what was injected, where, and when.
  *
  * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
- * called by any number of threads, and waits for nothing: a thread of its own writes the file (line_writer.h). Where the
- * file is slower than faults strike, {"missing":n} stands for n lines that were dropped. */
+ * called by any number of threads, and waits for nothing: a thread of its own writes the file (line_writer.h). Where
+ * the file is slower than faults strike, {"missing":n} stands for n lines that were dropped. */
 #ifndef FIRMWARE_SIM_FAULT_TRUTH_H
 #define FIRMWARE_SIM_FAULT_TRUTH_H
 
@@ -38,7 +38,8 @@ int truth_open(const char *path, _Atomic uint64_t *lost, struct truth **out, str
 void truth_write(struct truth *truth, const struct fault_note *note);
 /* 1: a caller that can wait should, so that nothing is dropped. truth may be NULL. */
 int truth_is_filling(const struct truth *truth);
-/* Writes what is left, as long as the file takes some of it every 2 s. The first error in writing it. truth may be NULL. */
+/* Writes what is left, as long as the file takes some of it every 2 s. Returns the first error in writing it. truth may
+ * be NULL. */
 int truth_close(struct truth *truth, struct sh_err *err);
 
 /* "fault 1 drop: t_ns 1, link 1, ...": at most 256 characters of printable ASCII. */

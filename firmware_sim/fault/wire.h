@@ -6,8 +6,8 @@
  * to unplug, and so on), which the owner carries out on its link when they come first. The wire notes each fault that
  * strikes on the board. The owner notes an act once it is carried out. Without faults a session has no wire.
  *
- * At a frame faults strike in this order: acts that end the session; drop, and on datagrams flips without reseal;
- * truncate; flips with reseal; all others, in the order of the list. A fault that finds nothing to do
+ * At a frame faults strike in this order: acts that end the session, and a pulled cable; drop, and on datagrams flips
+ * without reseal; truncate; flips with reseal; all others, in the order of the list. A fault that finds nothing to do
  * there does not strike: it is not noted, nor counted. One example is a flip of a byte beyond the end of a short frame.
  * Another is a dropped frame: only faults that act before the frame strike there.
  *

@@ -2,8 +2,8 @@
 /* The bytes that a client sent and that are not answered yet: an echo sends them back.
  *
  * In: the client's bytes, in pieces of any size. Out: the lines that get an answer, one after the other; or, for a
- * protocol without lines, all bytes since the last answer. Thread: one. Allocates as it grows, up to HEARD_MAX bytes twice.
- * Further bytes that a client sends without waiting for an answer get no echo. */
+ * protocol without lines, all bytes since the last answer. Thread: one. Allocates as it grows. Where HEARD_MAX bytes
+ * wait for an answer, they are dropped and get no echo. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_HEARD_H
 #define FIRMWARE_SIM_FAULT_WIRE_HEARD_H
 

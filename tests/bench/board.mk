@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# It measures scanheadd beside scanhead, in turns, and takes seconds.
+# This measures scanheadd beside scanhead, in turns. It takes seconds.
 .PHONY: bench-board
 #? bench-board       size of scanheadd, its memory at idle, and what its start takes
 bench-board: deps-build

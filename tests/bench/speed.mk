@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# All ratios of speed in turns, and once more with AVX2 alone: SPEED="--turns 1 --rounds 5 --only decode,live".
+# This measures all ratios of speed in turns, and once more with AVX2 alone. SPEED has options, as in
+# SPEED="--turns 1 --rounds 5 --only decode,live".
 .PHONY: bench-speed bench-live
 SPEED ?=
 SPEED_PROGRAMS = scanhead $(patsubst %,tests/bench/%,panorama decode live loop_cost)

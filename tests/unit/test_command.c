@@ -245,6 +245,8 @@ static void a_place_is_read_and_said(void **ctx)
     const double *v = result.place.v;
     assert_true(result.effect == COMMAND_MOVE && result.station == 2 && !result.to_first && result.changes);
     assert_true(v[0] == 1.0 && v[1] == 0.5 && v[2] == 0.0 && v[3] == 360.0 && v[4] == 90.0 && v[5] == -180.0);
+    expect(&dev, "SITE:POSE 2, 1 E2, 2e 1,-3 e -1 M,0,0,0", "OK"); /* blanks as in IEEE 488.2, 7.7.2.4.1 */
+    assert_true(v[0] == 100.0 && v[1] == 20.0 && v[2] == -0.3);
     expect(&dev, "SITE:POSE 2, DEF", "OK");
     assert_true(result.effect == COMMAND_MOVE && result.to_first);
     dev.moving = 2;

@@ -378,6 +378,39 @@ static void every_setting_is_listed(void **ctx)
         if (!has[i]) fail_msg("no command has the setting at byte %zu of struct head_settings", i);
 }
 
+/* A setting that a recording lacks has no limits, and asking for them is no error. */
+static void settings_that_a_recording_lacks_describe_themselves(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.recorded = "a recording is replayed";
+    dev.settings.pan_udeg_s = COMMAND_NOT_RECORDED;
+    dev.settings.noise = COMMAND_NOT_RECORDED_U32;
+    expect(&dev, "HELP? HEAD:PAN", "number,\"deg/s\",,,,0.000001,\"all\",\"\"");
+    command_execute(&dev, 1, "HELP? HEAD:NOIS", &result);
+    assert_int_equal(strncmp(result.reply, "word,\"\",,,,,", 12), 0);
+    expect(&dev, "SYST:ERR:COUN?", "0");
+}
+
+/* The client of the time server looks at the settings now and then: it must see that the role has changed, though it has
+ * come back to what it was. */
+static void each_change_of_a_role_counts(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.asks_server = 1;
+    const struct command_time_server client = {.role = COMMAND_TIME_CLIENT, .address = {127, 0, 0, 1}, .update_s = 600};
+    dev.server_default = (struct command_time_server){.address = {127, 0, 0, 1}, .update_s = 600};
+    dev.server = client;
+    expect(&dev, "*RST", "OK");
+    assert_int_equal(dev.server.role, COMMAND_TIME_NONE);
+    assert_int_equal(dev.server.n_roles, 1);
+    expect(&dev, "TIME:SERV CLIENT,127.0.0.1,600,0,ETH", "OK");
+    assert_int_equal(dev.server.n_roles, 2);
+    expect(&dev, "TIME:SERV CLIENT,127.0.0.2,600,0,ETH", "OK");
+    assert_int_equal(dev.server.n_roles, 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -395,6 +428,8 @@ int main(void)
         cmocka_unit_test(what_can_not_be_planned_is_refused),
         cmocka_unit_test(settings_describe_themselves),
         cmocka_unit_test(limits_are_those_that_hold),
+        cmocka_unit_test(settings_that_a_recording_lacks_describe_themselves),
+        cmocka_unit_test(each_change_of_a_role_counts),
     };
     return cmocka_run_group_tests_name("command knobs", tests, NULL, NULL);
 }

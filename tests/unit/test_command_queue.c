@@ -97,6 +97,7 @@ static void texts_are_made_safe_and_cut(void **ctx)
     command_queue_push(&queue, CMD_E_CLIENT_LOST, huge);
     command_queue_pop(&queue, buf, sizeof buf);
     assert_int_equal(strlen(buf), strlen("101,\"\"") + sizeof queue.entry[0].text - 1);
+    assert_string_equal(buf + strlen(buf) - 5, "x...\""); /* a list that is cut does not end like a whole one */
     command_queue_push(&queue, CMD_E_CLIENT_LOST, NULL);
     command_queue_pop(&queue, buf, 8);
     assert_string_equal(buf, "101,\"Cl");

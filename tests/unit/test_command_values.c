@@ -301,6 +301,22 @@ static void steps_of_time(void **ctx)
     expect_error(&dev, 1, "TIME:STEP -9300000000000000000", CMD_E_RANGE, "STEP -9300000000000000000, allowed 1 to");
 }
 
+/* A blank may stand on both sides of the E (IEEE 488.2, 7.7.2.4.1), in every number of a command. */
+static void numbers_may_have_blanks_in_their_exponents(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.step_allowed = dev.pose_allowed = 1;
+    dev.pose_reach_m = 1000.0;
+    expect(&dev, "TIME:STEP 1 E3, 1 E2,2e 1, -3 e -1,0,9 E 1,0", "OK");
+    const double *pose = result.pose;
+    assert_true(result.step_ns == 1000 && pose[0] == 100.0 && pose[1] == 20.0 && pose[2] == -0.3 && pose[4] == 90.0);
+    expect(&dev, "SCAN:REPL 1 E2, 2 e 1", "OK");
+    assert_true(result.replay.position_s == 100.0 && result.replay.speed == 20.0);
+    expect(&dev, "HEAD:PRR 2 E 5", "OK");
+    assert_true(dev.settings.prr_uhz == 200000 * MICRO);
+}
+
 /* A setting of words takes each in short and long form, and DEF, but no other word. */
 static void words(void **state)
 {
@@ -372,6 +388,7 @@ int main(void)
         cmocka_unit_test(effects_follow_the_state_machine),
         cmocka_unit_test(a_station_stays_during_a_scan),
         cmocka_unit_test(steps_of_time),
+        cmocka_unit_test(numbers_may_have_blanks_in_their_exponents),
         cmocka_unit_test(words),
         cmocka_unit_test(fixed_rates_are_the_only_ones),
     };

@@ -286,6 +286,8 @@ static void a_planar_head_has_its_geometries(void **state)
         {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "steps_per_turn, "},
         {lms, "front_step: { value: 540,", "front_step: { value: 541,", "geometries[0].steps_per_turn", "front_step"},
         {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "is given twice"},
+        {lms, "emitter: planar", "emitter: flat", "emitter", "allowed line, "},
+        {lms, "front_step: { value: 540,", "front_step: { value: x,", "front_step", "not a number"},
         {"velodyne-vlp16", "beams:\n", "geometries: []\nbeams:\n", "geometries", "allowed only with emitter: planar"},
     };
     expect_geometry("", 50, 720); /* the first one: what the device has from the factory */

@@ -163,6 +163,8 @@ static void profiles_are_looked_up_in_order(void **state)
     assert_string_equal(cfg->profile_file, path);
     assert_loads(load_edited("any-rate\n  prr_hz: 500000", "heads/mine.yaml")); /* relative to the file */
     assert_string_equal(cfg->profile.name, "mine");
+    assert_int_equal(load_edited("any-rate", "nosuch"), SH_EINPUT);
+    assert_says("zf-imager-5016, mine"); /* the list of names is whole */
     snprintf(env, sizeof env, "%s", getenv("SCANHEAD_HEADS"));
     snprintf(path, sizeof path, "%s/first", dir);
     mkdir(path, 0700);
@@ -171,6 +173,21 @@ static void profiles_are_looked_up_in_order(void **state)
     assert_int_equal(load_edited("any-rate", "mine"), SH_EINPUT);
     assert_says("first/mine.yaml:1: model: missing"); /* the variable goes before heads/ */
     setenv("SCANHEAD_HEADS", env, 1);
+}
+
+static void an_error_without_profiles_says_where_to_look(void **state)
+{
+    (void)state;
+    static struct config_profile profile;
+    char env[256], cwd[512];
+    snprintf(env, sizeof env, "%s", getenv("SCANHEAD_HEADS"));
+    assert_non_null(getcwd(cwd, sizeof cwd));
+    unsetenv("SCANHEAD_HEADS");
+    assert_int_equal(chdir("/"), 0);
+    config_load_profile("any-rate", NULL, &profile, &err);
+    assert_int_equal(chdir(cwd), 0);
+    setenv("SCANHEAD_HEADS", env, 1);
+    assert_says("no head profile \"any-rate\"; no profiles were found at all; SCANHEAD_HEADS can name their directory");
 }
 
 static int is_yaml_file(const struct dirent *entry)
@@ -237,6 +254,7 @@ int main(void)
         cmocka_unit_test(a_range_beyond_its_bits_is_refused),
         cmocka_unit_test(a_slow_pulse_rate_needs_slow_lines),
         cmocka_unit_test(profiles_are_looked_up_in_order),
+        cmocka_unit_test(an_error_without_profiles_says_where_to_look),
         cmocka_unit_test(profiles_are_listed),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

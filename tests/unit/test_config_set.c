@@ -25,6 +25,14 @@ static void set_changes_values(void **state)
     assert_int_equal(cfg->head.settings.line_stop_udeg, 65000000); /* defaults follow the profile */
 }
 
+/* The longest names: of a scanner's keys. */
+static void set_takes_long_names(void **state)
+{
+    (void)state;
+    assert_loads(load_set("stations[0].scanner.instrument.mirror_eccentricity_deg=0.5"));
+    assert_true(cfg->instrument.mirror_eccentricity_deg == 0.5);
+}
+
 static void set_appends_elements(void **state)
 {
     (void)state;
@@ -78,6 +86,7 @@ static void set_refuses(void **state)
         {"stations[0].scanner.surfaces.0.gloss=1", "stations[0].scanner.surfaces.0.gloss", "are set as one list"},
         {"stations[2].heading_deg=0", "stations[2].heading_deg", "allowed indices 0 to 1, the last appends one"},
         {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type", "allowed indices 0 to 1"},
+        {"links[500].typ=tcp", "links[500].typ", "allowed indices 0 to 1"},
         {"links[-1].type=tcp", "links[-1].type", "unknown key"},
         {"links[].type=tcp", "links[].type", "no index"},
         {"links[0.type=tcp", "links[0.type", "unknown key"},
@@ -266,6 +275,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(set_changes_values),
+        cmocka_unit_test(set_takes_long_names),
         cmocka_unit_test(set_appends_elements),
         cmocka_unit_test(set_refuses),
         cmocka_unit_test(yaml_replaces),

@@ -9,6 +9,8 @@
 #include "firmware_sim/config/table/row.h"
 #include "tests/unit/config_rig.h"
 
+#include <glob.h>
+
 static void the_reference_names_every_key(void **state)
 {
     (void)state;
@@ -123,9 +125,107 @@ static void a_section_has_its_keys(void **state)
     assert_int_equal(config_print_section("", stdout, &err), SH_EINPUT);
 }
 
+/* Whether the error's list of allowed keys has the word, as a whole. */
+static int allows(const char *word)
+{
+    char text[sizeof err.text + 2], part[CFG_PATH_MAX + 4];
+    const char *list = strstr(err.text, "allowed ");
+    if (list == NULL) return 0;
+    snprintf(text, sizeof text, "%s,", list + strlen("allowed"));
+    snprintf(part, sizeof part, " %s,", word);
+    return strstr(text, part) != NULL;
+}
+
+static void expect_all_keys(const struct cfg_table *table, const char *section)
+{
+    for (size_t i = 0; i < table->n; i++) {
+        const char *word = cfg_word_below(table->keys[i].path, section);
+        if (word != NULL && !allows(word)) fail_msg("%s is not among the allowed keys: %s", word, err.text);
+    }
+}
+
+/* The longest lists are those of the head's keys and of a profile's. */
+static void an_unknown_key_gets_the_list_of_all(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < cfg_config_table.n; i++) {
+        const struct cfg_key *key = &cfg_config_table.keys[i];
+        char section[CFG_PATH_MAX], set[CFG_PATH_MAX + 16];
+        if (key->type != CFG_MAP || strcmp(key->path, "stations[].scanner") == 0) continue; /* it has sections */
+        snprintf(set, sizeof set, "%s.zzz=1", cfg_name(key->path, 0, section));
+        assert_int_equal(load_set(set), SH_EINPUT);
+        expect_all_keys(&cfg_config_table, key->path);
+    }
+    assert_int_equal(load_set("zzz=1"), SH_EINPUT);
+    expect_all_keys(&cfg_config_table, "");
+    write_in("heads/mine.yaml", "zzz: 1\n");
+    assert_int_equal(load_edited("any-rate", "heads/mine.yaml"), SH_EINPUT);
+    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS && strstr(err.text, "zzz") == NULL; i++)
+        err = faults.fault[i];
+    expect_all_keys(&cfg_profile_table, "");
+}
+
+static char *pages;
+
+/* The text of all pages that explain keys. */
+static void read_pages(void)
+{
+    static const char *const folders[] = {"config/*.md",         "config/*/*.md",     "drivers/*/*.md",
+                                          "firmware_sim/*/*.md", "firmware_sim/*.md", "core/*/*.md"};
+    size_t len = 0;
+    FILE *all = open_memstream(&pages, &len);
+    for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++) {
+        glob_t found;
+        assert_int_equal(glob(folders[i], 0, NULL, &found), 0);
+        for (size_t k = 0; k < found.gl_pathc; k++) {
+            FILE *page = fopen(found.gl_pathv[k], "r");
+            assert_non_null(page);
+            for (int c; (c = fgetc(page)) != EOF;)
+                fputc(c, all);
+            fclose(page);
+        }
+        globfree(&found);
+    }
+    fclose(all);
+}
+
+static int is_letter_of_key(char c)
+{
+    return c == '_' || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
+}
+
+/* Whether a page has the word, as a whole. */
+static int is_on_a_page(const char *word)
+{
+    const size_t len = strlen(word);
+    for (const char *at = pages; (at = strstr(at, word)) != NULL; at += len)
+        if (at > pages && !is_letter_of_key(at[-1]) && !is_letter_of_key(at[len])) return 1;
+    return 0;
+}
+
+/* A user who reads the pages meets each key there, and not only in `check --help`. */
+static void every_key_is_on_a_page(void **state)
+{
+    (void)state;
+    const struct cfg_table *tables[] = {&cfg_config_table, &cfg_profile_table};
+    read_pages();
+    for (int t = 0; t < 2; t++)
+        for (size_t i = 0; i < tables[t]->n; i++) {
+            char path[CFG_PATH_MAX];
+            snprintf(path, sizeof path, "%s", tables[t]->keys[i].path);
+            const size_t len = strlen(path);
+            if (len > 2 && strcmp(path + len - 2, "[]") == 0) path[len - 2] = '\0';
+            const char *dot = strrchr(path, '.');
+            if (!is_on_a_page(dot != NULL ? dot + 1 : path)) fail_msg("no page has %s", tables[t]->keys[i].path);
+        }
+    free(pages);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_unknown_key_gets_the_list_of_all),
+        cmocka_unit_test(every_key_is_on_a_page),
         cmocka_unit_test(the_reference_names_every_key),
         cmocka_unit_test(rows_are_sound),
         cmocka_unit_test(the_example_loads),

@@ -209,7 +209,7 @@ static const struct {
      "fault 1 late_reply: t_ns 5, link 2, session 9, replies 1, for 12.5 ms"},
     {{.fault = 2, .kind = FAULT_REFUSE, .t_ns = 0, .link = 1, .session = 1, .number = 4, .byte = -1},
      "{\"fault\":2,\"kind\":\"refuse\",\"t_ns\":0,\"link\":1,\"session\":1,\"connection\":4}\n",
-     NULL},
+     "fault 2 refuse: t_ns 0, link 1, session 1, connection 4"},
     {{.fault = 4, .kind = FAULT_CLOCK_STOP, .t_ns = 99, .byte = -1, .ended = 1},
      "{\"fault\":4,\"kind\":\"clock_stop\",\"t_ns\":99,\"ended\":true}\n",
      NULL},

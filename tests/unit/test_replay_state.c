@@ -331,6 +331,8 @@ static void what_a_replay_refuses(void **state)
                 {"SCAN:REPL now", "ERR -104", "'now'"},
                 {"SCAN:REPL 0 S", "ERR -104", "'0 S'"},
                 {"SCAN:REPL 0,1,AGAIN", "ERR -104", "ON or OFF"},
+                {"SCAN:REPL ,1.0000000000000000000000000000000000000000000000000000000000000e2", "ERR -222",
+                 "a value has 65 characters, allowed up to 63"}, /* cut off it would be 1 */
                 {"SCAN:REPL 0,1,ON,1", "ERR -108", "takes a time"},
                 {"SCAN:REPL? 1", "ERR -108", ""}};
     struct config *cfg = config_new();

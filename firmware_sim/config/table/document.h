@@ -12,7 +12,7 @@ struct cfg_reader;
 
 /* SH_OK, or the code of a diagnostic that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
-/* The same; the document stays open for the scanner. NULL after an error. */
+/* The same; the document stays open for the scanner. *doc is NULL after an error. */
 struct cfg_document;
 int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc);
 /* The same from a text in memory. */

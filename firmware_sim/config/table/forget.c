@@ -8,7 +8,8 @@
 #include <string.h>
 
 const char cfg_sections_of_scanner[] =
-    "sections head (without station, start), beam, cast, plan, noise, signal, surfaces, optics, instrument";
+    "sections head (without station, start), beam, cast (without sight_mib), plan, noise, signal, surfaces, optics, "
+    "instrument";
 
 int cfg_is_of_scanner(const char *path)
 {
@@ -73,8 +74,8 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
     forget_row(rd, key);
 }
 
-/* With a profile of its own, the scanner drops the file's settings of the head and the errors of its instrument: they
- * belong to another head. */
+/* Where the scanner has a profile of its own, the file's settings of the head and errors of its instrument are dropped:
+ * they belong to another head. */
 void cfg_end_scanner(struct cfg_reader *rd)
 {
     if (!rd->own[cfg_row(rd, cfg_find(&rd->table, "head.profile"))]) return;

@@ -9,7 +9,7 @@
 struct cfg_reader;
 
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
-/* The head profile has no diagnostic. */
+/* Whether the head profile was read without a diagnostic. */
 int cfg_has_profile(const struct cfg_reader *rd);
 /* The word of a key for its value. */
 const char *cfg_word(const struct cfg_reader *rd, const char *path, int value);
@@ -20,8 +20,8 @@ int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const 
     cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
                   sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 
-/* Adds a diagnostic, "FILE:LINE: KEY: text", at the key's own line, or at the section's where the key is missing. Returns
- * SH_EINPUT; reading goes on after it. Nothing is added where the key, or a section around it, has a diagnostic
+/* Adds a diagnostic, "FILE:LINE: KEY: text", at the key's own line, or at the section's where the key is missing.
+ * Returns SH_EINPUT; reading goes on after it. Nothing is added where the key, or a section around it, has a diagnostic
  * already: this one may only follow from that one. */
 int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));

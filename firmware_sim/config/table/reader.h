@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader that fills a struct from YAML and --set by the rows of a table, and knows where each key was given. A reader
- * belongs to one thread. */
+/* The reader that fills a struct from YAML and --set by the rows of a table, and knows where each key was given. A
+ * reader belongs to one thread. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_READER_H
 #define FIRMWARE_SIM_CONFIG_TABLE_READER_H
 
@@ -20,7 +20,7 @@ struct cfg_reader {
     int line[CFG_MAX_ROWS][CFG_MAX_ITEMS];          /* where a key was given: line, CFG_FROM_SET, 0: not given */
     unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: this key has a diagnostic; its value means nothing */
     int root_line;
-    int profile_read;                                /* the head profile has no diagnostic */
+    int profile_read;                                /* 1: the head profile was read without a diagnostic */
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
     unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
     struct config_faults *faults;

@@ -49,6 +49,20 @@ void cfg_cut_to_parent(char *path)
     *dot = '\0';
 }
 
+void cfg_list_add(char *buf, size_t len, const char *word)
+{
+    const size_t used = strlen(buf);
+    snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", word);
+}
+
+int cfg_list_has(const char *list, const char *word)
+{
+    const size_t len = strlen(word);
+    for (const char *at = list; at != NULL && (at = strstr(at, word)) != NULL; at += len)
+        if ((at == list || at[-1] == ' ') && (at[len] == '\0' || at[len] == ',')) return 1;
+    return 0;
+}
+
 const char *cfg_word_below(const char *path, const char *parent)
 {
     size_t len = strlen(parent);

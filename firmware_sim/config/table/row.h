@@ -78,6 +78,11 @@ int cfg_is_in(const char *path, const char *section);
 /* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
 const char *cfg_word_below(const char *path, const char *parent);
 
+/* Appends a word to the list "a, b, c" in buf, as far as it fits. */
+void cfg_list_add(char *buf, size_t len, const char *word);
+/* Whether the list has the word. A list of NULL has none. */
+int cfg_list_has(const char *list, const char *word);
+
 /* How many numbers a key of CFG_VEC3 or CFG_PAIR has. */
 static inline int cfg_axes(const struct cfg_key *key)
 {

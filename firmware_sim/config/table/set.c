@@ -14,6 +14,9 @@
 #include <stdio.h>
 #include <string.h>
 
+/* A name that is written anew with its element's number, "[127]" for ".1", still fits. */
+enum { NAME_MAX_LEN = CFG_PATH_MAX - 8 };
+
 struct set {
     char name[CFG_PATH_MAX]; /* as the user wrote it */
     char path[CFG_PATH_MAX]; /* generic: "stations[].name" */
@@ -21,8 +24,8 @@ struct set {
     int has_item;
 };
 
-/* An element number, "[2]" or ".2", at p: its end, or NULL when there is none. Numbers above the lists'
- * limits come out as CFG_MAX_ITEMS. */
+/* Reads an element number, "[2]" or ".2", at p. Returns its end, or NULL where there is none. A number above the
+ * limits of all lists becomes CFG_MAX_ITEMS. */
 static const char *scan_item(const char *p, uint32_t *item)
 {
     int bracket = *p == '[';
@@ -68,6 +71,20 @@ static const struct cfg_key *cut_to_known(const struct cfg_reader *rd, char *pat
     return key;
 }
 
+/* Makes sure that the element exists; the number after the last one appends. */
+static int reach_item(struct cfg_reader *rd, const struct set *set, const struct cfg_key *list)
+{
+    uint32_t *count = cfg_list_count(rd, list);
+    if (set->item < *count) return SH_OK;
+    uint32_t last = *count < (uint32_t)list->max ? *count : (uint32_t)list->max - 1;
+    if (set->item > last)
+        return cfg_fail(rd, CFG_FROM_SET, set->name, "%s has %u element%s; allowed indices 0 to %u%s", list->path,
+                        *count, *count == 1 ? "" : "s", last, last == *count ? ", the last appends one" : "");
+    rd->line[cfg_row(rd, list) + 1][set->item] = CFG_FROM_SET;
+    ++*count;
+    return SH_OK;
+}
+
 static int fail_unknown(struct cfg_reader *rd, const struct set *set)
 {
     char parent[CFG_PATH_MAX], name[CFG_PATH_MAX];
@@ -81,6 +98,8 @@ static int fail_unknown(struct cfg_reader *rd, const struct set *set)
     if (key == NULL || (key->type == CFG_MAP && rest[0] == '['))
         return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, rd->in_scanner ? set->path : set->name);
     const uint32_t item = rd->in_scanner ? 0 : set->item;
+    const struct cfg_key *list = cfg_list_of(&rd->table, key);
+    if (list != NULL && !rd->in_scanner && item >= (uint32_t)list->max) return reach_item(rd, set, list);
     if (key->type == CFG_MAP) return cfg_fail_unknown(rd, CFG_FROM_SET, parent, item, rest + 1);
     cfg_name(parent, item, name);
     if (key->type == CFG_LIST)
@@ -90,20 +109,6 @@ static int fail_unknown(struct cfg_reader *rd, const struct set *set)
                     name);
 }
 
-/* Makes sure that the element exists; the number after the last one appends. */
-static int reach_item(struct cfg_reader *rd, const struct set *set, const struct cfg_key *list)
-{
-    uint32_t *count = cfg_list_count(rd, list);
-    if (set->item < *count) return SH_OK;
-    uint32_t last = *count < (uint32_t)list->max ? *count : (uint32_t)list->max - 1;
-    if (set->item > last)
-        return cfg_fail(rd, CFG_FROM_SET, set->name, "%s has %u elements; allowed indices 0 to %u%s", list->path,
-                        *count, last, last == *count ? ", the last appends one" : "");
-    rd->line[cfg_row(rd, list) + 1][set->item] = CFG_FROM_SET;
-    ++*count;
-    return SH_OK;
-}
-
 /* Puts the key that the text names into `set`; or adds a diagnostic. */
 static int take_name(struct cfg_reader *rd, const char *text, const char *equals, struct set *set)
 {
@@ -111,9 +116,9 @@ static int take_name(struct cfg_reader *rd, const char *text, const char *equals
     if (equals == NULL || equals == text)
         return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "no %s; allowed KEY=VALUE, as in head.prr_hz=300000",
                         equals == NULL ? "'='" : "key");
-    if ((size_t)(equals - text) >= sizeof set->name / 2)
-        return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "unknown key; allowed up to %zu characters",
-                        sizeof set->name / 2 - 1);
+    if (equals - text > NAME_MAX_LEN)
+        return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "unknown key; allowed up to %d characters",
+                        NAME_MAX_LEN);
     snprintf(set->name, sizeof set->name, "%.*s", (int)(equals - text), text);
     to_generic(set);
     for (char *p = set->name; *p != '\0'; p++)
@@ -147,7 +152,7 @@ static int enter_scanner(struct cfg_reader *rd, struct set *set)
     return 0;
 }
 
-/* A value of YAML replaces the list or the section; keys that it doesn't name get their defaults. */
+/* Replaces a list or a section by a value of YAML. Keys that the value doesn't name get their defaults. */
 static void replace(struct cfg_reader *rd, struct cfg_document *doc, const struct set *set, const struct cfg_key *key,
                     const char *text, int n_before)
 {

@@ -95,10 +95,10 @@ double cfg_real_figure(const struct config_profile *profile, const char *path)
     return value;
 }
 
-/* A limit that a profile gives: its own figure, or, without a profile, the limit of all profiles. */
+/* Writes the limit that a profile gives: its figure, or, without a profile, the limit of all profiles. */
 static void profile_limit(const char *path, double any, const struct config_profile *profile, char *buf)
 {
-    if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? 1e-6 * (double)cfg_figure(profile, path) : any);
+    if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? from_micro(cfg_figure(profile, path)) : any);
 }
 
 static void allowed_range(const struct cfg_key *key, const struct config_profile *profile, char *buf)
@@ -123,9 +123,9 @@ static void allowed_range(const struct cfg_key *key, const struct config_profile
 
 static void allowed_words(const struct cfg_key *key, char *buf)
 {
-    int used = snprintf(buf, CFG_ALLOWED_MAX, "allowed ");
-    for (size_t i = 0; key->names[i] != NULL && used < CFG_ALLOWED_MAX; i++)
-        used += snprintf(buf + used, CFG_ALLOWED_MAX - (size_t)used, "%s%s", i > 0 ? ", " : "", key->names[i]);
+    snprintf(buf, CFG_ALLOWED_MAX, "allowed %s", key->names[0]);
+    for (size_t i = 1; key->names[i] != NULL; i++)
+        cfg_list_add(buf, CFG_ALLOWED_MAX, key->names[i]);
 }
 
 const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf)
@@ -225,7 +225,7 @@ static int store_word(const struct place *at, void *dst, const char *text)
     return refuse(at, text, "not known");
 }
 
-/* For the command line; libyaml checks files. */
+/* libyaml checks files; this is for values of the command line. */
 static int is_utf8(const char *text)
 {
     yaml_document_t doc;
@@ -252,8 +252,8 @@ static int store_text(const struct place *at, char *dst, const char *text, const
     return SH_OK;
 }
 
-/* "[1, 2, 3]", "1,2,3": from --set and defaults. */
-static int store_vec3_text(struct place *at, const char *text)
+/* Stores "[1, 2, 3]" or "1,2,3", as --set and defaults have them. */
+static int store_vec3_text(const struct place *at, double *dst, const char *text)
 {
     const int last = cfg_axes(at->key) - 1;
     const char *wrong = last == 1 ? "not [low, high]" : "not [x, y, z]";
@@ -270,21 +270,14 @@ static int store_vec3_text(struct place *at, const char *text)
         p += len;
         p += strspn(p, " ");
         if (axis < last && *p++ != ',') return refuse(at, text, wrong);
-        int code = cfg_store_vec3(at->rd, at->key, at->item, at->line, axis, part);
+        int code = store_real(at, dst + axis, part);
         if (code != SH_OK) return code;
     }
     return strcmp(p, closed ? "]" : "") == 0 ? SH_OK : refuse(at, text, wrong);
 }
 
-int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
-                   const char *text)
-{
-    struct place at = {rd, key, item, line};
-    return store_real(&at, (double *)cfg_address(rd, key, item) + axis, text);
-}
-
-int cfg_store_point(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
-                    const char *text)
+int cfg_store_number(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
+                     const char *text)
 {
     struct place at = {rd, key, item, line};
     return store_real(&at, dst, text);
@@ -309,7 +302,7 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
         return store_text(&at, dst, text, base_dir);
     case CFG_VEC3:
     case CFG_PAIR:
-        return store_vec3_text(&at, text);
+        return store_vec3_text(&at, dst, text);
     default:
         return refuse(&at, text, "not what belongs here");
     }

@@ -17,14 +17,12 @@ enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out)
 /* Stores one scalar; base_dir (with its '/', may be empty) is put before relative paths. */
 int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,
               const char *base_dir);
-int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
-                   const char *text);
-/* One number of a point of CFG_POINTS, into dst. */
-int cfg_store_point(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
-                    const char *text);
+/* Stores one number of a key of CFG_VEC3, CFG_PAIR or CFG_POINTS into dst. */
+int cfg_store_number(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
+                     const char *text);
 /* The values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of all
  * profiles. */
-enum { CFG_ALLOWED_MAX = 900 }; /* room for the longest list of words, the kinds of faults */
+enum { CFG_ALLOWED_MAX = 900 }; /* room for the longest lists, the kinds of faults and the keys of a profile */
 const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);

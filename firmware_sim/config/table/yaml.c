@@ -92,6 +92,7 @@ static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item
 
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
+    double *dst = cfg_address(w->rd, key, item);
     char allowed[CFG_ALLOWED_MAX];
     if (node->type != YAML_SEQUENCE_NODE) {
         wrong_kind(w, key, item, node);
@@ -106,7 +107,7 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
     for (int axis = 0; axis < cfg_axes(key); axis++) {
         const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
         if (check_scalar(w, key, item, number) == SH_OK)
-            cfg_store_vec3(w->rd, key, item, line_of(w, number), axis, text_of(number));
+            cfg_store_number(w->rd, key, item, line_of(w, number), dst + axis, text_of(number));
     }
 }
 
@@ -135,7 +136,7 @@ static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item
         for (uint32_t axis = 0; axis < 2; axis++) {
             const yaml_node_t *number = yaml_document_get_node(w->doc, pair->data.sequence.items.start[axis]);
             if (check_scalar(w, key, item, number) == SH_OK)
-                cfg_store_point(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
+                cfg_store_number(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
         }
     }
 }
@@ -158,14 +159,14 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     const char *const *words = part == FIGURE_FROM         ? cfg_from_names
                                : part == FIGURE_DEFINITION ? key->definitions
                                                            : NULL;
-    char allowed[CFG_ALLOWED_MAX] = "a text in one line";
-    for (size_t i = 0, used = 0; words != NULL && words[i] != NULL && used < sizeof allowed; i++)
-        used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", words[i]);
+    char allowed[CFG_ALLOWED_MAX] = "";
+    for (size_t i = 0; words != NULL && words[i] != NULL; i++)
+        cfg_list_add(allowed, sizeof allowed, words[i]);
     cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must say %s; allowed %s", figure_parts[part],
                    part == FIGURE_FROM         ? "where the figure is from"
                    : part == FIGURE_DEFINITION ? "how the width is defined"
                                                : "it in words",
-                   allowed);
+                   words != NULL ? allowed : "a text in one line");
 }
 
 static int is_line_of_text(const yaml_node_t *node)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to yaml.c and yaml_file.c: a file's one document, and its parts that are read later. */
+/* Private to this folder: a file's one document, and its parts that are read later. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_YAML_H
 #define FIRMWARE_SIM_CONFIG_TABLE_YAML_H
 
@@ -22,7 +22,7 @@ static inline int cfg_line_of(const struct cfg_reader *rd, yaml_mark_t mark)
 
 /* Reads the document by the rows of the table, except the scanners of stations. SH_EINPUT: it is no section. */
 int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc);
-/* Parses a text that is one document; cfg_read_document then reads it. NULL after an error. */
+/* Parses a text that is one document; cfg_read_document then reads it. *doc is NULL after an error. */
 int cfg_parse_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 
 #endif

@@ -13,6 +13,7 @@
 #include "firmware_sim/config/table/given.h"
 #include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
+#include "firmware_sim/config/table/value.h"
 
 /* Where the list is full, the last diagnostic makes room. */
 int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text)
@@ -29,7 +30,7 @@ int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const 
     return sh_fail(&faults->fault[at], code, "%s", text);
 }
 
-static int fault_add(struct cfg_reader *rd, int code, int line, const char *text)
+static int diagnostics_add(struct cfg_reader *rd, int code, int line, const char *text)
 {
     const uint64_t source = line == CFG_FROM_SET || rd->set != NULL    ? 1
                             : rd->table.keys == cfg_profile_table.keys ? 2
@@ -37,7 +38,7 @@ static int fault_add(struct cfg_reader *rd, int code, int line, const char *text
     return cfg_add_fault(rd->faults, source << 32 | (uint32_t)line, code, text);
 }
 
-static int fault_fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
+static int diagnostics_fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
 {
     char what[sizeof rd->faults->fault[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[48] = "";
     vsnprintf(what, sizeof what, fmt, ap);
@@ -48,14 +49,14 @@ static int fault_fail(struct cfg_reader *rd, int code, int line, const char *nam
         snprintf(text, sizeof text, "--set %s: %s", name, what);
     else
         snprintf(text, sizeof text, "%s%s: %s%s%s", rd->file, place, name, name[0] != '\0' ? ": " : "", what);
-    return fault_add(rd, code, line, text);
+    return diagnostics_add(rd, code, line, text);
 }
 
 int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
 {
     va_list ap;
     va_start(ap, fmt);
-    fault_fail(rd, code, line, "", fmt, ap);
+    diagnostics_fail(rd, code, line, "", fmt, ap);
     va_end(ap);
     return code;
 }
@@ -64,7 +65,7 @@ int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt,
 {
     va_list ap;
     va_start(ap, fmt);
-    int code = fault_fail(rd, SH_EINPUT, line, name, fmt, ap);
+    int code = diagnostics_fail(rd, SH_EINPUT, line, name, fmt, ap);
     va_end(ap);
     return code;
 }
@@ -75,12 +76,12 @@ int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
     va_list ap;
     rd->bad[cfg_row(rd, key)][item] = 1;
     va_start(ap, fmt);
-    int code = fault_fail(rd, SH_EINPUT, line, cfg_full_name(rd, key, item, name), fmt, ap);
+    int code = diagnostics_fail(rd, SH_EINPUT, line, cfg_full_name(rd, key, item, name), fmt, ap);
     va_end(ap);
     return code;
 }
 
-/* The key, or a section around it, is bad. */
+/* Whether the key, or a section around it, is bad. */
 static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
 {
     char path[CFG_PATH_MAX];
@@ -92,14 +93,12 @@ static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
     return 0;
 }
 
-/* A key below the section is bad; in a list, a key of this item. */
+/* Whether a key below the section is bad; in a list, a key of this item. */
 static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
 {
-    const size_t len = strlen(section);
     for (size_t i = 0; i < rd->table.n; i++) {
         const char *path = rd->table.keys[i].path;
-        if (strncmp(path, section, len) != 0 || (path[len] != '.' && path[len] != '[')) continue;
-        if (rd->bad[i][strstr(path, "[]") != NULL ? item : 0]) return 1;
+        if (cfg_is_in(path, section) && rd->bad[i][strstr(path, "[]") != NULL ? item : 0]) return 1;
     }
     return 0;
 }
@@ -124,7 +123,7 @@ int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const c
         snprintf(name, sizeof name, "%.190s", of);
     }
     va_start(ap, fmt);
-    int code = fault_fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
+    int code = diagnostics_fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
     va_end(ap);
     return code;
 }
@@ -146,8 +145,8 @@ const char *cfg_show(const char *text, char *buf)
     return buf;
 }
 
-/* A known key that the writer may have meant: in this section one that differs in a letter or two or is cut short, or
- * the same word in another section. */
+/* Finds the known key that the writer may have meant. In this section it differs in a letter or two, or one of the two
+ * words begins the other. In another section it is the same word. NULL: there is none. */
 static const struct cfg_key *suggest(const struct cfg_table *table, const char *parent, const char *word)
 {
     const struct cfg_key *best = NULL;
@@ -172,15 +171,13 @@ int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32
 {
     /* A hostile file may have far more diagnostics than are shown: don't search the table for each. */
     if (rd->faults->n >= 10 * CONFIG_MAX_FAULTS) return cfg_fail(rd, line, "configuration", "unknown key");
-    char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[3 * CFG_PATH_MAX];
-    char before[CFG_PATH_MAX] = "";
+    char section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[3 * CFG_PATH_MAX];
+    char known[CFG_ALLOWED_MAX] = "", before[CFG_PATH_MAX] = "";
     if (rd->of != NULL) snprintf(before, sizeof before, "%s.", rd->of);
     if (rd->in_scanner) snprintf(before, sizeof before, "stations[%d].scanner.", rd->scanner);
     for (size_t i = 0; i < rd->table.n; i++) {
         const char *path = rd->table.keys[i].path, *here = cfg_word_below(path, parent);
-        size_t used = strlen(known);
-        if (here != NULL && (!rd->in_scanner || cfg_is_of_scanner(path)))
-            snprintf(known + used, sizeof known - used, "%s%s", used > 0 ? ", " : "", here);
+        if (here != NULL && (!rd->in_scanner || cfg_is_of_scanner(path))) cfg_list_add(known, sizeof known, here);
     }
     cfg_name(parent, item, section);
     snprintf(name, sizeof name, "%s%s%s%s", before, section, section[0] != '\0' ? "." : "", cfg_show(word, shown));
