@@ -77,8 +77,6 @@ struct protocol_host {
      * session, which then releases control. reply (cap 500 and more) gets the reply line without its end.
      * Returns 0, or the SCPI error number. */
     int (*command)(void *ctx, const char *line, char *reply, size_t cap);
-    /* UTC of a device time, ns since 1970; INT64_MIN: not known. */
-    int64_t (*utc_ns)(void *ctx, int64_t t_ns);
     /* The last fix of the GNSS receiver at or before a device time. Returns 1, or 0: there is none (no time, or no fix
      * since power-up). Quality 0 where the head is nowhere on the Earth. */
     int (*fix)(void *ctx, int64_t t_ns, struct nmea_fix *fix);
@@ -115,7 +113,6 @@ struct cola_fields;
 /* Facts about the head that the descriptor doesn't have; constant, and outlives the instance. */
 struct protocol_identity {
     char maker[32], model[64]; /* of the head profile */
-    char profile[32];          /* its name */
     char firmware[32];
     char serial[32];
     char name[32]; /* of the device, as its user calls it */
@@ -134,8 +131,6 @@ struct talk_options;
 struct protocol_spec {
     const struct protocol_identity *identity;
     struct protocol_host host;
-    uint32_t session;         /* from 1, over all links */
-    uint32_t fixes_hz;        /* of the GNSS receiver */
     int64_t power_ns;         /* device time of the last power-up, from which the device's counters count */
     uint32_t power_ons;       /* how often power has come, by power cycles and reboots, with the first time */
     uint32_t near_wrap;       /* counters begin so many below their wrap; 0: at 0 */

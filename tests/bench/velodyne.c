@@ -31,12 +31,6 @@ static int take_unit(void *ctx, const void *unit, size_t len)
     return 0;
 }
 
-static int64_t utc_ns(void *ctx, int64_t t_ns)
-{
-    (void)ctx;
-    return 1767225600000000000 + t_ns;
-}
-
 static void count(void *ctx, enum protocol_count what, uint64_t n)
 {
     (void)ctx;
@@ -104,7 +98,7 @@ static int measure(int dual)
     struct stream s = {0};
     const struct protocol_identity identity = {.model = "VLP-16"};
     const struct protocol_spec spec = {.identity = &identity,
-                                       .host = {.ctx = &s, .send = take_unit, .utc_ns = utc_ns, .count = count}};
+                                       .host = {.ctx = &s, .send = take_unit, .count = count}};
     void *protocol;
     double ns[ROUNDS];
     if (make_turn(&s, dual) != 0 || ops->create(&spec, &protocol, NULL) != 0) return -1;

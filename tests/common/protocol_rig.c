@@ -47,12 +47,6 @@ static int answer(void *ctx, const char *line, char *reply, size_t cap)
     return 0;
 }
 
-static int64_t utc_ns(void *ctx, int64_t t_ns)
-{
-    const struct protocol_rig *rig = ctx;
-    return rig->utc0_ns == INT64_MIN ? INT64_MIN : rig->utc0_ns + t_ns;
-}
-
 static int64_t date_ns(void *ctx, int64_t t_ns)
 {
     const struct protocol_rig *rig = ctx;
@@ -119,9 +113,7 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
     rig->spec = (struct protocol_spec){
         .identity = &rig->identity,
-        .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns, store, NULL},
-        .session = 1,
-        .fixes_hz = 1,
+        .host = {rig, keep_unit, answer, fix, count, hang_up, next_fix_ns, pps, date_ns, store, NULL},
         .power_ons = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
     if (rig->ops->open != NULL) rig->ops->open(rig->protocol, 0);

@@ -40,12 +40,6 @@ static int run_command(void *ctx, const char *line, char *reply, size_t cap)
     return out.error;
 }
 
-static int64_t utc_ns(void *ctx, int64_t t_ns)
-{
-    (void)ctx;
-    return rig.utc0_ns == INT64_MIN ? INT64_MIN : rig.utc0_ns + t_ns;
-}
-
 static int64_t date_ns(void *ctx, int64_t t_ns)
 {
     (void)ctx;
@@ -107,15 +101,13 @@ static void open_session(enum protocol_id id, unsigned how)
     snprintf(rig.identity.serial, sizeof rig.identity.serial, "17210001");
     snprintf(rig.identity.firmware, sizeof rig.identity.firmware, "1.2.3");
     snprintf(rig.identity.name, sizeof rig.identity.name, "rig");
-    rig.spec = (struct protocol_spec){
-        .identity = &rig.identity,
-        .host = {&rig, send_unit, run_command, utc_ns, fix, count, hang_up, next_fix_ns, pps, date_ns},
-        .session = 1,
-        .fixes_hz = 1,
-        .near_wrap = how & 64 ? 3 : 0,
-        .waits = how >> 7 & 1,
-        .address = "127.0.0.1",
-        .port = 2368};
+    rig.spec =
+        (struct protocol_spec){.identity = &rig.identity,
+                               .host = {&rig, send_unit, run_command, fix, count, hang_up, next_fix_ns, pps, date_ns},
+                               .near_wrap = how & 64 ? 3 : 0,
+                               .waits = how >> 7 & 1,
+                               .address = "127.0.0.1",
+                               .port = 2368};
     rig.protocol = NULL;
     if (rig.ops->create(&rig.spec, &rig.protocol, &err) != SH_OK) {
         fuzz_must_be_line(&err);
