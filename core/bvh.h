@@ -49,7 +49,7 @@ const struct scene *bvh_scene(const struct bvh *bvh);
 struct bvh_plane {
     double n[3], d;
 } __attribute__((aligned(32))); /* half a cache line */
-/* triangle: of the scene's own, as all are where it has no copies. */
+/* triangle: of the scene's own, as all hits are where it has no copies. A miss has none. */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 /* The same plane for any triangle. */
 void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
