@@ -62,6 +62,7 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
                           .body = plain ? NULL : p->body + at,
                           .colour = k->texels ? p->colour + at : NULL};
         caster_nearest(&c->nearest, s, &met);
+        kernel_limit(met.rays.range_m, 0.0, s->range_max_m, n); /* hits beyond may or may not have been reported */
         met.rays.scattered = c->sub_rays->scattered;
         if (through) look_through(c, s, &met, at);
         for (uint32_t i = at; i < at + n && caster_has_bodies(s); i++)
