@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Area, volume and openness of a body. In: its triangles, in any order, and a box around them (metres). Out: figures that
- * do not depend on how its faces are divided. All sums are of doubles, from the middle of the box, so that a body far
- * from the origin loses no digits. Pure; any thread. */
+/* Area, volume and openness of a body. In: its triangles, in any order, and a box around them (metres). Out: figures
+ * that do not depend on how its faces are divided. All sums are of doubles, from the middle of the box, so that a body
+ * far from the origin loses no digits. Pure; any thread. */
 #ifndef CORE_BODY_H
 #define CORE_BODY_H
 
@@ -19,8 +19,7 @@ void body_begin(struct body_sum *s, const double min_m[3], const double max_m[3]
 void body_add_triangle(struct body_sum *s, const double corner[3][3]);
 /* An edge of a triangle in its direction. Edges that lie twice in the body, once in each direction, may be left out. */
 void body_add_edge(struct body_sum *s, const double a[3], const double b[3]);
-/* An estimate of the area that would close the body; rounding leaves some 1e-7 of the area that was
- * added. */
+/* An estimate of the area that would close the body. Rounding leaves some 1e-7 of the area that was added. */
 double body_open_m2(const struct body_sum *s);
 
 #endif

@@ -36,8 +36,8 @@ void bvh_free(struct bvh *bvh);
 /* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Where this machine has no such packets, it is 1. The
  * hits are the same. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
-/* This machine's engine, in words: Embree's version, rays a packet, instructions. Where two machines
- * say the same, the same rays meet the same triangles. */
+/* This machine's engine, in words: Embree's version, rays a packet, instructions. On machines with the same words, the
+ * same rays hit the same triangles. */
 void bvh_engine(char *text, size_t len);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 /* The origin of the local frame: the middle of the scene, or where most triangles of a large scene are. */
@@ -49,7 +49,7 @@ const struct scene *bvh_scene(const struct bvh *bvh);
 struct bvh_plane {
     double n[3], d;
 } __attribute__((aligned(32))); /* half a cache line */
-/* triangle: of the scene's own, as all are where it has no copies. */
+/* triangle: of the scene's own, as all hits are where it has no copies. A miss has none. */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 /* The same plane for any triangle. */
 void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
@@ -100,7 +100,7 @@ struct bvh_profile {
     uint64_t (*now)(void);
     uint64_t last, spent[2 * BVH_STAGES];
 };
-/* Adds the time since the end of the stage before to this one. */
+/* The time since the end of the last stage counts as this stage's. */
 static inline void bvh_stage_ends(struct bvh_profile *profile, int stage)
 {
     if (profile == NULL) return;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Casting: a run of pulses -> echoes, as entries of a block.
  *
- * In: a setup (what stays the same for all pulses of a scan) and a run (angles and times of consecutive
+ * In: a setup (the settings that are the same for all pulses of a scan) and a run (angles and times of consecutive
  * pulses). Out: a block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points;
  * core/cast/caster.c has them in that order.
  *
@@ -42,13 +42,13 @@ struct cast_mover {
  * mirrors show the legs, if there are any. */
 struct cast_tripod {
     double down[3]; /* unit, prcs: along the plumb line, however the head is tilted */
-    double
-        cos_opening; /* a pulse whose beam's centre has a larger cosine with down is a shot without echo; 2: none has */
+    /* Where the centre of a pulse's beam has a larger cosine with `down`, the shot has no echo. 2: there is no cone. */
+    double cos_opening;
     int has_legs;
     struct cast_mover legs; /* a body that stands still */
 };
 
-/* A pulse is followed through at most so many panes and mirrors. */
+/* The most panes and mirrors that a pulse is followed through. */
 enum { CAST_MAX_DEPTH = 4 };
 
 /* The steps between a hit and a point that a configuration asks for. A part that is NULL or 0 is left out.
@@ -96,14 +96,14 @@ struct cast_colour {
 /* Disturbances of a head, for the runs that are cast with it. Its encoders read the wobbles; the head doesn't notice
  * the others. All 0, with a share of 1: none. */
 struct cast_disturbance {
-    int dark;         /* the laser does not fire: every shot is empty */
-    double slip_turn; /* the beam goes so much farther in pan than its encoder reads */
+    int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
+    double slip_turn; /* the beam's pan is this much more than the encoder reads */
     /* The share of the optical power that a clean window lets through, both ways together. With a signal model each
      * return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by 1 /
      * share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik). The
      * voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
     double share;
-    uint32_t n_wobbles; /* the axes run ahead and behind: turn * sin(2 pi hz (t - begin)), t since the scan's start */
+    uint32_t n_wobbles; /* each adds turn * sin(2 pi hz (t - begin)) to the axes, t since the scan's start */
     struct cast_wobble {
         double mirror_turn, pan_turn, hz;
         int64_t begin_ns;
@@ -146,16 +146,15 @@ struct cast_setup {
     /* NULL: pulses are single rays. Else blocks have room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
     enum beam_select echoes; /* which of a pulse's */
-    uint32_t max_echoes;     /* of a pulse, at most those of detect or beam; 0: as many as these say */
+    uint32_t max_echoes;     /* of a pulse, no more than detect or beam allow; 0: as many as they allow */
     double
         pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     const struct cast_tripod *tripod; /* NULL: none. For a head that stands still */
-    /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the
-     * firing times of the runs; before the first and after the last the head stands. station_m is then only
-     * what geo positions are relative to, and rotation is not used. n_knots 0: the head stands still at
-     * station_m. */
+    /* The poses of a moving head (socs -> prcs), in order of time; between two of them pose_between holds. They cover
+     * the firing times of the runs: before the first and after the last the head stands. Then geo positions are
+     * relative to station_m, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
     const uint8_t *silent; /* by label: surfaces that hide what is behind them and give no echo; NULL: none */
@@ -218,8 +217,8 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
 /* Exact hits, with the caster's working memory; bvh.h. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* The outlines of a scene that are steps as seen from the station (beam_outlines_create; kind: of
- * surface_kinds where detection models surfaces). For setting up. */
+/* Makes the outlines of a scene that are steps as seen from the station: beam_outlines_create, with rays into bvh.
+ * spec->kind is that of surface_kinds where detection models surfaces. For setting up. */
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err);
 

@@ -35,7 +35,7 @@ static inline int colour_has_limits(enum colour_mode mode)
 /* A figure of these on the ramp. NaN: colour_unknown. */
 void colour_between(double low, double high, double figure, uint8_t rgb[3]);
 
-/* Blue at 0, green at 1/3, yellow at 2/3, red at 1, straight lines between them; below 0 and above 1 as at the ends.
+/* Blue at 0, green at 1/3, yellow at 2/3, red at 1, with straight lines between; below 0 and above 1 as at the ends.
  * Low is blue and high is red everywhere: in recordings, maps, views and reports, and on the page (view_colours.js),
  * whose colours between the two are others. NaN: colour_unknown. */
 void colour_ramp(double part, uint8_t rgb[3]);

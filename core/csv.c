@@ -35,7 +35,7 @@ static int next_cell(const char **p, const char *end, char cell[CELL_LEN])
     memcpy(cell, from, (size_t)(to - from));
     cell[to - from] = '\0';
     for (char *c = cell; c < cell + (to - from); c++)
-        if (*c == '\0') *c = '?'; /* or what follows would be read by nobody */
+        if (*c == '\0') *c = '?'; /* else the rest of the cell would not be read */
     return 1;
 }
 

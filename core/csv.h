@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A CSV file of numbers whose first line names the columns. In: a path, the names that are known. Out: line by line, the
- * numbers by column. Empty lines, and those that begin with a number sign, do not count. Not real-time safe. */
+/* A CSV file of numbers whose first line names the columns. In: a path, the names that are known. Out: the numbers by
+ * column, line by line. Empty lines, and those that begin with a number sign, do not count. Not real-time safe. */
 #ifndef CORE_CSV_H
 #define CORE_CSV_H
 
@@ -10,7 +10,7 @@ enum { CSV_MAX_COLUMNS = 16 };
 
 struct csv {
     struct text text;
-    const char *const *known;    /* names of columns, NULL at the end; index is the column's number for csv_value */
+    const char *const *known;    /* names of columns, NULL at the end; their indices are those of `value` */
     int column[CSV_MAX_COLUMNS]; /* of the file: which known one */
     int n_columns;
     uint32_t has;                  /* bit per known column */

@@ -152,7 +152,7 @@ static inline int scale_surely(double v, double power, uint64_t *whole)
 {
     uint64_t bits;
     const double product = fabs(v) * power, rounded = vec_round(product, &bits);
-    *whole = bits & 0x7ffffffffffff; /* its bits below 2^51: C can't convert what is too large */
+    *whole = bits & 0x7ffffffffffff; /* the bits below 2^51: C can't convert a double that is too large */
     return product < 0x1p43 && fabs(product - rounded) < 0.5 - 0x1p-9;
 }
 

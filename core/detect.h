@@ -10,7 +10,7 @@
  *     A = E rho(i) o(R) exp(-2 a R) / rho_min(R)
  *
  * with E the share of the pulse's energy that took this way, rho(i) as in surface.h, and rho_min(R) the
- * reflectance that is just seen at R. That comes from the data sheet's ranges R_k for targets of rho_k: log
+ * reflectance that is just seen at R. It follows from the data sheet's ranges R_k for targets of rho_k: log
  * rho_min = 2 log R + g(R) passes through each of them, and g is linear between them. The slope of g is 2 a
  * for the air on the data sheet's day. Beyond the last and before the first R_k the nearest slope holds;
  * with a single R_k it is 0. So the a in A is only the extinction beyond that of the data sheet's day.
@@ -64,7 +64,7 @@ struct detect_signal_spec {
 struct detect_signal {
     uint32_t n; /* of the following: pieces of g */
     double g0, at_m[DETECT_MAX_REACHES],
-        more_1_m[DETECT_MAX_REACHES]; /* g = g0 + sum more (R - at)+; first without + */
+        more_1_m[DETECT_MAX_REACHES]; /* g = g0 + sum of more (R - at): the first everywhere, others where R > at */
     double per_overlap2, extinction2_1_m;
     double per_snr;         /* 1/k; 0: sharp */
     double floor2, jitter2; /* of sigma^2: constant, and at A = 1 */

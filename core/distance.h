@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The exact distance of a point to the scene. In: a scene, and a point in prcs (metres). Out: the nearest
- * point of the mesh. Embree's point query proposes triangles, double precision decides.
+/* The exact distance of a point to the scene's own triangles; those of copies are left out (core/scene_copies.h writes
+ * them out). In: a scene, and a point in prcs (metres). Out: the nearest point of the mesh. Embree's point query
+ * proposes triangles, double precision decides.
  *
  * The query runs in a float frame about the scene's centre. Every radius is widened by that frame's rounding,
  * so no triangle that could be nearest is missed. The distance is point to triangle in double, edges and face

@@ -28,7 +28,8 @@ enum emitter_kind { EMITTER_LINE, EMITTER_PLANAR, EMITTER_BEAMS, EMITTER_SPHERE,
 extern const char *const emitter_names[]; /* by kind; NULL at the end */
 enum { EMITTER_MAX_BEAMS = 128, EMITTER_MAX_STEPS = 1000000 };
 
-/* Firing time after the sequence's first; azimuth against that of the turning head at its firing time. */
+/* A beam fires offset_ns after the sequence's first one. Its azimuth counts from that of the turning head at that
+ * time. */
 struct emitter_beam {
     int64_t elevation_udeg, azimuth_udeg;
     uint32_t offset_ns;
@@ -55,7 +56,7 @@ struct emitter {
     uint64_t sequence_ticks;
     struct emitter_beam beam[EMITTER_MAX_BEAMS];
     struct emitter_firing firing[EMITTER_MAX_BEAMS];
-    /* directions: [steps], the owner's; a row each, tick i for row i */
+    /* directions: [steps], which stay the owner's; row i fires at tick i */
     const struct emitter_firing *direction;
 };
 
@@ -87,9 +88,9 @@ int emitter_ring_is_pole(const struct emitter *emitter, uint64_t ring);
 /* A list, which stays the owner's. */
 void emitter_set_directions(struct emitter *emitter, const struct emitter_firing *direction, uint32_t n);
 
-/* Reads such a list: a row each, "x y z" in the head's frame (of any length), or "azimuth elevation" in degrees,
- * all rows alike; what follows a # is left out. *direction: [*n], the caller's to free. SH_EINPUT names file and
- * line. */
+/* Reads such a list, a row each: "x y z" in the head's frame (of any length), or "azimuth elevation" in degrees, all
+ * rows alike. The rest of a line after a # is left out. *direction: [*n], the caller's to free. SH_EINPUT names file
+ * and line. */
 int emitter_read_directions(const char *path, struct emitter_firing **direction, uint32_t *n, struct sh_err *err);
 /* "planar, steps 0..1080 of 1440 a turn, ..."; empty for a line head. */
 void emitter_describe(const struct emitter *emitter, char *buf, size_t len);
@@ -101,7 +102,7 @@ static inline uint32_t emitter_line_pulses(const struct emitter *emitter)
 }
 /* Beams: pulses per second, in micro-hertz, rounded. */
 int64_t emitter_rate_uhz(const struct emitter *emitter);
-/* The line angle of a step of a planar head, rounded: from the front, in the direction of the steps. */
+/* The line angle of a planar head's step, rounded. It counts from the front, in the direction of the steps. */
 int64_t emitter_step_udeg(const struct emitter *emitter, int64_t step);
 
 #endif

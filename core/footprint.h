@@ -87,9 +87,9 @@ struct beam {
 /* Lengths and angles as above; the pulse width in seconds. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
-/* A footprint on one plane, hit in its centre at range_m, with steep = 1 / cos^2 of the incidence: the mean
- * of its ranges in place of the centre's, as range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is
- * within a footprint's angle of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
+/* Replaces the range at a footprint's centre by the mean of the footprint's ranges. It lies on one plane, with steep =
+ * 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is within a
+ * footprint's angle of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 /* The width of its echo: for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
@@ -106,7 +106,7 @@ void beam_half_squares(const struct beam *beam, double h, double *along, double 
 struct beam_pattern {
     uint32_t n;
     float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; from n on: nothing */
-    double rest; /* variance of the footprint's x (and y) minus that of the places: spread around each */
+    double rest; /* variance of x (and of y) around a place: that of the footprint minus that of the places */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);

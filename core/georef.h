@@ -87,7 +87,7 @@ void georef_free(struct georef *georef);
  * where the zone does not reach. Method as before; its bound may be another. */
 int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err);
 
-/* The centre in the CRS: what the differences are added to. */
+/* The centre in the CRS, to which the differences are added. */
 void georef_anchor(const struct georef *georef, double anchor[3]);
 
 /* EPSG code of the CRS: 4978 for ECEF, 4979 for geodetic, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for

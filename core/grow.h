@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Arrays that grow. In: an array, and how many elements it must hold. Out: the array, moved where it had to
- * be. */
+/* Arrays that grow. In: an array, and how many elements it must hold. Out: the array, which may have moved. */
 #ifndef CORE_GROW_H
 #define CORE_GROW_H
 
@@ -20,7 +19,7 @@ static inline bool resize(void *array, size_t n, size_t size)
     return true;
 }
 
-/* Room for `need` elements, with room to spare; *room is what there is. */
+/* Room for `need` elements, and some to spare. *room: how many there is room for, before and after. */
 static inline bool grow(void *array, size_t *room, size_t need, size_t size)
 {
     if (need <= *room) return true;

@@ -6,8 +6,8 @@
  * IfcGeometricRepresentationContext. And for IfcMapConversion, by which the model's origin has coordinates in an
  * IfcProjectedCRS. Strict: what is there but not as IFC2x3/IFC4 define it is an error, not a guess.
  *
- * IfcMapConversion.Scale is map units per unit of the model. Where IfcProjectedCRS has no MapUnit, the map's unit is the
- * known one (metre, foot, US survey foot, or the model's own) that is nearest to unit of the model / Scale. */
+ * IfcMapConversion.Scale is map units per unit of the model. Where IfcProjectedCRS has no MapUnit, the map's unit is
+ * the known one (metre, foot, US survey foot, or the model's own) that is nearest to unit of the model / Scale. */
 #ifndef CORE_IFC_SITE_H
 #define CORE_IFC_SITE_H
 

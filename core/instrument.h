@@ -20,8 +20,7 @@
  *
  * Encoders, each: reading = a + index + scale a + eccentricity sin(a - phase); a: true angle, as scheduled.
  * Range: reading = (1 + range_scale) R + range_offset.
- * Angle noise, independent for each pulse: the beam goes to m + n_m, p + n_p, and the encoders don't see
- * it.
+ * Angle noise is independent for each pulse: the beam goes to m + n_m, p + n_p, and the encoders don't see it.
  *
  * Pure; any thread; allocates nothing. */
 #ifndef CORE_INSTRUMENT_H
@@ -30,6 +29,7 @@
 #include <stdint.h>
 
 #include "core/vec3.h"
+#include "core/vecmath.h"
 
 struct instrument_encoder {
     double index_rad, scale, eccentricity_rad, phase_rad;
@@ -60,11 +60,20 @@ struct instrument_turns {
 void instrument_aim(const struct instrument *instrument, const struct instrument_turns *turns, const struct vec3_out *s,
                     const struct vec3_out *o);
 
-/* Scheduled angles become what the encoders say, in place. */
+/* Turns scheduled angles into the readings of the encoders, in place. */
 void instrument_read(const struct instrument *instrument, uint32_t n, double *mirror_turn, double *pan_turn);
 void instrument_range(const struct instrument *instrument, uint32_t n, double *range_m);
 
-/* Encoder reading of an angle: whole counts, modulo a turn. */
-uint32_t instrument_encoder_count(double turn, double counts_per_turn);
+/* Encoder reading of an angle: whole counts, modulo a turn. Points and the ends of lines both read by it. */
+VEC_INLINE uint32_t instrument_encoder_count(double turn, double counts_per_turn)
+{
+    uint64_t bits;
+    double below = vec_round(turn - 0.5, &bits); /* floor, up to a tie that the next line undoes */
+    double within = turn - below;
+    within = within >= 1.0 ? within - 1.0 : within;
+    double count = vec_round(within * counts_per_turn, &bits);
+    bits = count >= counts_per_turn ? 0 : bits;
+    return (uint32_t)bits;
+}
 
 #endif

@@ -6,8 +6,8 @@
  * shot without echo. Entries are in order of pulse, then of range. Times and pulse numbers count from the
  * scan's start.
  *
- * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes and
- * line_block_alloc_colours those that are optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
+ * Ownership: line_block_alloc makes the arrays for `capacity` entries. Each other line_block_alloc_... adds some that
+ * are optional. line_block_free releases them all. A block belongs to one thread. Nothing else allocates. */
 #ifndef CORE_LINE_H
 #define CORE_LINE_H
 

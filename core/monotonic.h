@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The monotonic clock, for what prepares a scene and what waits: nothing on the way of a pulse reads it. Real-time safe. */
+/* The monotonic clock, for code that prepares a scene or waits. Nothing on the way of a pulse reads it. Real-time
+ * safe. */
 #ifndef CORE_MONOTONIC_H
 #define CORE_MONOTONIC_H
 

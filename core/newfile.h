@@ -42,8 +42,8 @@ int newfile_check(const char *path, struct sh_err *err);
 /* Opens the `part` that a killed writer has left: an existing regular file, for reading and writing, locked as
  * newfile_part does. SH_EINPUT: there is none; SH_ESTATE: it is still being written. */
 int newfile_left(const char *part, int *fd, struct sh_err *err);
-/* Opens an existing regular file for reading. Where it is the user's own and has no other name, it is opened for
- * writing, too, and locked. */
+/* Opens an existing regular file for reading. Where it is the user's own, has no other name, and is not locked by
+ * another process, it is opened for writing, too, and locked. */
 int newfile_whole(const char *path, int *fd, struct sh_err *err);
 /* The size in bytes of a part that was left and that nobody writes, or 0. */
 long long newfile_left_len(const char *part);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The plan: which method each stage uses. In go a tolerance, the options of a stage and what is known of head
- * and scene; out come the method, and a row that says its error bound (m), its cost (ns per pulse), what was
- * left out, and why.
+/* The plan: which method each stage uses. In: a tolerance, the options of a stage, and what is known of head and scene.
+ * Out: the method, and a row with its error bound (m), its cost (ns per pulse), the options that were left out, and the
+ * reasons.
  *
  * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one
  * with the least error, and the row says so. Bounds are proven (order, georeferencing) or found by sampling:
@@ -75,13 +75,13 @@ void plan_georef_polar(struct plan_row *row);
 
 /* ---- sampling */
 
-/* Where the head fires from, and what. */
+/* A place that the head fires from, with its setup and the pulses of a scan there. */
 struct plan_place {
     struct cast_setup setup; /* as the run's */
     struct cast_beam *beam;  /* its footprint; NULL: none. Mode and pattern are changed. outlines NULL: not adaptive */
     struct schedule_segment segment;
     uint64_t pulses; /* to draw from, those outside the field of view included */
-    /* Poses of what moves at a time of the scan; NULL: nothing does. */
+    /* Sets the poses of head and bodies at a time of the scan; NULL: nothing moves. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
 };
@@ -108,7 +108,7 @@ void plan_sample_free(struct plan_sample *sample);
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* The error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
- * pulse whose way is longer than that counts as wrong, too: nothing is known of what it meets further on. */
+ * pulse whose way is longer than that counts as wrong, too: the rest of its way is not known. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* ---- sight */
@@ -124,8 +124,8 @@ struct plan_sight_need {
     const char *why_not;   /* no map is possible; NULL: it is */
 };
 
-/* Shares of the pulses, by their cell. It shows one triangle, nothing, a few triangles, or many (ask). small: it shows
- * triangles that few rays meet, which the map leaves to the BVH. */
+/* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
+ * or many (ask). small: its triangles are met by so few rays that the map leaves them to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */
@@ -165,7 +165,7 @@ struct plan_head {
     uint32_t n_movers;
     int noise_on;
     double range_sigma_m, range_sigma_ppm;
-    double range_sigma_at_m; /* noise by the signal: where that sigma holds; 0: whatever the signal */
+    double range_sigma_at_m; /* the range at which that sigma holds; 0: noise does not depend on the signal */
     double ball_radius_m;    /* 0: no ball-shaped noise */
     int signal, sharp;       /* there is a signal model; without noise of its own */
     double reach_m;          /* where a white target vanishes */

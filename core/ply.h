@@ -75,8 +75,8 @@ struct ply_list {
 extern const uint8_t ply_type_size[8];                 /* bytes, by ply_type */
 extern const char *const ply_scalar_name[PLY_SCALARS]; /* in the file, by ply_use from PLY_X on */
 
-/* Used within core/scene: leaves t at the first byte of data. A vertex has x, y and z afterwards; faces may
- * lack their list. */
+/* Called by ply_open alone. Leaves t at the first byte of data. A vertex has x, y and z afterwards; faces may lack
+ * their list. */
 int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err);
 
 /* The element's property of that use, or NULL. */
@@ -109,8 +109,8 @@ struct ply_user {
     bool has_faces;                              /* faces and strips are used, not passed over */
 };
 
-/* Reads all rows in the order of the file, but faces after the vertices. Warns of elements that nobody uses, and of bytes after the last
- * row. */
+/* Reads all rows in the order of the file, but faces after the vertices. Warns of elements that nobody uses, and of
+ * bytes after the last row. */
 int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err);
 
 /* Fails with "FILE, line L: ELEMENT N of M: what", or the byte instead of the line in a binary. */

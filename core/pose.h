@@ -96,7 +96,7 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
  * 0, so that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, const struct sh_report *report, struct trajectory **out, struct sh_err *err);
 
-/* Way-points, from a CSV file as well: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
+/* Reads way-points from a CSV file: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
  * the last point needs a speed, which is not used. At a point with pause_s it comes to rest smoothly, stands
  * for that time and starts smoothly. It heads along the path, with pitch and roll 0, about the axes that a

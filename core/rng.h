@@ -35,14 +35,26 @@ VEC_INLINE uint64_t rng_mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
+/* Mixes the numbers of a place into a hash. -0 counts as 0, so that places that compare as equal have one hash. */
+static inline uint64_t rng_place(uint64_t hash, const double p[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const double x = p[i] + 0.0;
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        hash = rng_mix(hash + 0x9e3779b97f4a7c15ULL + bits);
+    }
+    return hash;
+}
+
 /* Key of a stream; once per scan, not per pulse. */
 VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
 {
     return rng_mix(rng_mix(seed + 0x9e3779b97f4a7c15ULL) + (uint64_t)purpose * 0xd1b54a32d192ed03ULL);
 }
 
-/* A number to be XORed into keys, which separates the draws of scans: from the station and the number of its
- * scan, both counted from 1. 0 for the first scan at the first station. Once per scan. */
+/* Returns a number that is XORed into keys, so that each scan draws other numbers. It depends on the station and the
+ * number of its scan, both counted from 1. It is 0 for the first scan at the first station. Once per scan. */
 VEC_INLINE uint64_t rng_scan(uint32_t station, uint32_t scan)
 {
     return rng_mix((uint64_t)(station - 1) << 32 | (scan - 1));
@@ -94,7 +106,7 @@ VEC_INLINE double rng_cosine(uint64_t l)
 }
 
 /* Standard normal from 64 random bits, by Box and Muller: radius from the upper 32 bits, angle from the lower
- * 32. The largest is 6.7. The error of the arithmetic is below 4e-12 (tests/unit/test_rng.c); steps of the angle are
+ * 32. The largest is 6.8. The error of the arithmetic is below 4e-12 (tests/unit/test_rng.c); steps of the angle are
  * 1000 times as large. */
 VEC_INLINE double rng_normal_of(uint64_t bits)
 {

@@ -26,8 +26,8 @@
 enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
 
 enum {
-    /* The room of an object's or a material's name, with its NUL. Longer names are cut, counted, and end in a number of the
-     * whole name, so that no two become one. */
+    /* The room of an object's or a material's name, with its NUL. A longer name is cut and counted. It then ends in a
+     * hash of the whole name, so that two names never become one. */
     SCENE_NAME_LEN = 256,
     SCENE_TYPE_LEN = 64,        /* of a product's type, with its NUL */
     SCENE_GUID_LEN = 24,        /* of its GlobalId, likewise */
@@ -40,7 +40,7 @@ enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_RE
 /* Limits for readers in processes of their own: Assimp, and each reader of IFC. */
 struct scene_import_limits {
     uint32_t memory_mib; /* on top of the program's own; the same for the scene that is handed back */
-    double time_s;       /* by the clock on the wall; of processor time likewise */
+    double time_s;       /* the most seconds, both of time and of processor time */
     uint32_t files;      /* open at a time by Assimp */
     enum scene_ifc_reader ifc_reader;
     int ifc_strict;         /* 1: a difference between the readers of IFC is an error */
@@ -75,8 +75,8 @@ struct scene_mesh_spec {
     struct scene_places places;
 };
 
-/* A name of n bytes, and its NUL, into `room` bytes, at least 32. 1: it was too long, is cut between two characters of UTF-8,
- * and ends in a number of all its bytes. */
+/* Copies a name of n bytes, and a NUL, into `room` bytes, at least 32. Returns 1 where it was too long: it is cut
+ * between two characters of UTF-8, and ends in a hash of all its bytes. */
 int scene_copy_name(char *out, size_t room, const char *name, size_t n);
 
 /* Which of a surface's triangles have colours at their corners. */
@@ -93,9 +93,9 @@ struct scene_surface {
     int has_colour;
     uint16_t vertex_colours; /* enum scene_vertex_colours, once the load is over; they count before `colour` */
     uint16_t texture;        /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
-    uint16_t opacity;        /* what cuts holes, likewise; 0: the alpha of texture does */
+    uint16_t opacity;        /* of the opacity map that cuts holes, likewise; 0: the alpha of `texture` cuts them */
     float clear; /* share of the light that goes through it, as the file says, 0..1. Nothing here follows from it */
-    float solid; /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
+    float solid; /* a texel that is less opaque is a hole: 0.5, or the format's figure; 0: there are no holes */
     /* Type and GlobalId of a product of IFC; else empty. */
     char type[SCENE_TYPE_LEN], guid[SCENE_GUID_LEN];
 };
@@ -129,7 +129,7 @@ struct scene_says {
 struct scene_copy {
     double shift_m[3], scale, cosine, sine;
     double min_m[3], max_m[3]; /* bounds, prcs */
-    uint32_t label0;           /* what is added to the mesh's labels */
+    uint32_t label0;           /* added to the mesh's labels */
 };
 
 /* A mesh that is kept once and stands in the scene any number of times. Its frame: metres, z up, as it was loaded. */
@@ -154,8 +154,8 @@ struct scene {
     struct scene_surface *surface; /* [n_surfaces] */
     /* Only where a spec asks for textures, or a texture has holes; else NULL, 0. */
     float (*uv)[3][2]; /* [n_triangles] of the corners; the image's lower left corner is 0, 0; NaN: none */
-    /* Only where a spec asks for textures and a mesh has colours of its vertices; else NULL. sRGB; the fourth is 0 where
-     * the corner has none, else 255. */
+    /* Only where a spec asks for textures and a mesh has colours of its vertices; else NULL. sRGB; the fourth is 0
+     * where the corner has none, else 255. */
     uint8_t (*rgb)[3][4];          /* [n_triangles] of the corners */
     struct scene_texture *texture; /* [n_textures] */
     uint32_t n_textures;
@@ -164,7 +164,7 @@ struct scene {
     const struct texture_mask **cutout;
     struct texture_mask **mask; /* [n_masks] */
     uint32_t n_masks;
-    uint32_t label0;           /* what a user has added to all labels: label[i] - label0 is an index into surface */
+    uint32_t label0;           /* added to all labels by a user: label[i] - label0 is an index into surface */
     double error_m;            /* of the vertices, by rounding to single precision; 0: none */
     double min_m[3], max_m[3]; /* bounds of the used vertices, prcs */
     struct scene_counts counts;
@@ -173,8 +173,8 @@ struct scene {
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
- *   but .obj, .ply, .stl and .tif) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers that place
- *   them, come to more.
+ *   but .obj, .ply, .stl and .tif) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers
+ *   that place them, come to more.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
@@ -206,8 +206,8 @@ int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, str
  * uses the scene, and before label0 is set. */
 int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
-/* Marks duplicate faces: triangles with the same three corners, in any order, and the same holes, as one with a lower
- * number. Triangle i has bit i % 64 of (*twin)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
+/* Marks duplicate faces: triangles that have the same three corners, in any order, and the same holes as one with a
+ * lower number. Triangle i has bit i % 64 of (*duplicate)[i / 64], to be freed. SH_ENOMEM, SH_ESTOPPED. */
 int scene_find_duplicate_faces(const struct scene *scene, const struct sh_report *report, uint64_t **duplicate,
                                struct sh_err *err);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The objects of a scene, and figures of each: triangles, open edges, area, volume. An object is all surfaces of one name,
- * with their copies. In: a scene. Out: a row for each object, in the order of their first labels. Not real-time safe. */
+/* The objects of a scene, and figures of each: triangles, open edges, area, volume. An object is all surfaces of one
+ * name, with their copies. In: a scene. Out: a row for each object, in the order of their first labels. Not real-time
+ * safe. */
 #ifndef CORE_SCENE_OBJECTS_H
 #define CORE_SCENE_OBJECTS_H
 
@@ -35,8 +36,9 @@ struct scene_open_edges {
     int (*take)(void *ctx, const double a[3], const double b[3], struct sh_err *err);
 };
 
-/* Corners at the same place, bit for bit, are one. Takes up to 150 bytes a triangle of the largest object while it works.
- * edges: NULL: they are only counted. SH_ENOMEM, SH_ESTOPPED, or as edges returns. scene_objects_free is due in any case. */
+/* Corners at the same place, bit for bit, are one. It takes up to 150 bytes a triangle of the largest object while it
+ * works. edges NULL: they are only counted. SH_ENOMEM, SH_ESTOPPED, or as edges returns. scene_objects_free is due in
+ * any case. */
 int scene_objects_find(const struct scene *scene, const struct scene_open_edges *edges, const struct sh_report *report,
                        struct scene_objects *objects, struct sh_err *err);
 void scene_objects_free(struct scene_objects *objects);

@@ -54,7 +54,7 @@ struct schedule_segment {
     uint64_t end_pulse;       /* first pulse after the last frame, in the scan; UINT64_MAX without end */
 };
 
-/* A run of pulses of one line that are cast: what the caster needs. */
+/* Consecutive pulses of one line that are cast, as the caster needs them. */
 struct schedule_run {
     uint64_t pulse0;  /* first pulse, in the scan */
     uint32_t n;       /* pulses */
@@ -114,10 +114,9 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
-/* Angle at pulse k of what sweeps a line, in turns: the mirror of a line head, the rotor of one with beams. */
+/* The angle at pulse k of the axis that sweeps a line, in turns: a line head's mirror, the rotor of a head of beams. */
 double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k);
-/* Changes a run, of a line head or one with beams: what sweeps stands still at sweep_turn, and lines go on by
- * time. */
+/* Changes a run of a line head, or of a head of beams: that axis stands still at sweep_turn. Lines go on by time. */
 void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run);
 
 /* The number of pulses that fire within max_ns, at least one. */

@@ -82,7 +82,7 @@ struct text_span text_rest(struct text *t);
 /* A number that fills the word at p; false and p unmoved when it isn't one. NaN and inf are numbers here. */
 bool text_number(struct text *t, double *value);
 
-/* Decimal digits with a sign, up to 10^18; what follows is the caller's. */
+/* Reads up to 18 decimal digits, with or without a sign. p is then at the byte after them, whatever that is. */
 bool text_integer(struct text *t, int64_t *value);
 
 #endif

@@ -8,7 +8,7 @@
 #include "core/date.h"
 
 enum { DAY_S = 86400, FIRST_YEAR = 1972, LAST_YEAR = 2199 };
-static const int64_t GPS_EPOCH_TAI_S = 315964800 + 19; /* 1980-01-06, ten years and 7 days of 1970's, TAI-UTC 19 s */
+static const int64_t GPS_EPOCH_TAI_S = 315964800 + 19; /* 1980-01-06 is day 3,657; TAI-UTC was 19 s */
 static const int64_t NTP_TO_POSIX_S = 2208988800;      /* 1900 to 1970: 70 years, 17 leap days */
 static const int64_t WEEK_NS = 604800 * UTC_SECOND_NS;
 
@@ -35,13 +35,13 @@ static int parse_line(const char *line, int number, struct utc_table *out, struc
     long long ntp_s = strtoll(line, &end, 10);
     long offset = strtol(end, &end, 10);
     end += strspn(end, " \t\r");
-    if (ntp_s < 0 || labs(offset) > 1000) return sh_fail(err, SH_EFORMAT, "line %d: out of range", number);
+    if (ntp_s < 0 || offset < -1000 || offset > 1000) return sh_fail(err, SH_EFORMAT, "line %d: out of range", number);
     struct utc_leap leap = {ntp_s - NTP_TO_POSIX_S, (int32_t)offset};
     if ((*end != '#' && *end != '\n' && *end != '\0') || leap.posix_s % DAY_S != 0)
         return sh_fail(err, SH_EFORMAT, "line %d: allowed are the NTP seconds of a midnight and TAI-UTC", number);
     if (out->n == UTC_MAX_LEAPS)
         return sh_fail(err, SH_EFORMAT, "line %d: more than %d leap seconds", number, UTC_MAX_LEAPS);
-    /* Before the first a second less, so that it is one step as the others are. */
+    /* The first entry is a step of one second, too, as if 9 s stood before it. */
     struct utc_leap before = out->n != 0 ? out->leap[out->n - 1] : (struct utc_leap){0, 9};
     if (labs(offset - before.tai_minus_utc) != 1 || leap.posix_s <= before.posix_s ||
         (out->n == 0 && (leap.posix_s != 63072000 || offset != 10)))
@@ -51,6 +51,13 @@ static int parse_line(const char *line, int number, struct utc_table *out, struc
     return SH_OK;
 }
 
+/* Returns 0 for a date that can't be the end of a table. The table is then refused, as 0 is before its last entry. */
+static int64_t parse_expiry(const char *text)
+{
+    const long long ntp_s = strtoll(text, NULL, 10), last_s = date_days(LAST_YEAR + 1, 1, 1) * DAY_S;
+    return ntp_s < NTP_TO_POSIX_S || ntp_s - NTP_TO_POSIX_S > last_s ? 0 : ntp_s - NTP_TO_POSIX_S;
+}
+
 int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
@@ -58,7 +65,7 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
     for (const char *line = text; *line != '\0' && rc == SH_OK; number++) {
         const char *p = line + strspn(line, " \t\r");
         if (strncmp(p, "#@", 2) == 0)
-            out->expires_s = (int64_t)strtoull(p + 2, NULL, 10) - NTP_TO_POSIX_S;
+            out->expires_s = parse_expiry(p + 2);
         else if (*p != '#' && *p != '\n' && *p != '\0')
             rc = parse_line(p, number, out, err);
         line += strcspn(line, "\n");
@@ -66,7 +73,9 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
     }
     if (rc != SH_OK) return rc;
     if (out->n == 0 || out->expires_s <= out->leap[out->n - 1].posix_s)
-        return sh_fail(err, SH_EFORMAT, "no table of leap seconds with an expiry (#@) after its last entry");
+        return sh_fail(err, SH_EFORMAT,
+                       "no table of leap seconds with an expiry (#@) after its last entry, and by the end of %d",
+                       LAST_YEAR);
     return SH_OK;
 }
 

@@ -11,10 +11,10 @@
  * peaks at 1. So the integral of P over time is sum_r A_r times the integral of h: the link budget, whatever the
  * surfaces do to the shape.
  *
- * Samples. Sample k of a pulse is taken at k sample_s after its emission: one grid for all windows of a pulse. A count is
- * baseline + (P + n) / full_scale times the counts above the baseline, rounded and limited to 0 .. 2^bits - 1. n is white
- * Gaussian noise of the spec's sigma. Random numbers are keyed by (seed, scan, pulse, sample): nothing depends on which
- * windows are kept.
+ * Samples. Sample k of a pulse is taken at k sample_s after its emission: one grid for all windows of a pulse. A count
+ * is baseline + (P + n) / full_scale times the counts above the baseline, rounded and limited to 0 .. 2^bits - 1. n is
+ * white Gaussian noise of the spec's sigma. Random numbers are keyed by (seed, scan, pulse, sample): nothing depends on
+ * which windows are kept.
  *
  * Ownership: waveform_create makes a waveform, waveform_free releases it; constant in between, any thread. Sampling
  * allocates nothing. */
@@ -39,7 +39,7 @@ struct waveform_spec {
     double bandwidth_hz;    /* of the receiver, -3 dB; 0: no limit */
     double sample_s;        /* of the digitiser */
     uint32_t bits;          /* 8 .. 14 */
-    double baseline_counts; /* what no light gives */
+    double baseline_counts; /* the count without light */
     double full_scale;      /* signal, in thresholds, at the largest count */
     double saturation;      /* the receiver gives no more than this signal, in thresholds; 0: no limit */
     double dead_s;          /* after a saturated sample the receiver gives nothing for so long; 0: none */
@@ -120,9 +120,9 @@ int waveform_check_detection(const struct waveform *waveform, struct sh_err *err
 /* The largest value of h, of a pulse with which echoes are found. */
 double waveform_pulse_peak(const struct waveform *waveform);
 
-/* Finds at most `most` echoes in the order of range; level: amplitude, in thresholds, below which nothing is an echo (1: as
- * detect.h). Returns how many, and adds to *n_crowded those that found no room (the weakest are left out). None where
- * waveform_check_detection fails. Pure. */
+/* Finds at most `most` echoes in the order of range. level: the amplitude, in thresholds, below which nothing is an
+ * echo (1: as in detect.h). Returns how many, and adds to *n_crowded those that found no room: the weakest are left
+ * out. It finds none where waveform_check_detection fails. Pure. */
 uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded);

@@ -54,11 +54,12 @@ struct bvh {
     uint32_t n_leaves;
     struct bvh **mesh;     /* [scene->n_copied] of those that have copies */
     struct bvh_copy *copy; /* [scene->n_copies] */
-    uint32_t *at_plane;    /* [n_triangles + 1]: twice the leaf that has a triangle's plane, and which of its two. The
-                              * last stands for a miss: its plane is all NaN */
-    double origin_m[3];    /* the middle of the scene, or where most of its triangles are (leaves.c) */
-    double radius_m;       /* no vertex of the scene is further from there */
-    double stretch_m;      /* float rays are no longer than this; INFINITY: they have any length */
+    /* [n_triangles + 1]: twice the leaf that has a triangle's plane, plus which of its two it is. The last stands for a
+     * miss: its plane is all NaN. */
+    uint32_t *at_plane;
+    double origin_m[3]; /* the middle of the scene, or where most of its triangles are (leaves.c) */
+    double radius_m;    /* no vertex of the scene is further from there */
+    double stretch_m;   /* float rays are no longer than this; INFINITY: they have any length */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
 };

@@ -17,11 +17,11 @@
 enum { EDGES = 5 };
 static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2, 0, 3, 2};
 
-/* An edge's side is (p x (q - p)) . d. L is the leaf's size: no edge is longer, and no corner is further from the leaf's
- * base. F is the distance of that base from the ray's origin, plus L. In single precision the side's error is at most 15
- * units of 2^-24 of F L: the base from the ray's origin, rounded, 1; the corner, rounded and added to it, 2; the edge 3;
- * the cross product 3; the direction 1; the dot product 5. |p| itself is no measure, since it may be far smaller than
- * what it is the sum of. Where rays begin at points o of their own, p counts from one of these, c. Then the side is
+/* An edge's side is (p x (q - p)) . d. L is the leaf's size: no edge is longer, and no corner is further from the
+ * leaf's base. F is the distance of that base from the ray's origin, plus L. In single precision the side's error is at
+ * most 15 units of 2^-24 of F L: the base from the ray's origin, rounded, 1; the corner, rounded and added to it, 2;
+ * the edge 3; the cross product 3; the direction 1; the dot product 5. |p| itself is no measure, since it may be far
+ * smaller than its summands. Where rays begin at points o of their own, p counts from one of these, c. Then the side is
  * (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with |o - c| for F; the sum adds
  * 1. The doubt of double precision (edges.h) is far less than the rest of the bound. */
 #define SIDE_DOUBT (24.0F * 0x1p-24F)
@@ -81,8 +81,8 @@ VEC_INLINE void find_edges(const struct bvh_query *query, const struct bvh_leaf 
     edges->doubt = SIDE_DOUBT * 1.001F * far_m * size_m;
 }
 
-/* Judges a packet of `width` rays, which is a width of Embree's, or fewer. found: all bits of the rays that Embree asks
- * for. */
+/* Judges the first `width` lanes of a packet; those without a ray may have any result. found: in, all bits of the rays
+ * that Embree asks for; out, how each passes. */
 VEC_INLINE void judge_packet(const struct bvh_query *query, const struct edges *edges, uint32_t width,
                              struct lanes *found)
 {

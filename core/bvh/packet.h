@@ -35,11 +35,9 @@ struct bvh_query {
     int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
     double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points at_local is the first of them */
     double most_m;             /* of a float ray, as in struct bvh_batch */
-    const double
-        *dir[3]; /* [BVH_PACKET] each; of lanes without a ray: any. These and the next are arrays of the rays, or
-                           * of `room` */
-    const float *dir_float; /* [3][width] the same for Embree; may be read on to BVH_PACKET */
-    const double *org[3], *local[3];
+    /* [BVH_PACKET] each, in the arrays of all rays or in `room`; of lanes without a ray: any. */
+    const double *dir[3], *org[3], *local[3];
+    const float *dir_float;        /* [3][width] dir for Embree; may be read on to BVH_PACKET */
     double room[9][BVH_PACKET];    /* for dir, org, local */
     float turned[3][BVH_PACKET];   /* of own points: (local - at_local) x dir */
     double apart_m;                /* no local - at_local is longer */

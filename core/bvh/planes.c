@@ -92,7 +92,7 @@ static void find_labels(const struct bvh *bvh, const struct bvh_rays *rays)
         rays->label[i] = label_of(bvh, rays->triangle[i]);
 }
 
-/* A miss has the highest number there is and reads the record after the last triangle, which is all NaN. */
+/* A miss has the highest number there is and reads the plane after the last leaf, which is all NaN. */
 VEC_CLONES
 static void find_steepness(const struct bvh *bvh, const struct bvh_rays *rays)
 {

@@ -10,8 +10,8 @@
  *                sub_ray_plan.c   where in a footprint those rays lie
  *     waves      waves.c          the light of a pulse over time, and echoes found in it, where the setup has
  *                                 waveforms; within echoes
- *     upset      disturbance.c          where the head has a fault: wobbles and a slipped pan within aim, a dark laser after
- *                                 it, a soiled window within echoes
+ *     disturb    disturbance.c    where the head has a fault: wobbles and a slipped pan within aim, a dark laser
+ *                                 after it, a soiled window within echoes
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
  *     points     points.c         positions, and entries of the block
  *
@@ -160,7 +160,7 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
     k->spreads = k->attributes || k->waves != NULL;
     if (s->disturbance != NULL && s->disturbance->dark) {
         caster_darken(&c->list);
-        if (k->waves != NULL) caster_waves(k->waves);
+        caster_report(c, k);
         return caster_points(c, k);
     }
     const struct met met = centres(c, k);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: so many pulses are worked on at a time, and arrays for what they give have these sizes. */
+/* Private to core/cast: how many pulses are worked on at a time, and the sizes of the arrays for them. */
 #ifndef CORE_CAST_CHUNK_ARRAYS_H
 #define CORE_CAST_CHUNK_ARRAYS_H
 

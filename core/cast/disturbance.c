@@ -33,6 +33,7 @@ void caster_darken(struct echo_list *l)
     for (uint32_t i = 0; i < l->n; i++) {
         l->range_m[i] = (double)NAN;
         l->label[i] = 0;
+        l->rho[i] = 0.0;
     }
 }
 

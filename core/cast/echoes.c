@@ -167,7 +167,7 @@ static double fixed_sigma_m(const struct cast_setup *s)
     return s->disturbance != NULL && !is_modelled ? s->range_sigma_m / s->disturbance->share : s->range_sigma_m;
 }
 
-/* Noise is keyed by scan, pulse and echo, so that it doesn't depend on which others are sent. */
+/* Noise is keyed by scan, pulse and echo, so that it doesn't depend on which other echoes are sent. */
 static void add_noise(struct caster *c, const struct cast_setup *s)
 {
     const struct cast_detect *d = s->detect;
@@ -305,6 +305,13 @@ void caster_echoes(struct caster *c, const struct chunk *k)
     kernel_limit(l->range_m, s->range_min_m, s->range_max_m, l->n);
     if (s->silent != NULL) silence(c, s);
     if (s->beam == NULL && s->detect != NULL) weigh_returns(c, k);
+    caster_report(c, k);
+}
+
+void caster_report(struct caster *c, const struct chunk *k)
+{
+    const struct cast_setup *s = k->s;
+    struct echo_list *l = &c->list;
     if (k->waves != NULL) caster_waves(k->waves);
     if (s->detect != NULL || s->noise_on) make_keys(l, k);
     if (s->detect != NULL) detect(c, k);

@@ -43,6 +43,9 @@ struct chunk;
 uint32_t echoes_secondary(struct echo_list *list, uint32_t pulse, uint32_t n);
 /* The list has a place for each pulse. */
 void caster_echoes(struct caster *c, const struct chunk *k);
+/* The second half of caster_echoes: which returns are detected, their noise, and which of them are sent. It is called
+ * by itself for a list without returns, since noise in waveforms may still make echoes. */
+void caster_report(struct caster *c, const struct chunk *k);
 /* How many echoes a pulse may send. */
 uint32_t caster_max_echoes(const struct cast_setup *s);
 

@@ -67,23 +67,6 @@ void kernel_widths(const float *restrict width_m, const uint8_t *restrict echo, 
     }
 }
 
-/* Whole counts of an angle modulo a turn. */
-VEC_INLINE uint32_t count_of(double turn, double counts)
-{
-    uint64_t bits;
-    double below = vec_round(turn - 0.5, &bits); /* floor, up to a tie that the next line undoes */
-    double within = turn - below;
-    within = within >= 1.0 ? within - 1.0 : within;
-    double count = vec_round(within * counts, &bits);
-    bits = count >= counts ? 0 : bits;
-    return (uint32_t)bits;
-}
-
-uint32_t kernel_count(double turn, double counts)
-{
-    return count_of(turn, counts);
-}
-
 VEC_CLONES
 void kernel_polar(const struct cast_setup *setup, const double *restrict range_m, const struct kernel_turns *turns,
                   const struct kernel_wire *out)
@@ -101,10 +84,10 @@ void kernel_polar(const struct cast_setup *setup, const double *restrict range_m
     }
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++)
-        b[i] = count_of(mirror_turn[i], mirror_counts);
+        b[i] = instrument_encoder_count(mirror_turn[i], mirror_counts);
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++)
-        c[i] = count_of(pan_turn[i], pan_counts);
+        c[i] = instrument_encoder_count(pan_turn[i], pan_counts);
 }
 
 VEC_CLONES

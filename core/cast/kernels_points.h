@@ -25,8 +25,6 @@ void kernel_widths(const float *width_m, const uint8_t *echo, uint32_t n, uint16
 struct kernel_wire {
     uint32_t *a, *b, *c;
 };
-/* Returns the count that an encoder of `counts` a turn reads at an angle of `turn`; kernel_polar reads the same. */
-uint32_t kernel_count(double turn, double counts);
 /* a: range in counts, 0 for none; b, c: encoder counts modulo a turn. */
 void kernel_polar(const struct cast_setup *setup, const double *range_m, const struct kernel_turns *turns,
                   const struct kernel_wire *out);

@@ -141,7 +141,7 @@ void caster_follow(struct nearest *w, const struct cast_setup *s, const struct m
                                 .colour = first->colour != NULL ? p->colour : NULL};
         caster_nearest(w, s, &met);
         for (uint32_t k = 0; k < p->n; k++) {
-            if (isnan(p->range_m[k])) continue;
+            if (!(p->length_m[k] + p->range_m[k] <= s->range_max_m)) continue;
             optics_keep(p, k);
             if (caster_goes_on(s, p->label[k])) copy_ray(p, on++, k);
         }

@@ -15,7 +15,7 @@ struct path_hit {
     uint8_t ghost, body;
 };
 
-/* Rays that go on through glass or off a mirror: their origins, directions, and hits before. */
+/* Rays that go on through glass or off a mirror: their origins and directions, and the hits that they come from. */
 struct path_rays {
     uint32_t n;
     uint32_t ray[CHUNK]; /* number of the ray that each goes on from */

@@ -210,12 +210,12 @@ uint32_t caster_points(struct caster *c, struct chunk *k)
     const uint32_t secondary = l->n - k->n;
     uint32_t entries = l->n;
     if (secondary > 0) follow_pulse(c, k);
-    if (k->colours) caster_colours(k, c->d.z, l);
     if (d != NULL && d->ball != NULL) {
         const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn, k->s->scan_key};
         detect_move_in_ball(d->ball, k->s->rotation, &points);
         caster_aim_read(c, k);
     }
+    if (k->colours) caster_colours(k, c->d.z, l); /* by the ranges that are sent, which the ball has changed */
     uint32_t echoes = write_firsts(c, k) + secondary;
     uint32_t unfit = place(c, k, 0, k->n, &(struct kernel_wire){b->a + k->at, b->b + k->at, b->c + k->at});
     if (secondary > 0) {

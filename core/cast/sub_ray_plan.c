@@ -22,8 +22,8 @@ VEC_INLINE struct sub_ray sub_ray(const struct beam *beam, const struct beam_sig
 {
     const double exit_m = beam->exit_radius_m, slope = beam->slope;
     const double *dir = sight->dir, *e1 = sight->e1, *e2 = sight->e2;
-    /* 1 / sqrt(1 + t) as a series, which is faster than root and division. Its error is below t^4, with t
-     * < 2.5e-5. */
+    /* 1 / sqrt(1 + t) as a series, which is faster than root and division. Its error is below t^4 / 3, where t is at
+     * most 1e-4: a divergence of 0.02 rad. That is less than rounding. */
     const double t = slope * slope * (x * x + y * y), over = 1.0 - t * (0.5 - t * (0.375 - 0.3125 * t));
     return (struct sub_ray){{from_m[0] + exit_m * (x * e1[0] + y * e2[0]), from_m[1] + exit_m * (x * e1[1] + y * e2[1]),
                              from_m[2] + exit_m * (x * e1[2] + y * e2[2])},

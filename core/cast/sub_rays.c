@@ -62,6 +62,7 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
                           .body = plain ? NULL : p->body + at,
                           .colour = k->texels ? p->colour + at : NULL};
         caster_nearest(&c->nearest, s, &met);
+        kernel_limit(met.rays.range_m, 0.0, s->range_max_m, n); /* hits beyond may or may not have been reported */
         met.rays.scattered = c->sub_rays->scattered;
         if (through) look_through(c, s, &met, at);
         for (uint32_t i = at; i < at + n && caster_has_bodies(s); i++)
@@ -301,8 +302,10 @@ static void cast_parts(struct caster *c, const struct chunk *k, uint32_t candida
     const struct cast_setup *s = k->s;
     const uint32_t most = MAX_PASSES * BEAM_MAX_PARTS + s->beam->pattern.n;
     w->scattered = 1;
-    for (uint32_t i = 0; i < candidates; i++)
-        __builtin_prefetch(bvh_plane(s->bvh, c->hit[w->candidate[i].pulse]), 0, 3);
+    for (uint32_t i = 0; i < candidates; i++) {
+        const uint32_t triangle = c->hit[w->candidate[i].pulse];
+        if (triangle != BVH_NO_TRIANGLE) __builtin_prefetch(bvh_plane(s->bvh, triangle), 0, 3);
+    }
     for (uint32_t i = 0; i < candidates; i++) {
         if (is_full(w, most)) run_jobs(c, k);
         struct job *job = &w->job[w->n_jobs];

@@ -264,8 +264,8 @@ static void set_beams(const struct wave_chunk *k, uint32_t first)
             wave->b = float_bits(l->e.y[pulse]);
             wave->c = float_bits(l->e.z[pulse]);
         } else {
-            wave->b = kernel_count(l->mirror_turn[pulse], s->mirror_counts);
-            wave->c = kernel_count(l->pan_turn[pulse], s->pan_counts);
+            wave->b = instrument_encoder_count(l->mirror_turn[pulse], s->mirror_counts);
+            wave->c = instrument_encoder_count(l->pan_turn[pulse], s->pan_counts);
         }
     }
 }

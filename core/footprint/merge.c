@@ -15,7 +15,7 @@ void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *h
                                  .most = most};
 }
 
-/* Shell's sort, with Ciura's steps: in place; of few returns only the last steps are needed. */
+/* Shell's sort with Ciura's steps, in place. Few returns need only the last steps. */
 void beam_sort(struct beam_return *r, uint32_t n)
 {
     static const uint32_t steps[] = {301, 132, 57, 23, 10, 4, 1};

@@ -9,7 +9,7 @@
 
 #include "core/footprint.h"
 
-enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
+enum { OUTLINE_CELLS = 512 }; /* along a face: 3.9 mrad in its middle, about half of that in its corners */
 
 /* Pulses that are within this angle of one of them are looked up together. */
 #define OUTLINE_AROUND_RAD 4e-3

@@ -68,8 +68,8 @@ static int is_same_grid(const struct georef_spec *spec)
            (spec->side == 0 || (spec->side > 0) == spec->prcs_north) && spec->geoid == NULL;
 }
 
-/* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance
- * from the axis. The meridian's radius of curvature is largest at the poles: a^2/b. */
+/* Metres per degree of latitude and of longitude at the centre, and the distance from the axis. Latitude's is an upper
+ * bound up to height_m above the centre: the meridian's radius of curvature is largest at the poles, a^2/b. */
 void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m)
 {
     double place[3], p[3], rotation[9];

@@ -22,7 +22,7 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
             span[i] *= 1.1;
         return;
     }
-    /* Heights differ from those of the tangent plane by reach^2 / 2R, a geoid's by less than 1 % of the
+    /* Heights differ from those of the tangent plane by reach^2 / 2R. Those of a geoid change by less than 1 % of the
      * way. */
     span[2] = reach_m * 1.01 + reach_m * reach_m / (2 * 6.3e6);
     if (georef->crs == GEOREF_UTM) {

@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "core/rng.h"
-#include "core/vecmath.h"
 
 static int reads_true(const struct instrument_encoder *e)
 {
@@ -83,13 +82,6 @@ void instrument_read(const struct instrument *k, uint32_t n, double *mirror_turn
 {
     if (!reads_true(&k->mirror)) read_encoder(&k->mirror, n, mirror_turn);
     if (!reads_true(&k->pan)) read_encoder(&k->pan, n, pan_turn);
-}
-
-uint32_t instrument_encoder_count(double turn, double counts_per_turn)
-{
-    double within = turn - floor(turn);
-    double count = floor(within * counts_per_turn + 0.5);
-    return count >= counts_per_turn ? 0 : (uint32_t)(uint64_t)count;
 }
 
 VEC_CLONES

@@ -11,15 +11,15 @@
 #include "core/sight.h"
 #include "core/vec3.h"
 
-/* Rays whose ranges differ by more do not hit one smooth surface: at 80 deg, 100 m and 0.35 mrad, the mean
- * over a footprint differs from its centre by 2 um. */
+/* Rays whose ranges differ by more do not hit one smooth surface: at 80 deg, 100 m and 0.35 mrad, the mean over a
+ * footprint differs from its centre by 17 um (core/footprint.h). */
 static const double SMOOTH_M = 5e-5;
 
 enum {
     MAX_DRAWN = 32768,  /* pulses */
-    MIXED_LOOKS = 1024, /* of these, cast with the reference: those that meet more than one smooth surface, */
-    PLAIN_LOOKS = 1024, /* and of the others */
-    PLAIN_EVERY = 8,    /* one of so many */
+    MIXED_LOOKS = 1024, /* the most that are cast with the reference: of those that meet several smooth surfaces, */
+    PLAIN_LOOKS = 1024, /* and of the others, */
+    PLAIN_EVERY = 8,    /* of which one in so many is taken */
     PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
     TRIES = 1 << 23, /* in all, a second or two: where the field of view is narrow, most are not cast */
@@ -396,7 +396,7 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, double all_rays, 
         count_cell(p->setup.bvh, &rays, all_rays, found);
     }
     if (n == 0) found->ask = n = 1;
-    found->few += 0.5 * found->ask; /* about half of those that look so are decided by lists */
+    found->few += 0.5 * found->ask; /* about half of the cells that seem to ask are decided by lists */
     found->ask *= 0.5;
     *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n,
                                        found->ask / n, found->small / n,   found->per_pulse / n};

@@ -17,8 +17,9 @@ void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, dou
     quat_multiply(quat, qy, quat);
 }
 
-/* R's middle column is (sin h cos p, cos h cos p, sin p). Turned back by the heading, its first row is (cos r, 0, sin r).
- * Near the pole the heading has a large error. Roll then has the opposite one, so that the attitude has neither. */
+/* R's middle column is (sin h cos p, cos h cos p, sin p). Turned back by the heading, its first row is (cos r, 0,
+ * sin r). Near the pole the heading has a large error. Roll then has the opposite one, so that the attitude has
+ * neither. */
 static void matrix_to_angles(const double r[9], double *heading_rad, double *pitch_rad, double *roll_rad)
 {
     double flat = hypot(r[1], r[4]);
@@ -27,7 +28,8 @@ static void matrix_to_angles(const double r[9], double *heading_rad, double *pit
     double heading = pole ? atan2(-r[3], r[0]) : atan2(r[1], r[4]);
     double sh = sin(heading), ch = cos(heading);
     *roll_rad = pole ? 0.0 : atan2(ch * r[2] - sh * r[5], ch * r[0] - sh * r[3]);
-    *heading_rad = heading < 0.0 ? heading + 2.0 * M_PI : heading;
+    if (heading < 0.0) heading += 2.0 * M_PI;
+    *heading_rad = heading < 2.0 * M_PI ? heading : 0.0; /* a heading just below 0 is rounded to a whole turn */
 }
 
 void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad)

@@ -128,7 +128,7 @@ void trajectory_at(const struct trajectory *tr, double t_s, struct pose *pose, d
     }
 }
 
-/* Largest acceleration within an interval: of a cubic at one of its ends. */
+/* The largest acceleration within an interval: a cubic has it at one of the ends. */
 static double acceleration(const struct trajectory *tr, size_t i)
 {
     const struct pose_sample *a = &tr->sample[i], *b = &tr->sample[i + 1];

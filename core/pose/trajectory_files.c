@@ -75,8 +75,9 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
         memcpy(s->pose.quat, v + QW, sizeof s->pose.quat);
     } else {
         if (fabs(v[PITCH]) > 90.0 || fabs(v[HEADING]) > 1e6 || fabs(v[ROLL]) > 360.0)
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                             "an attitude out of range; allowed pitch_deg -90 to 90, roll_deg -360 to 360");
+            return text_fail(
+                &csv->text, csv->line, SH_EINPUT, err,
+                "an attitude out of range; allowed heading_deg -1e6 to 1e6, pitch_deg -90 to 90, roll_deg -360 to 360");
         pose_from_angles(angle_rad(fmod(v[HEADING], 360.0)), angle_rad(v[PITCH]), angle_rad(v[ROLL]), s->pose.quat);
     }
     int rc = check_position(csv, X, err);
@@ -198,8 +199,8 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
-/* The platform's share of an interval after the share f of its time: f, but smooth from or to a
- * standstill. */
+/* The share of an interval that the platform has gone after the share f of its time. It is f, or smooth where it begins
+ * or ends at rest. */
 static double along(double f, int from_rest, int to_rest)
 {
     double g = 1.0 - f;

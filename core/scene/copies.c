@@ -77,7 +77,8 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
     if (n > SCENE_MAX_SURFACES - scene->n_surfaces)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: %zu copies with %u surfaces each are too many: a scene holds up to %d, and has %u; allowed are copies without surfaces of their own (copy_labels: off)",
+            "%s: %zu copies with %u surfaces each are too many: a scene holds up to %d, and has %u; allowed are copies "
+            "without surfaces of their own (copy_labels: off)",
             places->says, places->n, mesh->n_surfaces, SCENE_MAX_SURFACES, scene->n_surfaces);
     if (!resize(&scene->surface, scene->n_surfaces + n, sizeof *scene->surface) ||
         !resize(&scene->texture, (size_t)scene->n_textures + mesh->n_textures, sizeof *scene->texture) ||

@@ -137,9 +137,10 @@ int scene_find_cutouts(struct scene *s, const struct sh_report *report, struct s
     }
     if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
     if (failed > 0)
-        sh_warn(report,
-                "%u of %u textures can't be read: their surfaces have no holes, and the mesh's colours; the first: %s",
-                failed, s->n_textures, first.text);
+        sh_warn(
+            report,
+            "%u of %u textures can't be read: their surfaces get no holes, and keep the mesh's colours; the first: %s",
+            failed, s->n_textures, first.text);
     return SH_OK;
 }
 

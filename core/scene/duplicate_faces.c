@@ -18,18 +18,6 @@ static void sorted_corners(const struct scene *scene, uint32_t prim, const doubl
     }
 }
 
-static uint64_t hash_corners(const double *const corner[3])
-{
-    uint64_t h = 0;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            uint64_t bits;
-            memcpy(&bits, &corner[i][j], sizeof bits);
-            h = rng_mix(h + 0x9e3779b97f4a7c15ULL + bits);
-        }
-    return h;
-}
-
 static int same_corners(const double *const a[3], const double *const b[3])
 {
     for (int i = 0; i < 3; i++)
@@ -68,7 +56,7 @@ int scene_find_duplicate_faces(const struct scene *scene, const struct sh_report
         if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
         const double *corner[3], *other[3];
         sorted_corners(scene, i, corner);
-        uint64_t at = hash_corners(corner) & (size - 1);
+        uint64_t at = rng_place(rng_place(rng_place(0, corner[0]), corner[1]), corner[2]) & (size - 1);
         for (; table[at] != UINT32_MAX; at = (at + 1) & (size - 1)) {
             sorted_corners(scene, table[at], other);
             if (!same_corners(corner, other)) continue;

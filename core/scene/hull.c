@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The outline of a mesh seen from above. A copy is turned about the vertical, so its bounds follow from this outline. */
+/* The outline of a mesh seen from above. A copy is turned about the vertical: its bounds follow from this outline. */
 #include <stdlib.h>
 #include <string.h>
 

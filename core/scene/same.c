@@ -8,18 +8,6 @@
 
 enum { NONE = 0xffffffff };
 
-static uint64_t place_key(const double p[3])
-{
-    uint64_t key = 0;
-    for (int i = 0; i < 3; i++) {
-        double x = p[i] + 0.0; /* no negative zeros */
-        uint64_t bits;
-        memcpy(&bits, &x, sizeof bits);
-        key = rng_mix(key + bits);
-    }
-    return key;
-}
-
 int scene_find_same(const struct scene *scene, const struct sh_report *report, uint32_t **same, struct sh_err *err)
 {
     uint64_t size = 64;
@@ -34,7 +22,7 @@ int scene_find_same(const struct scene *scene, const struct sh_report *report, u
     for (uint32_t i = 0; i < scene->n_vertices && rc == SH_OK; i++) {
         if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
         const double *p = scene->vertex_m[i];
-        uint64_t at = place_key(p) & (size - 1);
+        uint64_t at = rng_place(0, p) & (size - 1);
         for (; table[at] != NONE; at = (at + 1) & (size - 1)) {
             const double *q = scene->vertex_m[table[at]];
             if (p[0] == q[0] && p[1] == q[1] && p[2] == q[2]) break;

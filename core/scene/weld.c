@@ -11,17 +11,6 @@
 
 enum { NONE = 0xffffffff };
 
-static uint64_t key_of(const double p[3])
-{
-    uint64_t key = 0;
-    for (int i = 0; i < 3; i++) {
-        uint64_t bits;
-        memcpy(&bits, &p[i], sizeof bits);
-        key = rng_mix(key + bits);
-    }
-    return key;
-}
-
 static int weld_is_same(const struct scene_build *b, uint32_t number, const double p[3])
 {
     return memcmp(b->scene->vertex_m[number], p, sizeof *b->scene->vertex_m) == 0;
@@ -53,7 +42,7 @@ static int make_table(struct scene_build *b, struct build_weld *w, size_t size, 
     for (size_t i = 0; i < before; i++) {
         if (old[i] == NONE) continue;
         const double *p = b->scene->vertex_m[old[i]];
-        *weld_find(b, w, key_of(p), p) = old[i];
+        *weld_find(b, w, rng_place(0, p), p) = old[i];
     }
     free(old);
     return SH_OK;
@@ -71,7 +60,7 @@ int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t verti
     return make_table(b, w, size, err);
 }
 
-/* The number of the scene's last vertex. Where there was one at the same place, it goes again. */
+/* Returns the number of the scene's last vertex. Where one was at the same place before, the last one is removed. */
 static uint32_t weld_last(struct scene_build *b, struct build_weld *w, uint64_t key)
 {
     const uint32_t last = b->scene->n_vertices - 1;
@@ -120,7 +109,7 @@ int build_weld_flush(struct scene_build *b, struct build_weld *w, struct sh_err 
     int rc = size > w->size ? make_table(b, w, size, err) : SH_OK;
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n; i++)
-        key[i] = key_of(b->scene->vertex_m[first + i]);
+        key[i] = rng_place(0, b->scene->vertex_m[first + i]);
     b->scene->n_vertices = first;
     for (uint32_t i = 0; i < n; i++) {
         if (i + FAR < n) fetch_slot(w, key[i + FAR]);

@@ -6,15 +6,15 @@
 static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
 static const uint64_t FINE_DEN = 1ull << 40;
 
-/* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least
- * one. */
+/* How many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The first of them begins at
+ * r0/den. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
     const struct schedule_spec *spec = &seg->spec;
     if (spec->pan_udeg_s <= 0 || span_fine <= 0) return 1;
     u128 lines = (u128)(uint64_t)span_fine * (uint64_t)spec->lines_uhz;
     u128 unit = ((u128)(uint64_t)spec->pan_udeg_s * 1000000) << 24;
-    /* Whole lines apart, so that the rest times den stays within 128 bits. */
+    /* Whole lines are taken out first, so that the rest times den stays within 128 bits. */
     return (uint64_t)(lines / unit) + ceil_div(lines % unit * seg->den + seg->r0 * unit, unit * seg->den);
 }
 

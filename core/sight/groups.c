@@ -15,19 +15,12 @@ static uint32_t triangles_of(const struct build_shared *b, uint32_t group)
 
 static void find_box(const struct build_shared *b, uint32_t group, uint32_t n, struct build_group *g)
 {
-    for (int k = 0; k < 3; k++) {
-        g->lo_m[k] = INFINITY;
-        g->hi_m[k] = -INFINITY;
-    }
+    vec3_bound_nothing(g->lo_m, g->hi_m);
     for (uint32_t i = 0; i < n; i++) {
         double v[3][3];
         sight_corners(b->sight, group * BUILD_GROUP + i, v);
-        for (int j = 0; j < 9; j++) {
-            const double x = v[j / 3][j % 3];
-            double *lo_m = &g->lo_m[j % 3], *hi_m = &g->hi_m[j % 3];
-            *lo_m = x < *lo_m ? x : *lo_m;
-            *hi_m = x > *hi_m ? x : *hi_m;
-        }
+        for (int c = 0; c < 3; c++)
+            vec3_bound(g->lo_m, g->hi_m, v[c]);
     }
     g->far_m = 0.0;
     for (int k = 0; k < 3; k++)

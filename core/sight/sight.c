@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A sight: made by several threads, region by region, and given back. */
+/* Makes a sight with several threads, region by region, and frees it. */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

@@ -27,7 +27,7 @@
  *   to it first, in whatever way its ranges are rounded. An edge that is nearly hit lies in its triangle's plane,
  *   so it comes later as well.
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
- *   the square, the triangle's nearest point is further away than what covers the square is anywhere.
+ *   the square, the triangle's nearest point is further away than all of the triangle that covers the square.
  * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: it lies outside of the box
  * that holds them, with the margin of regions. Behind as a whole: by the box's nearest point. Where a group is not left
  * out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that covers the square

@@ -308,10 +308,9 @@ int texture_read(const struct texture_source *source, struct texture_image *imag
     *image = (struct texture_image){0};
     if (source->bytes != NULL && source->raw_height > 0) return unpack(source, image, err);
     if (source->bytes != NULL) return decode(source, source->bytes, source->n_bytes, image, err);
-    if (stat(source->file, &st) == 0) { /* before it is opened: a pipe would wait for a writer */
-        if (!S_ISREG(st.st_mode)) return fail_read(source->file, "it is not a file", err);
-        if (st.st_size > TEXTURE_MAX_FILE) return decode(source, NULL, (size_t)st.st_size, image, err);
-    }
+    /* The size is checked before the file is read, which would take as much memory. */
+    if (stat(source->file, &st) == 0 && st.st_size > TEXTURE_MAX_FILE)
+        return decode(source, NULL, (size_t)st.st_size, image, err);
     int rc = text_open(&t, source->file, NULL, NULL, err);
     if (rc == SH_OK) rc = decode(source, (const uint8_t *)t.data, t.size, image, err);
     text_close(&t);

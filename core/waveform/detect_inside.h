@@ -16,15 +16,15 @@
 enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 8, FINDER_PEAKS = 64 };
 #define FINDER_NEAR       2.5                /* sigmas about its centre: there one Gaussian is fitted */
 #define FINDER_LEAST      0.75               /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
-#define FINDER_ROUGH      0.001              /* of a peak: how far samples at any phase leave the learned misfit */
+#define FINDER_ROUGH      0.001              /* of a peak: added to a learned misfit for samples at other phases */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
 #define FINDER_SHAPE_LAG  8.0          /* and behind it */
 
-/* A term is what fits put together: a Gaussian, or where h is none, h stretched. Its middle is between its half
- * maxima, its sigma what a Gaussian of its width has. */
+/* Fits add up terms. A term is a Gaussian, or h stretched, where h is no Gaussian. Its middle is between its half
+ * maxima, and its sigma is that of a Gaussian of the same width. */
 struct finder_term {
     double at, sigma, peak;
 };

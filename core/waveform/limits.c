@@ -6,7 +6,7 @@
 #include "core/light.h"
 #include "core/waveform/waveform_inside.h"
 
-enum { GAUSSIAN = 1 << WAVEFORM_GAUSSIAN, ASYMMETRIC = 1 << WAVEFORM_ASYMMETRIC, TABLE = 1 << WAVEFORM_TABLE, ALL = 7 };
+enum { ASYMMETRIC = 1 << WAVEFORM_ASYMMETRIC, TABLE = 1 << WAVEFORM_TABLE, ALL = 7, FORMULA = ALL & ~TABLE };
 
 /* The limits low .. high are in SI. Texts show them in `unit`; one in SI is `scale` of these. */
 struct limit {
@@ -19,19 +19,19 @@ struct limit {
 #define AT(member) offsetof(struct waveform_spec, member)
 /* clang-format off */
 static const struct limit limits[] = {
-    {"a pulse's width",                  "ns",                AT(width_s),         1e-11,   1e-6,    1e9,  GAUSSIAN | ASYMMETRIC, 0},
-    {"a pulse's fall by its rise",       "times",             AT(skew),            1.0,     3.0,     1.0,  ASYMMETRIC, 0},
-    {"the step of a pulse's table",      "ns",                AT(table_step_s),    1e-12,   1e-7,    1e9,  TABLE, 0},
-    {"a receiver's bandwidth",           "MHz",               AT(bandwidth_hz),    1e6,     1e11,    1e-6, ALL, 1},
-    {"the time between samples",         "ns",                AT(sample_s),        5e-11,   1e-7,    1e9,  ALL, 0},
-    {"the largest count's signal",       "times the threshold", AT(full_scale),    1e-3,    1e9,     1.0,  ALL, 0},
-    {"the signal that saturates",        "times the threshold", AT(saturation),    1e-3,    1e9,     1.0,  ALL, 1},
-    {"a dead time",                      "ns",                AT(dead_s),          0.0,     1e-3,    1e9,  ALL, 0},
-    {"noise",                            "times the threshold", AT(noise),         0.0,     1e6,     1.0,  ALL, 0},
-    {"time kept before an echo",         "ns",                AT(before_s),        0.0,     1e-5,    1e9,  ALL, 0},
-    {"time kept behind an echo",         "ns",                AT(after_s),         0.0,     1e-5,    1e9,  ALL, 0},
-    {"the near end of the window",       "m",                 AT(near_m),          0.0,     1e7,     1.0,  ALL, 0},
-    {"the far end of the window",        "m",                 AT(far_m),           0.0,     1e7,     1.0,  ALL, 0},
+    {"a pulse's width",             "ns",                  AT(width_s),      1e-11, 1e-6, 1e9,  FORMULA,    0},
+    {"a pulse's fall by its rise",  "times",               AT(skew),         1.0,   3.0,  1.0,  ASYMMETRIC, 0},
+    {"the step of a pulse's table", "ns",                  AT(table_step_s), 1e-12, 1e-7, 1e9,  TABLE,      0},
+    {"a receiver's bandwidth",      "MHz",                 AT(bandwidth_hz), 1e6,   1e11, 1e-6, ALL,        1},
+    {"the time between samples",    "ns",                  AT(sample_s),     5e-11, 1e-7, 1e9,  ALL,        0},
+    {"the largest count's signal",  "times the threshold", AT(full_scale),   1e-3,  1e9,  1.0,  ALL,        0},
+    {"the signal that saturates",   "times the threshold", AT(saturation),   1e-3,  1e9,  1.0,  ALL,        1},
+    {"a dead time",                 "ns",                  AT(dead_s),       0.0,   1e-3, 1e9,  ALL,        0},
+    {"noise",                       "times the threshold", AT(noise),        0.0,   1e6,  1.0,  ALL,        0},
+    {"time kept before an echo",    "ns",                  AT(before_s),     0.0,   1e-5, 1e9,  ALL,        0},
+    {"time kept behind an echo",    "ns",                  AT(after_s),      0.0,   1e-5, 1e9,  ALL,        0},
+    {"the near end of the window",  "m",                   AT(near_m),       0.0,   1e7,  1.0,  ALL,        0},
+    {"the far end of the window",   "m",                   AT(far_m),        0.0,   1e7,  1.0,  ALL,        0},
 };
 /* clang-format on */
 

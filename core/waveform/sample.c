@@ -118,7 +118,7 @@ static int64_t find_windows(struct sampling *s, struct span piece, int64_t stret
     return open.end;
 }
 
-/* Takes the fixed window in place of those. */
+/* Does the same for a fixed window. It is kept whole: a piece that cuts it is followed by one that begins at it. */
 static int64_t find_gate(struct sampling *s, struct span piece, struct found *found)
 {
     const struct span gate = {s->w->gate_begin, s->w->gate_end};

@@ -163,6 +163,46 @@ static void test_wall(void **state)
     assert_true(plain > 1e-4);
 }
 
+/* A wall at 89 deg of incidence goes on beyond the largest range, within footprints: at 1 deg of pan it is 10 m away. A
+ * pulse has the same echo whichever pulses are cast with it: parts of its footprint beyond that range are not seen. */
+static void test_end_of_range(void **state)
+{
+    (void)state;
+    enum { PULSES = 64 };
+    const struct beam_view view = {-0.02, 0.02, 0.98, 1.02, 16, PULSES};
+    /* The wall, and another one behind all: a box around one alone is not tested. */
+    static const double corner_m[8][3] = {{0.17452, 0, -1}, {0.17452, 20, -1}, {0.17452, 20, 1}, {0.17452, 0, 1},
+                                          {-1, 50, -1},     {1, 50, -1},       {1, 50, 1},       {-1, 50, 1}};
+    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+    struct scene *scene;
+    struct sh_err err;
+    struct beam_rig rig;
+    uint32_t cut = 0;
+    assert_int_equal(scene_from_arrays(&(struct scene_arrays){corner_m, 8, triangle, 4, NULL, NULL, 0}, &scene, &err),
+                     SH_OK);
+    open_rig(&rig, scene, &view);
+    rig.setup.range_max_m = 10.0;
+    for (uint32_t rings = 1; rings <= 4; rings++)
+        for (uint32_t l = 0; l < view.lines; l++) {
+            uint32_t all[PULSES];
+            struct schedule_line line;
+            struct schedule_run run;
+            beam_rig_mode(&rig, BEAM_RINGS, rings);
+            beam_rig_line(&rig, l);
+            assert_int_equal(rig.block.n_points, PULSES);
+            memcpy(all, rig.block.a, sizeof all);
+            schedule_get_line(&rig.segment, l, &line);
+            for (uint32_t p = 0; p < PULSES; p++) {
+                schedule_get_run(&rig.segment, &line, line.cast0 + p, 1, &run);
+                caster_cast(rig.caster, &rig.setup, &run, &rig.block);
+                assert_int_equal(rig.block.a[0], all[p]);
+                cut += all[p] != 0 && 1e-6 * all[p] > 9.9;
+            }
+        }
+    assert_true(cut > 0);
+    beam_rig_close(&rig);
+}
+
 /* ---- a door edge */
 
 /* The left half of the view is at 20 m, the rest deeper by step_m. */
@@ -272,8 +312,9 @@ static void test_selection(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_half), cmocka_unit_test(test_rings),     cmocka_unit_test(test_end_of_a_plane),
-        cmocka_unit_test(test_wall), cmocka_unit_test(test_door_edge), cmocka_unit_test(test_selection),
+        cmocka_unit_test(test_half),      cmocka_unit_test(test_rings),        cmocka_unit_test(test_end_of_a_plane),
+        cmocka_unit_test(test_wall),      cmocka_unit_test(test_end_of_range), cmocka_unit_test(test_door_edge),
+        cmocka_unit_test(test_selection),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -347,9 +347,8 @@ static void cut_footprints_have_two_echoes(void **state)
 
 /* Noise of three times the level makes echoes all over a window of 40 m. Those within the head's ranges are sent, at
  * most max_echoes a pulse, the strongest. Those outside are counted. */
-static void found_echoes_are_in_range(void **state)
+static void check_echoes_of_noise(const struct cast_disturbance *disturbance)
 {
-    (void)state;
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};
     struct waveform_spec noisy = SPEC;
     noisy.noise = 3.0;
@@ -361,7 +360,8 @@ static void found_echoes_are_in_range(void **state)
     open_waves(&w, &SIDE, BEAM_ADAPTIVE, ROOM);
     w.cast.finds = 1;
     w.cast.detector = WAVEFORM_THRESHOLD;
-    for (uint32_t most = 2; most <= LINE_MAX_ECHOES; most += LINE_MAX_ECHOES - 2) {
+    w.lit.rig.setup.disturbance = disturbance;
+    for (uint32_t most = 1; most <= LINE_MAX_ECHOES; most += LINE_MAX_ECHOES - 1) {
         uint32_t echoes = 0;
         w.lit.rig.setup.range_min_m = 50.0;
         w.lit.rig.setup.range_max_m = 52.0; /* 13 samples, of which a third is above the level */
@@ -379,6 +379,15 @@ static void found_echoes_are_in_range(void **state)
         assert_true(after.faint - before.faint > 2 * PULSES);
     }
     close_waves(&w);
+}
+
+/* The receiver has its noise whether the laser fires or not. */
+static void found_echoes_are_in_range(void **state)
+{
+    (void)state;
+    const struct cast_disturbance dark = {.dark = 1, .share = 1.0};
+    check_echoes_of_noise(NULL);
+    check_echoes_of_noise(&dark);
 }
 
 /* A laser that does not fire gives no window. */

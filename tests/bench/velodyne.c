@@ -97,8 +97,7 @@ static int measure(int dual)
     const struct protocol_ops *ops = protocol_ops_get(PROTOCOL_VELODYNE);
     struct stream s = {0};
     const struct protocol_identity identity = {.model = "VLP-16"};
-    const struct protocol_spec spec = {.identity = &identity,
-                                       .host = {.ctx = &s, .send = take_unit, .count = count}};
+    const struct protocol_spec spec = {.identity = &identity, .host = {.ctx = &s, .send = take_unit, .count = count}};
     void *protocol;
     double ns[ROUNDS];
     if (make_turn(&s, dual) != 0 || ops->create(&spec, &protocol, NULL) != 0) return -1;

@@ -125,6 +125,23 @@ static void points_have_the_encoders_counts(void **state)
     cast_rig_close(rig);
 }
 
+/* An angle halfway between two counts reads as one of them. Points and the ends of lines, which call
+ * instrument_encoder_count, read the same one. With 4 counts a turn these angles are exact in binary. */
+static void halfway_both_read_the_same(void **state)
+{
+    (void)state;
+    struct cast_rig *rig = room();
+    rig->setup.mirror_counts = rig->setup.pan_counts = 4.0;
+    for (int64_t deg = -135; deg <= 315; deg += 90) {
+        fire(rig, deg * DEG, deg * DEG, 0.0);
+        const uint32_t count = instrument_encoder_count((double)deg / 360.0, 4.0);
+        assert_int_equal(rig->block.b[0], count);
+        assert_int_equal(rig->block.c[0], count);
+        assert_true(fabs(remainder(count - (double)deg / 90.0, 4.0)) == 0.5);
+    }
+    cast_rig_close(rig);
+}
+
 /* The bound is half a count each: range_scale/2 along the beam, pi/counts across it for each encoder. 1e-9 m for the
  * range are added, and 1e-9 turns for rounding and the pan's 2^-24 udeg. */
 static void polar_counts_give_the_position_back(void **state)
@@ -360,6 +377,7 @@ int main(void)
         cmocka_unit_test(beyond_90_degrees_the_beam_looks_back),
         cmocka_unit_test(encoders_count_modulo_a_turn),
         cmocka_unit_test(points_have_the_encoders_counts),
+        cmocka_unit_test(halfway_both_read_the_same),
         cmocka_unit_test(polar_counts_give_the_position_back),
         cmocka_unit_test(geo_counts_give_the_position_back),
         cmocka_unit_test(a_room_at_utm_coordinates_is_the_room_at_the_origin),

@@ -2,6 +2,7 @@
 /* Glass and mirrors, compared with rooms whose images can be worked out; and detection that changes nothing. */
 #include "tests/unit/optics_rig.h"
 
+#include "core/colour.h"
 #include "core/surface.h"
 
 /* The wall ahead is a mirror. The room continues in it as its own image, and each ray as if there were no mirror. */
@@ -259,6 +260,32 @@ static void noise_never_touches_empty_shots(void **state)
     close_optics(&o);
 }
 
+/* Points move by up to half a metre, 50 steps of the colours. The colour is that of the range in the point, but for the
+ * step that a range's rounding to counts may cross. */
+static void colours_show_the_ranges_that_are_sent(void **state)
+{
+    (void)state;
+    const struct cast_colour colour = {.scale = {.mode = COLOUR_RANGE, .low = 0.0, .high = 7.65}};
+    struct optics o;
+    struct schedule_line line;
+    struct sh_err err;
+    open_optics(&o, box_scene(LO, HI));
+    struct detect_ball ball = {.radius_m = 0.5, .factor = {1, 1, 1}};
+    detect_ball_keys(&ball, 3);
+    o.detect.ball = &ball;
+    o.rig->setup.colour = &colour;
+    assert_int_equal(line_block_alloc_colours(&o.rig->block, &err), SH_OK);
+    const uint32_t n = shoot_line(&o, 40, &line);
+    for (uint32_t i = 0; i < n; i++) {
+        uint8_t rgb[3];
+        assert_int_equal(o.rig->block.echo[i], 0x11);
+        colour_between(0.0, 7.65, o.rig->block.a[i] * o.rig->setup.range_scale_m, rgb);
+        for (int k = 0; k < 3; k++)
+            assert_in_range(o.rig->block.rgb[i][k] + 1 - rgb[k], 0, 2);
+    }
+    close_optics(&o);
+}
+
 /* A mirror is on a body that moves: it is turned by 45 degrees about z through (0, 2, 0), then 1 m ahead. Beams that
  * meet it go on to the wall at x = 6: the way there plus the rest, at right angles. */
 static void a_mirror_that_moves(void **state)
@@ -314,6 +341,7 @@ int main(void)
         cmocka_unit_test(cuts_leave_no_trace),
         cmocka_unit_test(nothing_asked_for_changes_nothing),
         cmocka_unit_test(noise_never_touches_empty_shots),
+        cmocka_unit_test(colours_show_the_ranges_that_are_sent),
         cmocka_unit_test(a_mirror_that_moves),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -54,6 +54,18 @@ static void test_convention(void **state)
     assert_true(out[2] < -0.08);
 }
 
+/* A heading just below 0 is nearer to a whole turn than doubles can tell. It is 0, not a whole turn. */
+static void test_heading_stays_below_a_turn(void **state)
+{
+    (void)state;
+    for (double below = 1e-300; below < 1e-12; below *= 10.0) {
+        double quat[4], heading, pitch, roll;
+        pose_from_angles(-below, 0.3, 0.2, quat);
+        pose_to_angles(quat, &heading, &pitch, &roll);
+        if (!(heading >= 0.0 && heading < 2.0 * M_PI)) fail_msg("-%g rad: a heading of %.17g", below, heading);
+    }
+}
+
 /* With the nose straight up or down, heading and roll turn about one axis, and only their sum or difference counts. The
  * angles that come back give the same attitude, also just beside the pole. Nearer to it than 1e-9 roll is added to the
  * heading. */
@@ -158,7 +170,8 @@ static void test_straight_up(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_convention), cmocka_unit_test(test_pole),        cmocka_unit_test(test_between),
+        cmocka_unit_test(test_convention), cmocka_unit_test(test_heading_stays_below_a_turn),
+        cmocka_unit_test(test_pole),       cmocka_unit_test(test_between),
         cmocka_unit_test(test_short_way),  cmocka_unit_test(test_straight_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -166,7 +166,10 @@ static void tables_are_checked(void **state)
                                       "#@ 3991593600\n2272060800 10\n2287785601 11\n",       /* not at midnight */
                                       "#@ 3991593600\n2272060800 10\nabout 11\n",            /* no number */
                                       "#@ 3991593600\n2272060800 10\n2287785600 11 extra\n", /* more than two */
-                                      "#@ 2272060800\n2272060800 10\n"};                     /* ends before it begins */
+                                      "#@ 2272060800\n2272060800 10\n",                      /* ends before it begins */
+                                      "#@ 9223372036854775808\n2272060800 10\n",             /* ends after all time */
+                                      "#@ -9223372036854775808\n2272060800 10\n",
+                                      "#@ 3991593600\n2272060800 -9223372036854775808\n"}; /* no offset */
     struct utc_table table;
     struct sh_err err;
     assert_int_equal(utc_table_parse(good, &table, &err), SH_OK);
