@@ -22,15 +22,14 @@ import math
 import random
 import re
 import resource
-import socket
 import struct
 import sys
-import threading
 
 sys.path.insert(0, sys.argv[1])
 if sys.argv[2] == "plain":
     sys.modules["numpy"] = None
 import scanhead  # noqa: E402
+from python_pair import chatter, framed, misuse, notices  # noqa: E402,F401
 
 ROW = struct.Struct("<10dqiii")
 NAN3 = ([math.nan], [math.nan], [math.nan])
@@ -212,11 +211,6 @@ def hostile(path, seed):
     chatter(b"\x80")
 
 
-def framed(kind, flags, length, payload, seq=0):
-    head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, flags, length, seq, scanhead.crc32c(payload), 0)
-    return head + struct.pack("<I", scanhead.crc32c(head)) + payload
-
-
 def older(path, out):
     with open(out, "wb") as file:
         for f in scanhead.open(path).frames():
@@ -259,155 +253,6 @@ def ends(path):
     for other in following:
         assert ends_of(path, start, scanning, other, scanning) == ([2, 3] if other == following[0] else [2], 0)
     print("ends")
-
-
-def refused(function, *arguments):
-    try:
-        function(*arguments)
-    except scanhead.ScanheadError:
-        return
-    assert False, f"{arguments} was taken"
-
-
-def pair():
-    ours, theirs = socket.socketpair()
-    ours.setblocking(False)
-    return scanhead.Head(scanhead._Source("pair", ours.fileno(), ours)), theirs
-
-
-def misuse(path):
-    for source in ("tcp:127.0.0.1:65537", "tcp:127.0.0.1:0", "tcp:127.0.0.1:\xb2", "tcp:5025", "a\0b", "",
-                   "tcp:" + 70 * "a" + ".b:1", "tty:" + path):
-        refused(scanhead.open, source)
-    refused(scanhead.open("/").next_frame)
-    for head in (scanhead.open(path), pair()[0]):
-        head.close()
-        head.close()
-        refused(head.next_frame)
-        refused(head.query, "*IDN?")
-    head, theirs = pair()
-    threading.Timer(0.05, theirs.close).start()
-    refused(head.next_frame, 1e300)  # longer than poll() can wait
-    for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
-        late_replies(lines)
-    late_answer()
-    dropped_frames()
-    whole_frame()
-    print("refused")
-
-
-def late_replies(lines):
-    """Replies to commands that were given up come only after the next command."""
-    head, theirs = pair()
-    for line in lines:
-        refused(head.query, line, 0.0)
-    replies = {"HEAD:PRR?": "1", "*IDN?": "a,b,c,d", ":*idn?": "a,b,c,d", "HEAD:LINes?": "2"}
-
-    def answer():
-        for line in theirs.makefile():
-            if line.strip():
-                theirs.sendall(replies[line.strip()].encode() + b"\r\n")
-
-    threading.Thread(target=answer, daemon=True).start()
-    assert [head.query("HEAD:LINes?") for _ in range(3)] == ["2", "2", "2"]
-
-
-def late_answer():
-    """One of two questions for the identity is answered at once, the other one before the reply to the next command."""
-    head, theirs = pair()
-    refused(head.query, "*IDN?", 0.0)
-
-    def answer():
-        asked = 0
-        for line in theirs.makefile():
-            asked += line.strip() == "*IDN?"
-            if line.strip():
-                theirs.sendall({"*IDN?": b"a,b,c,d\r\n" if asked == 2 else b""}.get(line.strip(), b"a,b,c,d\r\n2\r\n"))
-
-    threading.Thread(target=answer, daemon=True).start()
-    assert head.query("HEAD:LINes?") == "2"
-
-
-def whole_frame():
-    """A frame that needs two reads has come all the same."""
-    head, theirs = pair()
-    theirs.sendall(framed(200, scanhead.LOCAL, 65536, bytes(65536)))
-    assert len(head.next_frame(0).payload) == 65536
-    refused(head.next_frame, 0)
-
-
-def dropped_frames():
-    """Frames that find no room while a reply is awaited are counted, and stay in the hash. A wrong one ends the command,
-    whose reply does not count for the next one."""
-    frames = [framed(scanhead.ATTRIBUTES, 0, 16, struct.pack("<QII", i, 0, 0), i) for i in range(10)]
-    wrong = framed(scanhead.DESCRIPTOR, 0, 4, b"abcd") + b"".join(frames[1:4])
-    replies = {"TIME?": b"".join(frames) + b"5\r\n", "SCAN:STARt": wrong, "*IDN?": b"6\r\na,b,c,d\r\n",
-               "HEAD:PRR?": b"7\r\n", "": b""}
-
-    def answer(theirs):
-        for line in theirs.makefile():
-            theirs.sendall(replies[line.strip()])
-
-    whole, theirs = pair()
-    theirs.sendall(b"".join(frames))
-    for _ in frames:
-        whole.next_frame(5)
-    most, scanhead._QUEUE_BYTES = scanhead._QUEUE_BYTES, 2000  # three such frames
-    head, theirs = pair()
-    threading.Thread(target=answer, args=(theirs,), daemon=True).start()
-    assert head.query("TIME?") == "5" and head.dropped == 7, head.dropped
-    for _ in range(3):
-        head.next_frame(5)
-    assert head.stream_sha256() == whole.stream_sha256()
-    head, theirs = pair()
-    threading.Thread(target=answer, args=(theirs,), daemon=True).start()
-    refused(head.query, "SCAN:STARt")
-    assert head.query("HEAD:PRR?") == "7"
-    scanhead._QUEUE_BYTES = most
-
-
-def notices():
-    """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
-    said = []
-    head, theirs = pair()
-    head.on_notice = lambda n: said.append(tuple(n)[:4])
-    frames = [framed(scanhead.EVENT, 0, 128, struct.pack("<Q120x", i), (2**32 - 2 + i) % 2**32) for i in range(9)]
-    hurt = frames[5][:99] + b"?" + frames[5][100:]
-    theirs.sendall(frames[0] + frames[2] + frames[2] + b"\0\1" + frames[1] + hurt + frames[6] +
-                   framed(200, 0, 0, b"", 2**31 + 6))
-    assert [head.next_frame(5).seq for _ in range(4)] == [2**32 - 2, 0, 4, 2**31 + 6]
-    size = len(hurt)
-    assert said == [("gap", size, 2**32 - 1, 1), ("repeated", 2 * size, 0, 1), ("bad bytes", 3 * size, 0, 2),
-                    ("late", 3 * size + 2, 2**32 - 1, 1), ("bad payload", 4 * size + 2, 3, size),
-                    ("gap", 5 * size + 2, 1, 3), ("restarted", 6 * size + 2, 2**31 + 6, 1)], said
-    at_byte, said[:] = 6 * size + 2 + 28, []
-    theirs.sendall(b"9\r\n")
-    refused(head.next_frame, 0.0)
-    assert said == [("unasked", at_byte, 0, 1)]
-    refused(head.query, "TIME?", 0.0)
-    theirs.sendall(b"77\r\n")
-    refused(head.next_frame, 0.0)
-    assert said[1:] == [("late reply", at_byte + 3, 0, 2)] and head.late_replies == 1
-
-    def answer():
-        for line in theirs.makefile():
-            if line.strip() == "*IDN?":
-                theirs.sendall(b"*IDN?\r\na,b,c,d\r\n")
-            if line.strip() == "HEAD:PRR?":
-                theirs.sendall(b"HEAD:PRR?\r\n5\r\n" + frames[7][:40])
-                break
-
-    thread = threading.Thread(target=answer)
-    thread.start()
-    assert head.query("HEAD:PRR?") == "5"
-    thread.join()
-    theirs.shutdown(socket.SHUT_WR)
-    for _ in range(2):
-        refused(head.next_frame, 5)
-    assert said[2:] == [("echo", at_byte + 7, 0, 5), ("echo", at_byte + 23, 0, 9), ("cut", at_byte + 37, 5, 40),
-                        ("closed", at_byte + 77, 0, 1)], said[2:]
-    assert (head.parser.cuts, head.echoes, head.unasked, head.parser.repeated) == (1, 2, 1, 1)
-    print("noticed")
 
 
 def bombs(path):
@@ -512,28 +357,6 @@ def tables(folder, path):
         assert theirs == ours, (frame.type, theirs, frame.fields)
         seen.append(frame.type)
     print(*seen)
-
-
-def chatter(data):
-    """The head sends without end, but never the awaited answer. Calls end with their time all the same."""
-    head, theirs = pair()
-
-    def send():
-        try:
-            while True:
-                theirs.sendall(data * 100)
-        except OSError:
-            theirs.close()
-
-    sender = threading.Thread(target=send)
-    sender.start()
-    try:
-        head.query("*IDN?", 0.05) if data[0] == 0xD5 else head.next_frame(0.05)
-        assert False, "something came"
-    except scanhead.Timeout:
-        pass
-    head.close()
-    sender.join()
 
 
 if __name__ == "__main__":
