@@ -22,7 +22,8 @@ double cfg_used_share(const struct config_profile *profile);
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
 /* Whether profiles of some emitters need the key; then `words` gets the names of these emitters. */
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
-/* Whether a line spans an angle: from start up to stop, of a sphere also across azimuth 0. */
+/* Whether line_start and line_stop enclose an angle: start must be below stop. On a sphere any two different angles do,
+ * as the line may cross azimuth 0. */
 int cfg_line_has_width(const struct config *cfg);
 /* The settings of a head whose pulse rate follows from its lines. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks the section `ntp`, and reads its address. */
+/* Checks the section `ntp`: its address, its time zone, and what the role client needs. */
 #ifndef FIRMWARE_SIM_CONFIG_CHECK_NTP_H
 #define FIRMWARE_SIM_CONFIG_CHECK_NTP_H
 

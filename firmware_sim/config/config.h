@@ -45,7 +45,7 @@ struct config_gnss {
     double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
     int pps, nmea;         /* its pulses and its sentences reach the head */
     double nmea_late_ms;
-    int cold; /* neither has reached the head before power-up */
+    int cold; /* 1: no pulse and no sentence reached the head before power-up */
 };
 
 /* The time server that a SICK scanner asks (scanner_clock.h). */
@@ -85,7 +85,7 @@ struct config_waveform {
     char pulse_file[CONFIG_PATH_LEN];
     double skew, bandwidth_mhz, sample_ns;
     uint32_t bits;
-    double baseline_counts, full_scale_db, saturation_db, dead_ns; /* dB of power: 10 log10 of thresholds */
+    double baseline_counts, full_scale_db, saturation_db, dead_ns; /* dB of power above the threshold */
     double keep_db, before_ns, after_ns, near_m, far_m;
 };
 
@@ -191,7 +191,7 @@ struct config {
     const char *const *sets; /* the --set that it was loaded with; not copied */
     int n_sets;
     char scenario_file[CONFIG_PATH_LEN]; /* the scenario that was added; empty: none */
-    int has_no_head;                     /* 1: it is that of a recording, which refuses faults in the head by itself */
+    int has_no_head;                     /* 1: for the links of a replay, which itself refuses faults in the head */
     int links_are_not_here;              /* 1: this is not the scanner of head.station, which has the links */
     char profile_file[CONFIG_PATH_LEN];
     struct config_profile profile;

@@ -13,9 +13,10 @@
 /* clang-format off */
 static const struct cfg_key rows[] = {
     {"offset_m", CFG_MEMBER(struct scene_place, at_m), CFG_VEC3, "m", NULL, -1e9, 1e9, .help = "Where it stands."},
-    {"turn_deg", CFG_MEMBER(struct scene_place, turn_deg), CFG_REAL, "deg", "0", -360, 360, .help = "Turned before."},
+    {"turn_deg", CFG_MEMBER(struct scene_place, turn_deg), CFG_REAL, "deg", "0", -360, 360,
+     .help = "Turn about the vertical, clockwise seen from above; offset_m is added after it."},
     {"scale", CFG_MEMBER(struct scene_place, scale), CFG_REAL, NULL, "1", 1.0 / CONFIG_COPY_SCALES, CONFIG_COPY_SCALES,
-     .help = "Scaled before."},
+     .help = "Scale of the copy, applied before the turn."},
 };
 /* clang-format on */
 const struct cfg_table cfg_copy_table = {rows, CFG_LEN(rows)};

@@ -19,7 +19,7 @@ int epoch_parse(const char *text, const struct utc_table *table, enum epoch_sour
     int rc = utc_parse(text, &utc, err);
     if (rc == SH_OK) rc = utc_to_tai(table, &utc, &tai_ns, err);
     if (rc == SH_OK && utc_gps_ns(tai_ns) <= 0)
-        rc = sh_fail(err, SH_EINPUT, "GPS time begins after 1980-01-06T00:00:00Z");
+        rc = sh_fail(err, SH_EINPUT, "not after 1980-01-06T00:00:00Z, where GPS time begins");
     if (rc == SH_OK && tai0_ns != NULL) *tai0_ns = tai_ns;
     return rc;
 }

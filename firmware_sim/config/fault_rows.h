@@ -45,8 +45,8 @@
      .help = "Number. duplicate: additional copies, up to 100; reorder: most frames that overtake it, up to 1000; "
              "truncate: missing bytes, up to 1e6 (0: a random number); flip: bits, up to 1000; split: writes, up to 64; "
              "merge: frames, up to 64; garbage: bytes, up to 1024; short_packets: transfers, up to 1e6; "
-             "descriptor_length: additional bytes, up to 1000; counters_high: counts below the wrap. Otherwise 0 "
-             "stands for 1; of split and merge for 2, of garbage for 16."},
+             "descriptor_length: additional bytes, up to 1000; counters_high: counts below the wrap. 0 stands "
+             "for 2 with split and merge, for 16 with garbage, and for 1 with all others but truncate."},
     {FAULT(byte), CFG_COUNT, NULL, "", 0, 1e9, .example = "30",
      .help = "flip: byte of the frame whose bits are changed, counted from 0; when not given, any byte."},
     {FAULT(reseal), CFG_BOOL, .def = "off",

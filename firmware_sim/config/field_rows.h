@@ -22,17 +22,17 @@
     {FIELD(radii_m), CFG_PAIR, "m", "", 0, 1000, .example = "[0, 3]",
      .help = "segment: its inner and outer radius; an inner one of 0 begins at the head."},
     {FIELD(corner_m), CFG_PAIR, "m", "", -1000, 1000, .example = "[-1, 0.5]",
-     .help = "rectangle: the corner that it is turned about, x and y; before that its left rear one."},
+     .help = "rectangle: x and y of the corner that it is turned about: its left rear corner before the turn."},
     {FIELD(size_m), CFG_PAIR, "m", "", 0.001, 1000, .example = "[2, 2.5]",
      .help = "rectangle: width to the right and length forward from its corner."},
     {FIELD(turn_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "rectangle: it is turned about its corner, counter-clockwise seen from above."},
     {FIELD(response_ms), CFG_COUNT, "ms", "0", 0, 120000,
-     .help = "Response time: an object must be seen at one place for so long, that is in the nearest number of scans "
-             "in a row, at least one. 134 ms at 15 Hz are two."},
+     .help = "Response time: an object must stay at one place for this long. The time is rounded to whole scans in "
+             "a row, at least one: 134 ms at 15 Hz are two scans."},
     {FIELD(blanking_m), CFG_REAL, "m", "0", 0, 1000,
-     .help = "Objects that are narrower are ignored: neighbouring beams in the field, times the step, times the least "
-             "range."},
+     .help = "Objects narrower than this are ignored. An object's width is the number of its neighbouring beams in the "
+             "field, times the angle step, times their smallest range."},
     {FIELD(output), CFG_COUNT, NULL, "0", 0, 3,
      .help = "LMS1xx: the digital output that is active while the field is infringed; 0: none. Several fields may "
              "share one. TiM7xx: the first field of a set has output 1, and so on."},
@@ -41,6 +41,6 @@
              "the set of fields: the first input counts 1, the second 2, and so on."},
     {"inputs[]", .type = CFG_MAP, .help = "A time in which an input is active. An input may have several."},
     {INPUT(input), CFG_COUNT, NULL, NULL, 1, 4, .example = "1", .help = "Number of the input."},
-    {INPUT(from_s), CFG_REAL, "s", "0", 0, 1e8, .help = "It begins at this device time, as of faults."},
+    {INPUT(from_s), CFG_REAL, "s", "0", 0, 1e8, .help = "It begins at this device time, counted since power-up."},
     {INPUT(until_s), CFG_REAL, "s", "1e8", 0, 1e8, .help = "It ends at this device time."},
     /* clang-format on */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Geometries of a planar head: pairs of a line rate and the steps of a turn. The profile's figures are those of
- * steps_per_turn; a coarser geometry divides them all by the same whole number, so its beams are some of theirs. */
+/* Geometries of a planar head: pairs of a line rate and the steps of a turn. The profile's step numbers count in
+ * steps_per_turn. A coarser geometry divides them all by the same whole number, so its beams are some of the
+ * profile's. */
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"

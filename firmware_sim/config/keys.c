@@ -90,10 +90,10 @@ static const struct cfg_key config_keys[] = {
 
     {"head.phase_lock", SETTING(phase_lock), CFG_ENUM, .def = "off",
      WORDS([0] = "off", [1] = "on"),
-     .help = "beams: holds the rotor's phase, so that it is at phase_deg at each pulse per second while these are locked. "
-             "It needs a whole number of turns per second (lines_hz)."},
+     .help = "beams: holds the rotor's phase. At each PPS pulse the rotor is at phase_deg, while the head is locked to "
+             "PPS. It needs a whole number of turns per second (lines_hz)."},
     {"head.phase_deg", SETTING(phase_udeg), CFG_MICRO, "deg", "0", 0, 359.999999,
-     .help = "Azimuth of the rotor at a pulse per second, with phase_lock: on."},
+     .help = "Azimuth of the rotor at a PPS pulse, with phase_lock: on."},
     {KEY(head.motor_ppm), CFG_REAL, "ppm", "0", -10000, 10000,
      .help = "beams: how much too fast the rotor turns while nothing holds its phase."},
     {KEY(head.ambiguity), CFG_ENUM, .def = "none",
@@ -151,9 +151,9 @@ static const struct cfg_key config_keys[] = {
              "head's range limits, the scene's lowest and highest point, the first and last frame of the trajectory; "
              "a recording the smallest and largest value in it."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
-             "bits, a coordinate into 31. automatic: 1e-6 m for ranges up to 4294 m (geo: 2147 m), ten times as much "
-             "for each tenfold range."},
+     .help = "Metres per count of a range. A count of a coordinate is at most this long; only one of longitude near a "
+             "pole may be longer. The largest range must fit into 32 bits, a coordinate into 31. automatic: 1e-6 m "
+             "for ranges up to 4294 m (geo: 2147 m), ten times as much for each tenfold range."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Links by which clients reach the head; recording off line needs none."},
@@ -195,13 +195,13 @@ static const struct cfg_key config_keys[] = {
              "say where packets to other addresses go: binding a socket to an interface needs a privilege."},
     {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP),
      .help = "udp: numeric address of this machine that packets come from, so that receivers can distinguish heads. "
-             "When not given: the interface's, or as the system chooses; but the address after the receiver's where "
-             "that is on the loopback and has the source's port."},
+             "When not given: the interface's, or as the system chooses. Where it would be the receiver's own address "
+             "and port, on the IPv4 loopback, it is the next address."},
     {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP),
      .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, "
-             "velodyne-position 8308, as the device's, or another with a warning where these are taken; but without "
-             "source and interface the system chooses for a receiver on this machine. One that listens on the same "
-             "port at all addresses must share it (SO_REUSEADDR)."},
+             "velodyne-position 8308, as the device's. If that port is taken, another one is used, with a warning. For "
+             "a receiver on this machine the system chooses where neither source nor interface is given. A receiver "
+             "that listens on the same port at all addresses must share it (SO_REUSEADDR)."},
     {LINK(ttl), CFG_COUNT, NULL, "", 1, 255, .example = "4", .of = CFG_KIND(LINK_UDP),
      .help = "udp: time to live of the packets, in networks. When not given: 1 to a multicast group, else the "
              "system's."},
@@ -290,8 +290,8 @@ static const struct cfg_key config_keys[] = {
      .help = "The grandmaster's clock accuracy by IEEE 1588: 0x21 is within 100 ns, 0xfe is unknown."},
     {KEY(time.ptp.utc_valid), CFG_BOOL, .def = "on", .help = "The master says that its offset to UTC is valid."},
     {KEY(time.ptp.announce_ms), CFG_COUNT, "ms", "2000", 100, 64000,
-     .help = "Time between Announce messages. The second one selects a master; without one for 3 of these times it is "
-             "lost."},
+     .help = "Time between Announce messages. The second one selects a master. Without an Announce for 3 of these "
+             "times the master is lost."},
     {KEY(time.ptp.sync_ms), CFG_COUNT, "ms", "1000", 250, 64000,
      .help = "Time between Sync messages. At each the follower measures its offset and corrects its rate."},
     {KEY(time.ptp.path_delay_ns), CFG_COUNT, "ns", "0", 0, 1e9, .help = "Mean delay of the two ways, as reported."},
@@ -324,11 +324,12 @@ static const struct cfg_key config_keys[] = {
     {KEY(gnss.geoid_separation_m), CFG_REAL, "m", "0", -120, 120,
      .help = "Height of the geoid above the ellipsoid: altitude in GGA is the ellipsoidal height minus this."},
     {KEY(gnss.pps), CFG_BOOL, .def = "on",
-     .help = "Its pulses per second reach the head. off: none ever does; the fault pps_lost has a begin and an end."},
+     .help = "Its PPS pulses reach the head. off: no pulse ever does. For a loss of limited time use the fault "
+             "pps_lost."},
     {KEY(gnss.nmea), CFG_BOOL, .def = "on",
-     .help = "It sends sentences. off: it never does; the fault nmea_lost has a begin and an end."},
+     .help = "It sends sentences. off: it never does. For a loss of limited time use the fault nmea_lost."},
     {KEY(gnss.nmea_late_ms), CFG_REAL, "ms", "0", 0, 5000,
-     .help = "How long after its second a sentence arrives, also at the head."},
+     .help = "Delay of a sentence after the time that it reports, at clients and at the head."},
     {KEY(gnss.cold), CFG_BOOL, .def = "off",
      .help = "on: the run begins with a head that has had no pulse and no sentence, and a VLP-16 counts from power-up; "
              "off: it was synchronised before. After a power cycle it always begins cold."},

@@ -50,7 +50,7 @@ void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
             check_signal_of(rd, profile, i, "programs[].reach_90_m");
 }
 
-/* Sets members that an entry leaves out to NaN. */
+/* Members that an entry does not give become NaN, except gloss, which becomes 100. */
 static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
 {
     const struct {

@@ -77,8 +77,8 @@
      .help = "explicit: its latitude, WGS 84."},
     {KEY(scene.anchor.lon_deg), CFG_REAL, "deg", "", -180, 180, .example = "8.436", .help = "explicit: its longitude."},
     {KEY(scene.anchor.height_m), CFG_REAL, "m", "", -1000, 10000, .example = "110",
-     .help = "explicit: its height above the ellipsoid; ifc: the same, instead of the file's (above the sea); "
-             "geotiff: that of the raster's height 0."},
+     .help = "Height above the ellipsoid. explicit: of origin_m; ifc: of the model, in place of the file's height "
+             "above the sea; geotiff: of the raster's height 0."},
     {KEY(scene.anchor.north_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "explicit: direction of true north, clockwise from the scene's y axis."},
     {KEY(scene.anchor.utm_zone), CFG_COUNT, NULL, "", 0, 60, .example = "32",
@@ -157,7 +157,7 @@
     {KEY(platform.waypoints), CFG_PATH, .def = "", .example = "way.csv",
      .of = ON_PATH,
      .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] in place of file. The heading follows the "
-             "path; the platform is level as a station there."},
+             "path. The platform is level, like a station there with pitch and roll 0."},
     {KEY(platform.start_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH,
      .help = "trajectory, stops: start of a scan, or the first stop, on the trajectory: seconds after its first "
              "sample."},

@@ -183,7 +183,8 @@ static const struct cfg_key profile_keys[] = {
     {"beam_divergence_rad", IN_PROFILE(beam_divergence_given_rad), CFG_REAL, "rad", NULL, 0, 0.01, FIGURE,
      .definitions = angles, .definition_offset = offsetof(struct config_profile, beam_divergence_definition),
      .help = "Divergence, as the maker gives it. definition names the kind: 1/e2 (full angle; the default), 1/e, "
-             "FWHM, half angle 1/e2. To the full angle at 1/e2 these are times 1.41, 1.70 and 2."},
+             "FWHM, half angle 1/e2. The full angle at 1/e2 is the figure times 1.41 (1/e), 1.70 (FWHM) or 2 (half "
+             "angle)."},
     {KEY(pulse_width_ns), CFG_REAL, "ns", NULL, 0, 1000, FIGURE,
      .help = "Width of the pulse: echoes closer to each other than c / 2 times it merge into one. A beam that has a "
              "width needs at least 0.1 ns in any beam.mode but single."},

@@ -117,8 +117,8 @@ static void check_used(struct cfg_reader *rd, const struct config_profile *p, ui
     if (fabs(said_hz - used_hz) > USED_WITHIN * used_hz)
         cfg_fail_key(
             rd, "programs[].used_hz", i,
-            "%.10g is not the part of %.10g Hz that falls into the field of view; allowed %.6g to %.6g Hz, 2 %% about "
-            "%.4g of it",
+            "%.10g is not the share of %.10g Hz in the field of view; allowed %.6g to %.6g Hz, within 2 %% of the "
+            "share %.4g",
             said_hz, rate_hz, (1.0 - USED_WITHIN) * used_hz, (1.0 + USED_WITHIN) * used_hz, share);
 }
 

@@ -170,7 +170,7 @@ static int has_needed(const char *section)
     return 0;
 }
 
-/* Whether the key is a list for some heads only, or in one. */
+/* Whether the key is a list that only some heads have, or a key in such a list. */
 static int is_special(const char *path)
 {
     for (size_t i = 0; i < cfg_config_table.n; i++) {

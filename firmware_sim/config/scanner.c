@@ -15,7 +15,8 @@ int config_serves(const struct config *cfg, uint32_t i)
     const uint32_t n = cfg->n_stations;
     uint32_t here = cfg->head.settings.station;
     if (n < 2 || here == 0) return 1;
-    if (cfg->platform.kind == PLATFORM_STOPS) here = (here - 1) % n + 1; /* each stop has all stations, in order */
+    /* Stops go through all stations in order, again and again. */
+    if (cfg->platform.kind == PLATFORM_STOPS) here = (here - 1) % n + 1;
     if (here > n) return 1;
     return cfg->station[i % n].scanner == cfg->station[here - 1].scanner;
 }
@@ -70,7 +71,8 @@ static void add_faults(struct config_faults *faults, const struct config_faults 
             cfg_add_fault(faults, more->place[i], more->fault[i].code, more->fault[i].text);
 }
 
-/* Stations without a scanner of their own have the file's, as the first of them has. */
+/* Returns the station whose configuration station i uses. A station with a section `scanner` uses its own; the others
+ * share the file's, which is that of the first of them. */
 static uint32_t loaded_as(const struct config *cfg, uint32_t i)
 {
     uint32_t k = 0;
@@ -136,7 +138,7 @@ int config_load_scanner(const struct config *cfg, uint32_t station, struct confi
     for (uint32_t i = 0; i < cfg->n_stations && i < out->n_stations; i++)
         out->station[i].scanner = cfg->station[i].scanner;
     out->scene.shared_textures = cfg->scene.shared_textures;
-    const double tolerance_m = out->output.tolerance_m; /* by plan */
+    const double tolerance_m = out->output.tolerance_m; /* it depends on this scanner's plan */
     out->output = cfg->output;
     out->output.tolerance_m = tolerance_m;
     out->loop = cfg->loop;

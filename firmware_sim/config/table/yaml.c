@@ -34,7 +34,7 @@ static const char *text_of(const yaml_node_t *node)
     return (const char *)node->data.scalar.value;
 }
 
-/* "null" is the name of a link, and so a value like others. */
+/* "null" is a value like any other, not YAML's nothing: it is a type of link (links[].type). */
 static int is_nothing(const yaml_node_t *node)
 {
     return node->type == YAML_SCALAR_NODE && node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE &&
