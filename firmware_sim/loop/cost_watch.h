@@ -27,7 +27,7 @@ struct cost_figures {
  * 0. Pure. */
 double cost_add(struct cost_figures *figures, const struct cost_sample *now);
 
-/* The loop's thread. */
+/* A thread that takes a sample every second. The loop starts and joins it. */
 struct cost_watch;
 struct loop;
 /* After the casters were started. NULL: nobody is to be warned, or no thread could be started. */

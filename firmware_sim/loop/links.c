@@ -66,7 +66,7 @@ static void identify(struct links *links, const struct config *cfg)
     }
 }
 
-/* Addresses that only this machine reaches, as they are written. Others may reach any other name. */
+/* Whether the address, as it is written, is one that only this machine reaches. Other machines may reach any other. */
 static int is_loopback(const char *address)
 {
     return address[0] == '\0' || strncmp(address, "127.", 4) == 0 || strcmp(address, "localhost") == 0 ||

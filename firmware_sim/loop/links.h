@@ -32,7 +32,7 @@ struct link_counts {
     uint64_t sent_units, lost_units, lost_points, unsent_pulses, wrong_requests, lost_input_bytes;
 };
 
-/* It is told of the clients, as things happen. The threads of the links call it. */
+/* An observer of the clients. The threads of the links call each function when its event happens. */
 struct links_observer {
     void *ctx;
     /* A session begins (1) or ends (0). t_ns: device time from which on, or up to which, it is given the stream. */

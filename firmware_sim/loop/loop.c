@@ -195,7 +195,8 @@ static void lock_memory(const struct loop *loop)
             strerror(errno));
 }
 
-/* A SICK scanner, in real time. A journal that is replayed has what its time server's answers did. */
+/* Only a SICK scanner in real time asks a time server. While a journal is replayed, it does not: the journal has the
+ * effects of the server's answers. */
 static int asks_time(const struct loop *loop)
 {
     const int asks = config_speaks(loop->cfg, PROTOCOL_COLA);

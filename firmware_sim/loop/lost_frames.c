@@ -50,7 +50,7 @@ static void announce(struct pump *pump, struct session *s, const struct ring_cop
 uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released)
 {
     uint32_t frames = 0;
-    /* An empty tick has a number, too: the last frames for a long time may have been lost. */
+    /* An empty tick has the number of the next frame, so it shows a loss, too. That frame may come much later. */
     if (s->lost.have_seq && tick->first_seq != s->lost.next_seq) {
         uint64_t pulses = tick->pulses_before - s->lost.next_pulse;
         frames = tick->first_seq - s->lost.next_seq;
@@ -123,8 +123,8 @@ static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
     return frames;
 }
 
-/* Counts the frames of a session that is gone which the ring no longer has. The number of the next tick's frames would
- * show them, but nobody takes that tick any more. */
+/* When a session is gone, its frames that the ring no longer has are counted as lost. The number of the next tick's
+ * frames would show them, but nobody takes that tick any more. */
 static void count_overtaken(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;

@@ -12,7 +12,7 @@ void mover_create(struct mover *mover, struct device *device, struct stream *str
     pthread_cond_init(&mover->changed, NULL);
 }
 
-/* The ticket is compared since the session may have gone meanwhile: its place then waits for another ticket or none. */
+/* The ticket is compared since the session may have gone meanwhile: its box then waits for another move or for none. */
 static void deliver(struct mover *mover, const struct move_job *job, const struct command_result *result)
 {
     pthread_mutex_lock(&mover->lock);
@@ -22,7 +22,7 @@ static void deliver(struct mover *mover, const struct move_job *job, const struc
     }
     pthread_mutex_unlock(&mover->lock);
     eventfd_write(job->wake_fd, 1);
-    stream_poke(mover->stream); /* in the paces that wait, a tick must pass for the event */
+    stream_poke(mover->stream); /* in the paces that wait, a tick must pass to take the move's event along */
 }
 
 static void carry_out(struct mover *mover, const struct move_job *job)

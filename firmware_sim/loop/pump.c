@@ -214,8 +214,8 @@ static int is_unread(struct pump *pump, struct session *s, int index, int64_t no
     return unread > 0 || now_ns - s->moved_ns < MOMENT_NS;
 }
 
-/* True while some session has something to write and its reader takes it. A client in memory shows by each turn that it
- * does, however long it works on bytes between two of them. */
+/* True while some session has something to write and its reader takes it. A client in memory calls for each turn of the
+ * link, so it is waited for, however long it works between two turns. */
 static int has_more(struct pump *pump)
 {
     uint64_t released = stream_released(pump->stream);
@@ -240,7 +240,8 @@ static int has_more(struct pump *pump)
  * protocol needs. Returns 1 when such a tick passed meanwhile. */
 static int set_wake(struct pump *pump)
 {
-    const int by_frames = pump->protocol->passes_native || pump->stream->waits; /* if it waits, empty ticks wake, too */
+    /* In the paces that wait, empty ticks wake this thread anyway. */
+    const int by_frames = pump->protocol->passes_native || pump->stream->waits;
     uint64_t tick = UINT64_MAX;
     int sessions = 0;
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {

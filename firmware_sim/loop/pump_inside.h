@@ -14,8 +14,8 @@ enum {
     BATCH_BYTES = 131072, /* small ticks are written together up to this */
     QUEUE_UNITS = 16,     /* a session has room for so many of a protocol's longest units */
     READ_BYTES = 65536,
-    WRONG_AT_ONCE = 128, /* wrong lines of a session, and then a rest of so long for its link: */
-    REST_NS = 2000000,
+    WRONG_AT_ONCE = 128, /* after this many wrong lines of a session its link rests */
+    REST_NS = 2000000,   /* for this long */
     MAX_TOLD = 64,
 };
 
@@ -38,11 +38,11 @@ struct session_commands {
 struct session {
     int open;
     int shut;            /* its client sends nothing more */
-    int left;            /* the source knows that: control and a half line are gone */
+    int left;            /* the source was told (session_closed); control and a half line are gone */
     uint32_t id;         /* from 1, over all links */
     int reader;          /* of the stream */
     uint64_t cursor;     /* next tick to take */
-    uint64_t power_from; /* power that goes with a tick before this one does not end it */
+    uint64_t power_from; /* only a power cycle at this tick or later ends it */
     uint64_t came_at;    /* ticks before are looked back at, and not received (look_back) */
     struct {
         int have_seq; /* next_seq and next_pulse are known */
@@ -118,8 +118,8 @@ int session_write(struct pump *pump, struct session *s, int index);
  * nothing more and nothing is due to it. */
 int session_is_done(const struct pump *pump, const struct session *s);
 
-/* Lets the link know that all before the session's cursor was written, so that it passes on what is due. is_last: and
- * that nothing follows; nor does it at a power cycle. As faulty_pass. */
+/* Lets the link know that all before the session's cursor was written, so that it passes on what is due. is_last:
+ * nothing follows, as at a power cycle. Returns what faulty_pass returns. */
 int session_pass(struct pump *pump, struct session *s, int is_last);
 /* Whether bytes that were written wait in the link. */
 int session_waits(const struct pump *pump, const struct session *s);

@@ -126,8 +126,8 @@ static void host_hang_up(void *ctx)
 
 /* ---- the session */
 
-/* Gives the frames of a recording the device time of the run, which their protocol has from its clock. Their checksums
- * are not looked at any more. */
+/* Shifts the times of a recording's frames to the device time of the run, as the protocol's time (pass_time) is. The
+ * frames' checksums are not looked at any more. */
 static void shift_times(uint8_t *frames, size_t len, int64_t shift_ns)
 {
     for (size_t at = 0; at < len; at += native_frame_len(frames + at))
@@ -235,7 +235,7 @@ int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *e
 int session_restart_protocol(struct pump *pump, struct session *s)
 {
     session_close_protocol(pump, s);
-    struct sh_err err; /* a file or null link has none to tell */
+    struct sh_err err; /* not used: session_restart reports the failure */
     const int rc = pump_protocol_create(pump, s, &err);
     if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     return rc;
@@ -262,7 +262,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (session_waits_for_files(pump)) return 0;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
-    const uint64_t off_tick = session_off_tick(pump, s); /* known before the tick was released */
+    const uint64_t off_tick = session_off_tick(pump, s); /* after the read: it is set before its tick is released */
     if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);

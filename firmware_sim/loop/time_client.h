@@ -2,8 +2,8 @@
 /* The client of a time server: asks it over UDP, and sets the scanner's clock (device/scanner_clock.h).
  *
  * In: the settings TIME:SERVer, and answers (drivers/protocol/ntp.h). Out: TIME:SHIFt, and what TIME:SERVer? STATe
- * replies. A thread of its own waits for both, so no link and no tick waits for a server. Device time is the clock's
- * here, since ticks are released later than their time.
+ * replies. A thread of its own waits for both, so no link and no tick waits for a server. Device time is taken
+ * from the clock here, not from released ticks, since they are released later than their time.
  *
  *   a good answer         sets the clock at once, by the offset in the answer, in a step
  *   beyond max_offset_s   is refused, once the clock was set: error 107
