@@ -47,8 +47,8 @@ struct usb_backend_ops {
     int (*prepare)(void *backend, struct pollfd *fds);
 
     /* After poll(2) on exactly these. Works through what came; after each of the host's acts it asks
-     * go_on(ctx), and stops where that is 0. The rest waits for the next call, which then also comes without
-     * a descriptor that is ready: `more` says so. SH_EIO ends the back end for good. */
+     * go_on(ctx), and stops where that is 0. The rest waits for the next call. Then `more` returns 1, so
+     * the owner calls again even if no descriptor is ready. SH_EIO ends the back end for good. */
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
     int (*more)(const void *backend); /* NULL: poll(2) says it all */
 

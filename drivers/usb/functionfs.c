@@ -19,7 +19,7 @@
 #include "drivers/usb/functionfs_private.h"
 
 /* MAX_TAKEN: completions before ep0 is looked at again, and MAX_EVENTS: events of ep0 within one call.
- * Both get their turn at any answers of the kernel, and so does the owner. */
+ * The limits let endpoints, ep0 and the owner all get their turn, however much the kernel delivers. */
 enum { CLOSE_WAIT_MS = 500, MAX_TAKEN = 2 * FFS_SLOTS * FFS_MAX_PIPES, MAX_EVENTS = 64 };
 
 static void on_complete(void *ctx, struct usb_transfer *transfer)

@@ -126,7 +126,7 @@ void ffs_console_start(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* Unplugged, so that close does not wait for the host to read. */
+/* To be called once the device is no longer configured: before that, close would wait for the host to read. */
 void ffs_console_stop(struct ffs_console *console)
 {
     if (console->fd >= 0) close(console->fd);

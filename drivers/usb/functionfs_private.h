@@ -68,8 +68,8 @@ uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
  * and ends when the host has taken none of the waiting bytes for one or two seconds. Bytes that the tty then
- * still holds can't be taken back. The next reader gets it first, cut within a stream frame, and then a frame of its
- * own that brings it into step. */
+ * still holds can't be taken back. The next reader gets them first; they may end within a stream frame. Then it gets an
+ * event frame, which brings it into step. */
 struct ffs_console {
     struct usb_device *device;
     int fd;    /* of the tty; -1: not plugged in, or no console */

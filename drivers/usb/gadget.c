@@ -184,7 +184,7 @@ static int write_identity(const struct gadget *gadget, const struct usb_model *m
 {
     const char *dir = gadget->dir;
     if (sysfile_write(dir, "max_speed", "%s-speed", gadget_rate_name(id->highest)) != 0 && errno != ENOENT)
-        return -1; /* since 5.12 */
+        return -1; /* Linux before 5.12 has no max_speed: ENOENT is no failure */
     return sysfile_write(dir, "idVendor", "0x%04x", id->vid) || sysfile_write(dir, "idProduct", "0x%04x", id->pid) ||
            sysfile_write(dir, "bcdUSB", usb_describe_ms_os(model, NULL, 0) != 0 ? "0x0210" : "0x0200") ||
            sysfile_write(dir, "bcdDevice", "0x%04x", model->bcd_device) ||

@@ -23,7 +23,7 @@ struct scanhead_usb {
     struct usb_device *device;
     struct scanhead_usb_session session[USB_MAX_SESSIONS]; /* [personality->n_sessions] */
     uint8_t line_coding[7];
-    int cut_due; /* the bus, not the host, has ended a session; scanhead_usb_cut says why */
+    int cut_due; /* a reset, another configuration or an unplugging ended a session; scanhead_usb_cut says which */
     enum usb_end cut;
 };
 

@@ -300,7 +300,7 @@ void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint)
 
 /* ---- the rest */
 
-/* Endpoints are used once per interface, alternate settings count up from 0. */
+/* An endpoint belongs to one interface, whose alternate settings may share it. They count up from 0. */
 static int check_model(const struct usb_model *model, struct sh_err *err)
 {
     uint8_t owner[32];
@@ -314,7 +314,7 @@ static int check_model(const struct usb_model *model, struct sh_err *err)
             const uint8_t address = row->endpoint[k].address;
             uint8_t *of = &owner[usb_endpoint_index(address)];
             if ((address & USB_ENDPOINT_NUMBER_MASK) == 0 || (*of != 0xff && *of != number))
-                return sh_fail(err, SH_EINPUT, "usb: endpoint %02x belongs to two interfaces", address);
+                return sh_fail(err, SH_EINPUT, "usb: endpoint %02x is number 0, or in two interfaces", address);
             *of = (uint8_t)number;
         }
         if (i + 1 == model->n_rows && number + 1 != model->n_interfaces)

@@ -142,7 +142,8 @@ static void welcome(struct usbip *self)
         int fd = usb_backend_accept(self->listener, &self->door);
         if (fd < 0) return;
         socket_tune(fd);
-        socket_tune_impatient(fd); /* a kernel; and as long as it seems to be there, no other host gets the device */
+        /* The peer is a kernel, which always reads. While a dead one seems alive, no other host gets the device. */
+        socket_tune_impatient(fd);
         setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
         struct usbip_conn *conn = usbip_make_room(self);
         usbip_conn_start(conn, fd, self->device, &self->taken);

@@ -32,8 +32,7 @@ enum {
     DIR_IN = 1,
 };
 
-/* Place of a head on the server's side: bus 1, device number + 1 (the bus itself is device 1), port `number`, bus
- * id "1-number". */
+/* Place of head number N on the server's side: bus 1, device N + 1 (the root hub is device 1), port N, bus id "1-N". */
 enum { USBIP_BUS = 1 };
 
 #endif

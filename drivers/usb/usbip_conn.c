@@ -13,7 +13,7 @@
 #include "drivers/usb/usbip_private.h"
 
 enum {
-    MAX_URB_BYTES = 16 << 20, /* usbfs's own limit by default, of all */
+    MAX_URB_BYTES = 16 << 20, /* of one URB; usbfs's default limit for all URBs together */
     MAX_READS = 256,          /* in one call: a peer that sends without end must not occupy the thread */
 };
 

@@ -109,7 +109,7 @@ static void stop(struct usbredir *self)
     self->broken = self->greeted = 0;
 }
 
-/* self->fd has been connected, or could not. */
+/* The attempt to connect self->fd has ended. error: 0, or the errno of its failure. */
 static int end_connect(struct usbredir *self, int error)
 {
     if (error == 0 && start(self, self->fd) == SH_OK) return usb_retry_done(&self->retry);
