@@ -25,7 +25,7 @@ enum cola_level { COLA_RUN = 1, COLA_MAINTENANCE = 2, COLA_CLIENT = 3, COLA_SERV
 struct cola_settings {
     /* LMDscandatacfg */
     uint8_t channels[2], rssi, rssi_16bit, unit, encoder[2], position, name, comment, time;
-    uint16_t every; /* so many-th scan is sent */
+    uint16_t every; /* n: each n-th scan is sent */
     /* LMPoutputRange, 1/10000 deg: angles of beams. Without `narrowed` all beams are sent. */
     int32_t start_e4, stop_e4;
     uint8_t narrowed;
@@ -58,7 +58,7 @@ struct cola {
     } next;
     uint32_t field;  /* number in the name of the request at hand, field012 */
     int outputs_due; /* LIDoutputstate is sent once, after the answer */
-    struct {         /* which of their changes are sent, and the set of fields that is watched */
+    struct {         /* the events that the client switched on, and the set of fields that is watched */
         int results, outputs, inputs;
         uint8_t by_telegram; /* FieldSetSelectionMethod */
         uint16_t set;        /* ActiveFieldSet, from 1 */
@@ -95,7 +95,7 @@ typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, 
 
 /* Sends a scan that is done, if the client waits for it. */
 void cola_deliver(struct cola *self);
-/* sRN LMDscandata: the last scan, or later the first one. */
+/* sRN LMDscandata: answers with the last scan. Where there is none in the present geometry, the next scan answers. */
 cola_handler cola_read_scan;
 /* Sets the session and its settings as at power-up. SH_EINPUT: what is stored is wrong. */
 int cola_power_up(struct cola *self, struct sh_err *err);
@@ -105,7 +105,7 @@ uint32_t cola_time_us(const struct cola *self, int64_t t_ns);
 
 /* cola_lmd.c */
 
-/* Writes the values of LMDscandata after the head of the telegram. There is a last scan. */
+/* Writes the values of LMDscandata after the head of the telegram. Only to be called where there is a last scan. */
 void cola_put_scan(const struct cola *self, struct cola_out *out);
 
 /* cola_checksum.c: for protocol_ops of the same names */
@@ -142,7 +142,7 @@ cola_handler cola_keep;
 
 /* cola_dialect.c */
 
-/* EIHstCola as it is now, and where nobody has written it: enum cola_form. */
+/* EIHstCola as it is now, and as configured (CoLa-A where no dialect is chosen): enum cola_form. */
 uint32_t cola_framing(const struct cola *self);
 uint32_t cola_configured_framing(const struct cola *self);
 int cola_understands(const struct cola *self, enum cola_form form);
@@ -164,7 +164,7 @@ cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
 /* 12 of "field012"; UINT32_MAX: another name. */
 uint32_t cola_field_number(const char *name);
-/* A field is a record, or there is none. */
+/* A field is answered as a record; beyond the model's records the answer is a single 0 (n_records). */
 enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out);
 enum cola_error cola_write_field(struct cola *self, uint32_t field, struct cola_args *args);
 cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_set_method, cola_write_set_method,

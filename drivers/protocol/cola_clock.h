@@ -9,7 +9,7 @@ struct cola_date {
     uint32_t year, month, day, hour, minute, second, us; /* month and day from 1 */
 };
 
-/* ns from 0 on; before that it is 0. */
+/* ns since 1970-01-01; negative ns count as 0. */
 struct cola_date cola_date_of(int64_t ns);
 /* 1, or 0: there is no such date between 1970 and 2199. */
 int cola_date_ns(const struct cola_date *date, int64_t *ns);

@@ -186,7 +186,7 @@ static void reboot(struct cola *self)
 {
     char reply[512];
     const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
-    struct sh_err err; /* it was taken before */
+    struct sh_err err; /* unused: what is stored was accepted before */
     cola_power_up(self, &err);
     if (refused) self->host.hang_up(self->host.ctx);
 }

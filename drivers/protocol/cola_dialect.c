@@ -5,7 +5,8 @@
 
 #include "drivers/protocol/cola.h"
 
-/* The link's word has the form that EIHstCola has set since power came, and which time that was. */
+/* The word that the link's sessions share: the form that EIHstCola set, and power_ons at that time. A word from
+ * before the last power-up does not count. */
 static uint32_t cola_dialect_word_of(const struct cola *self, uint32_t form)
 {
     return self->power_ons << 2 | (form + 1);

@@ -61,7 +61,7 @@ static void take_rectangle(struct cola_args *args, struct cola_record *r)
     r->length_mm = cola_arg_u(args, 4);
 }
 
-/* A part that is known to exist, but not what is in it. */
+/* Reads the flag of a part whose content is not known. A record that has the part is refused. */
 static void take_no_part(struct cola_args *args)
 {
     if (take_flag(args)) args->error = COLA_INVALID_DATA;

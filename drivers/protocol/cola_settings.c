@@ -63,7 +63,7 @@ enum cola_error cola_write_output_range(struct cola *self, struct cola_args *arg
 }
 
 /* ---- LMDscandatacfg: 2 x u8 channels, u8 RSSI, u8 16 bit, u8 unit, 2 x u8 encoder, u8 position, u8 name, u8 comment,
- * u8 time, u16 every so many-th scan */
+ * u8 time, u16 n: each n-th scan is sent */
 
 void cola_list_cfg(struct cola_settings *s, uint8_t *bytes[COLA_CFG_BYTES])
 {

@@ -40,7 +40,7 @@ static int polygon_has(const struct cola_shape *s, const struct cola_point *p)
     return winding != 0;
 }
 
-/* Angles are compared as (1/10000 deg) x steps, which both are whole numbers of. */
+/* Angles are compared in the unit (1/10000 deg) / steps: both are whole numbers of it. */
 static int sector_has(const struct cola_shape *s, const struct cola_measured *m)
 {
     if (m->range_um < s->sector.inner_um || m->range_um > s->sector.outer_um) return 0;
@@ -64,7 +64,8 @@ static int32_t chain_step(const struct cola_measured *m, const struct cola_link 
     return (int32_t)(m->step - turns * m->steps);
 }
 
-/* Between two links the head is left of the far line and the field right of the near one. */
+/* Between two links a point is in the field if it lies left of the far line (on the head's side) and right of the near
+ * one. A point on a line is in it, too. */
 static int chain_has(const struct cola_shape *s, const struct cola_measured *seen)
 {
     struct cola_measured m = *seen;

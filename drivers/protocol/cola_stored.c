@@ -28,7 +28,7 @@ enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola
 {
     char reply[MAX_REPLY], text[PROTOCOL_STORED];
     const enum cola_error error = cola_args_end(args);
-    int kept = 1; /* a head without a file says so, too, and forgets */
+    int kept = 1; /* a head without a file answers 1, too, but keeps nothing */
     if (error != COLA_OK) return error;
     if (self->keeps) {
         put_lines(self, text, sizeof text);

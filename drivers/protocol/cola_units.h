@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The head's geometry, rates and signals in SICK's units; COLA.md has the scales. Angles: 0 is right, 90 degrees
- * forward, counted counter-clockwise seen from above. Beam 0 has the smallest angle; beams are the places of
- * struct planar_head. Pure. */
+ * forward, counted counter-clockwise seen from above. Beam 0 has the smallest angle; beams are numbered as the
+ * places of planar_scan.h, from 0 to n - 1. Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_UNITS_H
 #define DRIVERS_PROTOCOL_COLA_UNITS_H
 

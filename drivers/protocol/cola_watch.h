@@ -46,7 +46,8 @@ struct cola_watch {
 };
 
 /* Forgets what was seen, and watches these fields; n at most COLA_WATCH_SLOTS. outputs: that of each field, from 1; 0:
- * none. Outputs keep their state until the next scan, whose results are news where there were some before. */
+ * none. Outputs keep their state until the next scan. Where there were valid results or active outputs before, that
+ * scan reports COLA_NEW_RESULT in any case. */
 void cola_watch_select(struct cola_watch *watch, const struct cola_fields *fields, const uint32_t *numbers,
                        const uint8_t *outputs, uint32_t n);
 /* One scan. Returns the news. */

@@ -127,7 +127,7 @@ static int owes(const void *protocol)
     return s->stream.active || s->single.active || s->reboot_ns != INT64_MIN;
 }
 
-/* A client that reboots a scanner closes before it does. */
+/* A client that has sent RB twice may close before the reboot is due. Then the head reboots at once. */
 static void gone(void *protocol)
 {
     struct scip *s = protocol;

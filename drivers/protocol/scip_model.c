@@ -89,7 +89,7 @@ static const struct scip_model models[] = {
 };
 /* clang-format on */
 
-/* Firmware of a UST from 4.1 on, and 1.1 on in the older series. */
+/* Firmware 4.1 and later 4.x of a UST, and 1.1 and later 1.x of the older series. */
 static int has_time_us(const char *firmware)
 {
     int major, minor;

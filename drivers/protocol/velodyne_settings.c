@@ -306,7 +306,7 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     char copy[VELODYNE_MAX_FORM + 1];
     if (len > VELODYNE_MAX_FORM) return refuse(&posted, 413, "the body is too long");
     memcpy(copy, form, len);
-    if (len == 0 && strcmp(path, "/cgi/save") == 0) /* as a published client does; no other form has one meaning */
+    if (len == 0 && strcmp(path, "/cgi/save") == 0) /* a published client posts no body to it */
         len = (size_t)snprintf(copy, sizeof copy, "data=submit");
     const int n = read_form(&posted, path, copy, len, pairs);
     int status = n < 0 ? -n : 200;

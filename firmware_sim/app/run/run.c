@@ -273,7 +273,7 @@ static const struct app_option OPTIONS[] = {
 
 static const char NOTES[] =
     "Ctrl-C, or SIGTERM, ends the head with all files complete. A second signal within a second counts as the same\n"
-    "one; a third, or a later one, ends it at once.\n"
+    "one. A third signal, or one more than a second after the first, ends the head at once.\n"
     "\n"
     "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"

@@ -102,7 +102,8 @@ int colour_spool_drain(struct colour_spool *spool,
             rc = sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written",
                          spool->track.path);
     }
-    /* Bytes, not frames: after a replug a frame may equal one before, which is then taken for that one. */
+    /* Compares bytes, not numbers of frames: after a replug a frame may equal an earlier one, and the handle then drops
+     * it as a repetition. */
     if (rc == SH_OK) scanhead_get_stats(spool->sh, &stats);
     if (rc == SH_OK && (got != SCANHEAD_ECLOSED || stats.bytes != spool->bytes || stats.bad_bytes != 0))
         rc = sh_fail(err, SH_EIO, "%s: the stored frames can't be read back: %s", spool->track.path,

@@ -15,11 +15,11 @@ struct colour_spool {
     /* inner state */
     enum colour_mode mode;
     FILE *file;
-    char *path; /* what the file was made as */
+    char *path; /* the name that the file had until it was unlinked; for messages */
     uint64_t bytes;
     int has_points;
     struct track track;
-    struct scanhead *sh; /* of the frames that come again */
+    struct scanhead *sh; /* reads the stored frames back */
 };
 
 /* mode: one with limits. The file is made in the folder of path, which must live on. SH_EIO, SH_EPERM, SH_EINPUT,

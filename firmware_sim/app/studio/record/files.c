@@ -205,8 +205,8 @@ static int check_part(const char *part, const char *path, struct sh_err *err)
         part, len, path);
 }
 
-/* The ending of a second file of a recording, in place of FILE's own ending; NULL: there is none. It may be there
- * without FILE.part, where somebody moved that alone. */
+/* The ending of the second file that a format leaves behind, in place of FILE's own ending; NULL: it leaves none. The
+ * second file may be there without FILE.part, where somebody moved only FILE.part away. */
 static const char *second_of(const struct record_files *files, const struct record_file *file)
 {
     const char *ending = file->ops->ending;
@@ -224,8 +224,8 @@ static int check_second(const char *second, const char *path, struct sh_err *err
                    second, len, path);
 }
 
-/* Looks for remains of the files of single scans: each would stop the recording only when its scan begins. `end` is the
- * ending of such a name, in place of that of FILE. */
+/* With --split: looks for remains of any scan's file before the recording begins. Else one would stop the recording
+ * only when its scan begins. `end` is the ending of the remains, in place of FILE's own ending. */
 static int check_parts_of_scans(const struct record_file *file, const char *end,
                                 int (*check)(const char *left, const char *path, struct sh_err *err),
                                 struct sh_err *err)
@@ -292,7 +292,7 @@ static int to_coloured(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return rc;
 }
 
-/* Gives the frames that waited to the files with colours, with limits that are those of all. */
+/* Gives the frames that waited to the files with colours. The limits of the colours are taken over all spools. */
 static int colour_files(struct record_files *files, struct sh_err *err)
 {
     double low = INFINITY, high = -INFINITY;
@@ -319,7 +319,7 @@ int record_files_close(struct record_files *files, int keep, struct sh_err *err)
         const int is_whole = is_coloured || !files->file[i].ops->track.wants_colours;
         int e = recorder_close(files->file[i].rec, keep && is_whole, &why);
         files->file[i].rec = NULL;
-        if (e != SH_OK && rc != SH_OK) sh_warn(files->recorder.report, "%s", why.text); /* each is named */
+        if (e != SH_OK && rc != SH_OK) sh_warn(files->recorder.report, "%s", why.text); /* err has the first */
         if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
     }
     close_spools(files);

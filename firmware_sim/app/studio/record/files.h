@@ -40,7 +40,7 @@ struct record_files {
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
 /* With files of each scan beside those of all: SH_EINPUT where two of them would have one name. */
 int record_files_check_each(const struct record_files *files, struct sh_err *err);
-/* Once all options are read: each file gets the format that they make of it. */
+/* To be called once all options are read: picks the format of each file according to them. */
 void record_files_shape(struct record_files *files);
 /* Whether one of them is a mesh, or points spread over one. */
 int record_files_have_meshes(const struct record_files *files);

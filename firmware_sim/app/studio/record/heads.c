@@ -170,7 +170,7 @@ static int record_some(struct heads *heads, const struct recording_options *all,
     return rc;
 }
 
-/* The stations of head k. */
+/* Asks heads->fits about each station of head k. */
 static int check_fits(const struct heads *heads, uint32_t k, const struct site *site, uint32_t first, uint32_t last,
                       struct sh_err *err)
 {

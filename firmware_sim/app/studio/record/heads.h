@@ -40,7 +40,8 @@ struct heads {
 /* Loads the configurations of all scanners; nothing runs. heads begins as zeros, is large, and is to be closed, also
  * after an error. cfg must live on, and so must the sets that it was loaded with. */
 int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err);
-/* Heads that scan one after the other from station `first` to `last`, each as often as it comes; first 0: one. */
+/* How many turns the heads take from station `first` to `last`: a head that scans again after another one counts again.
+ * first 0: 1. */
 uint32_t heads_turns(const struct heads *heads, uint32_t first, uint32_t last);
 /* The configuration of the i-th of the heads that scan from stations first to last (0, 0: the station that the head is
  * set to); NULL: there is no i-th. */

@@ -20,7 +20,7 @@ static int is_stopped(const struct record_job *r)
     return r->stop != NULL && r->stop(r->stop_ctx);
 }
 
-/* A signal while files are completed. */
+/* Whether completing files is to be given up: a stop was asked for, or a signal came that did not end the recording. */
 static int gives_up(void *ctx)
 {
     const struct record_job *r = ctx;
@@ -57,7 +57,7 @@ static int close_files(struct record_job *r, int keep, struct sh_err *err)
     struct sh_err why = {0};
     const int of_each = r->each ? record_files_close(&r->parts, keep, &why) : SH_OK;
     const int rc = record_files_close(&r->files, keep, err);
-    if (rc != SH_OK && of_each != SH_OK) sh_warn(&app_report_stderr, "%s", why.text); /* each is named */
+    if (rc != SH_OK && of_each != SH_OK) sh_warn(&app_report_stderr, "%s", why.text); /* both are shown */
     return rc == SH_OK && of_each != SH_OK ? sh_fail(err, of_each, "%s", why.text) : rc;
 }
 
@@ -266,8 +266,8 @@ static int check_heads(struct record_job *r, const struct heads *heads, uint32_t
     return rc == SH_OK && n > 1 ? record_files_check_heads(&r->files, err) : rc;
 }
 
-/* Takes the shots of a line in the middle for each line: they differ by a pulse, except that the rings at the poles of
- * a sphere have one. */
+/* Assumes that every line has as many shots as the middle one. Lines differ by one pulse at most, but a sphere's rings
+ * at the poles have a single pulse. */
 static double most_shots(const struct record_job *r, const struct site *site)
 {
     struct head_settings settings = site->cfg->head.settings;
@@ -288,7 +288,7 @@ static int fits(void *ctx, const struct site *site, uint32_t station, struct sh_
 {
     struct record_job *r = ctx;
     const struct config_output *output = &site->cfg->output;
-    const double *centre_m, *scale; /* of a stretch of a way; not needed here */
+    const double *centre_m, *scale; /* the scene's point and scale of the georeference; unused here */
     const struct site_station *s = &site->station[station - 1];
     struct recorder_scan scan = {.station = station,
                                  .moves = site->moving,

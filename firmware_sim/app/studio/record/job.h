@@ -36,7 +36,7 @@ struct record_job {
     struct record_files parts;
     struct recorder_scan first; /* of the scans, as the configuration says it */
     int has_silent;             /* objects that give no echo (scene.target) */
-    int interrupted;            /* before the files were completed, which an interrupted recording does, too */
+    int interrupted;            /* a signal came before the files were completed; they are completed all the same */
 };
 
 /* Checks a recording off line before the scene is loaded: SH_EINPUT where it is not possible. cfg is changed. */

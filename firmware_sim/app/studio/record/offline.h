@@ -37,7 +37,8 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
                  struct sh_err *err);
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
                     struct sh_err *err);
-/* The same beside another one, of another scanner of the file: the scene that both have is loaded once. */
+/* Like offline_open, for another scanner of the configuration, beside the open head `other`. The scene that both have
+ * is loaded once. */
 int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
                         struct offline *offline, struct sh_err *err);
 /* The head ends; its scene and its threads are freed. The client's handle keeps what it knows. */

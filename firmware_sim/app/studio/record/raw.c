@@ -97,7 +97,7 @@ static int read_place(const char *text, int max_ports, struct raw_place *place)
     }
 }
 
-/* 0: none; 0 itself is any free one. */
+/* A port that is given twice; 0: none. Port 0 may be given twice, since it stands for any free port. */
 static int port_twice(const struct raw_place *place)
 {
     for (int i = 0; i < place->n_ports; i++)
@@ -151,8 +151,8 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(duration_s),
      .help = "end S seconds after the first packet"},
     {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(wait_s),
-     .help = "wait up to S seconds for SOURCE to appear, and for its first packet (default: as long as --duration for "
-             "the packet)"},
+     .help = "wait up to S seconds for SOURCE to appear, then up to S seconds for its first packet. Without --wait "
+             "SOURCE must be there, and its first packet may take as long as --duration"},
     {APP_CALL, "send", "TEXT", .apply = take_send,
      .help = "tcp: send this when connected. \\n, \\r, \\t, \\0, \\\\ and \\xHH are bytes. May be repeated: the next "
              "one goes "

@@ -63,7 +63,7 @@ struct raw {
     uint64_t bytes;     /* of payload */
     int64_t first_ns;   /* monotonic, of the first packet; 0: none came */
     int64_t last_t_ns;  /* of the last packet */
-    int over;           /* by itself */
+    int over;           /* 1: the source ended by itself */
     char endpoint[160]; /* where it listens; for --ready-fd */
     void *state;        /* of ops */
     double wall_s;
@@ -71,8 +71,9 @@ struct raw {
 
 extern const struct raw_ops raw_udp, raw_tcp;
 
-/* `record` with --raw among its arguments. Returns the exit status. */
+/* Whether --raw is among the arguments. */
 int raw_is_wanted(int argc, char **argv);
+/* `record` with --raw. Returns the exit status. */
 int raw_record(int argc, char **argv);
 
 /* ---- inside */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Puts data from several sockets into the order in which it came. Each socket is an input that holds one piece at most.
  *
- * A piece is passed on once every other input was asked after it was taken: an earlier piece of theirs is then known.
+ * A piece is passed on only after every empty input was asked again. So any earlier piece is known by then.
  * In: inputs. Out: calls of `pass`. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_ORDER_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_ORDER_H

@@ -175,7 +175,7 @@ static int check_options(const struct record_line *r)
     return option == NULL ? APP_OK : app_usage(&app_record, "%s is among the files", option);
 }
 
-/* Where no command is sent, the scans are those that come. */
+/* Where no command is sent to the head, its station and its number of frames can't be chosen. */
 static int check_commands(const struct record_line *r)
 {
     const int is_file = app_is_recording(r->in.operand[0]);
@@ -418,7 +418,7 @@ static const char HELP_NOTES[] =
     "does not begin while one of these exists.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends a recording with complete files. A second signal within a second counts as the same\n"
-    "one; a third, or a later one, ends it at once.\n";
+    "one. A third signal, or one more than a second after the first, ends the recording at once.\n";
 
 const struct app_command app_record = {
     .name = "record",

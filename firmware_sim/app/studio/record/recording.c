@@ -100,7 +100,7 @@ static int has_lost_frames(const struct recording *r)
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
 {
-    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* telemetry alone asks for it */
+    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* only telemetry uses it */
     enum recording_news news = recording_count(&r->result->counts, frame, lost);
     if (news == RECORDING_NOTHING) return;
     if (news == RECORDING_END_LOST) sh_warn(r->o->report, "the scan's end was lost; the head goes on without it");
@@ -114,7 +114,7 @@ static int64_t ns_since(int64_t t_ns, int64_t from_ns)
     return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
 }
 
-/* A pan sweep of a sphere is all its rings. */
+/* In a frame of the scan a sphere head fires a line for each of its rings. Any other head's scan_s needs no factor. */
 static uint32_t lines_of_frame(const struct scanhead *sh)
 {
     struct scanhead_emitter e;

@@ -6,7 +6,7 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/command/head.h"
 
-/* The scan at hand is over. cast is at least what is known of it. */
+/* The scan at hand is over. Where `cast` is less than the pulses received plus those lost, their sum counts instead. */
 static void recording_counts_end(struct recording_counts *c, uint64_t fired, uint64_t cast, uint64_t lost)
 {
     uint64_t least = c->scan.pulses + lost;

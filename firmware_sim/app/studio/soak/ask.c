@@ -67,7 +67,7 @@ static int is_noticed(const struct soak_ask *ask, const struct fault_note *note,
         return a->rc == SCANHEAD_ETIMEOUT || a->ms >= note->for_ms - MARGIN_MS;
     case FAULT_WRONG_REPLY:
         return a->rc == SCANHEAD_ETIMEOUT || !a->is_right;
-    default: /* an echo without CR is no line of the protocol */
+    default: /* FAULT_ECHO: an echo that lacks its CR counts as bad bytes */
         return ask->echoes != 0 || ask->bad_bytes >= note->n;
     }
 }
@@ -88,8 +88,8 @@ static void judge_note(struct soak_link *link, const struct fault_note *note, co
         row->missed++;
 }
 
-/* An answer is odd where no fault explains it. A reply that comes next to hurt bytes is lost with them, and one to a
- * question that goes out while the connection is being made again may be lost with the one before. */
+/* An answer is odd where no fault explains it. A reply that comes next to damaged bytes is lost with them. The reply to
+ * a question that is sent just after a session ended may be lost with the old connection. */
 static void ask_judge(struct soak_link *link, const struct answer *a)
 {
     struct soak_ask *ask = &link->ask;

@@ -234,7 +234,7 @@ static void *client_compare(void *arg)
     struct soak_link *link = arg;
     while (atomic_load(&link->soak->phase) == SOAK_RUNS)
         soak_datagrams_step(link);
-    const soak_seq until = soak_datagrams_top(link) + 1; /* the last one of a kind that was hit is before it */
+    const soak_seq until = soak_datagrams_top(link) + 1; /* the last datagram that a fault can have hit is before it */
     while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
         soak_datagrams_step(link);
         if (link->last >= until) atomic_store(&link->done, 1);

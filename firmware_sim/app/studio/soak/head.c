@@ -64,7 +64,7 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     link->ask.others++;
     if (note->kind == FAULT_POWER_CYCLE)
         soak_usb_forget(&link->plugs, link->row, "power went before a client opened it");
-    if (link->datagrams != NULL) why = "the packets are compared with those of the same head";
+    if (link->datagrams != NULL) why = "the clean packets come from the same head, so they have this fault, too";
     if (!link->usable) why = "the link has no client here";
     if (why == NULL && link->n_moments == SOAK_MAX_MOMENTS) why = "too many at a time";
     if (why != NULL) {
@@ -233,7 +233,7 @@ static void take_pps(struct soak_link *link, const struct scanhead_frame *frame)
 
 /* ---- the PTP follower, by the states of its port and its offset */
 
-/* A master that is lost shows as the port listens, up to an Announce after it is back. */
+/* A lost master shows as the port state LISTENING, also for up to an Announce interval after the master is back. */
 static int shows_ptp(const struct soak_link *link, const struct soak_moment *m, int64_t at_ns,
                      const struct native_telemetry *t)
 {

@@ -32,7 +32,7 @@ struct soak_times {
 
 /* The caller of the first three has the link's lock. */
 void soak_heard_head(struct soak_link *link, const struct fault_note *note);
-/* Its client's first frame. */
+/* The link's client got its first frame: hides power cycles and slow boots from before it. */
 void soak_head_begins(struct soak_link *link, const struct scanhead_frame *frame);
 /* Notes as noticed a power cycle that began before that device time. Returns 0 where there is none. */
 int soak_saw_power_go(struct soak_link *link, int64_t before_ns);

@@ -13,8 +13,8 @@
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/fault/fault.h"
 
-/* A frame counts as late from LATE_MS on. MARGIN_MS: a block of pulses lasts a tick, and the smallest time that any
- * frame took is not the smallest possible. */
+/* A frame counts as late from LATE_MS on. MARGIN_MS is the tolerance: the time of a frame is exact only to a tick, and
+ * the smallest delay that was seen may be above the smallest possible one. */
 static const double LATE_MS = 10.0, MARGIN_MS = 5.0;
 enum { NEAR_FRAMES = 64 };
 static const int64_t NEAR_NS = 20000000, FAR_NS = 20000000000;
@@ -58,7 +58,7 @@ static void judge_resealed(struct soak_link *link, const struct soak_fact *f, in
     else if (!is_known && f->got != 0)
         soak_hide(row, f->resealed, "the clean reader did not get the frame");
     else if (f->got != 0 && is_wrong)
-        row->accepted++; /* of its flips the frame shows one: it is one frame */
+        row->accepted++; /* once a frame, however many flips hit it */
     else
         decide(row, f->resealed, f->got == 0 && f->gap); /* refused for what it holds, or late */
 }
@@ -139,7 +139,7 @@ static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_
 static void judge_garbage(struct soak_link *link, const struct soak_fact *f)
 {
     if (f->garbage == 0) return;
-    if (link->datagrams != NULL) { /* a datagram of its own; the sum of all bytes shows whether it is this one */
+    if (link->datagrams != NULL) { /* a datagram of its own: any bad one counts; sheet.c compares the bytes */
         const int is_there = link->bad_units >= f->times[FAULT_GARBAGE];
         if (is_there) link->bad_units -= f->times[FAULT_GARBAGE];
         decide(&link->row[FAULT_GARBAGE], f->times[FAULT_GARBAGE], is_there);

@@ -43,7 +43,8 @@ struct soak_link {
     uint64_t odd_closings;      /* the connection was closed without a fault */
     int64_t odd_ns, no_open_ns; /* when that last was, and when there was no connection; 0: never */
     uint64_t away;              /* frames that came while there was no session */
-    /* Bytes that belong to no frame: noticed, and by the faults. Beside them a reply may be hurt, too. */
+    /* Bytes that belong to no frame: as the client counted them, and the least and the most that the faults explain.
+     * The most includes frames that may not have arrived, and a reply that was destroyed with such bytes. */
     uint64_t bad_bytes, expected_bad_min, expected_bad_max;
     struct soak_run run[SOAK_MAX_RUNS];
     uint32_t n_runs;

@@ -67,7 +67,8 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
         link->row[link->plugs.note[i].kind].missed++;
     for (int row = 0; row < SOAK_N_ROWS; row++)
         sheet_add(&sum, &link->row[row]);
-    sheet_fail(soak, has_open_rows(link->row), "a fault was not noticed, and is not one that can't be noticed");
+    sheet_fail(soak, has_open_rows(link->row),
+               "the counts of a fault do not add up: injected is not noticed + hidden + missed + accepted");
     if (!link->usable) return;
     sheet_fail(soak, link->failed[0] != '\0', "a client gave up");
     sheet_fail(soak, sum.missed != 0, "a fault that can be noticed was not noticed");

@@ -300,7 +300,7 @@ static const struct app_option OPTIONS[] = {
      .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults. With "
              "--client it may be repeated: each is run in turn"},
     {APP_NUMBER, "duration", "S", .min = 0.1, .max = 1e8, .at = AT(duration_s),
-     .help = "inject faults for S seconds from the first points on (default 30), in the pace fast of device time"},
+     .help = "inject faults for S seconds from the first points on (default 30); with --pace fast S is device time"},
     {APP_WHOLE, "link", "N", .min = 1, .max = CONFIG_MAX_LINKS, .at = AT(link),
      .help = "connect a client only to this link of the configuration; with --client: the link that it gets (default 1)"},
     {APP_TEXT, "client", "COMMAND", .at = AT(verdicts.options.command),
