@@ -180,7 +180,7 @@ enum scanhead_notice_kind {
      * known. */
     SCANHEAD_NOTICE_RESTARTED = 4,
     /* A frame with a correct header and a wrong payload: seq is its number, t_ns its time. n: its bytes up to the next
-     * correct frame. These are fewer than its length says where bytes were lost. */
+     * correct frame. Where bytes were lost, n is less than the frame's length field says. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
     /* n bytes that belong to nothing: garbage, a frame with a broken header, a broken reply, replies after these up to
      * the next frame. A whole run of them is one notice, before the next frame or reply. */
@@ -366,12 +366,14 @@ struct scanhead_beam {
 };
 enum { SCANHEAD_MAX_BEAMS = 128 };
 struct scanhead_emitter {
-    int kind;                                  /* enum scanhead_emitter_kind */
-    uint32_t steps;                            /* pulses of a line; beams: 0 */
-    int first_step, last_step, front_step;     /* planar: cast, both included; planar, sphere: looks along y */
-    int turn;                                  /* +1: clockwise seen from above, -1: the other way */
-    uint32_t rings;                            /* sphere: of a frame; the elevation of ring i is */
-    double first_ring_deg, ring_step_deg;      /* first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
+    int kind;       /* enum scanhead_emitter_kind */
+    uint32_t steps; /* pulses of a line; beams: 0 */
+    /* planar: the steps that are cast, both included. front_step, of a sphere, too: the step that looks along y */
+    int first_step, last_step, front_step;
+    int turn;       /* +1: clockwise seen from above, -1: the other way */
+    uint32_t rings; /* sphere: how many rings a frame has */
+    /* ring i has the elevation first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
+    double first_ring_deg, ring_step_deg;
     int echoes;                                /* the head sends of each pulse: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
@@ -389,11 +391,11 @@ struct scanhead_pose {
     double position_m[3]; /* scene frame */
     double quat[4];       /* w x y z: head's frame SOCS -> scene frame */
     double frame;         /* frame scalar of the trajectory */
-    int flags;            /* enum scanhead_pose_flags; between two poses those of either */
+    int flags;            /* enum scanhead_pose_flags; between two poses the flags of both hold */
 };
 enum scanhead_pose_flags {
     SCANHEAD_POSE_EXTRAPOLATED = 1, /* beyond the last pose that the head had been given */
-    SCANHEAD_POSE_LATE = 2,         /* too long after it: the head assumed that it stands */
+    SCANHEAD_POSE_LATE = 2,         /* too long after the last pose: the head assumed that the platform stands */
     SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
 };
 /* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.

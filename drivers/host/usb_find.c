@@ -96,7 +96,7 @@ struct search {
     char refused[64];
 };
 
-/* Names another head in the message that there are several; the message shows where there was no room for all. */
+/* Adds a head to the list in the message that several are plugged in. The list ends in "..." where it has no room. */
 static void name_another(struct search *s, const char *name)
 {
     const size_t used = strlen(s->others), room = sizeof s->others - used;

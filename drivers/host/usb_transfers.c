@@ -170,7 +170,8 @@ static int gone_or_reset(struct host_usb *usb)
 }
 
 /* Linux may end the transfers of a reset bus as if each had been answered by nothing. It takes new ones, and these
- * wait for a session that is over. A head that doesn't know the question stalls it. */
+ * wait for a session that is over. So this asks the head whether the session is open. A head that doesn't know this
+ * request stalls it. */
 static int session_is_over(struct host_usb *usb)
 {
     const uint8_t type = (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_IN;

@@ -13,8 +13,8 @@ struct track;
 
 /* Where a recording's colours come from. */
 struct colour_choice {
-    int given;                 /* 0: as the head sends them, if it does */
-    struct colour_scale scale; /* 1: made here, by this; not texture, which only the head knows */
+    int given;                 /* 0: as the head sends them, if it does; 1: made here, by scale */
+    struct colour_scale scale; /* not texture, which only the head knows */
 };
 
 /* Checks the scan that begins. SH_EFORMAT where its points have no such figure: frame without a trajectory; with a

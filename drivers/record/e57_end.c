@@ -43,7 +43,8 @@ int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct
     uint8_t header[E57_FILE_HEADER_LEN];
     const uint64_t at = e57_logical(pages);
     size_t len;
-    int rc = outfile_flush(pages->file, err); /* the room is for what follows the points, and a repair may want it */
+    /* The points are written before the reserved room is freed: if that fails, a repair still needs the room. */
+    int rc = outfile_flush(pages->file, err);
     if (rc != 0) return rc;
     outfile_release(pages->file);
     rc = put_xml(pages, facts, &len, err);

@@ -69,9 +69,10 @@ VEC_INLINE float near_atan(float r)
     return r + r * (z * s);
 }
 
-/* The same to a hundredth of a count. The errors of the series and its rounding, of two sums below pi and of atan2f are
- * below 8e-7 rad together, or 0.008 counts. The error of either product is half a last bit, or 0.001 counts. Angles
- * within 0.015 counts of a half, or NaN, are set to SCAN_ANGLE_NONE: there the formula decides. */
+/* Computes scan angles as scan_angle does, to a hundredth of a count. The errors of the series and its rounding, of two
+ * sums below pi and of atan2f are below 8e-7 rad together, or 0.008 counts. The error of either product is half a last
+ * bit, or 0.001 counts. Angles within 0.015 counts of a half, or NaN, are set to SCAN_ANGLE_NONE: there the formula
+ * decides. */
 VEC_CLONES static void near_scan_angles(const double *restrict x, const double *restrict y, const double *restrict z,
                                         int n, uint16_t *restrict to)
 {

@@ -84,7 +84,7 @@ static uint8_t *put_note_vlr(uint8_t *to, const struct las_facts *f)
     return to + n + 1;
 }
 
-/* The CRS's text ends in a NUL; there is none without a CRS. */
+/* Writes the text of the CRS, which ends in a NUL. Without a CRS it writes nothing. */
 static uint8_t *put_crs_vlr(uint8_t *to, int epsg, int geoid)
 {
     char wkt[CRS_WKT_MAX];

@@ -62,9 +62,9 @@ struct las_facts {
 size_t las_point_len(const struct las_facts *facts);
 /* How many bytes a point of format 0 to 10 takes without extra bytes. */
 size_t las_format_len(int format);
-/* The first returns how many of these bytes are the format's own; extra bytes follow them. The second is where the time
- * begins; a colour may follow it. */
+/* How many of a point's bytes are the format's own; extra bytes follow them. */
 size_t las_own_len(const struct las_facts *facts);
+/* Where in a point's bytes the time begins; a colour may follow it. */
 size_t las_time_at(const struct las_facts *facts);
 
 /* Counts a point's record as it is in the file: its place and its return. Of the facts it needs `minor`. */

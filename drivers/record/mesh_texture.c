@@ -55,7 +55,7 @@ int mesh_texture_draw(const struct mesh_grid *g, struct mesh_points *points, str
     return SH_OK;
 }
 
-/* A face within a grid that is closed along one of its sides. */
+/* These are needed to unwrap the faces of a grid that is closed along one of its sides. */
 struct unwrap {
     const struct mesh_grid *grid;
     struct mesh_points *points;

@@ -111,7 +111,8 @@ static int write_mesh(const struct mesh_recorder *m, const struct mesh_points *p
     if (has_faces) {
         mesh.normal = (const float(*)[3])points->normal;
         mesh.n_faces = (uint32_t)m->n_faces;
-        mesh.face = m->n_faces > 0 ? (const uint32_t(*)[3])m->face : none; /* not as points alone */
+        /* with NULL here a mesh without triangles would be written as points alone */
+        mesh.face = m->n_faces > 0 ? (const uint32_t(*)[3])m->face : none;
     }
     if (is_textured(m)) mesh.uv = (const float(*)[2])points->uv;
     if (is_ply(m) && m->base.track.has_colours && (columns & PLY_COLOUR) != 0)

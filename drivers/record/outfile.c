@@ -168,7 +168,8 @@ int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err
     return how == OUTFILE_LEAVE ? 0 : rc;
 }
 
-/* With a limit on file sizes reserving would end the program: some file systems count from the file's begin. */
+/* Returns whether file sizes are limited. Room is reserved far beyond the end. Some file systems compare that place
+ * with the limit, and the signal ends the program. */
 static int has_limit(void)
 {
     struct rlimit most;

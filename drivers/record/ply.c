@@ -265,8 +265,8 @@ static const double FLOAT_MOST_M = 1000, FLOAT_PART = 0x1p-24;
 static int fail_float(const char *path, double most, struct sh_err *err)
 {
     return sh_fail(err, SH_EINPUT,
-                   "%s: coordinates of %.0f m as float would be wrong by up to %.2g m; allowed without float, and for "
-                   "stations within %g m of the origin",
+                   "%s: coordinates of %.0f m as float would be wrong by up to %.2g m; leave out float, which is "
+                   "allowed for stations within %g m of the origin",
                    path, most, most * FLOAT_PART, FLOAT_MOST_M);
 }
 
@@ -279,7 +279,7 @@ static int check_float(const char *path, unsigned columns, int in_degrees, const
 {
     if ((columns & PLY_FLOAT) == 0) return 0;
     if (in_degrees)
-        return sh_fail(err, SH_EINPUT, "%s: degrees as float would be wrong by metres; allowed without float", path);
+        return sh_fail(err, SH_EINPUT, "%s: degrees as float would be wrong by metres; leave out float", path);
     const double most = largest(place_m);
     return most <= FLOAT_MOST_M ? 0 : fail_float(path, most, err);
 }

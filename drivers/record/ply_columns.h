@@ -13,8 +13,9 @@
 #include "drivers/record/track.h"
 
 enum { PLY_MAX_HEADS = 128, PLY_PAD_MIN = 8 /* "comment\n" */ };
-/* Lines of the header. The second stands there until the recording has its end. */
-#define PLY_CRS        "comment crs " /* the first comment but for that; it shows that this program wrote the file */
+/* Lines of the header. PLY_CRS begins the first comment, or the second after PLY_INCOMPLETE; it shows that this program
+ * wrote the file. PLY_INCOMPLETE stands there until the recording has its end. */
+#define PLY_CRS        "comment crs "
 #define PLY_INCOMPLETE "comment incomplete: its end is missing, and losses were not counted\n"
 
 struct ply_facts {

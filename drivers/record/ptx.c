@@ -4,9 +4,9 @@
  * place of the grid without a shot: lines may have been lost, and they differ by a pulse where the pulse rate is
  * no multiple of the line rate.
  *
- * The grid of a planar head has a column a turn and a row a step, from the first step that is cast on; that of a
- * sphere a column a ring, and of a pole one shot. Beams and lists of directions have no rows and columns: they
- * are refused.
+ * The grid of a planar head has a column per turn and a row per step; the first row is the first step that is cast.
+ * That of a sphere has a column per ring, and of a pole one shot. Beams and lists of directions have
+ * no rows and columns: they are refused.
  *
  * With colours each line goes on with red, green and blue, 0 to 255; all 0 for a place without a point.
  *
@@ -72,7 +72,7 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
                             .coloured = ptx->base.track.has_colours,
                             .report = ptx->base.options.report};
     int rc = ptx_text_put(&text, err);
-    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before what it was made of goes */
+    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before the cells go that it was made from */
     return rc == 0 ? ptx_grid_clear(g, err) : rc;
 }
 
@@ -193,8 +193,9 @@ static int ptx_finish(void *rec, struct sh_err *err)
     if (rc != 0) return rc;
     recorder_report(rec, ptx->n_left_out, "echoes left out; a PTX grid holds the first of a shot");
     recorder_report(rec, ptx->n_too_bright, "echoes brighter than a white target, which PTX writes as 1");
-    recorder_report(rec, ptx->n_split,
-                    "additional grids begun within a scan, since too many lines or pulses were missing to fill up");
+    recorder_report(
+        rec, ptx->n_split,
+        "additional grids begun within a scan, since too many places were missing to fill up, or lines went back");
     recorder_report(rec, ptx->n_padded, "places of the grid without a shot, filled like shots without echo");
     return 0;
 }

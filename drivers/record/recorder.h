@@ -34,7 +34,7 @@ enum ply_column {
     PLY_ALL = (1 << 9) - 1,
     PLY_FLOAT = 1 << 9,      /* no column: x, y, z and range as float */
     PLY_XYZ = 1 << 10,       /* no column: nothing else is asked for */
-    PLY_DEVIATION = 1 << 11, /* no word: with the attributes, where the head sends it */
+    PLY_DEVIATION = 1 << 11, /* no word for it: it comes with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
 /* Reads such words with commas between them; "xyz" stands for none. Returns 0 if a word is not known, or comes twice.
@@ -47,7 +47,7 @@ struct recorder_options {
     struct colour_choice colour; /* for formats that hold a colour */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads;            /* heads that scan one after the other, each as often as it comes; 0: 1 */
+    uint32_t n_heads;            /* how often a head begins to scan after another one, the first included; 0: 1 */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int las_wdp;   /* waveforms of .las go to a .wdp beside it */

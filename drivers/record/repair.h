@@ -82,7 +82,7 @@ int repair_fail_damaged(const struct repair *repair, uint64_t at, struct sh_err 
 /* SH_EFORMAT: the file is not whole, and another program wrote it. Such files are checked, but never changed: what
  * looks like damage may be a kind of line or block that only that program knows. */
 int repair_fail_foreign(const struct repair *repair, struct sh_err *err);
-/* SH_EFORMAT: "PATH: is no FORMAT, or too little of it came to the disk". */
+/* SH_EFORMAT: the file is not of that format, or too short to tell. */
 int repair_fail_none(const struct repair *repair, const char *format, struct sh_err *err);
 
 #endif

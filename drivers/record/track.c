@@ -30,7 +30,7 @@ static int check_sent(const struct track *t, int did, int does, const char *what
                    did ? "without" : "with", what);
 }
 
-/* Takes those frames beside the points that are wanted and sent. */
+/* Notes which frames beside those of points are wanted and sent. Fails if that has changed since the first points. */
 static int take_sent(struct track *t, struct sh_err *err)
 {
     const struct scanhead *sh = t->sh;

@@ -83,18 +83,18 @@ struct track {
     const struct track_ops *ops;
     void *rec; /* what ops are called with */
     struct colour_choice colour;
-    int no_empty;    /* 1: shots without echo are left out and counted */
-    unsigned spared; /* enum track_column: the recorder reads none of these; may change when a scan begins */
-    /* of the frame that the points at hand are in */
+    int no_empty;           /* 1: shots without echo are left out and counted */
+    unsigned spared;        /* enum track_column: the recorder reads none of these; may change when a scan begins */
     struct scanhead *sh;    /* of the last frame of any kind */
     struct scanhead *named; /* heads in a scene have the same labels: the head that names most of them */
     uint32_t n_named;
+    /* of the stream frame that the points at hand are in */
     struct scanhead_info info;
     struct station_pose pose;
     uint32_t line;  /* in the scan, from 0 */
     uint32_t sweep; /* of the pan (of all rings) in the scan, from 0 */
     int64_t t0_ns;  /* of the first point, since the scan's start */
-    /* of the stream so far; the first six only with points (begun) */
+    /* of the stream so far; the members from begun to stops are set by the first points */
     int begun;
     int crs;  /* enum native_crs; of the recording's points: of the stream in the geo layout, else the scene frame */
     int epsg; /* 0: none */

@@ -91,7 +91,7 @@ void track_pick(struct track *t, const uint16_t *index, int n)
     PICK(t->wave_at);
 }
 
-/* A difference is NaN where one of them is not finite. */
+/* x - x is 0, or NaN where x is not finite. */
 VEC_CLONES static int all_are_finite(const double *restrict x, const double *restrict y, const double *restrict z,
                                      int n)
 {

@@ -39,7 +39,8 @@ struct scene *chart_load_board(const char *image, const char *options, double y_
 
 /* Writes the texel's column and row at u, v. Returns 0 beyond a decal. */
 int chart_texel_of(double u, double v, const enum texture_wrap wrap[2], int *column, int *row);
-/* Returns whether x is too near to a border of the n texels of a side for a mesh, which has coordinates as floats. */
+/* Returns whether x lies near a border between texels, n on a side. There a mesh, whose coordinates are floats, may
+ * fall on either side. */
 int chart_is_near(double x, int n);
 
 #endif

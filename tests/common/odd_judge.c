@@ -6,8 +6,9 @@
 
 #include "core/vec3.h"
 
-/* Returns how wrong the place may be where the ray meets the plane of a triangle. Over the sine of the angle it is 8
- * units of double of the distance of its farthest corner and of the coordinates. */
+/* Returns how wrong the place may be where the ray meets the plane of a triangle. It is 8 * 2^-53 times the sum of the
+ * farthest corner's distance and the scene's diagonal. A thin triangle makes it larger, and so does a small angle
+ * between ray and plane: it is divided by the sine of that angle. */
 static double blur_m(const struct scene *scene, uint32_t triangle, const double at_m[3], const double dir[3])
 {
     double v[3][3], e1[3], e2[3], n[3], far_m = 0.0;

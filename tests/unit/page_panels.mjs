@@ -310,7 +310,7 @@ test('a trial: a suggestion that is refused is told, not asked for again and aga
     for (const s of trial.stations) s.seen = new Uint32Array(2);
     const n = asked.length;
     await trial.suggest();
-    equal([trial.nextError, asked.length], ['The head suggests a place beside at most 16 stations; there are 17.', n]);
+    equal([trial.nextError, asked.length], ['The head can suggest a place only for up to 16 stations; there are 17.', n]);
   });
 });
 

@@ -8,7 +8,7 @@ const HEAD = [
   ['line-rate', 'Lines a second'],
   ['pulses', 'Pulses', 'Delivered since power-up'],
   ['echoes', 'Echoes a pulse', 'Since power-up'],
-  ['lost', 'Pulses lost by the head', 'Cast, but not computed in time'],
+  ['lost', 'Pulses lost by the head', 'Fired within the field of view, but not computed in time'],
   ['late', 'Late blocks', 'Blocks that were sent late, and by how much at most'],
   ['queued', 'Errors in its queue', 'SYSTem:ERRor? reads and removes them, for all clients'],
   ['time', 'Time', 'UTC as the head’s clock has it, or its time since power-up; its offset from a PTP master'],
@@ -31,7 +31,7 @@ const PAGE = [
   ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
 ];
 
-// Any count but 0 is bad in these rows: their names among a head's figures.
+// In these rows any count but 0 is bad. Each row has its name in what figures() of a head returns.
 const LOSSES = {'lost-frames': 'lost_frames', 'repeated': 'repeated_frames', 'late-frames': 'late_frames',
   'restarts': 'jumps_back', 'lost-pulses': 'left_out_pulses', 'dropped': 'dropped_pulses',
   'unplaced': 'unplaced_pulses', 'bad': 'bad_bytes'};

@@ -53,8 +53,7 @@ export function limit(text, step = '', isUpper = false) {
   return readable(text.replace(/^-?\d*\.\d+$/, (all) => inward(all, isUpper)));
 }
 
-// A number with more than four figures after its point is rounded to four; after its first figure, where that comes
-// later.
+// Rounds a number to four decimals or, below 0.1, to four significant figures (at most 12 decimals).
 function inFew(text, round) {
   const value = Number(text), places = Math.min(12, 3 - Math.min(-1, Math.floor(Math.log10(Math.abs(value) || 1))));
   if ((text.split('.')[1] ?? '').length <= places) return text;

@@ -39,7 +39,7 @@ export class Losses {
     this.#isRunning ||= batch.scan === this.#scan;
   }
 
-  /** Points that the head had kept: of a scan that this page joined late they are not missing. */
+  /** Takes points that the head had kept. In a scan that this page joined late they then don't count as missing. */
   past({scan, shots}) {
     if (scan !== this.#before.scan) this.#before = {scan, shots: 0};
     this.#before.shots += shots;
@@ -69,7 +69,7 @@ export class Losses {
         if (!this.#isRunning || e.scan !== this.#scan) this.#ended += e.lost;
         this.#end(e.scan, this.#final(e.scan) ?? {scan_fired: e.fired, scan_cast: null, scan_lost: e.lost}, e.shots);
         break;
-      case 'STATE': // without SCAN_END the next telemetry has the counts, if the last one has not
+      case 'STATE': // if SCAN_END was lost, the last telemetry has the counts, or else the next one
         if (STATES[e.before] === 'scanning' && this.#final(this.#scan)) this.#end(this.#scan, this.#counts, e.shots);
         break;
       case 'OVERRUN':

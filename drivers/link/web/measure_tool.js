@@ -190,7 +190,7 @@ export class MeasureTool {
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
     if (!m.flat && Number.isFinite(spacing)) rows.push(['Points apart, mean', millimetres(spacing),
-      'An edge lies beyond the point that was picked by up to the distance of scan lines there, which may be several times this']);
+      'The real edge may lie further out than the picked point, by up to the distance of scan lines, which may be several times this figure']);
     return rows;
   }
 

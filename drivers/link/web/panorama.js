@@ -31,7 +31,7 @@ export class Panorama {
   #range; // from the head
   #held = 0; // points of the blocks
   #window;
-  #origin; // a cloud that was cleared has another one, and blocks of before lie elsewhere in it
+  #origin; // of the cloud; clearing the cloud changes it, and blocks from before would then lie elsewhere
   #section; // as relativeTo() returns it, or null
 
   constructor(cloud, station, section = null) {
@@ -155,7 +155,7 @@ export class Panorama {
   }
 
   // Returns {block, i} of the point of a pixel, or null. It is null, too, once the block was closed
-  // or the cloud was cleared: make it again.
+  // or the cloud was cleared: the panorama has to be made again then.
   pointAt(x, y) {
     if (this.n === 0 || this.cloud.origin !== this.#origin || x < 0 || y < 0 || x >= this.width || y >= this.height) return null;
     const pixel = this.#shown(y * this.width + x);

@@ -104,8 +104,8 @@ export function isWithin({middle, half, turn: [c, s]}, x, y, z) {
   return Math.abs(c * dx - s * dy) <= half[0] && Math.abs(s * dx + c * dy) <= half[1] && Math.abs(z - middle[2]) <= half[2];
 }
 
-// Returns how far along a line through `at` it comes closest to the ray of a place of the screen; null if the line
-// points at the eye.
+// Returns the distance from `at`, along a line through it, to the point of the line that is closest to the ray of a
+// place of the screen; null if the line points at the eye.
 export function alongLine(camera, at, along, x, y) {
   const o = camera.from(x, y), r = camera.ray(x, y);
   const f = r.map((c) => c / Math.hypot(...r));

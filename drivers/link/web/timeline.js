@@ -120,7 +120,7 @@ export class RecordingPlayer {
 }
 
 // This player is for a head that replays a recording (SCAN:REPLay). After a seek the points from before are taken off
-// the picture, whoever has sought it.
+// the picture, whichever client asked for it.
 export class ReplayPlayer {
   changed = () => {};
   follows = false;

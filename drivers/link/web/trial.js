@@ -11,7 +11,7 @@ const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station rests so long before the finer ones
 const COVER_MS = 500; // while a station is dragged, its cells come so far apart
 const MOST_OF = 16; // stations that a suggestion may be about
-const MOST_RENEWED = 3; // times in a row that the head no longer has what a suggestion is about
+const MOST_RENEWED = 3; // so often in a row stations are asked for again, where the head no longer has them
 
 // These are settings of a station that a preview takes; null: as at power-up.
 export const SETTINGS = ['step_deg', 'far_m', 'line0_deg', 'line1_deg', 'pan0_deg', 'pan1_deg'];
@@ -213,7 +213,7 @@ export class Trial extends EventTarget {
     if (this.stations.length === 0 || this.isBusy) return undefined;
     const all = this.stations.filter((s) => s.seen), before = this.#stamp();
     if (all.length > MOST_OF) {
-      this.nextError = `The head suggests a place beside at most ${MOST_OF} stations; there are ${all.length}.`;
+      this.nextError = `The head can suggest a place only for up to ${MOST_OF} stations; there are ${all.length}.`;
       return this.#tell('change');
     }
     try {

@@ -218,7 +218,7 @@ export class TrialPanel {
     }
     says.hidden = station.error === '';
     say(says, station.error);
-    say(mark, station.error && (station.seen || station.points > 0 ? 'See inside' : 'Nothing is seen from here'));
+    say(mark, station.error && (station.seen || station.points > 0 ? 'Open for the error' : 'Nothing is seen from here'));
   }
 
   #edit(number, key, input) {
@@ -262,7 +262,7 @@ export class TrialPanel {
     const {sum, cells, reach, section} = this.#trial;
     if (!sum || !section) return say(this.inSection, sum ? 'For one room alone: put a Section around it.' : '');
     const {seen_m2, all_m2} = seenWithin(cells, sum.counts, reach, section);
-    return say(this.inSection, all_m2 > 0 ? `In the section: ${percent(seen_m2 / all_m2)} of ${grouped(all_m2)}\u00a0m²` : 'Nothing of it is in the section.');
+    return say(this.inSection, all_m2 > 0 ? `In the section: ${percent(seen_m2 / all_m2)} of ${grouped(all_m2)}\u00a0m²` : 'No part of the surface is in the section.');
   }
 
   // Returns the area that can be seen, or all of it as long as that is not known.

@@ -121,7 +121,7 @@ export class View extends EventTarget {
     this.#frames.ask('restart');
   }
 
-  // Shows the points of another cloud from now on, of the same times. The one before keeps its own.
+  // From now on shows the points of another cloud, within the same window of times. The earlier cloud keeps its window.
   useCloud(cloud) {
     cloud.window = this.cloud.window;
     this.cloud.changed = null;

@@ -26,13 +26,14 @@ export const radians = (deg) => deg * Math.PI / 180;
 export const depthOf = (w) => Math.log2(w / NEAR_M) / Math.log2(FAR_M / NEAR_M);
 
 // In a flat view the depth is 0.5 at the target, with the step there that depthOf has at that distance.
-export const FLAT_REACH = 10; // so many distances from the target the depth is 0.25 or 0.75
+export const FLAT_REACH = 10; // the depth is 0.25 or 0.75 at so many times the target's distance before or behind it
 export function flatDepthOf(w, distance) {
   const x = (w - distance) / (FLAT_REACH * distance);
   return 0.5 + 0.5 * x / (1 + Math.abs(x));
 }
 
-// Returns a double as the sum of two floats; the difference to a float coordinate, hi first, is exact near the eye.
+// Returns a double as the sum of two floats. Near the eye the difference between a float coordinate and hi is exact; lo
+// is subtracted from that difference.
 export function split(v) {
   const hi = v.map(Math.fround);
   return {hi, lo: v.map((c, a) => Math.fround(c - hi[a]))};

@@ -22,7 +22,8 @@ export class Budget {
     this.points = points;
   }
 
-  // A step of `points` took `ms`. If it had fewer points than allowed, it does not apply to larger steps.
+  // A step of `points` took `ms`. A step well below the budget doesn't show that more points would be fast
+  // enough, so it doesn't raise the budget.
   took(ms, points) {
     const factor = Math.min(1.6, Math.max(0.4, this.goal_ms / Math.max(1, ms)));
     if (factor < 1 || points > 0.7 * this.points) this.points = Math.min(MOST, Math.max(LEAST, this.points * factor));

@@ -50,7 +50,7 @@ export class Scale {
     else this.forget();
   }
 
-  // The age of the oldest point before the newest one, where the mode shows ages.
+  // Returns by how much the oldest point is older than the newest one, where the mode shows ages; else NaN.
   get #oldest() {
     const {blocks, latest_s} = this.#cloud;
     return this.mode === 'age' && blocks.length > 0 ? latest_s - Math.min(...blocks.map(({began_s, span}) => began_s + span.from)) : NaN;

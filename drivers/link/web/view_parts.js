@@ -6,7 +6,7 @@ import {MODES, GREY, tableOf, valuesOf} from './view_colours.js';
 import {tableTexture} from './view_gl.js';
 import {isOutside} from './cloud.js';
 
-const STRIDE_MOST = 21; // 255 bytes of 12
+const STRIDE_MOST = 21; // every 21st point at most: a point has 12 bytes, and the largest stride is 255
 
 // This is one block of a cloud: positions, and one number a point for the colour mode.
 class BlockPart {

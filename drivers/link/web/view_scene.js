@@ -31,7 +31,7 @@ export class Solids {
 
   get isPainted() { return this.#painted !== null; }
 
-  // View says what it takes. The same cells again keep their buffers.
+  // view.js describes the arguments. If the cells are the same as before, their buffers are kept.
   paint(cells, seen) {
     if (this.cellsPart && this.#painted?.cells !== cells) {
       this.cellsPart.free();

@@ -211,7 +211,8 @@ export class Stations {
     this.#changed();
   }
 
-  // What follows a drag goes back, too. The pointer may still be down: its further moves do nothing.
+  // The points of a trial, which followed the dragged station, go back with it. The pointer may still be down: its
+  // further moves do nothing.
   cancel() {
     const station = this.moved && this.get(this.moved.number);
     const wasDragged = this.#hold !== null;
