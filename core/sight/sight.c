@@ -111,11 +111,11 @@ static int keep_records(struct build_shared *b, struct sh_err *err)
     const uint64_t bytes = b->record.used * sizeof *s->record;
     resize(&s->record, b->record.used, sizeof *s->record);
     if ((uintptr_t)s->record % sizeof *s->record == 0) return SH_OK;
-    struct sight_record *aligned = aligned_alloc(sizeof *s->record, bytes + sizeof *s->record);
+    void *const misplaced = s->record, *const aligned = aligned_alloc(sizeof *s->record, bytes + sizeof *s->record);
     if (aligned == NULL)
         return sh_fail(err, SH_ENOMEM, "sight: no memory for %llu triangles", (unsigned long long)b->record.used);
-    memcpy(aligned, s->record, bytes);
-    free(s->record);
+    memcpy(aligned, misplaced, bytes);
+    free(misplaced);
     s->record = aligned;
     return SH_OK;
 }
