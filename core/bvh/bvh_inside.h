@@ -25,9 +25,9 @@
  * are larger by that, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float
  * above its range. At that range the real ray is at its triangle. So the float ray is in the triangle's box there, and
  * has entered that box at a shorter range. Rays begin at most 1.5 r from the scene's middle: a ray from further away is
- * moved along its direction until it is that near (hits.c). So nothing here depends on where rays begin. Large triangles
- * hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that origin is where most triangles
- * are, else in the middle.
+ * moved along its direction until it is that near (hits.c). So nothing here depends on where rays begin. Large
+ * triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that origin is where most
+ * triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast
