@@ -78,8 +78,8 @@ static int build(struct bvh *bvh, unsigned threads, const struct sh_report *repo
 }
 
 /* The most leaves that Embree may put at one node of its tree. Four, where it finds that cheaper, save a seventh of
- * the memory, and rays are as fast where surfaces are connected. In foliage a ray would try half as many leaves
- * more. */
+ * the memory, and rays are as fast where surfaces are connected. In foliage a ray would try 1.5 times as many
+ * leaves. */
 static unsigned most_together(const struct scene *scene)
 {
     const int is_large = scene->n_triangles >= 500000, hangs_together = scene->n_vertices <= 0.6 * scene->n_triangles;

@@ -7,8 +7,9 @@
  * triangle where the sides of its edges, taken one way round, don't differ. Where the rounding of single precision
  * can't change that sign, vectors compute it in single precision (meet.c). Else it is computed again in double
  * (edges.h), in one way for both triangles of the edge. Both then get the same number with opposite signs, so no ray
- * passes between them. A ray that meets nothing nearer, but passes the edges of a triangle by less than their rounding,
- * meets that triangle. So nothing passes at corners, either, nor where a corner lies on another's edge up to rounding.
+ * passes between them. A ray that misses a triangle by less than the rounding at its edges meets that triangle, unless
+ * it meets something nearer. So nothing passes at corners, either, nor where a corner lies on another's edge up to
+ * rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). The nearest of the triangles that a ray
  * meets is the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever
@@ -20,12 +21,13 @@
  * direction over the range, which is |o| + |h| at most. Embree's test of a box is the fast one for such geometry,
  * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their difference
  * it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than their
- * triangles by 8 (2 r + |h|), r being the radius of the scene. Where that is more than 9 R + 17 |h|, boxes are larger
- * by this, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float above its
- * range. At that range the real ray is at its triangle, so the float ray is in its box, and has entered it before. Rays
- * begin at most 1.5 r from the scene's middle: a ray from further away is moved along its direction until it is that
- * near (hits.c). So nothing here depends on where rays begin. Large triangles hardly enlarge the boxes of small ones
- * near the BVH's origin. In a large scene that origin is where most triangles are, else in the middle.
+ * triangles by 8 (2 r + |h|), r being the radius of the scene. R is BVH_STRETCH_M. Where 9 R + 17 |h| is less, boxes
+ * are larger by that, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float
+ * above its range. At that range the real ray is at its triangle. So the float ray is in the triangle's box there, and
+ * has entered that box at a shorter range. Rays begin at most 1.5 r from the scene's middle: a ray from further away is
+ * moved along its direction until it is that near (hits.c). So nothing here depends on where rays begin. Large
+ * triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that origin is where most
+ * triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast

@@ -57,7 +57,7 @@ void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args)
 
 /* ---- the way in and out */
 
-/* Directions, in double and as Embree gets them. */
+/* Turns the directions into the mesh's frame, in double. */
 VEC_CLONES
 static void turn_directions(const struct bvh_query *query, const struct scene_copy *copy, struct bvh_query *in)
 {

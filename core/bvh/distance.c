@@ -61,10 +61,10 @@ static int is_inside(double corner[3][3], double edge[3][3], const double normal
     return 1;
 }
 
-/* The point of the triangle nearest to the origin. First come the edges, whose points are as exact on a needle. Then
+/* The point of the triangle nearest to the origin. First come the edges: their points are exact even on a needle. Then
  * comes the face, whose plane is taken through the edges' nearest point. The error of a needle's normal is an angle of
- * about 2^-53 l / h (length, height). Over the distance d that moves the foot by d times the angle, so the foot only
- * stays inside where the angle is below h / d. Then the error of the distance is below 2^-53 l. */
+ * about 2^-53 l / h (length, height). Over the distance d this error moves the foot by d times the angle, so the
+ * foot only stays inside where the angle is below h / d. Then the error of the distance is below 2^-53 l. */
 static double nearest_on_triangle(double corner[3][3], double nearest[3])
 {
     double edge[3][3], normal[3], best2 = INFINITY;

@@ -74,7 +74,7 @@ static inline int is_beside(const double a[3], const double b[3], const double d
     double e[3], across[3];
     vec3_sub(b, a, e);
     const double ee = vec3_dot(e, e), ed = vec3_dot(e, dir), dd = vec3_dot(dir, dir);
-    const double along = ed * vec3_dot(a, dir) - dd * vec3_dot(a, e); /* from a to b it goes from 0 to ... */
+    const double along = ed * vec3_dot(a, dir) - dd * vec3_dot(a, e); /* 0 at a; ee * dd - ed * ed at b */
     if (along >= 0.0 && along <= ee * dd - ed * ed) return 1;
     const double *end = along < 0.0 ? a : b;
     vec3_cross(end, dir, across);

@@ -23,7 +23,7 @@ struct bvh_leaf {
     uint32_t triangle;    /* number of triangle 0 */
     struct bvh_plane plane[2];
 } __attribute__((aligned(128)));
-_Static_assert(sizeof(struct bvh_leaf) == 128, "there are half as many as triangles");
+_Static_assert(sizeof(struct bvh_leaf) == 128, "a leaf is two cache lines");
 
 enum {
     BVH_LEAF_BITS = 6,       /* lowest bits of each number of base_m, which hold other figures */

@@ -13,7 +13,8 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-/* A leaf's edges, from one corner to another: three of triangle 0, whose second one triangle 1 has the other way. */
+/* A leaf's edges, from one corner to another: three of triangle 0, then two of triangle 1. The third edge of triangle 1
+ * is the second of triangle 0 in the other direction. */
 enum { EDGES = 5 };
 static const uint8_t edge_from[EDGES] = {0, 1, 2, 1, 3}, edge_to[EDGES] = {1, 2, 0, 3, 2};
 

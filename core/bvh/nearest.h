@@ -24,8 +24,8 @@ VEC_INLINE float tfar_of(double nearest_m, double start_m)
     return float_above(nearest_m + BVH_SAME * nearest_m - start_m);
 }
 
-/* Takes a hit that is as near as the nearest: the lowest number wins. Where the hit so far turns out not to be as
- * near, it may have kept out others that are: the ray is cast again. */
+/* Takes a hit that is as near as the nearest: the lowest number wins. Where the hit so far turns out to be
+ * further, its low number may have kept out hits that are as near: the ray is cast again. */
 static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     const double nearest_m = query->range_m[lane];
@@ -36,8 +36,8 @@ static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t tri
     query->hit_m[lane] = range_m;
 }
 
-/* Takes a hit. It is as near as first_m, which is no further than the nearest so far, or counts as equally
- * near. */
+/* Takes a hit at range_m, which counts as equal to first_m. first_m is no further than the nearest so far, or counts as
+ * equal to it. */
 VEC_INLINE void bvh_take_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m,
                              double first_m)
 {

@@ -34,7 +34,7 @@ struct bvh_query {
     uint32_t width;            /* rays of the call */
     int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
     double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points at_local is the first of them */
-    double most_m;             /* of a float ray, as in struct bvh_batch */
+    double most_m;             /* greatest length of a float ray; INFINITY: any */
     /* [BVH_PACKET] each, in the arrays of all rays or in `room`; of lanes without a ray: any. */
     const double *dir[3], *org[3], *local[3];
     const float *dir_float;        /* [3][width] dir for Embree; may be read on to BVH_PACKET */
@@ -64,8 +64,9 @@ struct bvh_nested {
     ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
 _Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");
 
-/* Embree's context at its beginning; `width` rays through the BVH. */
+/* Sets up Embree's context. */
 void bvh_begin_query(struct bvh_query *query);
+/* Casts `width` rays through the BVH. */
 void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width);
 
 /* Forgets the near misses of the packet before. */
@@ -105,7 +106,7 @@ struct bvh_batch {
     double far_m;   /* no ray begins further from the BVH's origin */
     double apart_m; /* no two rays begin further from each other; 0: all at one point */
     float t_max;
-    double most_m;                 /* of a float ray; INFINITY: what is further than t_max may or may not be met */
+    double most_m;                 /* greatest length of a float ray; INFINITY: hits beyond t_max may be missed */
     struct bvh_counters *counters; /* counted up */
 };
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch);

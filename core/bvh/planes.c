@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Planes of triangles in double: ranges, labels and steepness from them. Loops over arrays that compilers turn into
- * vectors. */
+/* Planes of triangles in double: ranges and steepness from them; labels of rays. Loops over arrays that compilers turn
+ * into vectors. */
 #include "core/bvh/planes.h"
 
 #include <math.h>
@@ -46,7 +46,8 @@ int bvh_find_planes(struct bvh *bvh, const struct sh_report *report, struct sh_e
     if (bvh->at_plane == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory for %u triangles", n);
     for (uint32_t i = 0; i < n_leaves; i++) {
         if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
-        for (uint32_t which = 2; which-- > 0;) /* a triangle that is alone is the first */
+        /* A triangle that is alone in its leaf is entered twice: its first plane, entered last, counts. */
+        for (uint32_t which = 2; which-- > 0;)
             bvh->at_plane[bvh_leaf_triangle(&bvh->leaf[i], (int)which)] = 2 * i + which;
     }
     bvh->at_plane[n] = 2 * n_leaves;

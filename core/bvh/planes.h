@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: planes of triangles, in double, give rays their labels and steepness. */
+/* Private to core/bvh: planes of triangles, in double; labels and steepness of rays. */
 #ifndef CORE_BVH_PLANES_H
 #define CORE_BVH_PLANES_H
 

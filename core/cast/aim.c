@@ -76,7 +76,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
     const int wobbles = s->disturbance != NULL && s->disturbance->n_wobbles != 0;
     struct kernel_leg leg;
-    /* Where nothing turns the head on its way, beams are turned once, by the same arithmetic. */
+    /* Where the head does not turn on its way, one rotation holds for the chunk, as for a head that stands. */
     const int straight = moves && find_leg(s, k, k->dt_ns, 0, k->n, &leg) == k->n && leg.turn == 0.0 &&
                          (s->disturbance == NULL || s->disturbance->slip_turn == 0.0);
     const int turns_later = moves && !straight;
@@ -105,7 +105,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     move(s, k, k->dt_ns, k->n, &m);
 }
 
-/* The same of directions and origins in socs. */
+/* As slipped_rotation, for directions and origins in socs: turns them by the slip. */
 static void slip_bent(struct caster *c, const struct chunk *k, int offset)
 {
     double slip[9], back[9];
@@ -174,7 +174,8 @@ void caster_aim(struct caster *c, struct chunk *k)
         aim_ideal(c, k, &(struct kernel_turns){k->n, l->mirror_turn, l->pan_turn});
 }
 
-/* Reads entries at .. at + n; overwrites c->socs. Where the head moves, they have the times dt_ns. */
+/* Computes what the encoders read of entries at .. at + n. Overwrites c->socs and, where the head moves, c->read. There
+ * dt_ns are the entries' times. */
 static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const uint32_t *dt_ns)
 {
     const struct cast_setup *s = k->s;

@@ -52,7 +52,7 @@ int caster_create(struct caster **out, struct sh_err *err)
     memset(&c->counters, 0, sizeof c->counters);
     int rc = bvh_work_create(&c->nearest.bvh, err);
     if (rc == SH_OK) rc = sight_work_create(&c->nearest.sight, err);
-    if (rc == SH_OK) c->sub_rays = aligned_alloc(64, (sizeof *c->sub_rays + 63) / 64 * 64); /* likewise */
+    if (rc == SH_OK) c->sub_rays = aligned_alloc(64, (sizeof *c->sub_rays + 63) / 64 * 64); /* not touched, either */
     if (rc == SH_OK && c->sub_rays == NULL) rc = sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     if (rc == SH_OK) return SH_OK;
     caster_free(c);
@@ -125,7 +125,8 @@ static void hide(struct caster *c, const struct chunk *k)
     c->counters.hidden += caster_hide(k->s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
 }
 
-/* Returns NULL where nobody wants waveforms: no setup, no memory, no room in the block. */
+/* Returns NULL where there are no waveforms: the caster or the setup has none, or they are neither sent nor searched
+ * for echoes. */
 static const struct wave_chunk *begin_waves(struct caster *c, const struct chunk *k, struct wave_chunk *waves)
 {
     if (c->waves == NULL || k->s->waves == NULL) return NULL;

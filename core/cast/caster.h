@@ -24,7 +24,7 @@ struct caster {
     uint8_t body[CHUNK];
     struct echo_list list;
     /* touched only where the head moves, or is not ideal: */
-    struct chunk_vectors socs, read; /* directions, socs: of the beam; as the encoders read it, or its origin */
+    struct chunk_vectors socs, read; /* socs: of the beams; as the encoders read them, or beams' origins */
     struct chunk_vectors origin;     /* of beams that don't begin where the head is, prcs */
     struct path_rays paths;          /* touched only where there is glass or a mirror */
     uint32_t secondary_a[CAST_LIST], secondary_b[CAST_LIST], secondary_c[CAST_LIST]; /* on their way into the block */

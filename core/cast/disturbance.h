@@ -7,7 +7,8 @@
 
 struct echo_list;
 
-/* socs -> socs: directions as the encoders read them become those of a beam whose pan has slipped. */
+/* Sets `slip` to the rotation, in socs, that turns directions as the encoders read them to those of the beams, after
+ * the pan has slipped. */
 void caster_slip(const struct cast_disturbance *disturbance, double slip[9]);
 /* Makes all shots empty, as of a laser that does not fire. */
 void caster_darken(struct echo_list *l);

@@ -128,7 +128,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
         l->secondary[g].n = merge_pulse(l, &how, &l->secondary[g], k->texels);
 }
 
-/* Returns whether echoes are found in waveforms: they are detected, and have noise. */
+/* Returns whether echoes are found in waveforms. Such echoes are detected already, and have their noise. */
 static int finds_echoes(const struct chunk *k)
 {
     return k->waves != NULL && k->waves->how->finds;
@@ -159,8 +159,8 @@ static void detect(struct caster *c, const struct chunk *k)
     c->counters.faint += before - kernel_count_echoes(l->range_m, l->n);
 }
 
-/* With a signal model, noise that doesn't depend on the signal was asked for: a soiled window leaves it as
- * it is. */
+/* Where there is a signal model, and yet this noise is used, the user asked for fixed noise: a soiled window does not
+ * change it. */
 static double fixed_sigma_m(const struct cast_setup *s)
 {
     const int is_modelled = s->detect != NULL && s->detect->signal != NULL;
@@ -252,7 +252,7 @@ uint32_t caster_max_echoes(const struct cast_setup *s)
     return s->max_echoes != 0 && s->max_echoes < most ? s->max_echoes : most;
 }
 
-/* Keeps those echoes in the list that pulses send, of pulses with several. */
+/* Of pulses with several echoes, keeps in the list only those that are sent. */
 static void choose_echoes(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;

@@ -41,7 +41,7 @@ struct chunk;
 
 /* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
 uint32_t echoes_secondary(struct echo_list *list, uint32_t pulse, uint32_t n);
-/* The list has a place for each pulse. */
+/* Turns the hits in the list, which has a place for each pulse, into the echoes that are sent. */
 void caster_echoes(struct caster *c, const struct chunk *k);
 /* The second half of caster_echoes: which returns are detected, their noise, and which of them are sent. It is called
  * by itself for a list without returns, since noise in waveforms may still make echoes. */

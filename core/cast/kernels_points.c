@@ -55,7 +55,7 @@ void kernel_values(const int16_t *restrict value, const uint8_t *restrict echo, 
     }
 }
 
-/* Back and forth, in units of 0.01 ns. Floats hold all that is sent: 16 bits. */
+/* Widths in range become times back and forth, in units of 0.01 ns. Floats are exact enough for the 16 bits sent. */
 VEC_CLONES
 void kernel_widths(const float *restrict width_m, const uint8_t *restrict echo, uint32_t n, uint16_t *restrict out)
 {

@@ -65,7 +65,7 @@ VEC_INLINE void find_middles(double zero, double count, double more, double unit
 
 /* The part of a line that the kernels work on. */
 struct part {
-    uint32_t blocks, skip; /* blocks that the pulses lie in; pulses of the first one before them */
+    uint32_t blocks, skip; /* blocks that the pulses lie in; places of the first one before the first pulse */
     struct middles mirror, pan;
 };
 

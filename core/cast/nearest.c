@@ -37,7 +37,7 @@ static void keep_nearer(struct nearest *w, const struct cast_mover *m, uint8_t b
     }
 }
 
-/* Casts into a body outside of the scene, in the body's own frame: its nearer hits replace the others. */
+/* Casts into a body that is not in the scene's BVH, in the body's own frame: its nearer hits replace the others. */
 static void cast_body(struct nearest *w, const struct cast_setup *s, uint8_t body, const struct met *met)
 {
     const struct cast_mover *m = caster_body(s, body);

@@ -125,8 +125,8 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
 
 /* Whether the centre is certainly on its side of the lines. Where the outlines' floats and the ray's hit
  * might disagree, the centre's hit says nothing about its part. Floats from the station have an error of
- * 2^-24 of the range: less than
- * 1e-3 of the radius where that is 6e-5 of the range or more, as beams of 0.12 mrad and wider have it. */
+ * 2^-24 of the range. That is 1e-3 of the radius of a beam of 0.12 mrad, 6e-5 of the range, and less of wider ones. The
+ * limit is twice that. */
 static int is_centre_clear(const struct beam_line *line, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)

@@ -121,7 +121,7 @@ static float met_sigma(const struct caster *c, const struct cast_setup *s, const
     const struct pool *p = &c->sub_rays->pool;
     const struct beam *beam = &s->beam->beam;
     const struct beam_part part = {.xx = (double)p->xx[i], .xy = (double)p->xy[i], .yy = (double)p->yy[i]};
-    if (p->triangle[i] == BVH_NO_TRIANGLE) /* of a body that moves, whole footprints, with an incidence */
+    if (p->triangle[i] == BVH_NO_TRIANGLE) /* on a body that moves: only the incidence is known */
         return beam_round_sigma(beam, p->range_m[i], p->cosine[i], part.xx);
     struct bvh_plane plane;
     bvh_get_plane(s->bvh, p->triangle[i], &plane);
@@ -152,7 +152,7 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     }
 }
 
-/* Adaptive, and a part of the footprint lies on glass or a mirror: the scene seen there has outlines of its
+/* Returns whether a part of an adaptive footprint lies on glass or a mirror: what is seen there has outlines of its
  * own. */
 static int sees_through(const struct caster *c, const struct cast_setup *s, const struct job *job)
 {
@@ -287,8 +287,8 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
 }
 
 /* The range up to which outlines may cut a footprint. Its centre hits a surface at range_m, and steep is 1
- * / cos^2 of the incidence. The limit is beyond the hit by some footprints, and by more than twice the
- * surface's slope, since the surface may bend away. */
+ * / cos^2 of the incidence. The limit lies 4 radii of the footprint beyond the hit, and 3 more
+ * times 1 / cos, since the surface may bend away: a footprint on a plane reaches tan(incidence) radii beyond. */
 static double limit_m(const struct beam *beam, double range_m, float steep)
 {
     double s = steep < 1e6f ? (double)steep : 1e6;

@@ -8,8 +8,8 @@
 enum {
     POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
     POOL_ROOM = POOL + 16, /* arrays of a power of two would collide in a cache */
-    MAX_JOBS = 256,        /* pulses with sub-rays, likewise */
-    MAX_PASSES = 4,        /* over their outlines */
+    MAX_JOBS = 256,        /* pulses with sub-rays worked on at a time */
+    MAX_PASSES = 4,        /* times that the outlines of a pulse are searched */
 };
 
 /* Sub-rays; those of a job lie together. */
@@ -55,7 +55,7 @@ struct sub_ray_work {
     struct beam_near candidate[CHUNK]; /* pulses to look at */
     struct beam_near reach[CHUNK];     /* with glass or mirrors: those near outlines */
     uint32_t near[CHUNK], n_near;      /* those with sub-rays, in order */
-    uint32_t again[CHUNK], n_again;    /* glass or a mirror was hit beside the centre */
+    uint32_t again[CHUNK], n_again;    /* those that hit glass or a mirror: whole footprints */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
     int scattered; /* the pool's rays have nothing in common */
@@ -80,8 +80,8 @@ void caster_sub_rays(struct caster *c, const struct chunk *k);
 /* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
 /* Sub-rays over the whole footprint. */
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
-/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where the rays for `known`
- * outlines are enough (0: the central ray). */
+/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where there are as many as `known`, so that
+ * the rays at hand are enough (known 0: the central ray). */
 int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double limit_m, uint32_t known);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This stage makes the light of each pulse that comes back, over time. It takes a pulse's returns before merging:
+/* This stage samples the light of each pulse that comes back, over time. It takes a pulse's returns before merging:
  *
  *     one ray for the whole footprint    a disc on the plane that it hits: the closed form
  *     parts of a footprint that is cut   a bell each, as wide as the part is deep
@@ -89,8 +89,8 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
 /* Up to so many returns stay as they are. */
 enum { FEW = 16 };
 
-/* Two equal pulses d apart differ from the one that they are joined to by a third moment of at most 0.096 d^3. With d
- * a fifteenth of a pulse's width that is 1e-4 of its peak: less than half a count of 12 bits. */
+/* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. With d a fifteenth of a
+ * pulse's width the signal changes by 1e-4 of its peak: less than half a count of 12 bits. */
 static double least_apart_m(const struct cast_waves *waves)
 {
     return 0.5 * LIGHT_SPEED_M_S * waveform_pulse_area_s(waves->waveform) / 16.0;

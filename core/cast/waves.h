@@ -29,7 +29,7 @@ struct wave_work {
     } of[CHUNK];
     struct wave_part part[CHUNK * WAVES_PARTS];
     uint32_t n_parts;
-    uint8_t merged[CHUNK]; /* where echoes are found: how many the returns would have made */
+    uint8_t merged[CHUNK]; /* where echoes are found in samples: how many the merged returns give */
     /* of the pulse at hand: */
     struct waveform_return returns[WAVES_PARTS];
     struct waveform_record record;

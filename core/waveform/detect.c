@@ -38,8 +38,8 @@ static void detect_mark(const struct finder *finder, const struct waveform_windo
     }
 }
 
-/* A maximum stands out by 15 %, which the shape of an echo on a plane never does, and by 6.5 sigma: the noise of 20
- * samples spans more than that once in 1,000. */
+/* A maximum has to stand out by 15 %: within the echo of one plane no second maximum does. It also has to stand out by
+ * 6.5 sigma: the noise of 20 samples spans more than that once in 1,000. */
 static double detect_prominence(const struct finder *finder, double y)
 {
     return fmax(6.5 * finder->noise, 0.15 * y);
@@ -85,9 +85,9 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
     return n;
 }
 
-/* The parabola through the logarithms of three samples is exact for a Gaussian. A neighbour of zero or less is noise
- * of a pulse that is short beside the sampling: it counts as 2 % of the top. A larger neighbour is noise, too, and says
- * nothing of a top: the parabola through it may have its own anywhere. */
+/* The parabola through the logarithms of three samples is exact for a Gaussian. Where pulses are short beside
+ * the sampling, noise may make a neighbour zero or less: it counts as 2 % of the top. A neighbour above the top is
+ * noise, too, and says nothing of a top: the parabola through it may have its top anywhere. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place)
 {
     const double y = run->y[top], least = 0.02 * y;

@@ -25,8 +25,8 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
 }
 
 /* Returns the height of a top that stays above the limit for `span` samples: the level sinks on both sides of h's
- * peak until h is above it for that long. *centroid: where the pulse then is, after the moment in which it reaches
- * the limit. */
+ * peak until h is above it for that long. *centroid: how long after reaching the limit the pulse has its
+ * centroid, in samples. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);

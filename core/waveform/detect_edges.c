@@ -29,7 +29,7 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
 }
 
 /* Another echo may begin once the signal is 5 sigma below the level: noise on a slow tail would cross it again. Where
- * noise is above the level, a sample may be below both at its crossing: the echo has that sample at least. */
+ * noise is above the level, the sample at the crossing may already be below `again`: the echo has at least that one. */
 void finder_threshold(const struct finder_run *run, double level, struct finder_list *list)
 {
     const double *y = run->y, at = level * run->finder->peak;

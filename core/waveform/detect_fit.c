@@ -75,7 +75,8 @@ static double fit_step(const struct fit_sums *m, double peak, double p[3])
     return peak * (p[0] * r[0] + p[1] * r[1] + p[2] * r[2]);
 }
 
-/* Chooses the samples within FINDER_NEAR sigma, at least 4. Returns 0 if the peak's samples don't reach both flanks. */
+/* Chooses the samples within FINDER_NEAR sigma, at least 3. Returns 0 if there are fewer, or if the peak's samples
+ * don't reach both flanks. */
 static int fit_samples(const struct finder_peak *peak, const struct finder_term *g, uint32_t *lo, uint32_t *hi)
 {
     double reach = fmax(FINDER_NEAR * g->sigma, 1.5), from = ceil(g->at - reach), to = floor(g->at + reach);

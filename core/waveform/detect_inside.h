@@ -29,7 +29,7 @@ struct finder_term {
     double at, sigma, peak;
 };
 
-/* An echo of a plane that is tilted so far, without noise: its true figures beside those of the term that fits it
+/* The echo of a plane of one of the tilts, without noise: its true figures beside those of the term that fits it
  * best. A real head is adjusted on such targets. */
 struct finder_spread {
     double sigma;     /* of that term */
@@ -38,7 +38,7 @@ struct finder_spread {
     double width;     /* of the echo, full at half maximum */
     double half_lead; /* from the echo's rising half maximum to its centroid */
     double misfit;    /* RMS of echo minus term near its middle, over its peak */
-    double tail;      /* most of echo minus term further out, over its peak */
+    double tail;      /* largest difference of echo and term further out, over its peak */
 };
 
 /* This is the pulse h, as detectors know it. It is constant after finder_learn. */
@@ -52,10 +52,10 @@ struct finder {
     uint32_t blind;                              /* samples without signal after a limited one */
     double metre;                                /* range of one sample */
     struct finder_spread spread[FINDER_SPREADS]; /* by growing tilt; the first is a plane that is hit head on */
-    double lead[FINDER_LEADS];    /* by v: from the first crossing of exp(-v v / 2) of h's peak to its centroid */
+    double lead[FINDER_LEADS];    /* by v: from h's rise through exp(-v v / 2) of its peak to its centroid */
     int gaussian;                 /* h is one */
     double middle;                /* from the centroid of h to its middle, in widths */
-    double reach[2];              /* sigmas: before and after them a term is nothing */
+    double reach[2];              /* so many sigmas before and after its middle a term ends */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
     double shape[FINDER_SHAPE];   /* h over its peak */
     uint32_t top;                 /* entry of the first maximum above a half in it */
@@ -84,7 +84,7 @@ void finder_by_width(const struct finder *finder, double width, struct finder_sp
 
 enum finder_mark { FINDER_PLAIN, FINDER_LIMITED, FINDER_BLIND };
 
-/* The samples of one window. A blind sample has the value of the limit, so that no echo seems to begin after it. */
+/* The samples of one window. A blind sample repeats the sample before it, so that no echo seems to begin after it. */
 struct finder_run {
     const struct finder *finder;
     const double *y; /* [n] */

@@ -185,7 +185,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     struct learn_echo echo;
     finder->metre = 0.5 * LIGHT_SPEED_M_S * spec->sample_s;
     finder->signal = spec->full_scale / (most - spec->baseline_counts);
-    finder->noise = 0.0; /* of what follows */
+    finder->noise = 0.0; /* the signals measured below have none */
     finder->gaussian = spec->shape == WAVEFORM_GAUSSIAN;
     finder->limit = INFINITY;
     finder->blind = spec->saturation > 0.0 ? (uint32_t)waveform->dead : 0;

@@ -201,7 +201,7 @@ static double mix_within(double x, double least, double most)
 }
 
 /* Takes a step, but a shortened one: a peak changes by at most a factor of e^2, a centre by 1.5 sigma. A centre
- * stays among the samples, unless the window ends there. */
+ * stays among the samples. Where these end with the window, it may lie 3 sigma of the pulse beyond. */
 static void mix_move(const struct finder_task *task, const double p[MIX_MOST], struct finder_mix *mix)
 {
     const double h = task->run->finder->spread[0].sigma, room = task->hi - task->lo + 1.0;

@@ -20,7 +20,7 @@ struct limit {
 /* clang-format off */
 static const struct limit limits[] = {
     {"a pulse's width",             "ns",                  AT(width_s),      1e-11, 1e-6, 1e9,  FORMULA,    0},
-    {"a pulse's fall by its rise",  "times",               AT(skew),         1.0,   3.0,  1.0,  ASYMMETRIC, 0},
+    {"a pulse's fall/rise ratio",   "times",               AT(skew),         1.0,   3.0,  1.0,  ASYMMETRIC, 0},
     {"the step of a pulse's table", "ns",                  AT(table_step_s), 1e-12, 1e-7, 1e9,  TABLE,      0},
     {"a receiver's bandwidth",      "MHz",                 AT(bandwidth_hz), 1e6,   1e11, 1e-6, ALL,        1},
     {"the time between samples",    "ns",                  AT(sample_s),     5e-11, 1e-7, 1e9,  ALL,        0},
@@ -67,9 +67,9 @@ static int check_gate(const struct waveform_spec *spec, struct sh_err *err)
 {
     const double sample_m = 0.5 * LIGHT_SPEED_M_S * spec->sample_s, long_m = spec->far_m - spec->near_m;
     if (long_m >= sample_m && long_m <= (WAVEFORM_MAX_SAMPLES - 1) * sample_m) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "a window from %.6g to %.6g m: %.4g to %.6g m are allowed, 1 to %d samples",
-                   spec->near_m, spec->far_m, sample_m, (WAVEFORM_MAX_SAMPLES - 1) * sample_m,
-                   WAVEFORM_MAX_SAMPLES - 1);
+    return sh_fail(err, SH_EINPUT,
+                   "a window from %.6g to %.6g m: %.4g to %.6g m of length are allowed, 1 to %d samples", spec->near_m,
+                   spec->far_m, sample_m, (WAVEFORM_MAX_SAMPLES - 1) * sample_m, WAVEFORM_MAX_SAMPLES - 1);
 }
 
 static int check_windows(const struct waveform_spec *spec, struct sh_err *err)

@@ -46,8 +46,8 @@ static struct span span_of(const struct sampling *s, uint32_t i)
     return (struct span){from > 0.0 ? (int64_t)from : 0, (int64_t)(centre + reach + w->pulse.lag) + w->after + 2};
 }
 
-/* Returns the first stretch after `from` that returns reach one by one. Light that begins before `from` is in an
- * earlier stretch. */
+/* Finds the first stretch from `from` on that returns cover without a gap. Returns 0 if there is none. Light that
+ * begins before `from` is in an earlier stretch. */
 static int next_stretch(const struct sampling *s, int64_t from, struct span *stretch)
 {
     const uint32_t n = s->n + (s->w->gate_end > 0);
@@ -91,8 +91,8 @@ static void found_add(struct sampling *s, struct found *found, struct span windo
 }
 
 /* Finds the windows of a piece of a stretch. Returns where the next piece begins. If this piece cuts a window, the
- * next one begins at that window, so that it has it whole. Else it begins so far back that a window can begin there.
- * A window with more samples than a piece is cut. */
+ * next piece begins where that window begins, so that it contains the whole window. Else it begins so far back that a
+ * window can begin there. A window with more samples than a piece is cut. */
 static int64_t find_windows(struct sampling *s, struct span piece, int64_t stretch_end, struct found *found)
 {
     const struct waveform *w = s->w;

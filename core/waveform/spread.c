@@ -13,9 +13,9 @@ static uint32_t nodes_of(uint32_t level)
     return level % 2 == 1 ? 8U << level / 2 : 12U << (level / 2 - 1);
 }
 
-/* The marginal of the irradiance exp(-2 r^2) within the unit disc, divided by sqrt(1 - x^2), times the weight sin^2 of
- * Gauss's and Chebyshev's nodes (second kind) at x = cos a: their weight function is the square root, and the rest is
- * entire. */
+/* Returns node i of n of Gauss's and Chebyshev's rule (second kind), at x = cos a. Its weight is sin^2 a times the
+ * marginal of the irradiance exp(-2 r^2) within the unit disc, over sqrt(1 - x^2). That quotient is an entire function,
+ * so the rule converges fast. */
 static struct waveform_node disc_node(uint32_t i, uint32_t n)
 {
     const double a = M_PI * (i + 1) / (n + 1), x = cos(a), y = sin(a);
@@ -29,8 +29,9 @@ static struct waveform_node bell_node(uint32_t i, uint32_t n)
     return (struct waveform_node){x, exp(-0.5 * x * x)};
 }
 
-/* Gauss's nodes for a spread that is even in x, by its moments m: 3 have those up to 5, 5 those up to 9. Their squares
- * are the roots of the polynomials x (x^2 - a) and x (x^4 - a x^2 + b), which are orthogonal to all of lower degree. */
+/* Gauss's nodes for a spread that is even in x, by its moments m: three nodes have the right moments up to the 5th,
+ * five nodes up to the 9th. They are the roots of the polynomials x (x^2 - a) and x (x^4 - a x^2 + b), which are
+ * orthogonal to all of lower degree. */
 static void gauss_nodes(struct waveform_node three[3], struct waveform_node five[5], const double m[10])
 {
     const double a = (m[8] * m[2] - m[6] * m[4]) / (m[6] * m[2] - m[4] * m[4]), b = (a * m[4] - m[6]) / m[2];
@@ -133,7 +134,7 @@ static double extent_of(const struct waveform *w, const struct waveform_return *
 }
 
 /* The ranges on a plane rise as 1 / (1 - b x) across the disc, b = extent / range where the beam has spread far beyond
- * its exit. This is b up to the half that core/footprint.h has, for the second term of the series. */
+ * its exit. Returns b, limited to 0.5 as in core/footprint.h; it weighs the second term of the series. */
 static double bend_of(const struct waveform_return *part)
 {
     if (part->spread != WAVEFORM_DISC) return 0.0;

@@ -15,7 +15,7 @@ struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
     double lead, lag;               /* its first and last step before and behind the centroid, in samples */
-    double scale;                   /* in samples: sigma of a Gaussian as short as the shortest in h */
+    double scale;                   /* in samples: sigma of the Gaussian with 1e-5 in its spectrum where h has it */
     double area_s;
 };
 /* For a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a failure. */
@@ -38,7 +38,7 @@ struct waveform_rule {
 int waveform_rule_make(enum waveform_spread spread, struct waveform_rule *rule, struct sh_err *err);
 void waveform_rule_free(struct waveform_rule *rule);
 
-/* A count is baseline + counts_1 times the signal, which is `most` at most, and its noise. */
+/* A count is baseline + counts_1 * (min(signal, most) + noise), from 0 to top. */
 struct waveform_digits {
     double baseline, counts_1, noise, most, top;
 };

@@ -285,8 +285,8 @@ static void limits_are_told(void **state)
     (void)state;
     static const char *const texts[] = {
         "a pulse's width of 2000 ns: 0.01 to 1000 is allowed",
-        "a pulse's fall by its rise of 0.9 times: 1 to 3 is allowed",
-        "a pulse's fall by its rise of 3.1 times: 1 to 3 is allowed",
+        "a pulse's fall/rise ratio of 0.9 times: 1 to 3 is allowed",
+        "a pulse's fall/rise ratio of 3.1 times: 1 to 3 is allowed",
         "a receiver's bandwidth of 0.0001 MHz: 1 to 100000 is allowed, or 0 for none",
         "the time between samples of 1000 ns: 0.05 to 100 is allowed",
         "a digitiser of 15 bits: 8 to 14 are allowed",
@@ -298,8 +298,8 @@ static void limits_are_told(void **state)
         "noise of -1 times the threshold: 0 to 1e+06 is allowed",
         "windows around a signal of 0 times the threshold: 1e-06 to 1e+09 is allowed",
         "9000 ns kept before an echo and 8 ns behind it: together at most 2048 ns, 2048 samples",
-        "a window from 10 to 700 m: 0.1499 to 613.825 m are allowed, 1 to 4095 samples",
-        "a window from 10 to 10.1 m: 0.1499 to 613.825 m are allowed, 1 to 4095 samples",
+        "a window from 10 to 700 m: 0.1499 to 613.825 m of length are allowed, 1 to 4095 samples",
+        "a window from 10 to 10.1 m: 0.1499 to 613.825 m of length are allowed, 1 to 4095 samples",
         "the near end of the window of -1 m: 0 to 1e+07 is allowed",
         "a pulse's table of 0 values: 2 to 1024 are allowed",
         "value 3 of a pulse's table is -0.5: 0 to 1e30 is allowed",

@@ -54,7 +54,7 @@ static int check_part(const struct reading *r, const struct ifc_part *part)
             if (part->triangle[i][k] >= part->n_vertices) return wrong(r, "a corner that is not a vertex");
     for (int k = 0; k < 4; k++)
         if (isnan(part->colour[k])) return wrong(r, "a colour that is no number");
-    return part->largest_m >= 0.0 && part->largest_m <= MOST_M ? SH_OK : wrong(r, "a rounding out of range");
+    return part->largest_m >= 0.0 && part->largest_m <= MOST_M ? SH_OK : wrong(r, "a rounded coordinate out of range");
 }
 
 static int read_part(struct reading *r)

@@ -5,8 +5,9 @@
 
 #include "core/import/ifc/ifc_product.h"
 
-/* Facets of curves explain this much of an area or a volume: 24 sides for a circle lack 1.1 % of its area, and half the
- * sides in each direction of a sphere twice that. Without curves, only rounding is allowed. */
+/* Facets of curves explain this much of an area or a volume: a polygon of 24 sides has 1.1 % less area
+ * than its circle. A sphere with half as many sides in each direction lacks twice as much. Without curves, only
+ * rounding is allowed. */
 #define CURVED_SHARE     0.03
 #define PLAIN_SHARE      1e-4
 #define BOX_M            0.01
@@ -84,7 +85,7 @@ static const struct {
     [IFC_ONLY_LITE] = {"only ifc-lite makes a body, and this body is used", true},
     [IFC_CLOSED_WEB] = {"ifc-lite leaves the body open: the closed body of web-ifc is used", true},
     [IFC_CLOSED_LITE] = {"web-ifc leaves the body open: the closed body of ifc-lite is used", true},
-    [IFC_OPEN] = {"the body is open, with the same area by both readers", false},
+    [IFC_OPEN] = {"the body is open", false},
     [IFC_FAILED] = {"the reader says that parts of the body failed", true},
     [IFC_UNCUT] = {"no IfcRelVoidsElement says what it opens, so it opens nothing", true},
 };

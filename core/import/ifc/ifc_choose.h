@@ -19,7 +19,7 @@ enum ifc_finding {
     IFC_ONLY_LITE,   /* likewise */
     IFC_CLOSED_WEB,  /* only that one's is closed */
     IFC_CLOSED_LITE, /* likewise */
-    IFC_OPEN,        /* both make the same, which is open */
+    IFC_OPEN,        /* both make the same, or one was run; the body is open */
     IFC_FAILED,      /* the one that is taken admits a failure */
     IFC_UNCUT,       /* the records have an opening that cuts nothing */
     IFC_FINDINGS,

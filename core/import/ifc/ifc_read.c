@@ -174,8 +174,8 @@ static int check_number(struct reading *r)
     return build_fail(
         r->b, SH_EINPUT, r->err,
         "%zu products with bodies need at least a surface each, and the scene already has %u: it holds up to %d, "
-        "since labels have 16 bits; export parts of the model to files of their own, and scan each with a "
-        "configuration",
+        "since labels have 16 bits; export parts of the model to files of their own, and scan each part with a "
+        "configuration of its own",
         n, r->b->scene->n_surfaces, SCENE_MAX_SURFACES);
 }
 
@@ -209,7 +209,7 @@ static int read_by_assimp(struct reading *r, const char *why)
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
 }
 
-/* Warns of an unknown unit: both readers take it for metres. */
+/* Warns of an unknown unit: readers mostly take it for metres. */
 static int say_unit(struct reading *r)
 {
     const struct sh_err *said = &r->records.no_unit;

@@ -36,8 +36,8 @@ static bool is_air(struct text_span type)
     return false;
 }
 
-/* IfcLocalPlacement(PlacementRelTo, RelativePlacement): up to one that is absolute, or that another product's chain has
- * passed. A chain that meets a link of its own has no end. */
+/* IfcLocalPlacement(PlacementRelTo, RelativePlacement): follows PlacementRelTo up to a placement that is absolute, or
+ * that was checked for another product. A chain that meets a link of its own has no end. */
 static int check_placement(struct ifc_records *r, const struct ifc_product *p, struct text_span placement,
                            struct sh_err *err)
 {

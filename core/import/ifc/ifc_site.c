@@ -18,7 +18,7 @@ enum { CONTEXT_TYPE = 1, CONTEXT_WORLD = 4, CONTEXT_NORTH = 5, CONTEXT_ARGS = 6 
 enum { MAP_CRS = 1, MAP_EASTING, MAP_NORTHING, MAP_HEIGHT, MAP_ABSCISSA, MAP_ORDINATE, MAP_SCALE, MAP_ARGS };
 enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
 
-static const char ADVICE[] = "use scene.anchor.source: explicit, which needs neither";
+static const char ADVICE[] = "use scene.anchor.source: explicit, which needs none of this";
 
 struct reader {
     struct ifc_index index;
@@ -142,7 +142,7 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct t
 {
     struct text_span list, part[3];
     size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
-    if (n < min || n > max) return ifc_site_fail(r, at, "needs 2 or 3 numbers");
+    if (n < min || n > max) return ifc_site_fail(r, at, min < 3 ? "needs 2 or 3 numbers" : "needs 3 numbers");
     for (size_t i = 0; i < n; i++)
         if (!step_real(&r->index.text, part[i], &value[i]))
             return ifc_site_fail(r, at, "a coordinate that is not a number");

@@ -10,7 +10,7 @@
 
 /* A style of surfaces, and an item that has it. */
 struct ifc_style {
-    uint64_t item;   /* first, for ifc_first; 0: it is a material's */
+    uint64_t item;   /* the first member, as ifc_first asks; 0: the style is a material's */
     char *name;      /* may be empty */
     float colour[3]; /* 0..1 */
     float clear;     /* its transparency, 0..1 */

@@ -79,7 +79,7 @@ static const char *escape(const char *p, const char *end, char **out)
         *out = ifc_text_put(*out, (uint32_t)(unsigned char)p[3] + 0x80);
         return p + 4;
     }
-    if (end - p >= 4 && p[1] == 'P' && p[3] == '\\') return p + 4; /* a code page: \S\ is read as that of Latin-1 */
+    if (end - p >= 4 && p[1] == 'P' && p[3] == '\\') return p + 4; /* a code page is skipped: \S\ means Latin-1 */
     if (end - p >= 2 && p[1] == '\\') {
         *out = ifc_text_put(*out, '\\');
         return p + 2;

@@ -5,8 +5,8 @@
 
 #include "core/text.h"
 
-/* A text of a STEP file, its quotes around it, as UTF-8 from malloc: \X2\, \X4\, \X\, \S\, '' and raw bytes. Not a text
- * ($, *): empty. NULL: no memory. */
+/* Returns a quoted text of a STEP file as UTF-8, from malloc, with \X2\, \X4\, \X\, \S\, '' and raw bytes decoded.
+ * Returns "" for what is no text ($, *), and NULL without memory. */
 char *ifc_text(struct text_span quoted);
 
 #endif

@@ -222,7 +222,7 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     }
     product->has_body = has_body;
     product->is_far = product->points_m > FAR_M;
-    /* The axis may lie as far on the other side. */
+    /* The axis may lie on the other side of the origin, so the radius may be twice the largest coordinate. */
     if (product->is_turned && !product->is_far) w->r->radius_m = fmax(w->r->radius_m, 2.0 * product->points_m);
     return done;
 }

@@ -84,7 +84,7 @@ static int read_record(const struct text *t, struct text_span all, struct step_r
     for (; p < end && *p >= '0' && *p <= '9' && r->id < UINT64_MAX / 20; p++)
         r->id = 10 * r->id + (uint64_t)(*p - '0');
     if (p == all.p + 1 || equals == NULL || trim(p, equals).n != 0 || open == NULL || open < equals || end[-1] != ')')
-        return text_fail(t, r->line, SH_EINPUT, err, "not STEP: it has no record of the form #1= TYPE(...);");
+        return text_fail(t, r->line, SH_EINPUT, err, "not STEP: this is no record of the form #1= TYPE(...);");
     r->type = trim(equals + 1, open);
     r->args = (struct text_span){open + 1, (size_t)(end - open - 2)};
     return 1;
