@@ -105,7 +105,7 @@ static void see_others(struct soak *soak, uint32_t from, uint32_t to)
 
 enum { HIT = FIRST + 100 };
 
-static struct soak_row *inject(struct soak *soak, enum fault_kind kind, uint64_t n, double for_ms, const char *text)
+static struct fault_note note_of(enum fault_kind kind, uint64_t n, double for_ms, const char *text)
 {
     struct fault_note note = {.fault = 1,
                               .kind = kind,
@@ -120,6 +120,12 @@ static struct soak_row *inject(struct soak *soak, enum fault_kind kind, uint64_t
                               .n = n,
                               .for_ms = for_ms};
     snprintf(note.text, sizeof note.text, "%s", text);
+    return note;
+}
+
+static struct soak_row *inject(struct soak *soak, enum fault_kind kind, uint64_t n, double for_ms, const char *text)
+{
+    const struct fault_note note = note_of(kind, n, for_ms, text);
     send_clean(soak);
     see_others(soak, FIRST, HIT);
     soak_heard(soak, &note);
@@ -187,6 +193,15 @@ static void test_a_resealed_flip(void **state)
     assert_int_equal(finish(soak), 0);
     assert_int_equal(row->accepted, 1);
     assert_int_equal(row->noticed, 0);
+    end(soak);
+
+    soak = make(); /* two of them in one frame */
+    row = inject(soak, FAULT_FLIP, 1, 0, "resealed");
+    const struct fault_note another = note_of(FAULT_FLIP, 1, 0, "resealed");
+    soak_heard(soak, &another);
+    see(soak, HIT, 1, 0.0);
+    assert_int_equal(finish(soak), 0);
+    assert_true(row->injected == 2 && row->accepted == 2);
     end(soak);
 
     soak = make(); /* the library refused it */

@@ -58,7 +58,7 @@ static void judge_resealed(struct soak_link *link, const struct soak_fact *f, in
     else if (!is_known && f->got != 0)
         soak_hide(row, f->resealed, "the clean reader did not get the frame");
     else if (f->got != 0 && is_wrong)
-        row->accepted++; /* once a frame, however many flips hit it */
+        row->accepted += f->resealed;
     else
         decide(row, f->resealed, f->got == 0 && f->gap); /* refused for what it holds, or late */
 }
