@@ -20,8 +20,7 @@ static void find_scanner(struct cfg_reader *rd, struct config *cfg, uint32_t sta
 {
     const size_t row = cfg_row(rd, cfg_find(&rd->table, "head.station"));
     const uint32_t given = rd->line[row][0] != 0 && !rd->bad[row][0] ? cfg->head.settings.station : 1;
-    /* A single station has all stops, which head.station may name by numbers above 1. */
-    const uint32_t i = cfg->n_stations == 1 ? 0 : (station != 0 ? station : given) - 1;
+    const uint32_t i = cfg_station_at(cfg, station != 0 ? station : given);
     rd->scanner = i < cfg->n_stations && cfg->station[i].has_scanner ? (int)i : -1;
     if (station == 0) return;
     cfg->head.settings.station = station;

@@ -10,15 +10,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-int config_serves(const struct config *cfg, uint32_t i)
+uint32_t cfg_station_at(const struct config *cfg, uint32_t number)
 {
     const uint32_t n = cfg->n_stations;
-    uint32_t here = cfg->head.settings.station;
-    if (n < 2 || here == 0) return 1;
-    /* Stops go through all stations in order, again and again. */
-    if (cfg->platform.kind == PLATFORM_STOPS) here = (here - 1) % n + 1;
-    if (here > n) return 1;
-    return cfg->station[i % n].scanner == cfg->station[here - 1].scanner;
+    if (n == 1) return 0; /* it has all stops of a trajectory */
+    /* Without a trajectory stops go through all stations in order, again and again. */
+    return cfg->platform.kind == PLATFORM_STOPS && n > 0 ? (number - 1) % n : number - 1;
+}
+
+int config_serves(const struct config *cfg, uint32_t i)
+{
+    const uint32_t n = cfg->n_stations, here = cfg_station_at(cfg, cfg->head.settings.station);
+    if (n < 2 || cfg->head.settings.station == 0 || here >= n) return 1;
+    return cfg->station[i % n].scanner == cfg->station[here].scanner;
 }
 
 int config_is_alone(const struct config *cfg)
@@ -92,7 +96,7 @@ static void find_same(struct config *cfg, const struct config *const *loaded, ui
 
 static void check_all(struct config *cfg, struct config **own, struct config_faults *faults)
 {
-    const uint32_t here = cfg->head.settings.station - 1;
+    const uint32_t here = cfg_station_at(cfg, cfg->head.settings.station);
     const struct config *loaded[CONFIG_MAX_STATIONS];
     for (uint32_t i = 0; i < cfg->n_stations; i++) {
         const uint32_t as = loaded_as(cfg, i);
@@ -119,11 +123,11 @@ static void check_all(struct config *cfg, struct config **own, struct config_fau
 void cfg_check_scanners(struct config *cfg, struct config_faults *faults)
 {
     struct config *own[CONFIG_MAX_STATIONS] = {NULL};
-    const uint32_t here = cfg->head.settings.station;
+    const uint32_t station = cfg->head.settings.station;
     int any = 0;
     for (uint32_t i = 0; i < cfg->n_stations; i++)
         any |= cfg->station[i].has_scanner;
-    if (!any || cfg->n_stations < 2 || here == 0 || here > cfg->n_stations) return;
+    if (!any || cfg->n_stations < 2 || station == 0 || cfg_station_at(cfg, station) >= cfg->n_stations) return;
     check_all(cfg, own, faults);
     for (uint32_t i = 0; i < cfg->n_stations; i++)
         free(own[i]);

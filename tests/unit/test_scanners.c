@@ -93,6 +93,13 @@ static void stops_have_the_scanner_of_their_station(void **state)
     assert_loads(load_text(with_scene(text)));
     assert_true(cfg->head.settings.lines_uhz == 30000000 && cfg->head.settings.station == 3);
     assert_true(config_is_alone(cfg) && config_serves(cfg, 2));
+    /* Without a trajectory all stations are scanned at each stop: the fifth is the second one's again. */
+    text = "head: {profile: riegl-vz400i, station: 5}\nplatform: {kind: stops, step_s: 1, end_s: 3}\nstations:\n"
+           "  - {position_m: [0, 0, 1]}\n  - {position_m: [1, 0, 1], scanner: {head: {lines_hz: 30}}}\n"
+           "  - {position_m: [0, 1, 1]}\n";
+    assert_loads(load_text(with_scene(text)));
+    assert_true(cfg->head.settings.lines_uhz == 30000000 && cfg->head.settings.station == 5);
+    assert_true(config_serves(cfg, 1) && !config_serves(cfg, 0));
 }
 
 static void sets_reach_the_file_or_one_scanner(void **state)
