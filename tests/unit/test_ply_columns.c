@@ -59,7 +59,7 @@ static void test_float_far_away(void **state)
     put_anchor(NATIVE_CRS_UTM, 32632, 2);
     put_points(0);
     assert_int_equal(record(out_path, (struct recorder_options){.columns = columns}, 1, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, "without float"));
+    assert_non_null(strstr(err.text, "leave out float"));
 
     /* The head starts at the origin and moves: INT32_MAX counts of 10 micrometres. */
     const struct native_anchor origin = {
