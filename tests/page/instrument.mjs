@@ -139,6 +139,7 @@ export async function testInstrument(browser) {
     await page.press('#record');
     const file = await saved('.shs');
     const counts = JSON.parse(execFileSync('/usr/bin/python3', [`${ROOT}tests/page/counts.py`, file], {encoding: 'utf8'}));
+    await page.until(`scanhead.head.figures().pulses >= ${counts.shots}`); // they come with the messages from the worker
     const [pulses, hash] = await page.eval('[scanhead.head.figures().pulses, scanhead.head.figures().point_hash]');
     equal(counts.shots, pulses, 'pulses');
     equal(counts.hash, hash, 'hash over all records');
