@@ -245,7 +245,8 @@ static int wait_idle(struct recording *r, struct sh_err *err)
         if (rc != SH_OK) return rc;
         if (strcmp(r->reply, "idle") == 0) return SH_OK;
         if (strcmp(r->reply, "scanning") == 0 || strcmp(r->reply, "fault") == 0 || strcmp(r->reply, "off") == 0)
-            return sh_fail(err, SH_ESTATE, "the state of the head is %s; --listen records it without commands", r->reply);
+            return sh_fail(err, SH_ESTATE, "the state of the head is %s; --listen records it without commands",
+                           r->reply);
         rc = step(r, 20, err); /* frames keep coming meanwhile */
         if (rc < 0) return rc;
     }
