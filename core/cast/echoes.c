@@ -252,7 +252,7 @@ uint32_t caster_max_echoes(const struct cast_setup *s)
     return s->max_echoes != 0 && s->max_echoes < most ? s->max_echoes : most;
 }
 
-/* Of pulses with several echoes, keeps in the list only those that are sent. */
+/* Keeps in the list only those echoes of a pulse that are sent. */
 static void choose_echoes(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;

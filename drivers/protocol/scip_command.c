@@ -98,7 +98,7 @@ static void adjust_time(struct scip *s, const char *line, size_t len)
     scip_send(s);
 }
 
-/* Of %TM only %TM1 exists. TM0 and TM2, without the %, switch the time mode. */
+/* The % goes with TM1 alone. TM0 and TM2, without it, switch the time mode. */
 static void tell_time_us(struct scip *s, const char *line, size_t len)
 {
     if (line[3] != '1') {

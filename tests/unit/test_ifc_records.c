@@ -104,7 +104,7 @@ static void products_are_found(void **state)
     ifc_records_close(&records);
 }
 
-/* Of a cylinder 30 m high, a cone 40 m high and a pipe whose curve ends at 90, only the radii count. */
+/* Only radii count, not the heights of 30 m and 40 m of a cylinder and a cone, nor the 90 at which a pipe's curve ends. */
 static void heights_are_no_radii(void **state)
 {
     (void)state;

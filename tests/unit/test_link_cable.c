@@ -126,7 +126,7 @@ static void test_tcp_v6(void **state)
     check_tcp("::1", AF_INET6);
 }
 
-/* Of the two options that a socket of IPv6 needs, the second one can't be set. Then neither is. */
+/* A socket of IPv6 needs two options. The second one can't be set, and then neither is. */
 static void test_neither_option(void **state)
 {
     (void)state;

@@ -67,7 +67,7 @@ static void obj_takes_colours_from_its_library(void **state)
     unlink(strcat(strcpy(path, folder), "/my colours.mtl"));
 }
 
-/* Of two definitions of a material the first one counts, in one library or in two. Within it, d counts before Tr. */
+/* The first of two definitions of a material counts, in one library or in two. Within it, d counts before Tr. */
 static void obj_takes_the_first_opacity(void **state)
 {
     (void)state;
