@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "core/bvh.h"
+#include "core/bvh/meet.h"
 
 int embree_fail(enum RTCError code, const char *what, struct sh_err *err)
 {
@@ -19,7 +20,7 @@ int embree_has_packet(RTCDevice device, uint32_t rays)
     const enum RTCDeviceProperty asked = rays == 16  ? RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED
                                          : rays == 8 ? RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED
                                                      : RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED;
-    return rtcGetDeviceProperty(device, asked) != 0;
+    return (rays < BVH_PACKET || bvh_has_wide()) && rtcGetDeviceProperty(device, asked) != 0;
 }
 
 uint32_t embree_packet(RTCDevice device)

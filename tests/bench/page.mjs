@@ -6,7 +6,9 @@
 //   3. decoding, ns a point, in the page and in node
 //   4. memory of the tab while points come and go, --minutes of it
 //   5. how soon a station that is tried has its points and cells, also beside a head at its limit
-//   node tests/bench/page.mjs [--seconds S] [--minutes M] [--only 1,2,3,4,5]
+//   6. the same on 100,000 triangles, beside Blender's geometry nodes on the same scene and step
+//   node tests/bench/page.mjs [--seconds S] [--minutes M] [--only 1,2,3,4,5,6]
+import {spawnSync} from 'node:child_process';
 import {readFileSync} from 'node:fs';
 import {cpus, loadavg} from 'node:os';
 import {resolve} from 'node:path';
@@ -17,7 +19,7 @@ import {folder, write} from '../page/work.mjs';
 
 const ROOT = new URL('../..', import.meta.url).pathname;
 const {values} = parseArgs({options: {seconds: {type: 'string', default: '20'}, minutes: {type: 'string', default: '1'},
-  only: {type: 'string', default: '1,2,3,4,5'}}});
+  only: {type: 'string', default: '1,2,3,4,5,6'}}});
 const seconds = Number(values.seconds), minutes = Number(values.minutes), wanted = values.only.split(',');
 if (!(seconds >= 1 && minutes > 0)) {
   console.error('--seconds: a number from 1 on; --minutes: a number above 0');
@@ -233,6 +235,37 @@ async function trials() {
   console.log(`  Pulses lost by the head meanwhile: ${grouped(busy.stats.lost_pulses)} of ${grouped(busy.stats.pulses)}\n`);
 }
 
+// ---- 6
+const BLENDER = '/usr/bin/blender';
+
+function blenderMoves(scene, middle, size, n) {
+  const {status, stdout, stderr, error} = spawnSync(BLENDER, ['-b', '--factory-startup', '-P', `${ROOT}tests/bench/blender_live.py`, '--', scene, '2',
+    ...[size, n, ...middle].map(String)], {encoding: 'utf8'});
+  if (error) return `${BLENDER} is not there: package blender`;
+  if (status === 77) return 'this Blender is too new for tests/readers/blender_scan.py';
+  if (status !== 0) throw new Error(stderr);
+  return JSON.parse(stdout.split('\n').find((line) => line.startsWith('{')));
+}
+
+async function besideBlender() {
+  const n = 15, size = 1.5, scene = `${folder}/ground.obj`;
+  console.log(`6. A panorama of 2 degrees on 100,000 triangles after its station was moved, ms, of ${n} times`);
+  const middle = spawnSync(`${ROOT}build/tests/bench/write_mesh`, ['100k', scene], {encoding: 'utf8'}).stdout.trim().split(' ').map(Number);
+  const config = write('ground.yaml', `head: {profile: sphere, step_deg: 2}
+scene: {meshes: [{file: ${scene}, up: z, scale: 1}]}
+stations: [{name: middle, position_m: [${middle}]}]
+links: [{type: web}]
+`);
+  const blender = blenderMoves(scene, middle, size, n), {row} = await dropAround(config, 1, middle, size, {n, nice: 0, more: []});
+  const rows = [['', 'points', 'median', 'most'], ['on the page, drawn in software', ...row.slice(0, 3)]];
+  if (typeof blender === 'object') {
+    const ms = blender.ms.sort((a, b) => a - b);
+    rows.push(['in Blender, not drawn', grouped(blender.points), grouped(ms[ms.length >> 1]), grouped(ms.at(-1))]);
+  }
+  table(rows);
+  if (typeof blender === 'string') console.log(`  ${blender}\n`);
+}
+
 console.log(`${cpus()[0].model.replace(/\s+/g, ' ')}, ${cpus().length} processors, load ${loadavg()[0].toFixed(1)} before; ${browserVersion()}, node ${process.version}\n`);
-for (const [number, measure] of Object.entries({1: load, 2: drawing, 3: decoding, 4: memory, 5: trials})) if (wanted.includes(number)) await measure();
+for (const [number, measure] of Object.entries({1: load, 2: drawing, 3: decoding, 4: memory, 5: trials, 6: besideBlender})) if (wanted.includes(number)) await measure();
 process.exit(0);

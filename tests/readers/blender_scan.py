@@ -125,20 +125,31 @@ def figures(mesh):
     return out
 
 
-def scan(path, step_deg, out, stations):
+def load(path):
+    """Returns a mesh file as the one object of the scene."""
     bpy.ops.object.select_all(action="SELECT")
     bpy.ops.object.delete()
     bpy.ops.wm.obj_import(filepath=path, forward_axis="Y", up_axis="Z")
     parts = [o for o in bpy.data.objects if o.type == "MESH"]
     bpy.context.view_layer.objects.active = parts[0]
     bpy.ops.object.join()
-    scene = bpy.context.view_layer.objects.active
+    return bpy.context.view_layer.objects.active
+
+
+def holder_of(nodes=None):
+    """Returns an object whose geometry the nodes make."""
     holder = bpy.data.objects.new("scanner", bpy.data.meshes.new("nothing"))
     bpy.context.collection.objects.link(holder)
-    modifier = holder.modifiers.new("scanner", "NODES")
+    holder.modifiers.new("scanner", "NODES").node_group = nodes
+    return holder
+
+
+def scan(path, step_deg, out, stations):
+    scene = load(path)
+    holder = holder_of()
     with open(out, "wb") as file:
         for station in stations:
-            modifier.node_group = scanner(scene, step_deg, station)
+            holder.modifiers[0].node_group = scanner(scene, step_deg, station)
             done = holder.evaluated_get(bpy.context.evaluated_depsgraph_get())
             figures(done.to_mesh()).tofile(file)
             done.to_mesh_clear()
@@ -149,11 +160,17 @@ def main():
     scan(path, float(step_deg), out, [[float(v) for v in s.split(",")] for s in stations])
 
 
-if bpy.app.version >= (4, 0, 0):
-    os._exit(77)
-try:
-    main()
-except Exception as e:  # Blender itself would end with 0
-    print(f"blender_scan.py: {type(e).__name__}: {e}", file=sys.stderr)
-    sys.stderr.flush()
-    os._exit(1)
+def run(what):
+    """Runs a script's main function. Blender itself would end with 0 after an error."""
+    if bpy.app.version >= (4, 0, 0):
+        os._exit(77)
+    try:
+        what()
+    except Exception as e:
+        print(f"{os.path.basename(sys.argv[sys.argv.index('-P') + 1])}: {type(e).__name__}: {e}", file=sys.stderr)
+        sys.stderr.flush()
+        os._exit(1)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: MIT */
+/* A packet of 16 at a leaf, with AVX-512. It computes what meet.c does, by the same operations in the same order. Rays
+ * are bits of a mask there: compilers make vectors of bytes from that, which cost twice as much. */
+#include "core/bvh/meet.h"
+
+#if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */
+#include <immintrin.h>
+
+#include "core/bvh/bvh_inside.h"
+
+#define WIDE __attribute__((target("avx512f,avx512vl"), always_inline)) static inline
+
+/* Rays that are inside of a triangle for certain, and those of which that is in doubt. */
+struct judged {
+    unsigned in, doubt;
+};
+
+/* Rays that pass an edge on its positive side for certain, and on its negative side. */
+struct sides {
+    unsigned above, below;
+};
+
+WIDE struct sides sides_of(__m512 side, __m512 doubt)
+{
+    return (struct sides){_mm512_cmp_ps_mask(side, doubt, _CMP_GT_OQ),
+                          _mm512_cmp_ps_mask(side, _mm512_sub_ps(_mm512_setzero_ps(), doubt), _CMP_LT_OQ)};
+}
+
+WIDE struct judged judge(struct sides a, struct sides b, struct sides c, unsigned valid)
+{
+    const unsigned in = (a.above & b.above & c.above) | (a.below & b.below & c.below),
+                   out = (a.above | b.above | c.above) & (a.below | b.below | c.below);
+    return (struct judged){in & valid, ~(in | out) & valid};
+}
+
+WIDE __m512 dot(float x, float y, float z, const __m512 v[3])
+{
+    const __m512 xy = _mm512_add_ps(_mm512_mul_ps(_mm512_set1_ps(x), v[0]), _mm512_mul_ps(_mm512_set1_ps(y), v[1]));
+    return _mm512_add_ps(xy, _mm512_mul_ps(_mm512_set1_ps(z), v[2]));
+}
+
+WIDE __m512d dot_8(const double n[3], const double *const v[3], int at)
+{
+    const __m512d xy = _mm512_add_pd(_mm512_mul_pd(_mm512_set1_pd(n[0]), _mm512_loadu_pd(v[0] + at)),
+                                     _mm512_mul_pd(_mm512_set1_pd(n[1]), _mm512_loadu_pd(v[1] + at)));
+    return _mm512_add_pd(xy, _mm512_mul_pd(_mm512_set1_pd(n[2]), _mm512_loadu_pd(v[2] + at)));
+}
+
+WIDE __m512d and_same(__m512d range_m)
+{
+    return _mm512_add_pd(range_m, _mm512_mul_pd(_mm512_set1_pd(BVH_SAME), range_m));
+}
+
+/* tfar_of of eight rays. */
+WIDE __m256 tfar_of_8(__m512d range_m, __m512d start_m)
+{
+    const __m512d x = _mm512_sub_pd(and_same(range_m), start_m);
+    const __m256 f = _mm512_cvtpd_ps(x);
+    const __mmask8 up = _mm512_cmp_pd_mask(_mm512_cvtps_pd(f), x, _CMP_LE_OQ);
+    const __m256i bits = _mm256_castps_si256(f);
+    return _mm256_castsi256_ps(_mm256_mask_add_epi32(bits, up, bits, _mm256_set1_epi32(1)));
+}
+
+/* The plane of a triangle for a packet. */
+struct plane {
+    const struct bvh_plane *of;
+    double least, off;
+    uint32_t triangle;
+    int may_pass; /* there may be a hole */
+};
+
+/* Eight rays from `at` on, of which `in` are inside for certain: takes the triangle as the hit of those for which it is
+ * the nearest so far. Returns those that have to be looked at one by one: it may be as near as another one, or they
+ * see it flat. */
+WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p, int at, __mmask8 in,
+                     double range_m[8], __mmask8 *flat, int own)
+{
+    const __m512d along = dot_8(p->of->n, query->dir, at);
+    const __m512d here = own ? dot_8(p->of->n, query->local, at) : _mm512_set1_pd(p->off);
+    const __m512d range = _mm512_div_pd(_mm512_sub_pd(_mm512_set1_pd(p->of->d), here), along);
+    const __m512d nearest = _mm512_loadu_pd(query->range_m + at);
+    const __mmask8 seen = _mm512_cmp_pd_mask(_mm512_mul_pd(along, along), _mm512_set1_pd(p->least), _CMP_GT_OQ),
+                   ahead = _mm512_cmp_pd_mask(range, _mm512_set1_pd(query->at_origin_m), _CMP_GT_OQ),
+                   as_near = _mm512_cmp_pd_mask(range, and_same(nearest), _CMP_LE_OQ),
+                   nearer = _mm512_cmp_pd_mask(and_same(range), nearest, _CMP_LT_OQ);
+    const __mmask8 counts = in & seen & ahead & as_near, takes = p->may_pass ? 0 : counts & nearer;
+    _mm512_mask_storeu_pd(query->range_m + at, takes, range);
+    _mm512_mask_storeu_pd(query->hit_m + at, takes, range);
+    _mm256_mask_storeu_epi32(query->triangle + at, takes, _mm256_set1_epi32((int)p->triangle));
+    _mm256_mask_storeu_ps(tfar + at, takes, tfar_of_8(range, _mm512_loadu_pd(query->start_m + at)));
+    _mm512_storeu_pd(range_m, range);
+    *flat = in & (__mmask8)~seen;
+    return (counts & (__mmask8)~takes) | *flat;
+}
+
+static __attribute__((noinline)) void look_closer(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf,
+                                                  int which, unsigned others, unsigned one_by_one,
+                                                  const double *range_m)
+{
+    for (others |= one_by_one; others != 0; others &= others - 1) {
+        const uint32_t lane = (uint32_t)__builtin_ctz(others);
+        if ((one_by_one >> lane & 1) != 0)
+            bvh_try_one(query, tfar + lane, lane, leaf, which);
+        else
+            bvh_note_hit(query, tfar + lane, lane, bvh_leaf_triangle(leaf, which), range_m[lane]);
+    }
+}
+
+WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, int which,
+                        struct judged judged, int own)
+{
+    const double *n = leaf->plane[which].n, *o = query->at_local;
+    const struct plane plane = {.of = &leaf->plane[which],
+                                .least = BVH_FLAT * BVH_FLAT * vec3_dot(n, n),
+                                .off = n[0] * o[0] + n[1] * o[1] + n[2] * o[2],
+                                .triangle = bvh_leaf_triangle(leaf, which),
+                                .may_pass = query->bvh->scene->cutout != NULL};
+    double range_m[BVH_PACKET];
+    unsigned others = 0, one_by_one = judged.doubt;
+    for (int at = 0; at < BVH_PACKET; at += 8) {
+        const __mmask8 in = (__mmask8)(judged.in >> at);
+        __mmask8 flat;
+        if (in == 0) continue;
+        others |= (unsigned)take_8(query, tfar, &plane, at, in, range_m + at, &flat, own) << at;
+        one_by_one |= (unsigned)flat << at;
+    }
+    if ((others | one_by_one) != 0) look_closer(query, tfar, leaf, which, others, one_by_one, range_m);
+}
+
+WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid, int own)
+{
+    const __m512i asked = _mm512_loadu_si512(valid);
+    const unsigned all = _mm512_test_epi32_mask(asked, asked);
+    struct bvh_edges edges;
+    struct sides side[BVH_EDGES];
+    __m512 dir[3], turned[3];
+    bvh_find_edges(query, leaf, &edges);
+    __asm__ volatile(
+        "" ::
+            : "memory"); /* each of their numbers fills a vector: as loads that costs less than as shuffles */
+    const __m512 doubt = _mm512_set1_ps(edges.doubt);
+    for (int j = 0; j < 3; j++) {
+        dir[j] = _mm512_loadu_ps(query->dir_float + j * BVH_PACKET);
+        if (own) turned[j] = _mm512_loadu_ps(query->turned[j]);
+    }
+    for (int k = 0; k < BVH_EDGES; k++) {
+        __m512 s = dot(edges.m[0][k], edges.m[1][k], edges.m[2][k], dir);
+        if (own) s = _mm512_add_ps(s, dot(edges.e[0][k], edges.e[1][k], edges.e[2][k], turned));
+        side[k] = sides_of(s, doubt);
+    }
+    const struct judged first = judge(side[0], side[1], side[2], all);
+    const struct sides turned_1 = {side[1].below, side[1].above};
+    const struct judged second = judge(side[3], side[4], turned_1, all);
+    if ((first.in | first.doubt) != 0) meet_triangle(query, tfar, leaf, 0, first, own);
+    if ((second.in | second.doubt) != 0 && bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0)
+        meet_triangle(query, tfar, leaf, 1, second, own);
+}
+
+__attribute__((target("avx512f,avx512vl"))) static void meet_own(struct bvh_query *query, float *tfar,
+                                                                 const struct bvh_leaf *leaf, const int *valid)
+{
+    meet(query, tfar, leaf, valid, 1);
+}
+
+__attribute__((target("avx512f,avx512vl"))) static void meet_one(struct bvh_query *query, float *tfar,
+                                                                 const struct bvh_leaf *leaf, const int *valid)
+{
+    meet(query, tfar, leaf, valid, 0);
+}
+
+void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid)
+{
+    query->leaves++;
+    (query->has_own ? meet_own : meet_one)(query, tfar, leaf, valid);
+}
+
+int bvh_has_wide(void)
+{
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl");
+}
+
+#else
+
+int bvh_has_wide(void)
+{
+    return 0;
+}
+
+void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid)
+{
+    (void)query;
+    (void)tfar;
+    (void)leaf;
+    (void)valid;
+}
+
+#endif
