@@ -45,10 +45,17 @@ VEC_INLINE void judge_packet(const struct bvh_query *query, const struct bvh_edg
     int32_t wide[LANES];
     VEC_LOOP
     for (uint32_t i = 0; i < LANES; i++) {
-        float s[BVH_EDGES];
+        float s[BVH_EDGES], more[BVH_EDGES];
         for (int k = 0; k < BVH_EDGES; k++) {
             s[k] = m[0][k] * dx[i] + m[1][k] * dy[i] + m[2][k] * dz[i];
-            if (own) s[k] += e[0][k] * ux[i] + e[1][k] * uy[i] + e[2][k] * uz[i];
+            if (own && k != 2 && k != 4) more[k] = e[0][k] * ux[i] + e[1][k] * uy[i] + e[2][k] * uz[i];
+        }
+        if (own) {
+            s[0] += more[0];
+            s[1] += more[1];
+            s[2] -= more[0] + more[1];
+            s[3] += more[3];
+            s[4] += more[1] - more[3];
         }
         wide[i] = judge(s[0], s[1], s[2], doubt) | judge(s[3], s[4], -s[1], doubt) << SECOND;
     }

@@ -38,8 +38,10 @@ void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t 
  * most 15 units of 2^-24 of F L: the base from the ray's origin, rounded, 1; the corner, rounded and added to it, 2;
  * the edge 3; the cross product 3; the direction 1; the dot product 5. |p| itself is no measure, since it may be far
  * smaller than its summands. Where rays begin at points o of their own, p counts from one of these, c. Then the side is
- * (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with |o - c| for F; the sum adds
- * 1. The doubt of double precision (edges.h) is far less than the rest of the bound. */
+ * (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with A = |o - c| for F. It is
+ * computed for three edges. For the other two it is a sum or difference of those, since the edges of a triangle add up
+ * to zero: that is at most 2 * 15 + 1 units of A L, and adding it is 1 more of each. So F has 2 A in it. The doubt of
+ * double precision (edges.h) is far less than the rest of the bound. */
 #define BVH_SIDE_DOUBT (24.0F * 0x1p-24F)
 
 /* The figures of a leaf by which rays are judged: edges e, and their moments m = p x (q - p). All rays from one point
@@ -71,7 +73,7 @@ VEC_INLINE void bvh_find_edges(const struct bvh_query *query, const struct bvh_l
         memcpy(edges->m[j], &m, sizeof m);
         memcpy(edges->e[j], &e[j], sizeof e[j]);
     }
-    const float far_m = fabsf(base[0]) + fabsf(base[1]) + fabsf(base[2]) + size_m + (float)query->apart_m;
+    const float far_m = fabsf(base[0]) + fabsf(base[1]) + fabsf(base[2]) + size_m + 2.0F * (float)query->apart_m;
     edges->doubt = BVH_SIDE_DOUBT * 1.001F * far_m * size_m;
 }
 

@@ -127,30 +127,43 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
     if ((others | one_by_one) != 0) look_closer(query, tfar, leaf, which, others, one_by_one, range_m);
 }
 
+/* Adds what rays from points of their own add to each edge's side. */
+WIDE void add_own(const struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
+{
+    __m512 turned[3], more[BVH_EDGES];
+    for (int j = 0; j < 3; j++)
+        turned[j] = _mm512_loadu_ps(query->turned[j]);
+    for (int k = 0; k < 4; k++)
+        if (k != 2) more[k] = dot(edges->e[0][k], edges->e[1][k], edges->e[2][k], turned);
+    side[0] = _mm512_add_ps(side[0], more[0]);
+    side[1] = _mm512_add_ps(side[1], more[1]);
+    side[2] = _mm512_sub_ps(side[2], _mm512_add_ps(more[0], more[1]));
+    side[3] = _mm512_add_ps(side[3], more[3]);
+    side[4] = _mm512_add_ps(side[4], _mm512_sub_ps(more[1], more[3]));
+}
+
 WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid, int own)
 {
     const __m512i asked = _mm512_loadu_si512(valid);
     const unsigned all = _mm512_test_epi32_mask(asked, asked);
     struct bvh_edges edges;
-    struct sides side[BVH_EDGES];
-    __m512 dir[3], turned[3];
+    struct sides sides[BVH_EDGES];
+    __m512 dir[3], side[BVH_EDGES];
     bvh_find_edges(query, leaf, &edges);
     __asm__ volatile(
         "" ::
             : "memory"); /* each of their numbers fills a vector: as loads that costs less than as shuffles */
     const __m512 doubt = _mm512_set1_ps(edges.doubt);
-    for (int j = 0; j < 3; j++) {
+    for (int j = 0; j < 3; j++)
         dir[j] = _mm512_loadu_ps(query->dir_float + j * BVH_PACKET);
-        if (own) turned[j] = _mm512_loadu_ps(query->turned[j]);
-    }
-    for (int k = 0; k < BVH_EDGES; k++) {
-        __m512 s = dot(edges.m[0][k], edges.m[1][k], edges.m[2][k], dir);
-        if (own) s = _mm512_add_ps(s, dot(edges.e[0][k], edges.e[1][k], edges.e[2][k], turned));
-        side[k] = sides_of(s, doubt);
-    }
-    const struct judged first = judge(side[0], side[1], side[2], all);
-    const struct sides turned_1 = {side[1].below, side[1].above};
-    const struct judged second = judge(side[3], side[4], turned_1, all);
+    for (int k = 0; k < BVH_EDGES; k++)
+        side[k] = dot(edges.m[0][k], edges.m[1][k], edges.m[2][k], dir);
+    if (own) add_own(query, &edges, side);
+    for (int k = 0; k < BVH_EDGES; k++)
+        sides[k] = sides_of(side[k], doubt);
+    const struct sides reversed = {sides[1].below, sides[1].above};
+    const struct judged first = judge(sides[0], sides[1], sides[2], all),
+                        second = judge(sides[3], sides[4], reversed, all);
     if ((first.in | first.doubt) != 0) meet_triangle(query, tfar, leaf, 0, first, own);
     if ((second.in | second.doubt) != 0 && bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0)
         meet_triangle(query, tfar, leaf, 1, second, own);
