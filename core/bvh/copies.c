@@ -152,7 +152,6 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
                  struct bvh_nested *nested)
 {
     struct bvh_query *in = &nested->query;
-    in->bvh = copy->mesh;
     in->width = query->width;
     in->has_own = query->has_own;
     in->at_origin_m = query->at_origin_m / copy->at->scale;
@@ -208,7 +207,7 @@ void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args)
     struct bvh_nested *nested = query->nested;
     float *tfar = bvh_field(args->rayhit, args->N, tfar);
     if (!enter(query, copy, tfar, args->valid, nested)) return;
-    bvh_begin_query(&nested->query);
+    bvh_begin_query(&nested->query, copy->mesh);
     bvh_call_embree(copy->mesh, &nested->query, nested->valid, &nested->rays, args->N);
     leave(query, copy, tfar, nested);
 }

@@ -3,7 +3,6 @@
  * certain, else double. */
 #include "core/bvh/meet.h"
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/nearest.h"
 #include "core/vec3.h"
 
@@ -109,7 +108,7 @@ VEC_INLINE void take_nearer(struct bvh_query *query, float *tfar, uint32_t trian
 VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, int which,
                               const struct lanes *found)
 {
-    const int shift = which * SECOND, may_pass = query->bvh->scene->cutout != NULL;
+    const int shift = which * SECOND, may_pass = query->may_pass;
     const uint32_t triangle = bvh_leaf_triangle(leaf, which);
     double range_m[LANES];
     int64_t becomes[LANES];
@@ -155,7 +154,7 @@ enum { AHEAD = 5 };
 void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)
 {
     struct bvh_query *query = (struct bvh_query *)(void *)args->context;
-    const struct bvh_leaf *leaf = &query->bvh->leaf[args->primID];
+    const struct bvh_leaf *leaf = &query->first_leaf[args->primID];
     float *tfar = bvh_field(args->rayhit, args->N, tfar);
     struct lanes found = {{0}};
     for (int i = 0; i <= AHEAD; i++) {

@@ -6,8 +6,6 @@
 #if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */
 #include <immintrin.h>
 
-#include "core/bvh/bvh_inside.h"
-
 #define WIDE __attribute__((target("avx512f,avx512vl"), always_inline)) static inline
 
 /* Rays that are inside of a triangle for certain, and those of which that is in doubt. */
@@ -66,7 +64,6 @@ struct plane {
     const struct bvh_plane *of;
     double least, off;
     uint32_t triangle;
-    int may_pass; /* there may be a hole */
 };
 
 /* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in` are
@@ -83,7 +80,7 @@ WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p
                    ahead = _mm512_cmp_pd_mask(range, _mm512_set1_pd(query->at_origin_m), _CMP_GT_OQ),
                    as_near = _mm512_cmp_pd_mask(range, and_same(nearest), _CMP_LE_OQ),
                    nearer = _mm512_cmp_pd_mask(and_same(range), nearest, _CMP_LT_OQ);
-    const __mmask8 counts = in & seen & ahead & as_near, takes = p->may_pass ? 0 : counts & nearer;
+    const __mmask8 counts = in & seen & ahead & as_near, takes = query->may_pass ? 0 : counts & nearer;
     _mm512_mask_storeu_pd(query->range_m + at, takes, range);
     _mm512_mask_storeu_pd(query->hit_m + at, takes, range);
     _mm256_mask_storeu_epi32(query->triangle + at, takes, _mm256_set1_epi32((int)p->triangle));
@@ -114,8 +111,7 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
     const struct plane plane = {.of = &leaf->plane[which],
                                 .least = BVH_FLAT * BVH_FLAT * vec3_dot(n, n),
                                 .off = n[0] * o[0] + n[1] * o[1] + n[2] * o[2],
-                                .triangle = bvh_leaf_triangle(leaf, which),
-                                .may_pass = query->bvh->scene->cutout != NULL};
+                                .triangle = bvh_leaf_triangle(leaf, which)};
     double range_m[BVH_PACKET];
     unsigned others = 0, one_by_one = judged.doubt;
     for (int at = 0; at < BVH_PACKET; at += 8) {

@@ -13,12 +13,20 @@ struct packet {
     int valid[BVH_PACKET];
 } __attribute__((aligned(64)));
 
-#if RTC_VERSION_MAJOR >= 4
-void bvh_begin_query(struct bvh_query *query)
+void bvh_begin_query(struct bvh_query *query, const struct bvh *bvh)
 {
+#if RTC_VERSION_MAJOR >= 4
     rtcInitRayQueryContext(&query->context);
+#else
+    rtcInitIntersectContext(&query->context);
+    query->context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+#endif
+    query->bvh = bvh;
+    query->first_leaf = bvh->leaf;
+    query->may_pass = bvh->scene->cutout != NULL;
 }
 
+#if RTC_VERSION_MAJOR >= 4
 void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width)
 {
     struct RTCIntersectArguments how;
@@ -35,12 +43,6 @@ void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *
         rtcIntersect1(bvh->rtc, rays, &how);
 }
 #else
-void bvh_begin_query(struct bvh_query *query)
-{
-    rtcInitIntersectContext(&query->context);
-    query->context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-}
-
 void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width)
 {
     if (width == 16)
@@ -178,9 +180,8 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     const struct bvh_rays *rays = batch->rays;
     const uint32_t width = rays->scattered ? 1 : bvh->info.packet;
     struct packet packet;
-    bvh_begin_query(query);
+    bvh_begin_query(query, bvh);
     begin_packet(&packet, batch, width);
-    query->bvh = bvh;
     query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
     query->most_m = batch->most_m;

@@ -29,12 +29,14 @@ struct bvh_nested;
 struct bvh_query {
     bvh_context context;
     const struct bvh *bvh;
-    struct bvh_nested *nested; /* for copies; of a query within a copy: NULL */
-    double at_origin_m;        /* no hit is nearer than this */
-    uint32_t width;            /* rays of the call */
-    int has_own;               /* each ray begins at its own point, org; else all begin at `at` */
-    double at[3], at_local[3]; /* prcs; from the BVH's origin. With own points at_local is the first of them */
-    double most_m;             /* greatest length of a float ray; INFINITY: any */
+    const struct bvh_leaf *first_leaf; /* its leaves */
+    int may_pass;                      /* textures have holes: a ray may pass a triangle that it meets */
+    struct bvh_nested *nested;         /* for copies; of a query within a copy: NULL */
+    double at_origin_m;                /* no hit is nearer than this */
+    uint32_t width;                    /* rays of the call */
+    int has_own;                       /* each ray begins at its own point, org; else all begin at `at` */
+    double at[3], at_local[3];         /* prcs; from the BVH's origin. With own points at_local is the first of them */
+    double most_m;                     /* greatest length of a float ray; INFINITY: any */
     /* [BVH_PACKET] each, in the arrays of all rays or in `room`; of lanes without a ray: any. */
     const double *dir[3], *org[3], *local[3];
     const float *dir_float;        /* [3][width] dir for Embree; may be read on to BVH_PACKET */
@@ -64,8 +66,8 @@ struct bvh_nested {
     ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
 _Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");
 
-/* Sets up Embree's context. */
-void bvh_begin_query(struct bvh_query *query);
+/* Sets up Embree's context, and what depends on the BVH alone. */
+void bvh_begin_query(struct bvh_query *query, const struct bvh *bvh);
 /* Casts `width` rays through the BVH. */
 void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *valid, void *rays, uint32_t width);
 
