@@ -411,7 +411,7 @@ bench-helios: deps-build
 	@python3 tests/bench/helios.py $(HELIOS)
 # A browser beside a head at its limit, and how fast the page is; some minutes.
 bench-page: deps-build deps-browser
-	@$(MAKE) --no-print-directory -j2 all
+	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/write_mesh
 	@SCANHEAD=$(BUILD)/scanhead node tests/bench/page.mjs $(PAGE)
 # The page in three widths and both themes, to be looked at.
 #? page-pictures     the page of a web link in three widths and both themes
