@@ -11,8 +11,8 @@
 enum { PATH_LEN = 1024 };
 
 /* Places of the readers, from the program's folder: where they are installed, and where they are built. Programs of
- * tests lie deeper. */
-static const char *const places[] = {"../share/scanhead/ifc", "ifc", "../ifc", "../../../ifc"};
+ * tests and of the bench lie deeper. */
+static const char *const places[] = {"../share/scanhead/ifc", "ifc", "../ifc", "../../ifc", "../../../ifc"};
 
 static bool has_readers(const char *folder)
 {
