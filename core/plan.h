@@ -129,6 +129,7 @@ struct plan_sight_need {
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */
+    double examined;  /* triangles of the scene that making the map examines one by one (sight_examined) */
 };
 
 /* Chooses (*map: 1: one is made) and fills row. Casts some pulses of the places, unless a map can't pay anyway. */

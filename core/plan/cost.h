@@ -31,7 +31,7 @@ struct plan_ray_cost {
     double met, out, border;
 };
 static const struct plan_ray_cost plan_ray_costs[] = {
-    {16, 13.0, 9.0, 42.0}, {8, 21.0, 12.0, 65.0}, {4, 50.0, 30.0, 130.0}};
+    {16, 12.0, 8.0, 35.0}, {8, 19.0, 13.0, 57.0}, {4, 34.0, 23.0, 100.0}};
 
 #define PLAN_COST_SIGHT_ONE   2.0   /* looked up: one triangle or nothing there, */
 #define PLAN_COST_SIGHT_FEW   35.0  /* one of a few, */
@@ -40,11 +40,11 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 /* Extra in a scene of a million triangles, whose planes fit into no cache; it grows with the root of their
  * number. */
 #define PLAN_COST_MILLION 10.0
-/* Cost of making the map: a fixed part, and a part per triangle. Triangles that are seen and not small cost more, and
- * so do as many hidden ones. So do cells that show more than one; their memory follows. */
-#define PLAN_COST_SIGHT          3e6
+/* Cost of making the map: a fixed part, and a part per triangle. Triangles that are examined one by one cost more,
+ * whether they are seen or hidden. So do cells that show more than one; their memory follows. */
+#define PLAN_COST_SIGHT          2.2e6
 #define PLAN_COST_SIGHT_TRIANGLE 28.0
-#define PLAN_COST_SIGHT_SEEN     440.0
+#define PLAN_COST_SIGHT_EXAMINED 440.0
 #define PLAN_COST_SIGHT_CELL     60.0
 #define PLAN_SIGHT_CELL_BYTES    25.0
 #define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle in such cells, per region; as many again are hidden */

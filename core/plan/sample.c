@@ -376,6 +376,14 @@ static void count_cell(const struct bvh *bvh, const struct bvh_rays *cast, doubl
                                              : &found->one) += 1.0;
 }
 
+static double examined(const struct plan_sample *s, double rays)
+{
+    const struct cast_setup *setup = &s->places.place[0].setup;
+    struct sight_spec spec = {.bvh = setup->bvh, .rays = rays};
+    memcpy(spec.station_m, setup->station_m, sizeof spec.station_m);
+    return sight_examined(&spec);
+}
+
 void plan_sample_sight(struct plan_sample *s, double cell_rad, double all_rays, struct plan_sight_found *found)
 {
     struct look look;
@@ -398,6 +406,6 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, double all_rays, 
     if (n == 0) found->ask = n = 1;
     found->few += 0.5 * found->ask; /* about half of the cells that seem to ask are decided by lists */
     found->ask *= 0.5;
-    *found = (struct plan_sight_found){found->one / n, found->nothing / n, found->few / n,
-                                       found->ask / n, found->small / n,   found->per_pulse / n};
+    *found = (struct plan_sight_found){found->one / n,   found->nothing / n,   found->few / n,       found->ask / n,
+                                       found->small / n, found->per_pulse / n, examined(s, all_rays)};
 }

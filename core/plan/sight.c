@@ -48,7 +48,7 @@ static double least_build_ns(const struct plan_sight_need *need)
 /* Returns the map's cost without that of its cells. */
 static double triangles_build_ns(const struct plan_sight_need *need, const struct plan_sight_found *f)
 {
-    return least_build_ns(need) + PLAN_COST_SIGHT_SEEN * fmin(0.5 * need->n_triangles, f->per_pulse * need->pulses);
+    return least_build_ns(need) + PLAN_COST_SIGHT_EXAMINED * f->examined;
 }
 
 /* Costs of a scan, ns: per pulse, except build. */

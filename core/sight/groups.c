@@ -7,6 +7,8 @@
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
 
+enum { GROUPS_LOOKED_AT = 1024 };
+
 static uint32_t triangles_of(const struct build_shared *b, uint32_t group)
 {
     const uint32_t left = bvh_scene(b->sight->bvh)->n_triangles - group * BUILD_GROUP;
@@ -88,9 +90,40 @@ static int is_whole(const struct build_shared *b, const struct build_group *g, u
     return area * b->spec->rays < n * SIGHT_GROUP_RAYS * faces_area;
 }
 
+static void set_group(const struct build_shared *b, uint32_t i, struct build_group *g)
+{
+    find_box(b, i, triangles_of(b, i), g);
+    g->beside = 0;
+    for (uint32_t face = 0; face < SIGHT_FACES; face++)
+        g->beside |= (uint8_t)(is_beside(g, face) << face);
+    g->whole = (int8_t)is_whole(b, g, triangles_of(b, i));
+}
+
+static uint32_t groups_of(const struct build_shared *b)
+{
+    return (bvh_scene(b->sight->bvh)->n_triangles + BUILD_GROUP - 1) / BUILD_GROUP;
+}
+
+/* Looks at some of the groups, evenly spread over the list. */
+double sight_examined(const struct sight_spec *spec)
+{
+    struct sight sight = {.bvh = spec->bvh};
+    const struct build_shared b = {.sight = &sight, .spec = spec};
+    const uint32_t n = groups_of(&b), step = n / GROUPS_LOOKED_AT + 1;
+    double all = 0.0, examined = 0.0;
+    memcpy(sight.station_m, spec->station_m, sizeof sight.station_m);
+    for (uint32_t i = 0; i < n; i += step) {
+        struct build_group g;
+        set_group(&b, i, &g);
+        all += triangles_of(&b, i);
+        examined += g.whole ? 0.0 : triangles_of(&b, i);
+    }
+    return n != 0 ? bvh_scene(spec->bvh)->n_triangles * examined / all : 0.0;
+}
+
 int build_groups(struct build_shared *b, struct sh_err *err)
 {
-    const uint32_t n = (bvh_scene(b->sight->bvh)->n_triangles + BUILD_GROUP - 1) / BUILD_GROUP;
+    const uint32_t n = groups_of(b);
     const uint64_t bytes = n * sizeof *b->group;
     b->group = malloc(bytes + 1);
     if (b->group == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u groups", n);
@@ -98,13 +131,8 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     b->bytes += bytes;
     b->given_back += bytes;
     for (uint32_t i = 0; i < n; i++) {
-        struct build_group *g = &b->group[i];
         if ((i & 0xfff) == 0 && sh_check_stop(b->report, err) != SH_OK) return SH_ESTOPPED;
-        find_box(b, i, triangles_of(b, i), g);
-        g->beside = 0;
-        for (uint32_t face = 0; face < SIGHT_FACES; face++)
-            g->beside |= (uint8_t)(is_beside(g, face) << face);
-        g->whole = (int8_t)is_whole(b, g, triangles_of(b, i));
+        set_group(b, i, &b->group[i]);
     }
     return SH_OK;
 }
