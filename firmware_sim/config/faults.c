@@ -175,6 +175,14 @@ static int needs_time(enum fault_kind kind)
            kind == FAULT_LEAP_SECOND || (kind >= FAULT_PPS_LOST && kind <= FAULT_NMEA_CHECKSUM);
 }
 
+/* Whether faults of the kind can strike on the link. */
+static int link_has_fault(const struct link_spec *link, enum fault_kind kind)
+{
+    const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
+    const uint32_t can = link_faults(link);
+    return !is_of_link || (can & LINK_FAULT_BIT(fault_act_of(kind, can) - FAULT_DISCONNECT)) != 0;
+}
+
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)
 {
     for (uint32_t i = 0; i < list->n; i++) {
@@ -191,17 +199,10 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&
-                 !config_link_has_fault(&cfg->link[f->link - 1], f->kind))
+                 !link_has_fault(&cfg->link[f->link - 1], f->kind))
             cfg_fail_key(rd, "faults[].link", i, "link %u can't have %s; allowed 0, or a link that can", f->link,
                          fault_names[f->kind]);
     }
-}
-
-int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
-{
-    const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
-    const uint32_t can = link_faults(link);
-    return !is_of_link || (can & LINK_FAULT_BIT(fault_act_of(kind, can) - FAULT_DISCONNECT)) != 0;
 }
 
 static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)

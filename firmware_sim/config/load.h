@@ -18,11 +18,11 @@ enum { CONFIG_MAX_FAULTS = 20 };
 struct config_faults {
     uint32_t n; /* all diagnostics that were found; fault[] has the first CONFIG_MAX_FAULTS */
     struct sh_err fault[CONFIG_MAX_FAULTS];
-    uint64_t place[CONFIG_MAX_FAULTS]; /* what they are ordered by */
+    uint64_t place[CONFIG_MAX_FAULTS]; /* they rise with it: file, --set or profile, and the line there */
 };
 
-/* Reads path, its profile, then the `key=value` settings of --set, in order. These are checked in the same way, and
- * errors name them `--set KEY`. On failure cfg is unspecified, and err has the first diagnostic. cfg is large: allocate
+/* Reads path, then the `key=value` settings of --set, in order, then the profile that they name. The settings are checked
+ * as the file's keys are, and errors name them `--set KEY`. On failure cfg is unspecified, and err has the first diagnostic. cfg is large: allocate
  * it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
@@ -43,8 +43,6 @@ void config_name_scenarios(char *buf, size_t len);
 /* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 270 KiB of
  * stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
-/* Whether faults of the kind can strike on the link. */
-int config_link_has_fault(const struct link_spec *link, enum fault_kind kind);
 
 /* Loads the configuration of the scanner at a station, from 1, which becomes its head.station. It has no links. Output,
  * loop and scenario are those of cfg as it is now. The sets that cfg was loaded with must still be there. */

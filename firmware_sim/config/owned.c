@@ -47,8 +47,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     char owner[64];
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
     const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_given(rd, "links[].path", i);
-    cfg_set_usb_serial(rd, cfg, link, i);
-    cfg_set_usb_personality(rd, link, i);
+    cfg_set_usb_identity(rd, cfg, link, i);
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));

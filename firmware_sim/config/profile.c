@@ -164,9 +164,9 @@ static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 {
     const char *base = basename(rd->file);
     size_t stem = strlen(base) - 5;
-    if (stem >= sizeof profile->name)
+    if (stem == 0 || stem >= sizeof profile->name)
         return cfg_fail_file(rd, SH_EINPUT, 0,
-                             "the file's name is the name of the profile; allowed up to %zu characters and .yaml",
+                             "the file's name is the name of the profile; allowed 1 to %zu characters and .yaml",
                              sizeof profile->name - 1);
     for (size_t i = 0; i < stem; i++)
         if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)

@@ -59,6 +59,9 @@ static void files_that_are_none_are_refused(void **state)
     assert_int_equal(config_load(long_path, NULL, 0, cfg, &err), SH_EINPUT);
     assert_says("path too long");
     assert_int_equal(config_load(long_path, NULL, 0, cfg, NULL), SH_EINPUT);
+    long_path[500] = '\0'; /* of 511 bytes that are allowed */
+    assert_int_equal(load_edited("cube.obj", long_path), SH_EINPUT);
+    assert_says("too long with the folder of its file; allowed a path of 1 to 511 bytes");
 }
 
 /* ---- numbers */

@@ -54,7 +54,11 @@ static void what_follows_from_a_fault_is_not_told(void **state)
         {"stations:", "station:", "10: station: unknown key, did you mean stations?"},
         {"position_m", "positon_m", "11: stations[0].positon_m: unknown key"},
         {"  - position_m: [1, 2, 3]\n    heading_deg: 90\n", "  gate\n", "11: stations: here stands a single value"},
-        {"type: tcp", "type: tpc", "14: links[0].type: "},                    /* what has a port? */
+        {"type: tcp", "type: tpc", "14: links[0].type: "}, /* what has a port? */
+        {"    port: 0\n", "    port: 0\n  - {type: tcp, port: 0, protocol: colla}\nntp: {role: client}\n",
+         "16: links[1].protocol: "}, /* it may send dates */
+        {"    port: 0\n", "    port: 0\n  - {type: tcp, port: 0, protocol: colla}\nfaults: [{kind: window_soiled}]\n",
+         "16: links[1].protocol: "},
         {"any-rate", "riegl", "2: head.profile: "},                           /* what are its limits? */
         {LINES, "  lines_hz: 1e6\n", "4: head.lines_hz: 1000000 is outside"}, /* more than pulses */
         {LINES, "  line_start_deg: 99\n  line_stop_deg: 5\n", "4: head.line_start_deg: 99 is outside"},
@@ -71,14 +75,11 @@ static void what_follows_from_a_fault_is_not_told(void **state)
 static void faults_of_the_profile_come_last(void **state)
 {
     (void)state;
-    char text[8192], name[160];
-    FILE *file = fopen("config/heads/leica-rtc360.yaml", "rb");
-    size_t len = fread(text, 1, sizeof text - 1, file);
-    fclose(file);
-    text[len] = '\0';
+    char *text = read_source("config/heads/leica-rtc360.yaml"), name[160];
     memcpy(strstr(text, "value: 130,"), "value: a30,", 11);
     memcpy(strstr(text, "value: 0.5,"), "value: b.5,", 11);
     write_in("heads/mine.yaml", text);
+    free(text);
     snprintf(name, sizeof name, "%s/heads/mine.yaml:", dir);
     assert_int_equal(load_edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  frames: x"), SH_EINPUT);
     ASSERT_FAULTS("3: head.frames: ", name, name);

@@ -45,13 +45,10 @@ static const char head[] = "maker: M\nmodel: H\n"                          /* 1 
 
 static int load_head(const char *old, const char *with, const char *settings)
 {
-    char text[8192], mine[128];
-    const char *at = strstr(head, old);
-    assert_non_null(at);
-    snprintf(text, sizeof text, "%.*s%s%s", (int)(at - head), head, with, at + strlen(old));
+    char *text = replaced(head, old, with);
     write_in("heads/mine.yaml", text);
-    snprintf(mine, sizeof mine, "  profile: mine\n%s", settings);
-    return load_edited("  profile: any-rate\n" PRR LINES, mine);
+    free(text);
+    return load_with_head("mine", settings, "");
 }
 
 static void what_the_file_leaves_out_is_the_heads(void **state)

@@ -93,13 +93,14 @@ static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
     return 0;
 }
 
-/* Whether a key below the section is bad; in a list, a key of this item. */
+/* Whether a key below the section is bad. In a list as a whole this is a key of any item, and else of this one. */
 static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
 {
-    for (size_t i = 0; i < rd->table.n; i++) {
-        const char *path = rd->table.keys[i].path;
-        if (cfg_is_in(path, section) && rd->bad[i][strstr(path, "[]") != NULL ? item : 0]) return 1;
-    }
+    const int is_of_item = strstr(section, "[]") != NULL;
+    for (size_t i = 0; i < rd->table.n; i++)
+        if (cfg_is_in(rd->table.keys[i].path, section) &&
+            (is_of_item ? rd->bad[i][item] != 0 : memchr(rd->bad[i], 1, sizeof rd->bad[i]) != NULL))
+            return 1;
     return 0;
 }
 
