@@ -23,7 +23,7 @@ const char base[] = "head:\n"                     /* 1 */
 char dir[64], config_path[128];
 struct config *cfg;
 struct sh_err err;
-struct config_faults faults;
+struct config_diagnostics diagnostics;
 
 void write_file(const char *path, const void *bytes, size_t len)
 {
@@ -43,8 +43,8 @@ void write_in(const char *name, const char *text)
 int load_sets(const char *const *sets, int n)
 {
     memset(&err, 0, sizeof err);
-    int code = config_load_all(config_path, sets, n, cfg, &faults);
-    if (code != SH_OK) err = faults.fault[0];
+    int code = config_load_all(config_path, sets, n, cfg, &diagnostics);
+    if (code != SH_OK) err = diagnostics.err[0];
     return code;
 }
 

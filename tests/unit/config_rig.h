@@ -24,8 +24,8 @@ extern const char base[];
 
 extern char dir[64], config_path[128];
 extern struct config *cfg;
-extern struct sh_err err; /* the first of the faults */
-extern struct config_faults faults;
+extern struct sh_err err; /* the first of the diagnostics */
+extern struct config_diagnostics diagnostics;
 
 void write_file(const char *path, const void *bytes, size_t len);
 

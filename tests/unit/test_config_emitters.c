@@ -35,13 +35,13 @@ static void check_wrong(const struct wrong *w)
     if (load_changed(w->profile, w->old, w->with) != SH_EINPUT) fail_msg("%s was taken", w->with);
     snprintf(start, sizeof start, "%s/heads/mine.yaml:", dir);
     snprintf(key, sizeof key, ": %s: ", w->key);
-    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++) {
-        const char *text = faults.fault[i].text, *line = text + strlen(start);
+    for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS; i++) {
+        const char *text = diagnostics.err[i].text, *line = text + strlen(start);
         if (strncmp(text, start, strlen(start)) == 0 && *line > '0' && *line <= '9' && strstr(text, key) != NULL &&
             strstr(text, w->fragment) != NULL)
             return;
     }
-    fail_msg("%s: none of %u faults says so of %s; the first: %s", w->with, faults.n, w->key, err.text);
+    fail_msg("%s: none of %u faults says so of %s; the first: %s", w->with, diagnostics.n, w->key, err.text);
 }
 
 static void tables_that_do_not_fit_are_refused(void **state)
@@ -246,7 +246,7 @@ static void a_bad_value_in_a_list_is_one_fault(void **state)
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         check_wrong(&wrong[i]);
-        if (faults.n != 1) fail_msg("%s: also %s", wrong[i].key, faults.fault[1].text);
+        if (diagnostics.n != 1) fail_msg("%s: also %s", wrong[i].key, diagnostics.err[1].text);
     }
 }
 
@@ -256,7 +256,7 @@ static void a_step_that_leaves_no_line_rate_is_refused(void **state)
     (void)state;
     assert_int_equal(load_changed("sphere", "lines_min_hz: { value: 1,", "lines_min_hz: { value: 300,"), SH_OK);
     assert_int_equal(load_with_head("mine", "  step_deg: 0.01\n", ""), SH_EINPUT);
-    assert_int_equal(faults.n, 1);
+    assert_int_equal(diagnostics.n, 1);
     assert_says(
         ":3: head.step_deg: 0.01 makes more than 10000000 pulses/s at 300 lines/s, lines_min_hz of head profile "
         "mine; allowed at least 0.0108 deg");

@@ -8,8 +8,8 @@
 static void assert_faults(const char *const *starts, uint32_t n)
 {
     char want[256];
-    for (uint32_t i = 0; i < n || i < faults.n; i++) {
-        const char *got = i < faults.n ? faults.fault[i].text : "nothing";
+    for (uint32_t i = 0; i < n || i < diagnostics.n; i++) {
+        const char *got = i < diagnostics.n ? diagnostics.err[i].text : "nothing";
         const int of_file = i < n && starts[i][0] >= '0' && starts[i][0] <= '9';
         snprintf(want, sizeof want, "%s%s%s", of_file ? config_path : "", of_file ? ":" : "",
                  i < n ? starts[i] : "nothing");
@@ -40,7 +40,7 @@ static void all_faults_are_told_in_order(void **state)
     /* The shorter call returns the first. */
     struct sh_err first;
     assert_int_equal(config_load(config_path, sets, 2, cfg, &first), SH_EINPUT);
-    assert_string_equal(first.text, faults.fault[0].text);
+    assert_string_equal(first.text, diagnostics.err[0].text);
 }
 
 static void what_follows_from_a_fault_is_not_told(void **state)
@@ -93,16 +93,16 @@ static void twenty_are_kept_and_all_are_counted(void **state)
     for (int i = 0; i < 60; i++)
         n += snprintf(text + n, sizeof text - (size_t)n, "  - {retro: -1}\n");
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_int_equal(faults.n, 60);
-    snprintf(want, sizeof want, "surfaces[%d]", CONFIG_MAX_FAULTS - 1);
-    assert_non_null(strstr(faults.fault[CONFIG_MAX_FAULTS - 1].text, want));
+    assert_int_equal(diagnostics.n, 60);
+    snprintf(want, sizeof want, "surfaces[%d]", CONFIG_MAX_DIAGNOSTICS - 1);
+    assert_non_null(strstr(diagnostics.err[CONFIG_MAX_DIAGNOSTICS - 1].text, want));
     /* An error that is found later and stands before the others takes its place before them. */
     char *first = strstr(text, "  prr_hz: 500000");
     memcpy(first, "  prr_hz: 999999", 16);
     memcpy(strstr(text, "lines_hz: 100"), "lines_hz: 2  ", 13); /* outside the profile: found after reading */
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_int_equal(faults.n, 61);
-    assert_non_null(strstr(faults.fault[0].text, ":4: head.lines_hz: 2 is outside"));
+    assert_int_equal(diagnostics.n, 61);
+    assert_non_null(strstr(diagnostics.err[0].text, ":4: head.lines_hz: 2 is outside"));
 }
 
 /* A hostile file: thousands of errors cost as much as reading. The only assertion on time is that it ends. */
@@ -115,7 +115,7 @@ static void many_faults_end(void **state)
     for (int i = 0; i < LINES_OF_IT; i++)
         at += sprintf(at, "k%05d: 1\n", i);
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_true(faults.n >= LINES_OF_IT);
+    assert_true(diagnostics.n >= LINES_OF_IT);
     free(text);
 }
 

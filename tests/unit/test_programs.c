@@ -141,12 +141,12 @@ static void tables_that_do_not_fit_are_refused(void **state)
         if (load_head(wrong[i].old, wrong[i].with, "") != SH_EINPUT) fail_msg("%s was taken", wrong[i].with);
         snprintf(start, sizeof start, "%s/heads/mine.yaml:%d: %s: ", dir, wrong[i].line, wrong[i].key);
         int found = 0;
-        for (uint32_t k = 0; k < faults.n && k < CONFIG_MAX_FAULTS; k++)
-            found |= (wrong[i].line == 0 || strncmp(faults.fault[k].text, start, strlen(start)) == 0) &&
-                     strstr(faults.fault[k].text, wrong[i].key) != NULL &&
-                     strstr(faults.fault[k].text, wrong[i].fragment) != NULL;
+        for (uint32_t k = 0; k < diagnostics.n && k < CONFIG_MAX_DIAGNOSTICS; k++)
+            found |= (wrong[i].line == 0 || strncmp(diagnostics.err[k].text, start, strlen(start)) == 0) &&
+                     strstr(diagnostics.err[k].text, wrong[i].key) != NULL &&
+                     strstr(diagnostics.err[k].text, wrong[i].fragment) != NULL;
         if (!found) fail_msg("%s: not \"%s...%s\" but %s", wrong[i].with, start, wrong[i].fragment, err.text);
-        if (wrong[i].line != 0 && faults.n != 1) fail_msg("%s: also %s", wrong[i].with, faults.fault[1].text);
+        if (wrong[i].line != 0 && diagnostics.n != 1) fail_msg("%s: also %s", wrong[i].with, diagnostics.err[1].text);
     }
 }
 
@@ -171,7 +171,7 @@ static void only_rates_of_programs_are_taken(void **state)
         char setting[64];
         snprintf(setting, sizeof setting, "  prr_hz: %s\n", rates[i]);
         assert_int_equal(load_head("maker", "maker", setting), SH_EINPUT);
-        assert_int_equal(faults.n, 1);
+        assert_int_equal(diagnostics.n, 1);
         assert_says(":3: head.prr_hz: ");
         assert_says(" is not a pulse rate of head profile mine; allowed 100000, 400000 Hz");
     }
