@@ -2,6 +2,17 @@
 /* Command lines one by one: replies, errors, the status byte, places, faults on request. */
 #include "tests/unit/command_device.h"
 
+struct wrong {
+    const char *line;
+    int number;
+};
+
+static void expect_errors(struct command_device *dev, const struct wrong *wrong, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        expect_error(dev, 1, wrong[i].line, wrong[i].number, "");
+}
+
 static void replies_of_queries(void **ctx)
 {
     (void)ctx;
@@ -59,10 +70,7 @@ static void state_names_and_control(void **ctx)
 static void wrong_lines_give_one_error(void **ctx)
 {
     (void)ctx;
-    static const struct {
-        const char *line;
-        int number;
-    } cases[] = {
+    static const struct wrong wrong[] = {
         {";", CMD_E_SYNTAX},
         {"*IDN?;*RST", CMD_E_SYNTAX},
         {"HEAD:PRR 300000;", CMD_E_SYNTAX},
@@ -122,8 +130,7 @@ static void wrong_lines_give_one_error(void **ctx)
         {"TIME:STEP 5", CMD_E_SETTINGS},
     };
     struct command_device dev = command_test_device();
-    for (size_t i = 0; i < N_OF(cases); i++)
-        expect_error(&dev, 1, cases[i].line, cases[i].number, "");
+    expect_errors(&dev, wrong, N_OF(wrong));
 }
 
 static void a_line_too_long_is_dropped_whole(void **ctx)
@@ -155,10 +162,7 @@ static void a_head_without_the_time_says_so(void **ctx)
 static void a_place_is_read_and_said(void **ctx)
 {
     (void)ctx;
-    static const struct {
-        const char *line;
-        int number;
-    } wrong[] = {
+    static const struct wrong wrong[] = {
         {"SITE:POSE", CMD_E_MISSING},
         {"SITE:POSE 1", CMD_E_MISSING},
         {"SITE:POSE 1,0,0,0,0,0", CMD_E_MISSING},
@@ -190,8 +194,7 @@ static void a_place_is_read_and_said(void **ctx)
         {"SITE:POSE? 1,", CMD_E_NOT_ALLOWED},
     };
     struct command_device dev = command_test_device();
-    for (size_t i = 0; i < N_OF(wrong); i++)
-        expect_error(&dev, 1, wrong[i].line, wrong[i].number, "");
+    expect_errors(&dev, wrong, N_OF(wrong));
     expect(&dev, "SITE:POSE? 2", "-0.1,5e-07,1000000000,359.5,-90,0.3333333333333333");
     expect(&dev, "SITE:POSE? 2, MIN", "-1000000000,-1000000000,-1000000000,-360,-90,-180");
     expect(&dev, "SITE:POSE? 2 , DEFault", "4,5,6,0,0,0");
@@ -219,10 +222,7 @@ static void a_place_is_read_and_said(void **ctx)
 static void faults_are_added_listed_counted_and_cleared(void **ctx)
 {
     (void)ctx;
-    static const struct {
-        const char *line;
-        int number;
-    } wrong[] = {
+    static const struct wrong wrong[] = {
         {"FAUL:ADD", CMD_E_MISSING},
         {"FAUL:ADD drop", CMD_E_DATA_TYPE},
         {"FAUL:ADD 3", CMD_E_DATA_TYPE},
@@ -244,8 +244,7 @@ static void faults_are_added_listed_counted_and_cleared(void **ctx)
         {"FAUL:LIST", CMD_E_HEADER},
     };
     struct command_device dev = command_test_device();
-    for (size_t i = 0; i < N_OF(wrong); i++)
-        expect_error(&dev, 1, wrong[i].line, wrong[i].number, "");
+    expect_errors(&dev, wrong, N_OF(wrong));
     dev.control = 0;
     expect(&dev, "FAUL:ADD   {kind: drop}  ", "3");
     assert_true(result.changes && result.took_control && result.effect == COMMAND_FAULTS);
@@ -270,10 +269,7 @@ static void faults_are_added_listed_counted_and_cleared(void **ctx)
 static void a_time_server_is_set_and_read(void **ctx)
 {
     (void)ctx;
-    static const struct {
-        const char *line;
-        int number;
-    } wrong[] = {
+    static const struct wrong wrong[] = {
         {"TIME:SERV", CMD_E_MISSING},
         {"TIME:SERV CLIENT", CMD_E_DATA_TYPE},
         {"TIME:SERV CLIENT,127.0.0.1,600,0,ETH,1", CMD_E_DATA_TYPE},
@@ -293,8 +289,7 @@ static void a_time_server_is_set_and_read(void **ctx)
     };
     struct command_device dev = command_test_device();
     dev.server.update_s = 600;
-    for (size_t i = 0; i < N_OF(wrong); i++)
-        expect_error(&dev, 1, wrong[i].line, wrong[i].number, "");
+    expect_errors(&dev, wrong, N_OF(wrong));
     expect(&dev, "TIME:SERV?", "NONE,0.0.0.0,600,0,ETH");
     expect(&dev, "TIME:SERV? STAT", "OFF,0,0,0,0,0,0");
     dev.control = 2;
