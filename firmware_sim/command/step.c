@@ -170,7 +170,7 @@ static int is_sphere(const struct command_device *dev)
     return dev->limits.emitter == EMITTER_SPHERE;
 }
 
-/* Whether what a step follows from is 0. A configuration has none of that, but a recording may. */
+/* Whether a value is 0 from which the step follows. No configuration has that, but a damaged recording may. */
 static int lacks_rates(const struct command_device *dev)
 {
     const struct head_settings *s = &dev->settings;
