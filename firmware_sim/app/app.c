@@ -67,12 +67,13 @@ int app_fail(const struct sh_err *err)
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 
-int app_fail_config(const struct config_faults *faults)
+int app_fail_config(const struct config_diagnostics *diagnostics)
 {
     int status = APP_USAGE;
-    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
-        status = app_fail(&faults->fault[i]);
-    if (faults->n > CONFIG_MAX_FAULTS) fprintf(stderr, "%s: and %u more\n", app_program, faults->n - CONFIG_MAX_FAULTS);
+    for (uint32_t i = 0; i < diagnostics->n && i < CONFIG_MAX_DIAGNOSTICS; i++)
+        status = app_fail(&diagnostics->err[i]);
+    if (diagnostics->n > CONFIG_MAX_DIAGNOSTICS)
+        fprintf(stderr, "%s: and %u more\n", app_program, diagnostics->n - CONFIG_MAX_DIAGNOSTICS);
     return status;
 }
 
@@ -80,17 +81,17 @@ int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx)
 {
     struct sh_err err = {0};
-    struct config_faults faults;
+    struct config_diagnostics diagnostics;
     struct config *cfg = calloc(1, sizeof *cfg);
     if (cfg == NULL) {
         sh_fail(&err, SH_ENOMEM, "no memory");
         return app_fail(&err);
     }
-    int rc = links != NULL ? config_load_links(links, "--link", in->sets.set, in->sets.n, cfg, &faults)
-                           : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults);
-    if (rc != SH_OK || (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &faults) != SH_OK)) {
+    int rc = links != NULL ? config_load_links(links, "--link", in->sets.set, in->sets.n, cfg, &diagnostics)
+                           : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &diagnostics);
+    if (rc != SH_OK || (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &diagnostics) != SH_OK)) {
         free(cfg);
-        return app_fail_config(&faults);
+        return app_fail_config(&diagnostics);
     }
     rc = app_check_files(in, cfg, &err);
     if (rc == SH_OK) rc = work(cfg, ctx, &err);

@@ -14,7 +14,7 @@
 #include "firmware_sim/base/json.h"
 
 struct config;
-struct config_faults;
+struct config_diagnostics;
 
 /* The only list of commands, in the order of `scanhead --help`. scanheadd has those of HEAD, scanhead has all of
  * them. */
@@ -37,7 +37,7 @@ APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 /* Prints "PROGRAM: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
-int app_fail_config(const struct config_faults *faults);
+int app_fail_config(const struct config_diagnostics *diagnostics);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
  * change it; it is freed afterwards. Returns the exit status. The reason of a failure is printed: each error of a

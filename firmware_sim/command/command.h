@@ -25,7 +25,8 @@
  * pulse are sent. On a head with fixed pulse rates HEAD:PRR takes only these; another rate is -222 with the list of
  * them.
  *
- * Ranges, noise, and the step of a sphere hold from the next scan on, and can't change within one.
+ * Ranges, noise, and the step of a sphere or of a planar head with geometries hold from the next scan on, and can't
+ * change within one.
  *
  * Stations. HEAD:STATION takes stations that have this scanner; a station with another scanner is -221.
  *

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/command/scan_replay.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "firmware_sim/command/call.h"
@@ -14,14 +15,20 @@ const struct command_unit command_unit_replay = {"s", 0, "no unit", {{NULL, 0}}}
 static const double SLOWEST = 0.01, FASTEST = 1000.0;
 static const double LONGEST_S = 1e9; /* of a recording whose length is not known */
 
+/* Cuts a time of whole ns to the digits of a reply. Rounded up, the length would be refused as a time. */
+static double whole_us(double s)
+{
+    return 1e-6 * (double)(llround(1e9 * s) / 1000);
+}
+
 int command_replay_query(struct command_call *call)
 {
     const struct command_replay *r = &call->dev->replay;
     if (call->param[0] != '\0')
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes no parameter", call->row->header);
     if (!r->is_there) return command_reply(call, "NONE");
-    return command_reply(call, "%s,%.6f,%.6f,%.10g,%s", call->dev->is_played ? "PLAYING" : "IDLE", r->position_s,
-                         r->length_s, r->speed, r->loop ? "ON" : "OFF");
+    return command_reply(call, "%s,%.6f,%.6f,%.10g,%s", call->dev->is_played ? "PLAYING" : "IDLE",
+                         whole_us(r->position_s), whole_us(r->length_s), r->speed, r->loop ? "ON" : "OFF");
 }
 
 /* Reads a number of at least 0. An empty field leaves the value. */

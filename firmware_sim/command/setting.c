@@ -148,7 +148,8 @@ static int64_t most_lines_of_sphere(const struct command_call *call)
     return call->dev->limits.prr_max_uhz / head_line_pulses(&call->dev->limits, &call->dev->settings);
 }
 
-void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max)
+/* Finds the present range, as the profile and other settings leave it. */
+static void present_range(const struct command_call *call, int64_t *min, int64_t *max)
 {
     const struct command_setting *setting = call->row->setting;
     if (setting->derived != NULL) {
@@ -186,7 +187,7 @@ static int64_t read_value(const struct command_call *call, const struct head_set
 static int64_t special_value(const struct command_call *call)
 {
     int64_t min, max;
-    command_setting_range(call, &min, &max);
+    present_range(call, &min, &max);
     if (call->value.kind == COMMAND_VALUE_MIN) return min;
     if (call->value.kind == COMMAND_VALUE_MAX) return max;
     return read_value(call, &call->dev->defaults);
@@ -321,7 +322,7 @@ static int check_other(struct command_call *call, int64_t value)
 {
     int64_t min, max;
     char with[NUMBER_LEN + 40];
-    command_setting_range(call, &min, &max);
+    present_range(call, &min, &max);
     const int no_width = call->dev->limits.round && is_line_angle(call) && value == read_other(call);
     if (value >= min && value <= max && !no_width) return 0;
     if (call->row->setting->words != NULL)
@@ -347,7 +348,7 @@ static int is_default_beyond(const struct command_call *call, int64_t value)
     int64_t min, max;
     if (call->row->setting->derived == NULL) return 0;
     then.prr_uhz = call->dev->settings.prr_uhz; /* the pulse rate stays */
-    command_setting_range(call, &min, &max);
+    present_range(call, &min, &max);
     return (value < min || value > max) && value == read_value(call, &then);
 }
 

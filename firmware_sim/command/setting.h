@@ -49,8 +49,6 @@ struct command_setting {
 int command_setting_query(struct command_call *call);
 int command_setting_change(struct command_call *call);
 
-/* The present range: as the profile and other settings leave it. */
-void command_setting_range(const struct command_call *call, int64_t *min, int64_t *max);
 /* 0: a recording is replayed that does not have the setting. */
 int command_setting_is_known(const struct command_call *call);
 /* The index of the last word that the head takes. */

@@ -170,15 +170,25 @@ static int is_sphere(const struct command_device *dev)
     return dev->limits.emitter == EMITTER_SPHERE;
 }
 
+/* Whether a value is 0 from which the step follows. No configuration has that, but a damaged recording may. */
+static int lacks_rates(const struct command_device *dev)
+{
+    const struct head_settings *s = &dev->settings;
+    if (is_sphere(dev)) return s->step_udeg <= 0;
+    if (dev->limits.emitter == EMITTER_PLANAR) return head_line_pulses(&dev->limits, s) == 0;
+    return is_line_head(dev) && (s->prr_uhz <= 0 || s->lines_uhz <= 0);
+}
+
 static const char *line_why_not(const struct command_device *dev)
 {
+    if (lacks_rates(dev)) return "the recording does not have this value";
     return dev->limits.emitter == EMITTER_DIRECTIONS ? "the head has a list of directions, so no step" : NULL;
 }
 
 static const char *pan_why_not(const struct command_device *dev)
 {
     const int has = is_sphere(dev) || (is_line_head(dev) && dev->limits.pan_max_udeg_s > 0);
-    return has ? NULL : "the head has no pan";
+    return has ? line_why_not(dev) : "the head has no pan";
 }
 
 /* Sets one of the geometries; the caller has checked that it is one. */
@@ -228,8 +238,9 @@ static void both_range(const struct command_device *dev, int64_t *min, int64_t *
 
 static const char *both_why_not(const struct command_device *dev)
 {
+    const char *why_not = line_why_not(dev);
     int64_t min, max;
-    if (!is_line_head(dev)) return line_why_not(dev);
+    if (why_not != NULL || !is_line_head(dev)) return why_not;
     if (dev->limits.pan_max_udeg_s <= 0) return "the head has no pan; SCAN:STEP:LINE is its step";
     both_range(dev, &min, &max);
     return min <= max ? NULL : "at this HEAD:PRR line and pan have no step in common";

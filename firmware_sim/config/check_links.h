@@ -15,8 +15,7 @@ struct link_spec;
 /* Keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
 /* Fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
-void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
-void cfg_set_usb_personality(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
+void cfg_set_usb_identity(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
 /* Checks which links the protocols are spoken on, and sets what follows from a protocol. */
 void cfg_check_protocols_alone(struct cfg_reader *rd, struct config *cfg);
 /* Checks also their needs of the stream and of the head. */

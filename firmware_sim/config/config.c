@@ -42,12 +42,12 @@ static void read_scanner(struct cfg_reader *rd, struct cfg_document *doc, const 
 
 /* known: the profile, if it was read before; else NULL. Returns whether cfg->profile is read. */
 static int load_once(const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
-                     const struct config_profile *known, struct config_faults *faults)
+                     const struct config_profile *known, struct config_diagnostics *diagnostics)
 {
     struct cfg_reader rd;
     struct cfg_document *doc;
-    memset(faults, 0, sizeof *faults);
-    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, faults);
+    memset(diagnostics, 0, sizeof *diagnostics);
+    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, diagnostics);
     rd.profile = known;
     if (cfg_open_file(&rd, &doc) != SH_OK) return 0;
     cfg_apply_sets(&rd, doc, sets, n_sets);
@@ -70,38 +70,38 @@ static void config_begin(const char *path, const char *const *sets, int n_sets, 
 }
 
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
-                 struct config_faults *faults)
+                 struct config_diagnostics *diagnostics)
 {
     config_begin(path, sets, n_sets, cfg);
-    const int has_profile = load_once(sets, n_sets, station, cfg, NULL, faults);
-    if (faults->n == 0) return SH_OK;
+    const int has_profile = load_once(sets, n_sets, station, cfg, NULL, diagnostics);
+    if (diagnostics->n == 0) return SH_OK;
     /* Values are read before the profile, but their errors need its limits. So read them once more. */
     const struct config_profile profile = cfg->profile;
     config_begin(path, sets, n_sets, cfg);
-    if (has_profile) load_once(sets, n_sets, station, cfg, &profile, faults);
-    return faults->fault[0].code;
+    if (has_profile) load_once(sets, n_sets, station, cfg, &profile, diagnostics);
+    return diagnostics->err[0].code;
 }
 
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
-                    struct config_faults *faults)
+                    struct config_diagnostics *diagnostics)
 {
-    memset(faults, 0, sizeof *faults);
+    memset(diagnostics, 0, sizeof *diagnostics);
     if (strlen(path) >= sizeof cfg->file) {
         memset(cfg, 0, sizeof *cfg);
-        faults->n = 1;
-        return sh_fail(&faults->fault[0], SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path,
+        diagnostics->n = 1;
+        return sh_fail(&diagnostics->err[0], SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path,
                        sizeof cfg->file - 1);
     }
-    cfg_load_for(path, sets, n_sets, 0, cfg, faults);
-    cfg_check_scanners(cfg, faults);
-    return faults->n == 0 ? SH_OK : faults->fault[0].code;
+    cfg_load_for(path, sets, n_sets, 0, cfg, diagnostics);
+    cfg_check_scanners(cfg, diagnostics);
+    return diagnostics->n == 0 ? SH_OK : diagnostics->err[0].code;
 }
 
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err)
 {
-    struct config_faults faults;
-    int code = config_load_all(path, sets, n_sets, cfg, &faults);
-    return code == SH_OK ? SH_OK : sh_fail(err, code, "%s", faults.fault[0].text);
+    struct config_diagnostics diagnostics;
+    int code = config_load_all(path, sets, n_sets, cfg, &diagnostics);
+    return code == SH_OK ? SH_OK : sh_fail(err, code, "%s", diagnostics.err[0].text);
 }
 
 double config_cast_hz(const struct config *cfg)

@@ -26,7 +26,7 @@ void cfg_begin_copy(struct cfg_reader *rd, const struct cfg_reader *of, uint32_t
     struct config_scene *scene = &((struct config *)of->base)->scene;
     struct config_copy *copy = &scene->copy[scene->n_copies++];
     copy->mesh = mesh;
-    cfg_reader_init(rd, of->file, &cfg_copy_table, &copy->place, of->faults);
+    cfg_reader_init(rd, of->file, &cfg_copy_table, &copy->place, of->diagnostics);
     rd->of = name;
     rd->set = of->set;
     rd->root_line = line;

@@ -292,5 +292,5 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     cfg_check_faults(rd, &cfg->faults);
     cfg_check_fault_links(rd, cfg, &cfg->faults);
     cfg_check_fault_beams(rd, cfg, &cfg->faults);
-    if (rd->faults->n == 0) cfg_take_scan_settings(cfg); /* last, since it copies values that the checks derive */
+    if (rd->diagnostics->n == 0) cfg_take_scan_settings(cfg); /* last, since it copies values that the checks derive */
 }

@@ -185,8 +185,16 @@ static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
     struct sh_err why;
     if (!CFG_SOUND(rd, 0, "head.step_deg", "head.ring_start_deg", "head.ring_stop_deg")) return;
     if (cfg_is_given(rd, "head.step_deg", 0)) {
+        const int64_t most_uhz = (int64_t)(1e6 * PRR_MOST_HZ) / emitter_sphere_steps(h->step_udeg);
+        if (most_uhz < p->lines_min_uhz) {
+            cfg_fail_key(rd, "head.step_deg", 0,
+                         "%.15g makes more than %.10g pulses/s at %.15g lines/s, lines_min_hz of head profile %s; "
+                         "allowed at least %.6g deg",
+                         from_micro(h->step_udeg), PRR_MOST_HZ, from_micro(p->lines_min_uhz), p->name,
+                         360.0 * from_micro(p->lines_min_uhz) / PRR_MOST_HZ);
+            return;
+        }
         emitter_set_sphere(&p->emitter, h->step_udeg);
-        const int64_t most_uhz = (int64_t)(1e6 * PRR_MOST_HZ) / p->emitter.steps;
         if (p->lines_max_uhz > most_uhz) p->lines_max_uhz = most_uhz;
         if (!cfg_is_given(rd, "head.lines_hz", 0)) h->settings.lines_uhz = p->lines_max_uhz;
         set_rates(rd, "head.step_deg", p);

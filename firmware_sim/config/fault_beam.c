@@ -41,7 +41,8 @@ static void check_factor(struct cfg_reader *rd, const struct config *cfg, const 
 static void check_window(struct cfg_reader *rd, const struct config *cfg, uint32_t i)
 {
     const int is_noisy = cfg->noise.range == RANGE_NOISE_ON && cfg->profile.range_sigma_m > 0.0;
-    if (!cfg->signal.on && !is_noisy && !cfg->links_are_not_here && !config_speaks(cfg, PROTOCOL_COLA))
+    if (!cfg->signal.on && !is_noisy && !cfg->links_are_not_here && !config_speaks(cfg, PROTOCOL_COLA) &&
+        CFG_SOUND(rd, 0, "links"))
         cfg_fail_key(
             rd, "faults[].kind", i,
             "window_soiled would have no effect: no signal is modelled, ranges have no noise, and no link speaks cola; "

@@ -175,6 +175,14 @@ static int needs_time(enum fault_kind kind)
            kind == FAULT_LEAP_SECOND || (kind >= FAULT_PPS_LOST && kind <= FAULT_NMEA_CHECKSUM);
 }
 
+/* Whether faults of the kind can strike on the link. */
+static int link_has_fault(const struct link_spec *link, enum fault_kind kind)
+{
+    const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
+    const uint32_t can = link_faults(link);
+    return !is_of_link || (can & LINK_FAULT_BIT(fault_act_of(kind, can) - FAULT_DISCONNECT)) != 0;
+}
+
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list)
 {
     for (uint32_t i = 0; i < list->n; i++) {
@@ -191,17 +199,10 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&
-                 !config_link_has_fault(&cfg->link[f->link - 1], f->kind))
+                 !link_has_fault(&cfg->link[f->link - 1], f->kind))
             cfg_fail_key(rd, "faults[].link", i, "link %u can't have %s; allowed 0, or a link that can", f->link,
                          fault_names[f->kind]);
     }
-}
-
-int config_link_has_fault(const struct link_spec *link, enum fault_kind kind)
-{
-    const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
-    const uint32_t can = link_faults(link);
-    return !is_of_link || (can & LINK_FAULT_BIT(fault_act_of(kind, can) - FAULT_DISCONNECT)) != 0;
 }
 
 static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fault_list *list)
@@ -210,17 +211,17 @@ static int read_list(struct cfg_reader *rd, const struct config *cfg, struct fau
     cfg_check_faults(rd, list);
     cfg_check_fault_links(rd, cfg, list);
     cfg_check_fault_beams(rd, cfg, list);
-    return rd->faults->n == 0 ? SH_OK : rd->faults->fault[0].code;
+    return rd->diagnostics->n == 0 ? SH_OK : rd->diagnostics->err[0].code;
 }
 
-int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults)
+int config_add_scenario(struct config *cfg, const char *name, struct config_diagnostics *diagnostics)
 {
     struct cfg_reader rd;
     char path[CONFIG_PATH_LEN], known[512];
     struct fault_list *list = calloc(1, sizeof *list);
-    memset(faults, 0, sizeof *faults);
+    memset(diagnostics, 0, sizeof *diagnostics);
     const int is_there = cfg_find_scenario(name, path);
-    cfg_reader_init(&rd, is_there ? path : name, &fault_table, list, faults);
+    cfg_reader_init(&rd, is_there ? path : name, &fault_table, list, diagnostics);
     config_name_scenarios(known, sizeof known);
     int code = SH_OK;
     if (!is_there)
@@ -248,16 +249,16 @@ int config_read_fault(const struct config *cfg, const char *text, struct fault *
     enum { TEXT_MAX = 1024 };
     struct cfg_reader rd;
     struct cfg_document *doc;
-    struct config_faults faults = {0};
+    struct config_diagnostics diagnostics = {0};
     struct fault_list list = {0};
     char yaml[TEXT_MAX];
     const int len = snprintf(yaml, sizeof yaml, "faults: [ %s ]\n", text);
     if (len >= (int)sizeof yaml) return sh_fail(err, SH_EINPUT, "longer than %d characters", TEXT_MAX - 16);
-    cfg_reader_init(&rd, "fault", &fault_table, &list, &faults);
+    cfg_reader_init(&rd, "fault", &fault_table, &list, &diagnostics);
     int code = cfg_open_text(&rd, (const unsigned char *)yaml, (size_t)len, &doc);
     if (code == SH_OK) cfg_close_file(doc);
     if (code == SH_OK) code = read_list(&rd, cfg, &list);
-    if (code != SH_OK) return sh_fail(err, code, "%s", faults.fault[0].text);
+    if (code != SH_OK) return sh_fail(err, code, "%s", diagnostics.err[0].text);
     if (list.n != 1) return sh_fail(err, SH_EINPUT, "%u faults; allowed one, as {kind: drop, every: 10}", list.n);
     *out = list.fault[0];
     return SH_OK;

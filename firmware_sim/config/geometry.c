@@ -54,11 +54,11 @@ static void check_one(struct cfg_reader *rd, const struct config_profile *p, uin
 void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *p)
 {
     const struct config_emitter *c = &p->arrangement;
-    if (c->n_geometries == 0 || !CFG_SOUND(rd, 0, "geometries", "lines_min_hz", "lines_max_hz")) return;
+    if (c->n_geometries == 0 || !CFG_SOUND(rd, 0, "lines_min_hz", "lines_max_hz")) return;
     for (uint32_t i = 0; i < c->n_geometries; i++)
         check_one(rd, p, i);
+    if (!CFG_SOUND(rd, 0, "geometries")) return;
     for (uint32_t i = 0; i < c->n_geometries; i++) {
-        if (!CFG_SOUND(rd, i, "geometries[].lines_hz", "geometries[].steps_per_turn")) return;
         const int64_t prr_uhz = c->geometry[i].lines_uhz * c->geometry[i].steps_per_turn;
         if (i == 0) p->prr_min_uhz = p->prr_max_uhz = prr_uhz;
         if (prr_uhz < p->prr_min_uhz) p->prr_min_uhz = prr_uhz;

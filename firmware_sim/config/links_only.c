@@ -19,7 +19,7 @@ static int is_taken(const char *path)
 }
 
 int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
-                      struct config_faults *faults)
+                      struct config_diagnostics *diagnostics)
 {
     struct cfg_key keys[CFG_MAX_ROWS];
     struct cfg_table table = {keys, 0};
@@ -27,12 +27,12 @@ int config_load_links(const char *text, const char *name, const char *const *set
     struct cfg_document *doc;
     memset(cfg, 0, sizeof *cfg);
     cfg->has_no_head = 1;
-    memset(faults, 0, sizeof *faults);
+    memset(diagnostics, 0, sizeof *diagnostics);
     snprintf(cfg->file, sizeof cfg->file, "%s", name);
     for (size_t i = 0; i < cfg_config_table.n; i++)
         if (is_taken(cfg_config_table.keys[i].path)) keys[table.n++] = cfg_config_table.keys[i];
-    cfg_reader_init(&rd, cfg->file, &table, cfg, faults);
-    if (cfg_open_text(&rd, (const unsigned char *)text, strlen(text), &doc) != SH_OK) return faults->fault[0].code;
+    cfg_reader_init(&rd, cfg->file, &table, cfg, diagnostics);
+    if (cfg_open_text(&rd, (const unsigned char *)text, strlen(text), &doc) != SH_OK) return diagnostics->err[0].code;
     cfg_apply_sets(&rd, doc, sets, n_sets);
     cfg_close_file(doc);
     cfg_fill_defaults(&rd, NULL);
@@ -41,5 +41,5 @@ int config_load_links(const char *text, const char *name, const char *const *set
     cfg_check_loop(&rd, cfg);
     cfg_check_faults(&rd, &cfg->faults);
     cfg_check_fault_links(&rd, cfg, &cfg->faults);
-    return faults->n == 0 ? SH_OK : faults->fault[0].code;
+    return diagnostics->n == 0 ? SH_OK : diagnostics->err[0].code;
 }

@@ -14,37 +14,35 @@ struct config;
 struct link_spec;
 
 /* The diagnostics of a configuration, in the order of the file; then those of --set and of the head profile. */
-enum { CONFIG_MAX_FAULTS = 20 };
-struct config_faults {
-    uint32_t n; /* all diagnostics that were found; fault[] has the first CONFIG_MAX_FAULTS */
-    struct sh_err fault[CONFIG_MAX_FAULTS];
-    uint64_t place[CONFIG_MAX_FAULTS]; /* what they are ordered by */
+enum { CONFIG_MAX_DIAGNOSTICS = 20 };
+struct config_diagnostics {
+    uint32_t n; /* all diagnostics that were found; err[] has the first CONFIG_MAX_DIAGNOSTICS */
+    struct sh_err err[CONFIG_MAX_DIAGNOSTICS];
+    uint64_t place[CONFIG_MAX_DIAGNOSTICS]; /* they rise with it: file, --set or profile, and the line there */
 };
 
-/* Reads path, its profile, then the `key=value` settings of --set, in order. These are checked in the same way, and
- * errors name them `--set KEY`. On failure cfg is unspecified, and err has the first diagnostic. cfg is large: allocate
- * it. */
+/* Reads path, then the `key=value` settings of --set, in order, then the profile that they name. The settings are
+ * checked as the file's keys are, and errors name them `--set KEY`. On failure cfg is unspecified, and err has the
+ * first diagnostic. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
 /* The same, with all diagnostics. Returns SH_OK or the code of the first. */
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
-                    struct config_faults *faults);
+                    struct config_diagnostics *diagnostics);
 
 /* The same for a text that has only links, loop and faults. Errors call it `name`. The rest of cfg is zero. */
 int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
-                      struct config_faults *faults);
+                      struct config_diagnostics *diagnostics);
 
 /* Adds the injected faults of a scenario, a file that has nothing but a list `faults`. name: a path, or the name of a
- * scenario that comes with the program. At most once. Diagnostics go to `faults`; then nothing is added, and the code
- * of the first is returned. */
-int config_add_scenario(struct config *cfg, const char *name, struct config_faults *faults);
+ * scenario that comes with the program. At most once. With diagnostics nothing is added, and the code of the first is
+ * returned. */
+int config_add_scenario(struct config *cfg, const char *name, struct config_diagnostics *diagnostics);
 /* "a, b, c": the scenarios that come with the program, as many as buf holds. */
 void config_name_scenarios(char *buf, size_t len);
 /* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 270 KiB of
  * stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
-/* Whether faults of the kind can strike on the link. */
-int config_link_has_fault(const struct link_spec *link, enum fault_kind kind);
 
 /* Loads the configuration of the scanner at a station, from 1, which becomes its head.station. It has no links. Output,
  * loop and scenario are those of cfg as it is now. The sets that cfg was loaded with must still be there. */

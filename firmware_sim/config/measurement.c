@@ -41,8 +41,6 @@ void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
     if (!CFG_SOUND(rd, 0, "reaches", "range_max_m", "range_sigma_m", "range_sigma_at_m", "range_sigma_reflectance",
                    "range_sigma_floor_m", "range_sigma_ppm", "threshold_snr", "overlap_m"))
         return;
-    for (uint32_t i = 0; i < profile->n_reaches; i++)
-        if (!CFG_SOUND(rd, i, "reaches[]")) return;
     for (uint32_t i = 0; i < (n > 0 ? n : 1); i++)
         if (n == 0 || profile->program[i].reach_90_m == 0.0)
             check_signal_of(rd, profile, 0, "reaches");

@@ -18,7 +18,7 @@ void cfg_check_ntp(struct cfg_reader *rd, const struct config *cfg)
     if (floor(ntp->zone_h) != ntp->zone_h)
         cfg_fail_key(rd, "ntp.zone_h", 0, "%.10g; allowed whole hours from -12 to 12", ntp->zone_h);
     if (ntp->role == NTP_ROLE_CLIENT && !cfg->links_are_not_here && !config_speaks(cfg, PROTOCOL_COLA) &&
-        CFG_SOUND(rd, 0, "ntp.role", "links[].protocol"))
+        CFG_SOUND(rd, 0, "ntp.role", "links"))
         cfg_fail_key(rd, "ntp.role", 0, "client, but no link sends dates; allowed with a link of protocol: cola");
     if (ntp->role == NTP_ROLE_CLIENT && cfg->loop.pace != PACE_REALTIME && CFG_SOUND(rd, 0, "ntp.role", "loop.pace"))
         cfg_fail_key(rd, "ntp.role", 0,

@@ -47,8 +47,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     char owner[64];
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
     const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_given(rd, "links[].path", i);
-    cfg_set_usb_serial(rd, cfg, link, i);
-    cfg_set_usb_personality(rd, link, i);
+    cfg_set_usb_identity(rd, cfg, link, i);
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
@@ -63,6 +62,14 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
         cfg_fail_key(rd, "links[].port", i, "0, but the head must connect to this port; allowed 1 to 65535");
 }
 
+/* Whether both listen on one port of one address. */
+static int listens_as(const struct link_spec *a, const struct link_spec *b)
+{
+    const unsigned tcp = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_WEB);
+    return (CFG_KIND(a->type) & tcp) != 0 && (CFG_KIND(b->type) & tcp) != 0 && a->port != 0 && a->port == b->port &&
+           strcmp(a->address, b->address) == 0;
+}
+
 static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     struct link_spec *link = &cfg->link[i];
@@ -72,9 +79,13 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
     if (!check_owned(rd, "links[]", i, 0, (int)link->type, owner)) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
         cfg_fail_key(rd, "links[].path", i, "missing; a file link requires the path of the file to write");
-    for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
-        if (strcmp(cfg->link[k].path, link->path) == 0)
+    for (uint32_t k = 0; k < i; k++) {
+        if (link->path[0] != '\0' && strcmp(cfg->link[k].path, link->path) == 0)
             cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
+        if (listens_as(link, &cfg->link[k]) && CFG_SOUND(rd, k, "links[].type", "links[].port"))
+            cfg_fail_key(rd, "links[].port", i, "links[%u] listens on the same port; allowed a port of its own, or 0",
+                         k);
+    }
     if (link->type == LINK_USB) check_usb_link(rd, cfg, link, i);
     if (link->type == LINK_UDP && link->port == 0 && CFG_SOUND(rd, i, "links[].port"))
         cfg_fail_key(rd, cfg_is_given(rd, "links[].port", i) ? "links[].port" : "links[].type", i,

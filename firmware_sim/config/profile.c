@@ -164,9 +164,9 @@ static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 {
     const char *base = basename(rd->file);
     size_t stem = strlen(base) - 5;
-    if (stem >= sizeof profile->name)
+    if (stem == 0 || stem >= sizeof profile->name)
         return cfg_fail_file(rd, SH_EINPUT, 0,
-                             "the file's name is the name of the profile; allowed up to %zu characters and .yaml",
+                             "the file's name is the name of the profile; allowed 1 to %zu characters and .yaml",
                              sizeof profile->name - 1);
     for (size_t i = 0; i < stem; i++)
         if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)
@@ -178,16 +178,16 @@ static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 
 /* Returns whether it has no diagnostic. */
 static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile,
-                        struct config_faults *faults)
+                        struct config_diagnostics *diagnostics)
 {
-    const uint32_t before = faults->n;
+    const uint32_t before = diagnostics->n;
     memset(profile, 0, sizeof *profile);
-    cfg_reader_init(rd, file, &cfg_profile_table, profile, faults);
+    cfg_reader_init(rd, file, &cfg_profile_table, profile, diagnostics);
     if (name_profile(rd, profile) == SH_OK && cfg_read_file(rd) == SH_OK) {
         cfg_fill_defaults(rd, NULL);
         check_profile(rd, profile);
     }
-    return faults->n == before;
+    return diagnostics->n == before;
 }
 
 /* ---- lookup */
@@ -230,21 +230,21 @@ void cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
     if (cfg->profile_file[0] == '\0')
         cfg_fail_key(rd, "head.profile", 0, "missing; required is the name of a profile, or a path that ends in .yaml");
     else if (find_profile(rd, cfg) == SH_OK)
-        rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->faults);
+        rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->diagnostics);
 }
 
 int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err)
 {
     struct profile_dirs dirs;
     struct cfg_reader rd;
-    struct config_faults faults = {0};
+    struct config_diagnostics diagnostics = {0};
     char path[2 * CONFIG_PATH_LEN], allowed[CFG_ALLOWED_MAX + 16];
     find_dirs(config_file, &dirs);
     for (int i = 0; i < dirs.n; i++) {
         snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
         if (access(path, F_OK) != 0) continue;
-        if (read_profile(&rd, path, profile, &faults)) return SH_OK;
-        return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
+        if (read_profile(&rd, path, profile, &diagnostics)) return SH_OK;
+        return sh_fail(err, diagnostics.err[0].code, "%s", diagnostics.err[0].text);
     }
     allow_profiles(&dirs, allowed, sizeof allowed);
     return sh_fail(err, SH_EINPUT, "no head profile \"%s\"; %s", name, allowed);
@@ -257,10 +257,10 @@ static int list_profile(const char *dir, const char *entry, FILE *out, struct sh
     char path[2 * CONFIG_PATH_LEN];
     struct cfg_reader rd;
     struct config_profile profile;
-    struct config_faults faults = {0};
+    struct config_diagnostics diagnostics = {0};
     snprintf(path, sizeof path, "%s/%s", dir, entry);
-    if (!read_profile(&rd, path, &profile, &faults))
-        return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
+    if (!read_profile(&rd, path, &profile, &diagnostics))
+        return sh_fail(err, diagnostics.err[0].code, "%s", diagnostics.err[0].text);
     cfg_list_profile(&rd, &profile, out);
     return SH_OK;
 }

@@ -173,14 +173,12 @@ static void check_program(struct cfg_reader *rd, const struct config_profile *p,
 void cfg_check_programs(struct cfg_reader *rd, struct config_profile *p)
 {
     const uint32_t n = p->n_programs;
-    int have = 0, sound = 1;
-    for (uint32_t i = 0; i < n; i++) {
+    int have = 0;
+    for (uint32_t i = 0; i < n; i++)
         have |= p->program[i].reach_90_m > 0.0;
-        sound &= CFG_SOUND(rd, i, "programs[]");
-    }
     if (n > 0 && have && p->n_reaches > 0)
         cfg_fail_key(rd, "reaches", 0, "given together with programs[].reach_90_m; allowed one of them");
-    if (n > 0 && sound && !have && p->n_reaches == 0 && CFG_SOUND(rd, 0, "reaches"))
+    if (n > 0 && !have && p->n_reaches == 0 && CFG_SOUND(rd, 0, "programs", "reaches"))
         cfg_fail_key(rd, "programs", 0,
                      "no program has a reach; required is reach_90_m in each, or reaches of the head");
     if (p->n_reaches == 0) p->reach[p->n_reaches++] = (struct config_reach){WHITE, p->range_max_m, FROM_ASSUMED};

@@ -45,34 +45,34 @@ static int is_same_scanner(const struct config *a, const struct config *b)
            IS_SAME(a, b, instrument);
 }
 
-static int copy_text_of(char *text, size_t len, const char *fault)
+static int copy_text_of(char *text, size_t len, const char *diagnostic)
 {
     static const char mark[] = ", for stations[";
-    const char *at = strstr(fault, mark), *end = at != NULL ? strchr(at + 1, ':') : NULL;
+    const char *at = strstr(diagnostic, mark), *end = at != NULL ? strchr(at + 1, ':') : NULL;
     if (end == NULL)
-        snprintf(text, len, "%s", fault);
+        snprintf(text, len, "%s", diagnostic);
     else
-        snprintf(text, len, "%.*s%s", (int)(at - fault), fault, end);
+        snprintf(text, len, "%.*s%s", (int)(at - diagnostic), diagnostic, end);
     return end != NULL;
 }
 
 /* Whether a diagnostic was reported before: those of the file's own sections were. */
-static int is_told(const struct config_faults *faults, const char *fault)
+static int is_told(const struct config_diagnostics *diagnostics, const char *diagnostic)
 {
-    char text[sizeof faults->fault[0].text], told[sizeof text];
-    copy_text_of(text, sizeof text, fault);
-    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++) {
-        copy_text_of(told, sizeof told, faults->fault[i].text);
+    char text[sizeof diagnostics->err[0].text], told[sizeof text];
+    copy_text_of(text, sizeof text, diagnostic);
+    for (uint32_t i = 0; i < diagnostics->n && i < CONFIG_MAX_DIAGNOSTICS; i++) {
+        copy_text_of(told, sizeof told, diagnostics->err[i].text);
         if (strcmp(told, text) == 0) return 1;
     }
     return 0;
 }
 
-static void add_faults(struct config_faults *faults, const struct config_faults *more)
+static void add_diagnostics(struct config_diagnostics *diagnostics, const struct config_diagnostics *more)
 {
-    for (uint32_t i = 0; i < more->n && i < CONFIG_MAX_FAULTS; i++)
-        if (!is_told(faults, more->fault[i].text))
-            cfg_add_fault(faults, more->place[i], more->fault[i].code, more->fault[i].text);
+    for (uint32_t i = 0; i < more->n && i < CONFIG_MAX_DIAGNOSTICS; i++)
+        if (!is_told(diagnostics, more->err[i].text))
+            cfg_add_diagnostic(diagnostics, more->place[i], more->err[i].code, more->err[i].text);
 }
 
 /* Returns the station whose configuration station i uses. A station with a section `scanner` uses its own; the others
@@ -94,25 +94,25 @@ static void find_same(struct config *cfg, const struct config *const *loaded, ui
     cfg->station[i].scanner = k + 1;
 }
 
-static void check_all(struct config *cfg, struct config **own, struct config_faults *faults)
+static void check_all(struct config *cfg, struct config **own, struct config_diagnostics *diagnostics)
 {
     const uint32_t here = cfg_station_at(cfg, cfg->head.settings.station);
     const struct config *loaded[CONFIG_MAX_STATIONS];
     for (uint32_t i = 0; i < cfg->n_stations; i++) {
         const uint32_t as = loaded_as(cfg, i);
-        struct config_faults more = {0};
+        struct config_diagnostics more = {0};
         loaded[i] = as == loaded_as(cfg, here) ? cfg : as < i ? loaded[as] : own[as];
         if (as != i || loaded[i] == cfg) continue;
         own[as] = calloc(1, sizeof *own[as]);
         if (own[as] == NULL) {
-            cfg_add_fault(faults, 0, SH_ENOMEM, "no memory for the scanners of stations");
+            cfg_add_diagnostic(diagnostics, 0, SH_ENOMEM, "no memory for the scanners of stations");
             return;
         }
         cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, i + 1, own[as], &more);
-        add_faults(faults, &more);
+        add_diagnostics(diagnostics, &more);
         loaded[i] = own[as];
     }
-    if (faults->n != 0) return;
+    if (diagnostics->n != 0) return;
     for (uint32_t i = 0; i < cfg->n_stations; i++)
         find_same(cfg, loaded, i);
     if (config_is_alone(cfg)) return;
@@ -120,7 +120,7 @@ static void check_all(struct config *cfg, struct config **own, struct config_fau
         cfg->scene.shared_textures |= loaded[i]->signal.on;
 }
 
-void cfg_check_scanners(struct config *cfg, struct config_faults *faults)
+void cfg_check_scanners(struct config *cfg, struct config_diagnostics *diagnostics)
 {
     struct config *own[CONFIG_MAX_STATIONS] = {NULL};
     const uint32_t station = cfg->head.settings.station;
@@ -128,17 +128,17 @@ void cfg_check_scanners(struct config *cfg, struct config_faults *faults)
     for (uint32_t i = 0; i < cfg->n_stations; i++)
         any |= cfg->station[i].has_scanner;
     if (!any || cfg->n_stations < 2 || station == 0 || cfg_station_at(cfg, station) >= cfg->n_stations) return;
-    check_all(cfg, own, faults);
+    check_all(cfg, own, diagnostics);
     for (uint32_t i = 0; i < cfg->n_stations; i++)
         free(own[i]);
 }
 
 int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err)
 {
-    struct config_faults faults = {0};
-    int rc = cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, station, out, &faults);
-    if (rc == SH_OK && cfg->scenario_file[0] != '\0') rc = config_add_scenario(out, cfg->scenario_file, &faults);
-    if (rc != SH_OK) return sh_fail(err, rc, "%s", faults.fault[0].text);
+    struct config_diagnostics diagnostics = {0};
+    int rc = cfg_load_for(cfg->file, cfg->sets, cfg->n_sets, station, out, &diagnostics);
+    if (rc == SH_OK && cfg->scenario_file[0] != '\0') rc = config_add_scenario(out, cfg->scenario_file, &diagnostics);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s", diagnostics.err[0].text);
     for (uint32_t i = 0; i < cfg->n_stations && i < out->n_stations; i++)
         out->station[i].scanner = cfg->station[i].scanner;
     out->scene.shared_textures = cfg->scene.shared_textures;

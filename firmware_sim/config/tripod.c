@@ -3,23 +3,13 @@
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
+#include "firmware_sim/config/table/reader.h"
 #include "firmware_sim/config/table/row.h"
-
-static const char *const keys[] = {
-    "stations[].tripod",
-    "stations[].tripod.leg_m",
-    "stations[].tripod.opening_min_deg",
-    "stations[].tripod.head_above_m",
-    "stations[].tripod.cone",
-    "stations[].tripod.legs",
-    "stations[].tripod.leg_diameter_m",
-    "stations[].tripod.legs_heading_deg",
-};
 
 static void check_tripod(struct cfg_reader *rd, const struct config *cfg, struct config_tripod *t, uint32_t i)
 {
-    for (size_t k = 0; k < CFG_LEN(keys); k++)
-        t->given |= cfg_is_given(rd, keys[k], i);
+    for (size_t k = 0; k < rd->table.n; k++)
+        t->given |= cfg_is_in(rd->table.keys[k].path, "stations[].tripod") && rd->line[k][i] != 0;
     if (!t->given || !CFG_SOUND(rd, i, "stations[].tripod")) return;
     if (!cfg_is_given(rd, "stations[].tripod.leg_m", i))
         cfg_fail_missing(rd, "stations[].tripod.leg_m", i);

@@ -22,21 +22,17 @@ static enum usb_personality_id look_of(int protocol)
     }
 }
 
-void cfg_set_usb_personality(struct cfg_reader *rd, struct link_spec *link, uint32_t item)
+void cfg_set_usb_identity(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item)
 {
     const struct usb_personality *personality = usb_personality_get(look_of(link->protocol));
+    char path[PATH_MAX];
     link->personality = (int)look_of(link->protocol);
     if (!cfg_is_given(rd, "links[].vid", item)) link->vid = personality->vid;
     if (!cfg_is_given(rd, "links[].pid", item)) link->pid = personality->pid;
-}
-
-/* `whose` identifies the head: the configuration's file and the link's place in it. */
-void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item)
-{
-    char path[PATH_MAX];
     if (link->serial[0] != '\0') return;
     snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
     link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    /* `whose` identifies the head: the configuration's file and the link's place in it. */
     const char *file = realpath(cfg->file, path) != NULL ? path : cfg->file;
     const size_t len = strlen(file), most = sizeof link->whose - 12; /* long paths differ mostly at their ends */
     snprintf(link->whose, sizeof link->whose, "%u %.*s", item, (int)most - 1,

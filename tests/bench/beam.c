@@ -65,12 +65,6 @@ static void *must(void *memory)
     exit(1);
 }
 
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void compare(struct result *t, const struct line_block *b, uint32_t *at, const struct beam_ref *ref)
 {
     uint32_t first = *at;
@@ -153,7 +147,7 @@ static void sum_up(struct result *r)
     r->ns_median = bench_median(r->ns, ROUNDS);
     r->ratio_median = bench_median(r->ratio, ROUNDS);
     if (only_speed) return;
-    qsort(r->off_m, r->n_off, sizeof *r->off_m, by_value);
+    bench_sort(r->off_m, r->n_off);
     r->rms_m = sqrt(t->range2 / (double)t->echoes);
     r->p999_m = r->off_m[(uint64_t)ceil(0.999 * (double)r->n_off) - 1];
     r->max_m = r->off_m[r->n_off - 1];

@@ -7,6 +7,7 @@
 #include "core/cast.h"
 #include "core/scene.h"
 #include "core/schedule.h"
+#include "core/studio/mesh.h"
 #include "tests/common/embree_alone.h"
 
 enum { BENCH_LINES = 400, BENCH_LINE_PULSES = 2500, BENCH_MIN_ROUNDS = 7, BENCH_MAX_ROUNDS = 101 };
@@ -33,6 +34,9 @@ int bench_is_made(const char *name);  /* one that is generated and is no terrain
 int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
                       struct sh_err *err);
 void bench_target_free(struct bench_target *target);
+struct mesh bench_target_mesh(const struct bench_target *target);
+/* The ending chooses the format (core/studio/mesh.h). */
+int bench_target_write(const struct bench_target *target, const char *path, struct sh_err *err);
 
 /* ---- rays.c: a normal scan of lines of 100 degrees, spread over a turn of the pan */
 enum { BENCH_LOWEST_DEG = -40, BENCH_HIGHEST_DEG = 60, BENCH_MAX_LINE = 6000 /* pulses */ };
@@ -75,10 +79,15 @@ struct bench_case {
 /* Sets Embree up alone over a mesh, with the bench's longest range and all threads for the build. */
 int bench_embree(const struct scene *scene, const double origin_m[3], int robust, struct embree_alone *out,
                  struct sh_err *err);
+/* Prepares Embree for the packets at which it is fastest: 4, 8 or 16 rays, from memory or filled on the way. cost()
+ * measures a pass with those that *width and *feed have at the time. */
+int bench_choose_embree(struct embree_alone *e, uint32_t *width, enum embree_feed *feed, double (*cost)(void *ctx),
+                        void *ctx, struct sh_err *err);
 /* The station is at 52.5 N, 13.4 E, and positions are in ECEF. */
 int bench_georef(const struct bench_target *target, struct georef **out, struct sh_err *err);
 void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup);
-double bench_thread_s(void);                     /* processor time of this thread */
+double bench_thread_s(void); /* processor time of this thread */
+void bench_sort(double *values, size_t n);
 double bench_median(double *values, uint32_t n); /* sorts them */
 
 /* ---- measure.c: one thread, everything in turns, medians of the rounds' ratios */

@@ -18,7 +18,7 @@
 #include "tests/bench/pin.h"
 #include "tests/bench/sight.h"
 
-enum { LINES = 104 /* cast, of a whole scan's */, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 21 };
+enum { LINES = 104 /* cast, of a whole scan's */, ROUNDS = 9, CHUNK = 256, WIDTHS = 4, METHODS = 21 };
 enum kind { FLOAT, REFINED, DECIDED, SIGHT }; /* the last two are the program's own */
 #define WHOLE_SCAN 22.5e6 /* pulses of a turn at 0.04 degrees: what a sight is made for, and shared by */
 
@@ -164,12 +164,6 @@ static void cast(struct chart *c, const struct method *m)
     }
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* A ray that misses is wrong by the whole range. */
 static void measure_error(struct chart *c, struct method *m)
 {
@@ -182,7 +176,7 @@ static void measure_error(struct chart *c, struct method *m)
                                                                   : (double)e->t[at];
         c->error_m[i] = isnan(range_m) ? c->reference_m[i] : fabs(range_m - c->reference_m[i]);
     }
-    qsort(c->error_m, c->n_sample, sizeof *c->error_m, compare);
+    bench_sort(c->error_m, c->n_sample);
     m->err_p999_m = c->error_m[(uint32_t)ceil(0.999 * c->n_sample) - 1];
     m->err_max_m = c->error_m[c->n_sample - 1];
 }
@@ -223,14 +217,13 @@ static void mark_front(struct method *method)
 
 static int make_reference(struct chart *c)
 {
-    uint32_t most = c->rays.n / SAMPLE_STEP, misses = 0, doubtful = 0;
+    uint32_t most = c->rays.n, misses = 0, doubtful = 0;
     c->reference_m = malloc(most * sizeof *c->reference_m);
     c->error_m = malloc(most * sizeof *c->error_m);
     c->sample = malloc(most * sizeof *c->sample);
     struct ground_truth *r = ground_truth_create(c->scene, c->station_m);
     if (c->reference_m == NULL || c->error_m == NULL || c->sample == NULL || r == NULL) return 0;
-    for (uint32_t i = 0; i < most; i++) {
-        uint32_t at = i * SAMPLE_STEP;
+    for (uint32_t at = 0; at < most; at++) {
         const double dir[3] = {c->rays.dx[at], c->rays.dy[at], c->rays.dz[at]};
         int in_doubt;
         double range_m = (double)ground_truth_range(r, dir, &in_doubt);
@@ -334,8 +327,8 @@ static void print_rows(const struct method *method, const char *scene)
     fflush(stdout);
 }
 
-/* Adds the cost of a method in normal scans, and its worst error in any scan. */
-static void add_to_all(struct method *all, const struct chart *c, int n_normal)
+/* Adds the cost of a method in the two normal scans, and its worst error in any scan. */
+static void add_to_all(struct method *all, const struct chart *c)
 {
     for (int i = 0; i < METHODS; i++) {
         const struct method *m = &c->method[i];
@@ -343,7 +336,7 @@ static void add_to_all(struct method *all, const struct chart *c, int n_normal)
         all[i].robust = m->robust;
         all[i].width = m->width;
         all[i].is_default = m->is_default;
-        if (!c->spec->at_edges) all[i].ns_median += m->ns_median / n_normal;
+        if (!c->spec->at_edges) all[i].ns_median += m->ns_median / 2.0;
         all[i].err_p999_m = fmax(all[i].err_p999_m, m->err_p999_m);
         all[i].err_max_m = fmax(all[i].err_max_m, m->err_max_m);
     }
@@ -366,7 +359,7 @@ static int draw_scene(const struct chart_scene *spec, struct method *all, struct
     if (rc == SH_OK) {
         mark_front(c->method);
         print_rows(c->method, spec->name);
-        add_to_all(all, c, 2);
+        add_to_all(all, c);
     }
     tear_down(c);
     free(c);

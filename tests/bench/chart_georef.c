@@ -4,7 +4,6 @@
  * shares nothing with GeographicLib. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "core/plan.h"
 #include "core/rng.h"
@@ -118,12 +117,6 @@ static void measure_speed(struct georef *georef, struct result *result)
         }
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Returns the method that the plan takes at the place that needs most. */
 static int planned(const struct georef *georef, int scene, int before)
 {
@@ -140,7 +133,7 @@ static int planned(const struct georef *georef, int scene, int before)
 static void finish(struct result *result, int the_default)
 {
     for (int m = 0; m < METHODS; m++) {
-        qsort(error_m[m], PLACES * POINTS, sizeof error_m[m][0], compare);
+        bench_sort(error_m[m], PLACES * POINTS);
         result[m].ns_median = bench_median(result[m].ns, ROUNDS);
         result[m].err_p999_m = error_m[m][(int)(0.999 * PLACES * POINTS)];
         result[m].err_max_m = error_m[m][PLACES * POINTS - 1];

@@ -238,12 +238,6 @@ static void move_body(struct world *w)
 
 /* ---- errors: a missed ray, and one that meets something where nothing is, are wrong by the whole range */
 
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double *true_ranges(const struct world *w)
 {
     struct reference *r = reference_create((const double(*)[3])w->scene->vertex_m,
@@ -268,7 +262,7 @@ static void measure_error(struct world *w, struct method *m, const double *truth
         if (isnan(truth_m[i]) && isnan(range_m)) continue;
         error_m[n++] = isnan(range_m) ? truth_m[i] : isnan(truth_m[i]) ? range_m : fabs(range_m - truth_m[i]);
     }
-    qsort(error_m, n, sizeof *error_m, compare);
+    bench_sort(error_m, n);
     m->p999_m = error_m[(uint32_t)ceil(0.999 * n) - 1];
     m->max_m = error_m[n - 1];
 }

@@ -5,7 +5,6 @@
  * README.md tells how to read it. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "core/georef/polynomial_kernels.h"
 #include "core/georef/state.h"
@@ -68,12 +67,6 @@ static void scatter(void)
                        ((double)(rng_u64(rng_key(9, RNG_SCENE), 3 * i + (uint64_t)k) >> 11) * 0x1p-52 - 1.0);
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void compare_points(const struct georef *georef)
 {
     double degree_m = 6399594.0 * M_PI / 180.0, weight[3] = {1.0, 1.0, 1.0};
@@ -84,7 +77,7 @@ static void compare_points(const struct georef *georef)
             sum += pow((out[k][i] - exact[k][i]) * weight[k], 2);
         error_m[i] = sqrt(sum);
     }
-    qsort(error_m, POINTS, sizeof error_m[0], compare);
+    bench_sort(error_m, POINTS);
 }
 
 static int measure(int map, const struct width *width, int n_widths)

@@ -9,11 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "core/bvh.h"
 #include "core/scene_copies.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
 
 enum { LEAVES = 50000, SIDE = 100, ROUNDS = 15, LINES = 256, LINE = 512, RAYS = LINES * LINE };
@@ -106,27 +106,14 @@ static double cast_ns(struct bvh_work *work, const struct bvh *bvh, double *hit)
                                   .range_max_m = 1000,
                                   .range_m = range_m,
                                   .triangle = triangle};
-    struct timespec a, b;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &a);
+    const double start_s = bench_thread_s();
     bvh_hits(work, bvh, &rays);
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
+    const double spent_s = bench_thread_s() - start_s;
     uint32_t n = 0;
     for (int i = 0; i < RAYS; i++)
         n += isnan(range_m[i]) ? 0 : 1;
     *hit = (double)n / RAYS;
-    return ((double)(b.tv_sec - a.tv_sec) * 1e9 + (double)(b.tv_nsec - a.tv_nsec)) / RAYS;
-}
-
-static int compare(const void *a, const void *b)
-{
-    const double p = *(const double *)a, q = *(const double *)b;
-    return (p > q) - (p < q);
-}
-
-static double median(double *values)
-{
-    qsort(values, ROUNDS, sizeof *values, compare);
-    return values[ROUNDS / 2];
+    return 1e9 * spent_s / RAYS;
 }
 
 static void measure(struct bvh_work *work, struct bvh *const bvh[SCENES])
@@ -142,7 +129,8 @@ static void measure(struct bvh_work *work, struct bvh *const bvh[SCENES])
         }
     printf("%-16s %10s %8s %s\n", "", "ns a ray", "hits", "ratio");
     for (int k = 0; k < SCENES; k++)
-        printf("%-16s %10.1f %7.0f%% %.2f of %s\n", NAMES[k], median(ns[k]), 100.0 * hit[k], median(ratio[k]),
+        printf("%-16s %10.1f %7.0f%% %.2f of %s\n", NAMES[k], bench_median(ns[k], ROUNDS), 100.0 * hit[k],
+               bench_median(ratio[k], ROUNDS),
                NAMES[k == NEAR_COPIES      ? FOREST
                      : k == NEAR_TRIANGLES ? NEAR_COPIES
                                            : ALONE]);

@@ -16,17 +16,10 @@
 #include "tests/bench/options.h"
 #include "tests/bench/pin.h"
 
-enum { BATCH = 256, TIMES = 300, MAX_ROUNDS = 99, LAYOUTS = 3, WAYS = 3 };
+enum { TIMES = 300, MAX_ROUNDS = 99, LAYOUTS = 3, WAYS = 3 };
 
 static const char *const LAYOUT[LAYOUTS] = {"polar", "utm", "geodetic"};
 static const char *const WAY[WAYS] = {"points", "columns", "recorded"};
-
-struct columns_room {
-    double figure[7][BATCH];
-    int64_t t_ns[BATCH];
-    uint16_t label[BATCH];
-    uint8_t echo[BATCH], echo_count[BATCH];
-};
 
 struct reader {
     struct scanhead *sh;
@@ -34,8 +27,7 @@ struct reader {
     struct scanhead_columns columns[WAYS]; /* [0]: none; those of a recorder lack range and angles */
 };
 
-static struct columns_room room;
-static struct scanhead_point points[BATCH];
+static struct scanhead_point points[MADE_BATCH];
 
 static int open_reader(enum made_layout layout, struct reader *r)
 {
@@ -51,10 +43,7 @@ static int open_reader(enum made_layout layout, struct reader *r)
         while (rc == 0 && r->frame.type != SCANHEAD_POINTS);
     }
     if (rc != 0) fprintf(stderr, "decode: %s\n", r->sh != NULL ? scanhead_error(r->sh) : err);
-    r->columns[1] = (struct scanhead_columns){room.figure[0], room.figure[1], room.figure[2], room.figure[3],
-                                              room.figure[4], room.figure[5], room.figure[6], room.t_ns,
-                                              room.label,     room.echo,      room.echo_count};
-    r->columns[2] = r->columns[1];
+    r->columns[1] = r->columns[2] = made_columns;
     r->columns[2].range_m = r->columns[2].mirror_rad = r->columns[2].pan_rad = NULL;
     return rc;
 }
@@ -63,11 +52,11 @@ static double decode_ns(struct reader *r, int way)
 {
     const double start_s = bench_thread_s();
     for (int i = 0; i < TIMES; i++)
-        for (uint32_t first = 0; first < r->frame.n_points; first += BATCH) {
+        for (uint32_t first = 0; first < r->frame.n_points; first += MADE_BATCH) {
             if (way == 0)
-                scanhead_points(r->sh, &r->frame, first, points, BATCH);
+                scanhead_points(r->sh, &r->frame, first, points, MADE_BATCH);
             else
-                scanhead_columns(r->sh, &r->frame, first, &r->columns[way], BATCH);
+                scanhead_columns(r->sh, &r->frame, first, &r->columns[way], MADE_BATCH);
         }
     return 1e9 * (bench_thread_s() - start_s) / TIMES / r->frame.n_points;
 }

@@ -27,7 +27,7 @@
 #include "tests/bench/pin.h"
 #include "tests/unit/fake_libusb.h"
 
-enum { BATCH = 256, MAX_ROUNDS = 99, TICKS = 100, WRITE_BYTES = 1 << 20, WAIT_MS = 60000 };
+enum { MAX_ROUNDS = 99, TICKS = 100, WRITE_BYTES = 1 << 20, WAIT_MS = 60000 };
 enum way { BY_TCP, BY_UNIX, BY_USB, WAYS };
 enum take { TAKE_COLUMNS, TAKE_POINTS, TAKE_FRAMES, TAKES };
 
@@ -124,24 +124,14 @@ static void send_by_usb(char *source, size_t len)
 
 /* ---- the client */
 
-static struct {
-    double figure[7][BATCH];
-    int64_t t_ns[BATCH];
-    uint16_t label[BATCH];
-    uint8_t echo[BATCH], echo_count[BATCH];
-} room;
-static struct scanhead_point points[BATCH];
-
-static const struct scanhead_columns columns = {room.figure[0], room.figure[1], room.figure[2], room.figure[3],
-                                                room.figure[4], room.figure[5], room.figure[6], room.t_ns,
-                                                room.label,     room.echo,      room.echo_count};
+static struct scanhead_point points[MADE_BATCH];
 
 static int take_frame(struct scanhead *sh, const struct scanhead_frame *frame, enum take take)
 {
     int n = 0;
     for (uint32_t first = 0; take != TAKE_FRAMES && n >= 0 && first < frame->n_points; first += (uint32_t)n)
-        n = take == TAKE_COLUMNS ? scanhead_columns(sh, frame, first, &columns, BATCH)
-                                 : scanhead_points(sh, frame, first, points, BATCH);
+        n = take == TAKE_COLUMNS ? scanhead_columns(sh, frame, first, &made_columns, MADE_BATCH)
+                                 : scanhead_points(sh, frame, first, points, MADE_BATCH);
     return n < 0 ? n : 0;
 }
 

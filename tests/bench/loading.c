@@ -18,7 +18,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "core/studio/mesh.h"
 #include "firmware_sim/base/clock.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/options.h"
@@ -79,10 +78,7 @@ static int write_mesh(const struct loading_case *c, uint32_t triangles, struct s
     uint32_t(*face)[3] = NULL;
     int rc = make_terrain(triangles, &target, err);
     if (rc != SH_OK) return rc;
-    struct mesh mesh = {.n_vertices = target.scene->n_vertices,
-                        .n_faces = target.scene->n_triangles,
-                        .xyz_m = (const double(*)[3])target.scene->vertex_m,
-                        .face = (const uint32_t(*)[3])target.scene->triangle};
+    struct mesh mesh = bench_target_mesh(&target);
     if (c->is_private) {
         rc = tear(&mesh, &xyz_m, &face, err);
         mesh.n_vertices = 3 * mesh.n_faces;
@@ -145,15 +141,6 @@ static void become_check(const struct options *o, unsigned threads)
     _exit(127);
 }
 
-static void show_messages(void)
-{
-    char line[512];
-    FILE *f = fopen(messages_path, "r");
-    while (f != NULL && fgets(line, sizeof line, f) != NULL)
-        fputs(line, stderr);
-    if (f != NULL) fclose(f);
-}
-
 static double seconds_of(const struct timeval *t)
 {
     return (double)t->tv_sec + 1e-6 * (double)t->tv_usec;
@@ -167,7 +154,7 @@ static int wait_for(pid_t pid, const char *what, struct figures *out, struct sh_
     if (pid < 0) return sh_fail(err, SH_EIO, "fork: %s", strerror(errno));
     const int64_t start_ns = clock_now_ns();
     if (wait4(pid, &status, 0, &usage) != pid || status != 0) {
-        show_messages();
+        bench_show_file(messages_path);
         return sh_fail(err, SH_EIO, "%s failed", what);
     }
     out->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);

@@ -64,14 +64,9 @@ static int write_mesh(struct sh_err *err)
     struct bench_target target;
     int rc = bench_target_load("100k", NULL, NULL, &target, err);
     if (rc != SH_OK) return rc;
-    const struct scene *scene = target.scene;
-    FILE *f = fopen(mesh_path, "w");
-    for (uint32_t i = 0; f != NULL && i < scene->n_vertices; i++)
-        fprintf(f, "v %.9g %.9g %.9g\n", scene->vertex_m[i][0], scene->vertex_m[i][1], scene->vertex_m[i][2]);
-    for (uint32_t i = 0; f != NULL && i < scene->n_triangles; i++)
-        fprintf(f, "f %u %u %u\n", scene->triangle[i][0] + 1, scene->triangle[i][1] + 1, scene->triangle[i][2] + 1);
+    rc = bench_target_write(&target, mesh_path, err);
     bench_target_free(&target);
-    return f != NULL && fclose(f) == 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", mesh_path, strerror(errno));
+    return rc;
 }
 
 static int write_config(struct sh_err *err)
@@ -144,15 +139,6 @@ static void become(const struct options *o, const char *program, double seconds,
     _exit(127);
 }
 
-static void show_messages(void)
-{
-    char line[512];
-    FILE *f = fopen(messages_path, "r");
-    while (f != NULL && fgets(line, sizeof line, f) != NULL)
-        fputs(line, stderr);
-    if (f != NULL) fclose(f);
-}
-
 /* Waits for the head and its clients. */
 static int wait_for(pid_t head, struct bench_clients *clients, double *switches)
 {
@@ -182,7 +168,7 @@ static int run_once(const struct options *o, const char *program, double seconds
     bench_clients_begin(&clients, ready[0], o->clients);
     const int status = wait_for(pid, &clients, &switches);
     if (status != 0) {
-        show_messages();
+        bench_show_file(messages_path);
         return sh_fail(err, SH_EIO, "%s failed", program);
     }
     int rc = read_figures(out, err);

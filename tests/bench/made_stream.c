@@ -12,6 +12,17 @@
 enum { LINE_TICKS = 5, LINE_PULSES = LINE_TICKS * MADE_TICK_POINTS, PULSE_NS = 50, TICK_NS = 1000000 };
 enum { TURN_COUNTS = 1 << 20, HEAD_ROOM = 4096 };
 
+static struct {
+    double figure[7][MADE_BATCH];
+    int64_t t_ns[MADE_BATCH];
+    uint16_t label[MADE_BATCH];
+    uint8_t echo[MADE_BATCH], echo_count[MADE_BATCH];
+} room;
+
+const struct scanhead_columns made_columns = {room.figure[0], room.figure[1], room.figure[2], room.figure[3],
+                                              room.figure[4], room.figure[5], room.figure[6], room.t_ns,
+                                              room.label,     room.echo,      room.echo_count};
+
 struct maker {
     struct made_stream *out;
     size_t cap;

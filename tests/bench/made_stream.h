@@ -9,7 +9,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { MADE_TICK_POINTS = 20000 };
+#include "drivers/host/scanhead.h"
+
+enum { MADE_TICK_POINTS = 20000, MADE_BATCH = 256 };
 enum made_layout { MADE_POLAR, MADE_UTM, MADE_GEODETIC };
 
 struct made_stream {
@@ -22,5 +24,8 @@ struct made_stream {
 int made_stream_create(enum made_layout layout, uint32_t ticks, struct made_stream *out);
 /* Writes the stream into a file in memory, and sets `source` to its name (fd:N) for scanhead_open. Returns 0, or -1. */
 int made_stream_source(const struct made_stream *stream, char *source, size_t len);
+
+/* Room for MADE_BATCH points, with all columns. */
+extern const struct scanhead_columns made_columns;
 
 #endif

@@ -125,32 +125,12 @@ static double timed_pass(struct measure *m, int method, uint32_t round)
     return 1e9 * s / m->c->rays->n;
 }
 
-/* Chooses the packets at which Embree is fastest: 4, 8 or 16, from memory or filled on the way. */
-static int choose_embree(struct measure *m, struct sh_err *err)
+static double embree_ns(void *ctx)
 {
-    static const uint32_t widths[] = {4, 8, 16};
-    double best = 0.0;
-    uint32_t best_width = 0;
-    enum embree_feed best_feed = EMBREE_PREPARED;
-    for (int i = 0; i < 6; i++) {
-        m->out->embree_width = widths[i / 2];
-        m->out->embree_feed = i % 2 == 0 ? EMBREE_PREPARED : EMBREE_LOADED;
-        int rc = embree_alone_prepare(m->c->embree, m->out->embree_width, m->out->embree_feed, err);
-        if (rc != SH_OK) return rc;
-        double ns[3];
-        for (uint32_t k = 0; k < 3; k++)
-            ns[k] = timed_pass(m, EMBREE, 0);
-        double median = bench_median(ns, 3);
-        if (best_width != 0 && median >= best) continue;
-        best = median;
-        best_width = m->out->embree_width;
-        best_feed = m->out->embree_feed;
-    }
-    m->out->embree_width = best_width;
-    m->out->embree_feed = best_feed;
-    int rc = embree_alone_prepare(m->c->embree, best_width, best_feed, err);
-    if (rc == SH_OK) rc = embree_alone_prepare(m->c->fast, best_width, best_feed, err);
-    return rc;
+    double ns[3];
+    for (uint32_t k = 0; k < 3; k++)
+        ns[k] = timed_pass(ctx, EMBREE, 0);
+    return bench_median(ns, 3);
 }
 
 static int check_same(struct measure *m)
@@ -194,20 +174,22 @@ static void summarise(struct measure *m)
 
 static int run(struct measure *m, struct sh_err *err)
 {
-    struct cast_counters before, *n = &m->out->counters;
-    int rc = choose_embree(m, err);
+    struct bench_result *out = m->out;
+    struct cast_counters before, *n = &out->counters;
+    int rc = bench_choose_embree(m->c->embree, &out->embree_width, &out->embree_feed, embree_ns, m, err);
+    if (rc == SH_OK) rc = embree_alone_prepare(m->c->fast, out->embree_width, out->embree_feed, err);
     if (rc != SH_OK) return rc;
     caster_get_counters(m->caster, &before);
     timed_blocks(m, CAST);
     caster_get_counters(m->caster, n);
     n->decided -= before.decided;
-    m->out->same_bytes = check_same(m);
+    out->same_bytes = check_same(m);
     int64_t start_ns = clock_now_ns();
     for (uint32_t round = 0; round < BENCH_MAX_ROUNDS; round++) {
         if (round >= BENCH_MIN_ROUNDS && (double)(clock_now_ns() - start_ns) > 1e9 * m->c->seconds) break;
         for (int method = 0; method < N_METHODS; method++)
             m->ns[method][round] = timed_pass(m, method, round);
-        m->out->rounds = round + 1;
+        out->rounds = round + 1;
     }
     summarise(m);
     return SH_OK;

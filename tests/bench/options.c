@@ -127,6 +127,15 @@ static int parse_option(struct bench_options *o, int opt, char **argv)
     }
 }
 
+void bench_show_file(const char *path)
+{
+    char line[512];
+    FILE *f = fopen(path, "r");
+    while (f != NULL && fgets(line, sizeof line, f) != NULL)
+        fputs(line, stderr);
+    if (f != NULL) fclose(f);
+}
+
 const char *bench_next_name(const char *list, char *name, size_t len)
 {
     size_t n = strcspn(list, ",");

@@ -14,7 +14,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/bytes.h"
 #include "firmware_sim/app/studio/record/files.h"
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/record/recording.h"
@@ -51,76 +50,21 @@ static const double RAD = M_PI / 180.0;
 
 /* ---- the scene */
 
-static int write_mesh(const struct scene *s, struct sh_err *err)
-{
-    uint8_t row[24];
-    FILE *f = fopen(mesh_path, "w");
-    if (f == NULL) return sh_fail(err, SH_EIO, "%s: %s", mesh_path, strerror(errno));
-    fprintf(f,
-            "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty double x\nproperty double y\n"
-            "property double z\nelement face %u\nproperty list uchar int vertex_indices\nend_header\n",
-            s->n_vertices, s->n_triangles);
-    for (uint32_t i = 0; i < s->n_vertices; i++) {
-        for (int k = 0; k < 3; k++)
-            le_put_double(row + 8 * k, s->vertex_m[i][k]);
-        fwrite(row, 1, 24, f);
-    }
-    for (uint32_t i = 0; i < s->n_triangles; i++) {
-        row[0] = 3;
-        for (int k = 0; k < 3; k++)
-            le_put32(row + 1 + 4 * k, s->triangle[i][k]);
-        fwrite(row, 1, 13, f);
-    }
-    return fclose(f) == 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", mesh_path, strerror(errno));
-}
-
 static int write_head(struct sh_err *err)
 {
-    static const char *const FIGURES[] = {"step_deg",
-                                          "0.1",
-                                          "lines_min_hz",
-                                          "1",
-                                          "lines_max_hz",
-                                          "1000",
-                                          "range_min_m",
-                                          "0.1",
-                                          "range_max_m",
-                                          "9000",
-                                          "range_sigma_m",
-                                          "0",
-                                          "range_sigma_ppm",
-                                          "0",
-                                          "mirror_sigma_deg",
-                                          "0",
-                                          "pan_sigma_deg",
-                                          "0",
-                                          "mirror_counts",
-                                          "0",
-                                          "pan_counts",
-                                          "0",
-                                          "beam_exit_m",
-                                          "0",
-                                          "beam_divergence_rad",
-                                          "0",
-                                          "pulse_width_ns",
-                                          "4",
-                                          "max_echoes",
-                                          "1",
-                                          "overlap_m",
-                                          "1",
-                                          "wavelength_nm",
-                                          "1550",
-                                          "boot_s",
-                                          "0.2",
-                                          "spin_up_s",
-                                          "0.03",
-                                          "spin_down_s",
-                                          "0.2"};
+    static const struct {
+        const char *key, *value;
+    } FIGURES[] = {
+        {"step_deg", "0.1"},          {"lines_min_hz", "1"},   {"lines_max_hz", "1000"}, {"range_min_m", "0.1"},
+        {"range_max_m", "9000"},      {"range_sigma_m", "0"},  {"range_sigma_ppm", "0"}, {"mirror_sigma_deg", "0"},
+        {"pan_sigma_deg", "0"},       {"mirror_counts", "0"},  {"pan_counts", "0"},      {"beam_exit_m", "0"},
+        {"beam_divergence_rad", "0"}, {"pulse_width_ns", "4"}, {"max_echoes", "1"},      {"overlap_m", "1"},
+        {"wavelength_nm", "1550"},    {"boot_s", "0.2"},       {"spin_up_s", "0.03"},    {"spin_down_s", "0.2"}};
     FILE *f = fopen(head_path, "w");
     if (f == NULL) return sh_fail(err, SH_EIO, "%s: %s", head_path, strerror(errno));
     fprintf(f, "maker: scanhead\nmodel: panorama\nemitter: sphere\n");
-    for (size_t i = 0; i < sizeof FIGURES / sizeof *FIGURES; i += 2)
-        fprintf(f, "%s: {value: %s, from: assumed}\n", FIGURES[i], FIGURES[i + 1]);
+    for (size_t i = 0; i < sizeof FIGURES / sizeof *FIGURES; i++)
+        fprintf(f, "%s: {value: %s, from: assumed}\n", FIGURES[i].key, FIGURES[i].value);
     fprintf(f, "reaches: [{reflectance: 0.9, range_m: 9000, from: assumed}]\n");
     return fclose(f) == 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", head_path, strerror(errno));
 }
@@ -145,7 +89,7 @@ static int prepare_files(const struct options *o, const struct bench_target *t, 
     snprintf(head_path, sizeof head_path, "%s/head.yaml", folder);
     snprintf(mesh_path, sizeof mesh_path, "%s/mesh.ply", folder);
     int rc = write_head(err);
-    if (rc == SH_OK && !bench_is_house(t->name)) rc = write_mesh(t->scene, err);
+    if (rc == SH_OK && !bench_is_house(t->name)) rc = bench_target_write(t, mesh_path, err);
     return rc == SH_OK ? write_config(t, err) : rc;
 }
 
@@ -185,11 +129,12 @@ static void aim(struct alone *a)
             a->d[k][i] = a->d[k][i - 1];
 }
 
-/* Returns the seconds for n rays. The rays of a block lie in the cache when their time begins. */
-static double alone_pass(struct alone *a, uint32_t n)
+/* Returns the seconds for all rays. Those of a block lie in the cache when their time begins. */
+static double alone_pass(void *ctx)
 {
+    struct alone *a = ctx;
     double spent_s = 0.0;
-    for (uint32_t at = 0; at < n; at += BENCH_BLOCK) {
+    for (uint32_t at = 0; at < a->n; at += BENCH_BLOCK) {
         memcpy(a->block->fx, a->d[0] + at, sizeof a->block->fx);
         memcpy(a->block->fy, a->d[1] + at, sizeof a->block->fy);
         memcpy(a->block->fz, a->d[2] + at, sizeof a->block->fz);
@@ -199,29 +144,6 @@ static double alone_pass(struct alone *a, uint32_t n)
         spent_s += bench_thread_s() - start_s;
     }
     return spent_s;
-}
-
-/* Chooses the fastest packets: 4, 8 or 16, ready or filled from arrays. */
-static int choose(struct alone *a, struct sh_err *err)
-{
-    double best_s = INFINITY;
-    uint32_t width = 16;
-    enum embree_feed feed = EMBREE_LOADED;
-    int rc = SH_OK;
-    for (uint32_t w = 4; w <= 16 && rc == SH_OK; w *= 2)
-        for (int f = 0; f < 2 && rc == SH_OK; f++) {
-            a->width = w;
-            a->feed = f == 0 ? EMBREE_PREPARED : EMBREE_LOADED;
-            rc = embree_alone_prepare(&a->e, w, a->feed, err);
-            const double s = rc == SH_OK ? alone_pass(a, a->n) : INFINITY;
-            if (s >= best_s) continue;
-            best_s = s;
-            width = w;
-            feed = a->feed;
-        }
-    a->width = width;
-    a->feed = feed;
-    return rc == SH_OK ? embree_alone_prepare(&a->e, width, feed, err) : rc;
 }
 
 static int alone_create(const struct bench_target *t, struct alone *a, struct sh_err *err)
@@ -236,7 +158,7 @@ static int alone_create(const struct bench_target *t, struct alone *a, struct sh
         return rc != SH_OK ? rc : sh_fail(err, SH_ENOMEM, "no memory for the rays");
     aim(a);
     if (rc == SH_OK) rc = embree_alone_rays(&a->e, a->block->fx, a->block->fy, a->block->fz, BENCH_BLOCK, err);
-    return rc == SH_OK ? choose(a, err) : rc;
+    return rc == SH_OK ? bench_choose_embree(&a->e, &a->width, &a->feed, alone_pass, a, err) : rc;
 }
 
 static void alone_free(struct alone *a)
@@ -284,7 +206,7 @@ struct figures {
 static int measure(const struct options *o, struct alone *a, struct offline *off, struct figures *f, struct sh_err *err)
 {
     for (uint32_t round = 0; round < o->rounds; round++) {
-        f->alone_ns[round] = 1e9 * alone_pass(a, a->n) / a->n;
+        f->alone_ns[round] = 1e9 * alone_pass(a) / a->n;
         for (uint32_t i = 0; i < o->n_endings; i++) {
             double spent_s;
             const int rc = scan_once(o, o->ending[i], off, &spent_s, err);

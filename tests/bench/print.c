@@ -66,10 +66,10 @@ static double rest_ns(const struct bench_result *r)
 }
 
 /* Prints the counts of n rays as counts per million. */
-static void put_counters(struct json *json, const char *key, const struct cast_counters *c, double rays)
+static void put_counters(struct json *json, const struct cast_counters *c, double rays)
 {
     double per_million = rays > 0.0 ? 1e6 / rays : 0.0;
-    json_open_object(json, key);
+    json_open_object(json, "per_million");
     json_double(json, "decided", (double)c->decided * per_million);
     json_close_object(json);
 }
@@ -114,7 +114,7 @@ static void put_result(struct json *json, const struct bench_scene_report *s)
     json_double(json, "pipeline_ns", r->pipeline_ns);
     json_bool(json, "stages_give_same_bytes", r->same_bytes);
     put_loop(json, s);
-    put_counters(json, "per_million", &r->counters, r->pulses);
+    put_counters(json, &r->counters, r->pulses);
     json_uint(json, "packet", s->info.packet);
     json_uint(json, "embree_packet", r->embree_width);
     json_string(json, "embree_feed", r->embree_feed == EMBREE_PREPARED ? "prepared" : "loaded");
@@ -150,7 +150,7 @@ static void put_leaks(struct json *json, const struct bench_leaks *l)
     json_uint(json, "sight_rays", l->sight_rays);
     json_uint(json, "sight_differ", l->sight_differ);
     json_uint(json, "sight_asked", l->sight_asked);
-    put_counters(json, "per_million", &l->counters, (double)l->rays);
+    put_counters(json, &l->counters, (double)l->rays);
     json_close_object(json);
 }
 

@@ -22,7 +22,8 @@ void bench_scan_of(double pulses, uint32_t every, struct bench_scan *out)
 
 static const double RAD = M_PI / 180.0;
 
-int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad)
+/* Returns false where no pulse of such a scan goes, as sight_spec asks. */
+static int scan_sees(const void *ctx, const double dir[3], double radius_rad)
 {
     (void)ctx;
     const double elevation_rad = asin(fmin(fmax(dir[2], -1.0), 1.0));
@@ -41,7 +42,7 @@ void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const
     *out = (struct sight_spec){.bvh = bvh,
                                .rays = (double)scan->pulses / share(),
                                .memory_bytes = (uint64_t)BENCH_SIGHT_MIB << 20,
-                               .sees = bench_scan_sees};
+                               .sees = scan_sees};
     memcpy(out->station_m, station_m, sizeof out->station_m);
 }
 

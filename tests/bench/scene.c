@@ -98,3 +98,18 @@ void bench_target_free(struct bench_target *target)
     scene_free(target->scene);
     target->scene = NULL;
 }
+
+struct mesh bench_target_mesh(const struct bench_target *target)
+{
+    const struct scene *scene = target->scene;
+    return (struct mesh){.n_vertices = scene->n_vertices,
+                         .n_faces = scene->n_triangles,
+                         .xyz_m = (const double(*)[3])scene->vertex_m,
+                         .face = (const uint32_t(*)[3])scene->triangle};
+}
+
+int bench_target_write(const struct bench_target *target, const char *path, struct sh_err *err)
+{
+    const struct mesh mesh = bench_target_mesh(target);
+    return mesh_write(path, &mesh, NULL, err);
+}

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -39,6 +40,28 @@ void bench_setup(const struct bench_case *c, const struct georef *georef, struct
     pose_heading(0.0, setup->rotation);
 }
 
+int bench_choose_embree(struct embree_alone *e, uint32_t *width, enum embree_feed *feed, double (*cost)(void *ctx),
+                        void *ctx, struct sh_err *err)
+{
+    double least = INFINITY;
+    uint32_t best_width = 16;
+    enum embree_feed best_feed = EMBREE_PREPARED;
+    for (int i = 0; i < 6; i++) {
+        *width = 4U << i / 2;
+        *feed = i % 2 == 0 ? EMBREE_PREPARED : EMBREE_LOADED;
+        int rc = embree_alone_prepare(e, *width, *feed, err);
+        if (rc != SH_OK) return rc;
+        const double now = cost(ctx);
+        if (now >= least) continue;
+        least = now;
+        best_width = *width;
+        best_feed = *feed;
+    }
+    *width = best_width;
+    *feed = best_feed;
+    return embree_alone_prepare(e, best_width, best_feed, err);
+}
+
 double bench_thread_s(void)
 {
     struct timespec t;
@@ -52,8 +75,13 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-double bench_median(double *values, uint32_t n)
+void bench_sort(double *values, size_t n)
 {
     qsort(values, n, sizeof *values, compare);
+}
+
+double bench_median(double *values, uint32_t n)
+{
+    bench_sort(values, n);
     return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }

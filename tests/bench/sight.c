@@ -11,7 +11,7 @@
 #include "tests/common/hits.h"
 
 enum { EMBREE, WITHOUT, SIGHT, PIPELINE_WITHOUT, PIPELINE, N_METHODS };
-enum { KINDS = 3 /* one or nothing, few, ask */, WIDTHS = 3, TRIES = 3 };
+enum { KINDS = 3 /* one or nothing, few, ask */, TRIES = 3 };
 
 struct sums { /* sums of the least squares that explain a block's cost by its kinds of pulses */
     double a[KINDS][KINDS], b[KINDS];
@@ -189,25 +189,13 @@ static double timed_pass(struct rows *r, int method, uint32_t step, struct sums 
     return 1e9 * spent_s / pulses;
 }
 
-/* Chooses the packets at which Embree is fastest: 4, 8 or 16, from memory or filled on the way. */
-static int choose_embree(struct rows *r, struct sh_err *err)
+static double embree_ns(void *ctx)
 {
-    static const uint32_t widths[WIDTHS] = {4, 8, 16};
-    struct bench_sight *out = r->out, best = {.embree_ns = (double)INFINITY};
-    for (int i = 0; i < 2 * WIDTHS; i++) {
-        double ns[TRIES];
-        out->embree_width = widths[i / 2];
-        out->embree_feed = i % 2 == 0 ? EMBREE_PREPARED : EMBREE_LOADED;
-        int rc = embree_alone_prepare(r->c->embree, out->embree_width, out->embree_feed, err);
-        if (rc != SH_OK) return rc;
-        for (int k = 0; k < TRIES; k++)
-            ns[k] = timed_pass(r, EMBREE, 8 * out->scan.every, NULL);
-        out->embree_ns = bench_median(ns, TRIES);
-        if (out->embree_ns < best.embree_ns) best = *out;
-    }
-    out->embree_width = best.embree_width;
-    out->embree_feed = best.embree_feed;
-    return embree_alone_prepare(r->c->embree, out->embree_width, out->embree_feed, err);
+    struct rows *r = ctx;
+    double ns[TRIES];
+    for (int k = 0; k < TRIES; k++)
+        ns[k] = timed_pass(r, EMBREE, 8 * r->out->scan.every, NULL);
+    return bench_median(ns, TRIES);
 }
 
 /* Counts pulses whose triangle or bits differ between the cast without and with the sight. Also counts the pulses that
@@ -285,7 +273,7 @@ static void summarise(struct rows *r)
 
 static int run(struct rows *r, struct sh_err *err)
 {
-    int rc = choose_embree(r, err);
+    int rc = bench_choose_embree(r->c->embree, &r->out->embree_width, &r->out->embree_feed, embree_ns, r, err);
     const double start_s = bench_process_s();
     if (rc == SH_OK) rc = bench_scan_plan(&r->out->scan, r->c->bvh, r->c->target->station_m, &r->out->planned, err);
     r->out->plan_s = bench_process_s() - start_s;

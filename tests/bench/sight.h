@@ -17,8 +17,6 @@ struct bench_scan {
 };
 /* every 1 casts all lines. 0 casts as many as a round has time for. */
 void bench_scan_of(double pulses, uint32_t every, struct bench_scan *out);
-/* Returns false where no pulse of such a scan goes, as sight_spec asks. */
-int bench_scan_sees(const void *ctx, const double dir[3], double radius_rad);
 /* Sets what a sight is made of for the scan. */
 void bench_scan_spec(const struct bench_scan *scan, const struct bvh *bvh, const double station_m[3],
                      struct sight_spec *out);

@@ -38,7 +38,7 @@ loop_config "  - {type: pty, path: $out/pty}
   - {type: tcp, port: 0}
   - {type: file, path: $out/stream.shs}" >"$out/links.yaml"
 
-# keep PREFIX: what `loop_cost` prints becomes lines of: set, name, value. The order of programs is that of loop_programs.
+# keep_loop PREFIX: turns what `loop_cost` prints into lines of set, name, value. The order of programs is that of loop_programs.
 keep_loop() {
     awk -v prefix="$1" -v sets="$sets" '
         BEGIN { n_sets = split(sets, set, " ") }

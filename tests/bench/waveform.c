@@ -74,12 +74,6 @@ static void by_window(void)
         }
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* One method on one shape; errors in counts. */
 struct row {
     char method[32];
@@ -97,7 +91,7 @@ static struct row measure(const struct waveform *w, struct waveform_return *r, u
         peak = fmax(peak, reference->p[i]);
     for (uint32_t i = 0; i < ours.n; i++)
         off[i] = 4095.0 / peak * fabs(ours.p[i] - reference->p[i]);
-    qsort(off, ours.n, sizeof *off, compare);
+    bench_sort(off, ours.n);
     return (struct row){.ns = cost_ns(w, r, n, &samples),
                         .p999 = off[(uint32_t)(0.999 * (ours.n - 1))],
                         .most = off[ours.n - 1],

@@ -10,7 +10,6 @@
  * `skew` is `single` with an asymmetric pulse, whose samples are 0.5 ns apart. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/rng.h"
@@ -88,19 +87,13 @@ struct figures {
     double ns, rms_m, p999_m, max_m, echoes;
 };
 
-static int by_size(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Errors are those of echoes from the nearest return; in foliage no return has an echo of its own. */
 static void judge(int scene, uint64_t echoes, double *off, uint32_t n, struct figures *f)
 {
     double sum = 0.0;
     f->echoes = (double)echoes / PULSES;
     if (n == 0 || scene == 3) return;
-    qsort(off, n, sizeof *off, by_size);
+    bench_sort(off, n);
     for (uint32_t i = 0; i < n; i++)
         sum += off[i] * off[i];
     f->rms_m = sqrt(sum / n);

@@ -3,7 +3,6 @@
  *   build/tests/bench/write_mesh NAME FILE */
 #include <stdio.h>
 
-#include "core/studio/mesh.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/options.h"
 
@@ -17,13 +16,7 @@ int main(int argc, char **argv)
         return BENCH_USAGE;
     }
     int rc = bench_target_load(argv[1], BENCH_HOUSE_FILE, NULL, &target, &err);
-    if (rc == SH_OK) {
-        const struct mesh mesh = {.n_vertices = target.scene->n_vertices,
-                                  .n_faces = target.scene->n_triangles,
-                                  .xyz_m = (const double(*)[3])target.scene->vertex_m,
-                                  .face = (const uint32_t(*)[3])target.scene->triangle};
-        rc = mesh_write(argv[2], &mesh, NULL, &err);
-    }
+    if (rc == SH_OK) rc = bench_target_write(&target, argv[2], &err);
     if (rc == SH_OK)
         printf("%.9g %.9g %.9g\n", target.station_m[0], target.station_m[1], target.station_m[2]);
     else

@@ -62,17 +62,17 @@ static void check_taken(const struct config *cfg)
             fuzz_must(isfinite(cfg->station[i].position_m[c]), "positions are finite");
 }
 
-static void check_refused(int code, const struct config_faults *faults)
+static void check_refused(int code, const struct config_diagnostics *diagnostics)
 {
-    fuzz_must(faults->n > 0 && faults->fault[0].code == code, "the first fault says why");
-    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
-        fuzz_must_be_line(&faults->fault[i]);
+    fuzz_must(diagnostics->n > 0 && diagnostics->err[0].code == code, "the first fault says why");
+    for (uint32_t i = 0; i < diagnostics->n && i < CONFIG_MAX_DIAGNOSTICS; i++)
+        fuzz_must_be_line(&diagnostics->err[i]);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static struct config *cfg;
-    static struct config_faults faults;
+    static struct config_diagnostics diagnostics;
     char text[MAX_INPUT + 1];
     if (size > MAX_INPUT) return 0;
     if (cfg == NULL) cfg = malloc(sizeof *cfg);
@@ -80,14 +80,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(text, data, size);
     text[size] = '\0';
     find_sets(text);
-    const int code = config_load_all(fuzz_file(".yaml", data, size), sets.of, sets.n, cfg, &faults);
+    const int code = config_load_all(fuzz_file(".yaml", data, size), sets.of, sets.n, cfg, &diagnostics);
     if (code == SH_OK) {
         check_taken(cfg);
         add_faults(cfg, text);
     } else {
-        check_refused(code, &faults);
+        check_refused(code, &diagnostics);
     }
-    const int links = config_load_links(text, "links", sets.of, sets.n, cfg, &faults);
-    if (links != SH_OK) check_refused(links, &faults);
+    const int links = config_load_links(text, "links", sets.of, sets.n, cfg, &diagnostics);
+    if (links != SH_OK) check_refused(links, &diagnostics);
     return 0;
 }

@@ -26,6 +26,17 @@ export function recorded(name, settings, ...options) {
   return {...JSON.parse(text), file};
 }
 
+/** Returns two places on the screen: where station 1 stands, at the origin, and (1.5, 2) of the scene at its height. */
+export async function placesToDrag(page) {
+  await page.click('#fit');
+  await page.where('#picture');
+  return page.eval(`(() => {
+    const {left, top} = document.querySelector('#picture').getBoundingClientRect();
+    const at = (x, y) => { const p = scanhead.view.camera.project([x, y, 1.6]); return [left + p.x, top + p.y]; };
+    return [at(0, 0), at(1.5, 2)];
+  })()`);
+}
+
 /** Gives a field another value, as its user does. */
 export const choose = (page, selector, value) => page.eval(`(() => {
   const field = document.querySelector(${JSON.stringify(selector)});

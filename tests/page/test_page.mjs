@@ -7,7 +7,7 @@ import {readFileSync} from 'node:fs';
 import {Browser} from './browser.mjs';
 import {Client, end, endpoint, start} from './head.mjs';
 import {testInstrument} from './instrument.mjs';
-import {both, CONFIG, recorded} from './rig.mjs';
+import {both, CONFIG, placesToDrag, recorded} from './rig.mjs';
 import {testTools} from './tools.mjs';
 import {appliedTest, trialTests} from './trial.mjs';
 import {equal, finish, folder, giveUpAfter, is, near, test, whenFailed} from './work.mjs';
@@ -144,15 +144,8 @@ await test('a page that is opened later, or again, has the same points', async (
 await testTools(browser, endpoint(head, 'web'), wanted.points);
 
 await test('a station dragged in the picture is where the next scan is made', async () => {
-  await page.click('#fit');
   await page.until('scanhead.view.movable');
-  await page.where('#picture');
-  const [from, to] = await page.eval(`(() => {
-    const {left, top} = document.querySelector('#picture').getBoundingClientRect();
-    const at = (x, y) => { const p = scanhead.view.camera.project([x, y, 1.6]); return [left + p.x, top + p.y]; };
-    return [at(0, 0), at(1.5, 2)];
-  })()`);
-  await page.drag(from, to);
+  await page.drag(...await placesToDrag(page));
   const pose = (await other.until('SITE:POSE? 1', (reply) => /^[^E]*[1-9]/.test(reply.split(',').slice(0, 2).join()))).split(',').map(Number);
   is(Math.hypot(pose[0] - 1.5, pose[1] - 2) < 0.05, `the station is where it was let go: ${pose}`);
   equal(pose[2], 1.6, 'its height');

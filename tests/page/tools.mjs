@@ -12,8 +12,7 @@ const TOOLS = 'scanhead.tools';
 // canvas.
 async function drawn(page) {
   await page.eval('scanhead.view.screenshotReady()');
-  const {data} = await page.send('Page.captureScreenshot', {format: 'png'});
-  const {width, size, out} = pixelsOf(Buffer.from(data, 'base64'));
+  const {width, size, out} = pixelsOf(await page.picture());
   const box = await page.eval(`(() => { const {left, top, width, height} = scanhead.view.canvas.getBoundingClientRect(); return {left, top, width, height}; })()`);
   const at = (x, y) => size * ((Math.round(box.top) + Math.round(y)) * width + Math.round(box.left) + Math.round(x));
   const ground = [...out.subarray(at(1, box.height / 2), at(1, box.height / 2) + 3)];

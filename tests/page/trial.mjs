@@ -2,7 +2,7 @@
 // These tests are about stations that are tried in the page. They compare what is shown and painted with the words of
 // `coverage` about the same scans. The head must not notice any of it.
 import {run} from './head.mjs';
-import {CONFIG} from './rig.mjs';
+import {CONFIG, placesToDrag} from './rig.mjs';
 import {pixelsOf} from './png8.mjs';
 import {equal, is, near, test} from './work.mjs';
 import {SEEN_COLOURS} from '../../drivers/link/web/view_paint.js';
@@ -117,13 +117,7 @@ export async function trialTests(page, other, SIZE) {
 
   await test('a station that is dragged has other points and cells soon; the head stands where it stood', async () => {
     await page.eval(`scanhead.view.show({points: true, scene: true, stations: true})`);
-    await page.click('#fit');
-    await page.where('#picture');
-    const [from, to] = await page.eval(`(() => {
-      const {left, top} = document.querySelector('#picture').getBoundingClientRect();
-      const at = (x, y) => { const p = scanhead.view.camera.project([x, y, 1.6]); return [left + p.x, top + p.y]; };
-      return [at(0, 0), at(1.5, 2)];
-    })()`);
+    const places = await placesToDrag(page);
     await page.eval(`document.querySelector('#picture').addEventListener('pointerup', () => {
       const t0 = performance.now(), {trial, view} = scanhead, station = trial.get(1);
       window.took = null;
@@ -134,7 +128,7 @@ export async function trialTests(page, other, SIZE) {
       };
       look();
     }, {once: true})`);
-    await page.drag(from, to);
+    await page.drag(...places);
     const took = await page.until('window.took');
     await page.until(RESTS);
     const at = await page.eval(`(() => { const s = scanhead.trial.get(1); return [s.x_m, s.y_m, s.z_m].map((v) => Math.round(v * 1e4) / 1e4); })()`);

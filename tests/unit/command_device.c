@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/command_device.h"
 
-#include <stdio.h>
-#include <string.h>
-
 static const struct command_place first_places[3] = {{{1, 2, 3, 0, 0, 0}}, {{4, 5, 6, 0, 0, 0}}, {{7, 8, 9, 0, 0, 0}}};
 static const struct command_place places[3] = {
     {{1, 2, 3, 0, 0, 0}}, {{-0.1, 5e-7, 1e9, 359.5, -90, 1.0 / 3.0}}, {{7, 8, 9, 0, 0, 0}}};
@@ -86,4 +83,38 @@ struct command_device command_test_device(void)
     dev.defaults = dev.settings;
     dev.faults = &faults;
     return dev;
+}
+
+struct command_result result;
+
+const char *say(struct command_device *dev, uint32_t session, const char *line)
+{
+    command_execute(dev, session, line, &result);
+    return result.reply;
+}
+
+void expect(struct command_device *dev, const char *line, const char *reply)
+{
+    const char *got = say(dev, 1, line);
+    if (strcmp(got, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, got, reply);
+}
+
+void expect_error(struct command_device *dev, uint32_t session, const char *line, int number, const char *part)
+{
+    const struct head_settings before = dev->settings;
+    const uint32_t control = dev->control;
+    char popped[COMMAND_MAX_REPLY], expected[COMMAND_MAX_REPLY + 8];
+    memset(&dev->queue, 0, sizeof dev->queue);
+    say(dev, session, line);
+    if (result.error != number || strstr(result.reply, part) == NULL)
+        fail_msg("'%s' gives '%s', not %d with '%s'", line, result.reply, number, part);
+    assert_int_equal(dev->queue.count, 1);
+    command_queue_pop(&dev->queue, popped, sizeof popped);
+    snprintf(expected, sizeof expected, "ERR %s", popped);
+    assert_string_equal(result.reply, expected);
+    assert_int_equal(atoi(popped), number);
+    assert_int_equal(result.effect, COMMAND_NONE);
+    assert_false(result.changes || result.took_control);
+    assert_int_equal(dev->control, control);
+    assert_memory_equal(&before, &dev->settings, sizeof before);
 }

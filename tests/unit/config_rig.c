@@ -23,7 +23,7 @@ const char base[] = "head:\n"                     /* 1 */
 char dir[64], config_path[128];
 struct config *cfg;
 struct sh_err err;
-struct config_faults faults;
+struct config_diagnostics diagnostics;
 
 void write_file(const char *path, const void *bytes, size_t len)
 {
@@ -43,8 +43,8 @@ void write_in(const char *name, const char *text)
 int load_sets(const char *const *sets, int n)
 {
     memset(&err, 0, sizeof err);
-    int code = config_load_all(config_path, sets, n, cfg, &faults);
-    if (code != SH_OK) err = faults.fault[0];
+    int code = config_load_all(config_path, sets, n, cfg, &diagnostics);
+    if (code != SH_OK) err = diagnostics.err[0];
     return code;
 }
 
@@ -54,14 +54,18 @@ int load_text(const char *text)
     return load_sets(NULL, 0);
 }
 
+char *replaced(const char *text, const char *old, const char *with)
+{
+    const char *at = strstr(text, old);
+    char *out = NULL;
+    if (at == NULL) fail_msg("there is no %s", old);
+    assert_true(asprintf(&out, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old)) >= 0);
+    return out;
+}
+
 char *edited(const char *old, const char *with)
 {
-    const char *at = strstr(base, old);
-    assert_non_null(at);
-    char *text = malloc(sizeof base + strlen(with));
-    assert_non_null(text);
-    sprintf(text, "%.*s%s%s", (int)(at - base), base, with, at + strlen(old));
-    return text;
+    return replaced(base, old, with);
 }
 
 int load_edited(const char *old, const char *with)
@@ -77,6 +81,40 @@ int load_set(const char *set)
     const char *const sets[] = {set};
     write_file(config_path, base, sizeof base - 1);
     return load_sets(sets, 1);
+}
+
+int load_with_head(const char *profile, const char *settings, const char *with)
+{
+    char head[512], rest[1024];
+    snprintf(head, sizeof head, "%s\n%s", profile, settings);
+    snprintf(rest, sizeof rest, "%soutput:", with);
+    char *text = edited("any-rate\n" PRR LINES, head), *whole = replaced(text, "output:", rest);
+    int code = load_text(whole);
+    free(text);
+    free(whole);
+    return code;
+}
+
+char *read_source(const char *path)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    assert_true(getdelim(&text, &size, '\0', file) > 0);
+    fclose(file);
+    return text;
+}
+
+int load_changed(const char *profile, const char *old, const char *with)
+{
+    char path[128];
+    snprintf(path, sizeof path, "config/heads/%s.yaml", profile);
+    char *text = read_source(path), *changed = replaced(text, old, with);
+    write_in("heads/mine.yaml", changed);
+    free(text);
+    free(changed);
+    return load_with_head("mine", "", "");
 }
 
 void assert_loads(int code)

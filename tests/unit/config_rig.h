@@ -24,8 +24,8 @@ extern const char base[];
 
 extern char dir[64], config_path[128];
 extern struct config *cfg;
-extern struct sh_err err; /* the first of the faults */
-extern struct config_faults faults;
+extern struct sh_err err; /* the first of the diagnostics */
+extern struct config_diagnostics diagnostics;
 
 void write_file(const char *path, const void *bytes, size_t len);
 
@@ -35,12 +35,24 @@ int load_sets(const char *const *sets, int n);
 
 int load_text(const char *text);
 
-/* Returns base with its first `old` replaced by `with`. */
+/* Returns text with its first `old` replaced by `with`; free it. */
+char *replaced(const char *text, const char *old, const char *with);
+
+/* Does the same with base. */
 char *edited(const char *old, const char *with);
 
 int load_edited(const char *old, const char *with);
 
 int load_set(const char *set);
+
+/* Loads base with another head, these settings of it ("  prr_hz: 5\n"), and `with` before the section output. */
+int load_with_head(const char *profile, const char *settings, const char *with);
+
+/* Reads a file of the source tree as a text; free it. */
+char *read_source(const char *path);
+
+/* Writes a shipped profile with its first `old` replaced as heads/mine.yaml, and loads base with that head. */
+int load_changed(const char *profile, const char *old, const char *with);
 
 void assert_loads(int code);
 

@@ -16,14 +16,12 @@ import {Trial} from '../../drivers/link/web/trial.js';
 import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
 import {Section} from '../../drivers/link/web/section.js';
 import {drawLegend} from '../../drivers/link/web/picture.js';
+import {same as equal} from './page_rig.mjs';
 import {runTests, test} from './page_tap.mjs';
 
 const web = new URL('../../drivers/link/web/', import.meta.url);
 const page = readFileSync(new URL('index.html', web), 'utf8'), css = readFileSync(new URL('style.css', web), 'utf8');
-
-const equal = (got, want, what = '') => {
-  if (JSON.stringify(got) !== JSON.stringify(want)) throw new Error(`${what}: ${JSON.stringify(got)}, expected ${JSON.stringify(want)}`);
-};
+const tools = readFileSync(new URL('tools.css', web), 'utf8');
 
 // WCAG 2.1, relative luminance and contrast ratio.
 const channel = (v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
@@ -55,6 +53,14 @@ for (const [name, colours] of Object.entries(themes)) {
     }
   });
 }
+
+test('a wide page has a place for each part, also with a panorama', () => {
+  const places = new Set([...(css + tools).matchAll(/grid-area: ([a-z]+);/g)].map(([, name]) => name));
+  const templates = [...(css + tools).matchAll(/grid-template: ('[^;]*);/g)].map(([, text]) => text.match(/'[^']*'/g).join(' ').match(/[a-z]+/g));
+  equal(templates.map((names) => [names.includes('stage') && names.includes('time'), names.filter((name) => !places.has(name))]),
+    templates.map(() => [true, []]));
+  equal(templates.length, 4);
+});
 
 test('a saved picture says how many items of a list its legend leaves out', () => {
   for (const [n, last] of [[20, 'and 6 more'], [14, 's13']]) {
@@ -147,6 +153,7 @@ test('events in words', () => {
   equal(eventWords({name: 'SCAN_END', scan: 2, fired: 1000, lost: 0}), ['Scan 2 ends: 1\u2009000 pulses fired', '']);
   equal(eventWords({name: 'ERROR', number: -222, session: 9, held_back: 0, text: 'Data out of range'}), ['Session 9: -222 Data out of range', 'bad']);
   equal(eventWords({name: 'ERROR', number: 102, session: 0, held_back: 0, text: 'session 17, fd:3'}), ['Reader too slow (102): session 17, fd:3', 'bad']);
+  equal(eventWords({name: 'ERROR', number: 107, session: 0, held_back: 0, text: 'no answer'}), ['Time server (107): no answer', 'bad']);
   equal(eventWords({name: 'PPS'}), null);
   equal(eventWords({name: 'PTP', text: 'servo s0 to s1'}), ['PTP: servo s0 to s1', '']);
   equal(eventWords({name: 'PTP', text: 'SLAVE to FAULTY on FAULT_DETECTED'}), ['PTP: SLAVE to FAULTY on FAULT_DETECTED', 'bad']);
@@ -386,6 +393,9 @@ test('a saved file: its number is in each request, another page\'s file is refus
   let said = '';
   await fetchSaved('las').catch((error) => (said = error.message));
   equal(said, 'The file is gone: another page began one. Save it again.');
+  answers((path) => ({state: path === '/save' ? 'idle' : 'working', as: 'las', file: 4, bytes: 0}));
+  await fetchSaved('las').catch((error) => (said = error.message));
+  equal(said, 'The head could not write the file.');
 });
 
 test('targets: the cell of a place, the stations that see it, and what pairs have in common', () => {

@@ -7,17 +7,11 @@ import {Cloud} from '../../drivers/link/web/cloud.js';
 import {Head} from '../../drivers/link/web/head.js';
 import {Losses} from '../../drivers/link/web/losses.js';
 import {Past} from '../../drivers/link/web/past.js';
-import fs from 'node:fs';
+import {readSamples, same as equal} from './page_rig.mjs';
 import {runTests, test} from './page_tap.mjs';
 
-function equal(got, wanted, what) {
-  const [a, b] = [got, wanted].map((v) => JSON.stringify(v));
-  if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
-}
-
 // This makes a descriptor and an anchor of the polar layout, from the samples of the protocol.
-const text = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
-const samples = [...text.matchAll(/```text\n(d5 [0-9a-f \n]*)```/g)].map(([, hex]) => Buffer.from(hex.replace(/\s/g, ''), 'hex'));
+const samples = readSamples();
 const sampleOf = (type) => samples.find((s) => s[1] === type).subarray(28);
 const DESCRIPTOR = 1, ANCHOR = 2, POINTS = 3, TELEMETRY = 5;
 

@@ -188,6 +188,8 @@ test('colours: ends of a ramp, NaN, ticks, legend', () => {
   same([...valuesOf(cloud.blocks[0], 'reflectance', 0, 2)], [NONE, NONE].map(Math.fround), 'not modelled at all');
   same(ticks([-0.13, 3.31]).map((t) => t.text), ['0', '1', '2', '3'], 'ticks');
   same(ticks([0, 2]).map((t) => t.text), ['0.0', '0.5', '1.0', '1.5', '2.0'], 'ticks at both limits');
+  same(ticks([5, 5 + 2 ** -50]).length <= 7, true, 'ticks of limits that are almost equal: their numbers are above 2^53');
+  same(ticks([0, 1e-200])[0].text, (0).toFixed(100), 'ticks of limits by hand');
   const echoes = {n: 4, echo: Uint8Array.from([0x11, 0x31, 0x32, 0x33])}; // these are count and number
   same([...valuesOf(echoes, 'echo', 0, 4)], [0, 1, 2, 3], 'only echo, first, between, last');
   const legend = legendOf('height', {limits: [-1, 1], offset: 110});
@@ -376,6 +378,7 @@ const frameOf = (type, flags, seq, text) => {
 };
 
 test('a recording begins with what its points need, and has every frame from there on', async () => {
+  same((new Keeper()).end().size, 0, 'one that has not begun, as where the worker was started anew');
   const keeper = new Keeper();
   const parser = new Parser({frame: (frame) => keeper.take(frame)});
   [frameOf(1, 0, 0, 'old'), frameOf(10, 0, 1, 'old emitter'), frameOf(2, 0, 2, 'old anchor'), frameOf(1, 0, 3, 'new'),

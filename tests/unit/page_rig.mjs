@@ -1,14 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-// It has what the tests of the page's pure parts share: comparing, points, a camera.
+// It has what the tests of the page's pure parts share: comparing, samples of the protocol, points, a camera.
+import {readFileSync} from 'node:fs';
 import {Camera} from '../../drivers/link/web/view_camera.js';
 
 export function near(ours, theirs, tolerance, what) {
   if (!(Math.abs(ours - theirs) <= tolerance)) throw new Error(`${what}: ${ours}, and not ${theirs}, by more than ${tolerance}`);
 }
-export const same = (ours, theirs, what) => {
+export const same = (ours, theirs, what = '') => {
   const [a, b] = [ours, theirs].map((v) => JSON.stringify(v));
   if (a !== b) throw new Error(`${what}: ${a}, and not ${b}`);
 };
+
+export function equal(ours, theirs, what) {
+  if (!Object.is(ours, theirs)) throw new Error(`${what}: ${ours}, and not ${theirs}`);
+}
 
 export function throws(run, words) {
   try {
@@ -18,6 +23,12 @@ export function throws(run, words) {
     return;
   }
   throw new Error(`no error: ${words}`);
+}
+
+// Reads the frames of SAMPLES.md.
+export function readSamples() {
+  const page = readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
+  return [...page.matchAll(/```text\n(d5 [0-9a-f \n]*)```/g)].map(([, hex]) => Buffer.from(hex.replace(/\s/g, ''), 'hex'));
 }
 
 // Makes n points; place(i) gives x, y, z.

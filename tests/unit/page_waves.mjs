@@ -1,19 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 // Waveforms in the page (drivers/link/web/native_waves.js), from the frame of SAMPLES.md. It prints TAP on standard
 // output.
-import fs from 'node:fs';
 import {Decoder, Parser} from '../../drivers/link/web/native.js';
 import {Waves} from '../../drivers/link/web/native_waves.js';
 import {Wire} from '../../drivers/link/web/wire.js';
+import {equal, readSamples} from './page_rig.mjs';
 import {runTests, test} from './page_tap.mjs';
 
-const page = fs.readFileSync(new URL('../../drivers/protocol/SAMPLES.md', import.meta.url), 'utf8');
-const samples = [...page.matchAll(/```text\n(d5 [0-9a-f \n]*)```/g)].map(([, hex]) => Buffer.from(hex.replace(/\s/g, ''), 'hex'));
+const samples = readSamples();
 const stream = Buffer.concat(samples), viewOf = (bytes) => new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
-
-function equal(ours, theirs, what) {
-  if (!Object.is(ours, theirs)) throw new Error(`${what}: ${ours}, and not ${theirs}`);
-}
 
 function decoded() {
   const decoder = new Decoder(), parser = new Parser({frame: (f) => decoder.take(f)});

@@ -1,28 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Headers of commands: long and short forms, in any case and from the root, and nothing between or beyond them. HELP?
  * lists them all. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "drivers/protocol/native.h"
 #include "tests/unit/command_device.h"
-
-#define N_OF(array) (sizeof(array) / sizeof(array)[0])
-
-static struct command_result result;
-
-static const char *say(struct command_device *dev, const char *line)
-{
-    command_execute(dev, 1, line, &result);
-    return result.reply;
-}
 
 /* Long and short forms, written out by hand from the set's description. */
 static const struct {
@@ -110,7 +90,7 @@ static void try_forms(size_t i, const char *header, int good)
             const char *asks = strcmp(commands[i].full, "SITE:POSE") == 0 ? " 1" : "";
             snprintf(line, sizeof line, "%s%s%s%s ", lead[k], header, query ? "?" : "",
                      query ? asks : commands[i].value);
-            say(&dev, line);
+            say(&dev, 1, line);
             const int expected = good && !colon && (query ? commands[i].query : commands[i].set);
             if ((result.error == 0) != expected) fail_msg("'%s' gives '%s'", line, result.reply);
             assert_true(result.reply[0] != '\0');
@@ -185,7 +165,7 @@ static void nothing_between_or_beyond_the_forms(void **ctx)
 /* Counts the headers of a reply; each must be a command. */
 static size_t count_headers(struct command_device *dev, const char *line)
 {
-    say(dev, line);
+    say(dev, 1, line);
     assert_true(strlen(result.reply) < COMMAND_MAX_REPLY - 1); /* not cut */
     assert_true(strlen(result.reply) + 2 < NATIVE_MAX_TEXT);   /* and fits the wire with CR LF */
     char copy[COMMAND_MAX_REPLY], *save = NULL;

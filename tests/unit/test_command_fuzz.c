@@ -1,15 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Random lines. None may crash the command set, get more than one reply or error, or leave settings that the head could
  * not run with. Seeds are fixed, so a failure names the line and comes again. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "tests/common/thorough.h"
 #include "tests/unit/command_device.h"
 

@@ -1,37 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Ranges, noise and angular steps as settings, and settings that describe themselves. Expected values are worked out by
  * hand. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include "firmware_sim/command/command.h"
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
 #include "tests/unit/command_device.h"
-
-static struct command_result result;
-
-static void expect(struct command_device *dev, const char *line, const char *reply)
-{
-    command_execute(dev, 1, line, &result);
-    if (strcmp(result.reply, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, result.reply, reply);
-}
-
-/* The line is refused with this number and these words, and nothing has changed. */
-static void refuse(struct command_device *dev, const char *line, int number, const char *words)
-{
-    const struct head_settings before = dev->settings;
-    command_execute(dev, 1, line, &result);
-    if (result.error != number || strstr(result.reply, words) == NULL)
-        fail_msg("'%s' gives '%s', not %d with '%s'", line, result.reply, number, words);
-    assert_memory_equal(&before, &dev->settings, sizeof before);
-}
 
 static void ranges_keep_apart(void **ctx)
 {
@@ -44,11 +16,11 @@ static void ranges_keep_apart(void **ctx)
     expect(&dev, "HEAD:RANG:MIN? MAX", "99.999999999");
     expect(&dev, "HEAD:RANG:MAX? MIN", "2.500000001");
     expect(&dev, "HEAD:RANG:MAX? MAX", "800");
-    refuse(&dev, "HEAD:RANG:MIN 100", CMD_E_SETTINGS, "allowed 0.5 to 99.999999999 as HEAD:RANGe:MAX is 100");
-    refuse(&dev, "HEAD:RANG:MIN 0.4", CMD_E_RANGE, "HEAD:RANGe:MIN 0.4 m, allowed 0.5 to 250");
-    refuse(&dev, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* no program would be left */
-    refuse(&dev, "HEAD:RANG:MAX 900", CMD_E_RANGE, "allowed 2 to 800");
-    refuse(&dev, "HEAD:RANG:MAX 5 DEG", CMD_E_SUFFIX, "takes M, MM or KM");
+    expect_error(&dev, 1, "HEAD:RANG:MIN 100", CMD_E_SETTINGS, "allowed 0.5 to 99.999999999 as HEAD:RANGe:MAX is 100");
+    expect_error(&dev, 1, "HEAD:RANG:MIN 0.4", CMD_E_RANGE, "HEAD:RANGe:MIN 0.4 m, allowed 0.5 to 250");
+    expect_error(&dev, 1, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* no program would be left */
+    expect_error(&dev, 1, "HEAD:RANG:MAX 900", CMD_E_RANGE, "allowed 2 to 800");
+    expect_error(&dev, 1, "HEAD:RANG:MAX 5 DEG", CMD_E_SUFFIX, "takes M, MM or KM");
     expect(&dev, "*RST", "OK");
     expect(&dev, "HEAD:RANG:MAX?", "400");
     expect(&dev, "HEAD:RANG:MIN?", "1");
@@ -62,24 +34,25 @@ static void noise_has_kinds_and_sizes(void **ctx)
     expect(&dev, "HEAD:NOISE on", "OK");
     expect(&dev, "HEAD:NOIS? DEF", "OFF");
     expect(&dev, "HEAD:NOIS?", "ON");
-    refuse(&dev, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs signal.model: on");
+    expect_error(&dev, 1, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs signal.model: on");
     expect(&dev, "HEAD:NOIS:ANGL ON", "OK");
     dev.limits.angle_most = 0;
     expect(&dev, "HELP? HEAD:NOIS:ANGL", "word,\"\",,,OFF,,\"off boot idle spin-down fault\",\"OFF\"");
-    refuse(&dev, "HEAD:NOIS:ANGL ON", CMD_E_SETTINGS, "needs mirror_sigma_deg or pan_sigma_deg of the head profile");
-    refuse(&dev, "HEAD:NOIS LOUD", CMD_E_DATA_TYPE, "HEAD:NOISe takes OFF, ON, SIGNal, DEF, not 'LOUD'");
+    expect_error(&dev, 1, "HEAD:NOIS:ANGL ON", CMD_E_SETTINGS,
+                 "needs mirror_sigma_deg or pan_sigma_deg of the head profile");
+    expect_error(&dev, 1, "HEAD:NOIS LOUD", CMD_E_DATA_TYPE, "HEAD:NOISe takes OFF, ON, SIGNal, DEF, not 'LOUD'");
     dev.limits.noise_most = 0; /* of echoes that are found in samples */
-    refuse(&dev, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs waveform.echoes: model");
-    refuse(&dev, "HEAD:NOIS ON", CMD_E_SETTINGS, "HEAD:NOISe ON needs waveform.echoes: model");
+    expect_error(&dev, 1, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs waveform.echoes: model");
+    expect_error(&dev, 1, "HEAD:NOIS ON", CMD_E_SETTINGS, "HEAD:NOISe ON needs waveform.echoes: model");
     dev.limits.noise_most = 2;
     dev.limits.sigma_min_nm = 3 * MICRO;
     expect(&dev, "HEAD:NOIS SIGNAL", "OK");
-    refuse(&dev, "HEAD:NOIS:SIGM 0.0029", CMD_E_RANGE, "HEAD:NOISe:SIGMa 0.0029 m, allowed 0.003 to 10");
+    expect_error(&dev, 1, "HEAD:NOIS:SIGM 0.0029", CMD_E_RANGE, "HEAD:NOISe:SIGMa 0.0029 m, allowed 0.003 to 10");
     expect(&dev, "HEAD:NOIS:SIGM MIN", "OK");
     expect(&dev, "HEAD:NOIS:SIGM?", "0.003");
     expect(&dev, "HEAD:NOIS:BALL 0.000000001", "OK");
-    refuse(&dev, "HEAD:NOIS:BALL 0.0000000001", CMD_E_RANGE, "allowed multiples of 0.000000001 m");
-    refuse(&dev, "HEAD:NOIS:BALL 100.5", CMD_E_RANGE, "allowed 0 to 100");
+    expect_error(&dev, 1, "HEAD:NOIS:BALL 0.0000000001", CMD_E_RANGE, "allowed multiples of 0.000000001 m");
+    expect_error(&dev, 1, "HEAD:NOIS:BALL 100.5", CMD_E_RANGE, "allowed 0 to 100");
 }
 
 /* A client can switch them within a scan, too, where the head samples them at all. */
@@ -89,7 +62,8 @@ static void waveforms_can_be_switched(void **ctx)
     struct command_device dev = command_test_device();
     expect(&dev, "SCAN:WAV?", "OFF");
     expect(&dev, "SCAN:WAVEFORM OFF", "OK");
-    refuse(&dev, "SCAN:WAV ON", CMD_E_SETTINGS, "SCAN:WAVeform ON needs waveform.send: on in the configuration");
+    expect_error(&dev, 1, "SCAN:WAV ON", CMD_E_SETTINGS,
+                 "SCAN:WAVeform ON needs waveform.send: on in the configuration");
     expect(&dev, "SCAN:WAV? MAX", "OFF");
     dev.limits.waves_most = 1;
     dev.settings.waves = dev.defaults.waves = 1;
@@ -98,7 +72,7 @@ static void waveforms_can_be_switched(void **ctx)
     assert_int_equal(dev.settings.waves, 0);
     expect(&dev, "SCAN:WAV DEF", "OK");
     expect(&dev, "SCAN:WAV?", "ON");
-    refuse(&dev, "SCAN:WAV 1", CMD_E_DATA_TYPE, "SCAN:WAVeform takes OFF, ON, DEF, not '1'");
+    expect_error(&dev, 1, "SCAN:WAV 1", CMD_E_DATA_TYPE, "SCAN:WAVeform takes OFF, ON, DEF, not '1'");
 }
 
 static void what_is_planned_rests_in_a_scan(void **ctx)
@@ -112,7 +86,7 @@ static void what_is_planned_rests_in_a_scan(void **ctx)
             dev = command_test_device();
             dev.state = (enum head_state)state;
             if (state == HEAD_SPIN_UP || state == HEAD_SCANNING)
-                refuse(&dev, lines[i], CMD_E_SETTINGS, "can't change in state");
+                expect_error(&dev, 1, lines[i], CMD_E_SETTINGS, "can't change in state");
             else
                 expect(&dev, lines[i], "OK");
         }
@@ -156,17 +130,17 @@ static void steps_stay_within_the_rates(void **ctx)
     expect(&dev, "SCAN:STEP:PAN? MAX", "0.6");
     expect(&dev, "SCAN:STEP? MIN", "0.0012");
     expect(&dev, "SCAN:STEP? MAX", "0.268328156");
-    refuse(&dev, "SCAN:STEP 0.27", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
-    refuse(&dev, "SCAN:STEP:LINE 2.41", CMD_E_SETTINGS, "allowed 0.0012 to 2.4 as HEAD:PRR is 300000");
-    refuse(&dev, "SCAN:STEP:PAN 0.61", CMD_E_SETTINGS, "allowed 0 to 0.6 as HEAD:LINes is 100");
-    refuse(&dev, "SCAN:STEP 0", CMD_E_RANGE, "allowed 0.000000001 to 360");
-    refuse(&dev, "SCAN:STEP 361", CMD_E_RANGE, "allowed 0.000000001 to 360");
+    expect_error(&dev, 1, "SCAN:STEP 0.27", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
+    expect_error(&dev, 1, "SCAN:STEP:LINE 2.41", CMD_E_SETTINGS, "allowed 0.0012 to 2.4 as HEAD:PRR is 300000");
+    expect_error(&dev, 1, "SCAN:STEP:PAN 0.61", CMD_E_SETTINGS, "allowed 0 to 0.6 as HEAD:LINes is 100");
+    expect_error(&dev, 1, "SCAN:STEP 0", CMD_E_RANGE, "allowed 0.000000001 to 360");
+    expect_error(&dev, 1, "SCAN:STEP 361", CMD_E_RANGE, "allowed 0.000000001 to 360");
     command_execute(&dev, 1, "SCAN:STEP MAX", &result);
     assert_true(result.error == 0 && dev.settings.pan_udeg_s == 60 * MICRO);
     expect(&dev, "SCAN:STEP:LINE MAX", "2.4");
     assert_true(dev.settings.lines_uhz == 2000 * MICRO);
     dev.limits.pan_max_udeg_s = dev.settings.pan_udeg_s = 0;
-    refuse(&dev, "SCAN:STEP 0.1", CMD_E_SETTINGS, "the head has no pan; SCAN:STEP:LINE is its step");
+    expect_error(&dev, 1, "SCAN:STEP 0.1", CMD_E_SETTINGS, "the head has no pan; SCAN:STEP:LINE is its step");
     expect(&dev, "SCAN:STEP:LINE 0.1", "0.1");
 }
 
@@ -182,11 +156,11 @@ static void what_def_answers_can_be_set(void **ctx)
     assert_true(dev.settings.lines_uhz == 100 * MICRO && dev.settings.pan_udeg_s == 60 * MICRO);
     expect(&dev, "SCAN:STEP 0.12", "0.12");
     assert_true(dev.settings.pan_udeg_s == 12 * MICRO);
-    refuse(&dev, "SCAN:STEP 0.59", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
+    expect_error(&dev, 1, "SCAN:STEP 0.59", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
     /* It is not allowed where the lines of power-up give another step: 360 * 100 / 1000 deg. */
     expect(&dev, "HEAD:PRR 1000", "OK");
     expect(&dev, "SCAN:STEP:LINE? DEF", "0.12");
-    refuse(&dev, "SCAN:STEP:LINE 0.12", CMD_E_SETTINGS, "allowed 0.36 to 360 as HEAD:PRR is 1000");
+    expect_error(&dev, 1, "SCAN:STEP:LINE 0.12", CMD_E_SETTINGS, "allowed 0.36 to 360 as HEAD:PRR is 1000");
 }
 
 /* 360 kHz at 1 deg and 1000 rings/s. */
@@ -214,17 +188,18 @@ static void a_spheres_step_divides_half_a_turn(void **ctx)
     expect(&dev, "SCAN:STEP 0.36", "0.36");
     expect(&dev, "HEAD:PRR?", "100000"); /* 1000 a ring */
     expect(&dev, "HEAD:LIN? MAX", "360");
-    refuse(&dev, "HEAD:LIN 361", CMD_E_SETTINGS, "allowed 1 to 360 with this SCAN:STEP");
-    refuse(&dev, "SCAN:STEP 0.37", CMD_E_RANGE, "the nearest are 0.36 and 0.375 deg"); /* 500 and 480 to 180 deg */
-    refuse(&dev, "SCAN:STEP 0.05", CMD_E_SETTINGS, "allowed 0.1 to 90 as HEAD:LINes is 100");
-    refuse(&dev, "SCAN:STEP:LINE 1", CMD_E_SETTINGS, "allowed 0.36: SCAN:STEP sets both");
+    expect_error(&dev, 1, "HEAD:LIN 361", CMD_E_SETTINGS, "allowed 1 to 360 with this SCAN:STEP");
+    expect_error(&dev, 1, "SCAN:STEP 0.37", CMD_E_RANGE,
+                 "the nearest are 0.36 and 0.375 deg"); /* 500 and 480 to 180 deg */
+    expect_error(&dev, 1, "SCAN:STEP 0.05", CMD_E_SETTINGS, "allowed 0.1 to 90 as HEAD:LINes is 100");
+    expect_error(&dev, 1, "SCAN:STEP:LINE 1", CMD_E_SETTINGS, "allowed 0.36: SCAN:STEP sets both");
     dev.state = HEAD_SCANNING;
-    refuse(&dev, "SCAN:STEP 1", CMD_E_SETTINGS, "can't change in state scanning");
+    expect_error(&dev, 1, "SCAN:STEP 1", CMD_E_SETTINGS, "can't change in state scanning");
     dev.state = HEAD_IDLE;
     expect(&dev, "SCAN:STEP DEF", "1");
     expect(&dev, "HEAD:PRR?", "36000");
     dev.limits.step_fixed = 1;
-    refuse(&dev, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
+    expect_error(&dev, 1, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
 }
 
 static void steps_of_fixed_patterns_are_readings(void **ctx)
@@ -234,16 +209,16 @@ static void steps_of_fixed_patterns_are_readings(void **ctx)
     dev.limits.emitter = EMITTER_PLANAR;
     dev.limits.line_pulses = 1440;
     expect(&dev, "SCAN:STEP?", "0.25");
-    refuse(&dev, "SCAN:STEP 0.5", CMD_E_SETTINGS, "allowed 0.25: its steps are fixed");
-    refuse(&dev, "SCAN:STEP:PAN?", CMD_E_SETTINGS, "the head has no pan");
+    expect_error(&dev, 1, "SCAN:STEP 0.5", CMD_E_SETTINGS, "allowed 0.25: its steps are fixed");
+    expect_error(&dev, 1, "SCAN:STEP:PAN?", CMD_E_SETTINGS, "the head has no pan");
     dev = command_test_device();
     dev.limits.emitter = EMITTER_BEAMS;
     dev.limits.sequence_ps = 55296000;
     dev.settings.lines_uhz = 20 * MICRO;
     expect(&dev, "SCAN:STEP:LINE?", "0.3981312"); /* 360 * 20 * 55.296e-6 */
-    refuse(&dev, "SCAN:STEP 0.4", CMD_E_SETTINGS, "allowed 0.3981312 as HEAD:LINes is 20");
+    expect_error(&dev, 1, "SCAN:STEP 0.4", CMD_E_SETTINGS, "allowed 0.3981312 as HEAD:LINes is 20");
     dev.limits.emitter = EMITTER_DIRECTIONS;
-    refuse(&dev, "SCAN:STEP?", CMD_E_SETTINGS, "the head has a list of directions, so no step");
+    expect_error(&dev, 1, "SCAN:STEP?", CMD_E_SETTINGS, "the head has a list of directions, so no step");
 }
 
 static int too_far(void *owner, const struct head_settings *settings, char *why, size_t len)
@@ -270,11 +245,11 @@ static void geometries_go_together(void **ctx)
     dev.settings.prr_uhz = 36000 * MICRO;
     dev.defaults = dev.settings;
     expect(&dev, "SCAN:STEP?", "0.5");
-    refuse(&dev, "SCAN:STEP 0.25", CMD_E_RANGE, "SCAN:STEP 0.25, allowed 0.5 deg as HEAD:LINes is 50");
-    refuse(&dev, "HEAD:LIN 30", CMD_E_RANGE, "allowed 25, 50 Hz with this SCAN:STEP");
+    expect_error(&dev, 1, "SCAN:STEP 0.25", CMD_E_RANGE, "SCAN:STEP 0.25, allowed 0.5 deg as HEAD:LINes is 50");
+    expect_error(&dev, 1, "HEAD:LIN 30", CMD_E_RANGE, "allowed 25, 50 Hz with this SCAN:STEP");
     expect(&dev, "HEAD:LIN 25", "OK");
     assert_true(dev.settings.prr_uhz == 18000 * MICRO);
-    refuse(&dev, "SCAN:STEP 0.3", CMD_E_RANGE, "allowed 0.25, 0.5 deg as HEAD:LINes is 25");
+    expect_error(&dev, 1, "SCAN:STEP 0.3", CMD_E_RANGE, "allowed 0.25, 0.5 deg as HEAD:LINes is 25");
     expect(&dev, "SCAN:STEP? MIN", "0.25");
     expect(&dev, "SCAN:STEP? MAX", "0.5");
     expect(&dev, "HELP? SCAN:STEP",
@@ -282,11 +257,11 @@ static void geometries_go_together(void **ctx)
     expect(&dev, "SCAN:STEP 0.25", "0.25");
     assert_true(dev.settings.prr_uhz == 36000 * MICRO);
     expect(&dev, "SCAN:STEP:LINE?", "0.25");
-    refuse(&dev, "HEAD:LIN DEF", CMD_E_RANGE, "HEAD:LINes DEF, allowed 25 Hz with this SCAN:STEP");
+    expect_error(&dev, 1, "HEAD:LIN DEF", CMD_E_RANGE, "HEAD:LINes DEF, allowed 25 Hz with this SCAN:STEP");
     expect(&dev, "HEAD:LIN MAX", "OK");
     expect(&dev, "HEAD:LIN?", "25");
     dev.state = HEAD_SCANNING;
-    refuse(&dev, "SCAN:STEP 0.5", CMD_E_SETTINGS, "can't change in state scanning");
+    expect_error(&dev, 1, "SCAN:STEP 0.5", CMD_E_SETTINGS, "can't change in state scanning");
     dev.state = HEAD_IDLE;
     expect(&dev, "SCAN:STEP DEF", "0.5");
     expect(&dev, "*RST", "OK");
@@ -300,7 +275,7 @@ static void what_can_not_be_planned_is_refused(void **ctx)
     struct command_device dev = command_test_device();
     dev.can_plan = too_far;
     dev.owner = &most_nm;
-    refuse(&dev, "HEAD:RANG:MAX 51", CMD_E_SETTINGS, "HEAD:RANGe:MAX: it does not fit");
+    expect_error(&dev, 1, "HEAD:RANG:MAX 51", CMD_E_SETTINGS, "HEAD:RANGe:MAX: it does not fit");
     expect(&dev, "HEAD:RANG:MAX 50", "OK");
 }
 
@@ -321,7 +296,7 @@ static void settings_describe_themselves(void **ctx)
     expect(&dev, "HELP? HEAD:PRR", "number,\"Hz\",100000,300000,300000,0.000001,\"all\",\"100000 300000\"");
     dev.limits.pan_max_udeg_s = 0;
     expect(&dev, "HELP? SCAN:STEP", "number,\"deg\",,,,,\"\",\"\"");
-    refuse(&dev, "HELP? HEAD", CMD_E_DATA_TYPE, "HELP? takes a header, not 'HEAD'");
+    expect_error(&dev, 1, "HELP? HEAD", CMD_E_DATA_TYPE, "HELP? takes a header, not 'HEAD'");
 }
 
 /* The limits of HELP? are the answers to MIN, MAX and DEF, and none of them is refused. */
@@ -392,6 +367,26 @@ static void settings_that_a_recording_lacks_describe_themselves(void **ctx)
     expect(&dev, "SYST:ERR:COUN?", "0");
 }
 
+/* A damaged recording may have rates of 0, and then its steps can't be worked out. */
+static void a_recording_without_rates_has_no_step(void **ctx)
+{
+    (void)ctx;
+    static const char *const asks[] = {"SCAN:STEP?", "SCAN:STEP? MAX", "SCAN:STEP:LINE?", "SCAN:STEP:LINE? MIN"};
+    static const enum emitter_kind kinds[] = {EMITTER_LINE, EMITTER_PLANAR, EMITTER_SPHERE};
+    for (size_t k = 0; k < N_OF(kinds); k++) {
+        struct command_device dev = command_test_device();
+        dev.recorded = "a recording is replayed";
+        dev.limits.emitter = kinds[k];
+        dev.limits.step_fixed = kinds[k] != EMITTER_LINE;
+        dev.settings.prr_uhz = dev.settings.lines_uhz = 0;
+        for (size_t i = 0; i < N_OF(asks); i++)
+            expect_error(&dev, 1, asks[i], CMD_E_SETTINGS, "the recording does not have this value");
+        expect(&dev, "HELP? SCAN:STEP", "number,\"deg\",,,,,\"\",\"\"");
+        if (kinds[k] != EMITTER_PLANAR)
+            expect_error(&dev, 1, "SCAN:STEP:PAN?", CMD_E_SETTINGS, "the recording does not have this value");
+    }
+}
+
 /* The client of the time server looks at the settings now and then: it must see that the role has changed, though it has
  * come back to what it was. */
 static void each_change_of_a_role_counts(void **ctx)
@@ -429,6 +424,7 @@ int main(void)
         cmocka_unit_test(settings_describe_themselves),
         cmocka_unit_test(limits_are_those_that_hold),
         cmocka_unit_test(settings_that_a_recording_lacks_describe_themselves),
+        cmocka_unit_test(a_recording_without_rates_has_no_step),
         cmocka_unit_test(each_change_of_a_role_counts),
     };
     return cmocka_run_group_tests_name("command knobs", tests, NULL, NULL);

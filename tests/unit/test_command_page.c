@@ -1,16 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* COMMANDS.md beside the table of commands: the commands do what its columns say. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include "firmware_sim/command/command.h"
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
@@ -124,7 +113,6 @@ static void fill_line(char line[256], const struct command_row *row, int query)
 static int refused(const struct command_row *row, enum head_state state, uint32_t control)
 {
     struct command_device dev = command_test_device();
-    struct command_result result;
     char line[256];
     dev.state = state;
     dev.control = control;
@@ -134,7 +122,7 @@ static int refused(const struct command_row *row, enum head_state state, uint32_
     dev.settings.range_min_nm = dev.settings.sigma_nm = dev.settings.ball_nm = NANO + 1;
     dev.settings.range_max_nm = 300 * NANO;
     fill_line(line, row, row->act == NULL);
-    command_execute(&dev, 1, line, &result);
+    say(&dev, 1, line);
     return result.error;
 }
 
@@ -164,11 +152,9 @@ static void columns(char text[256], const struct command_row *row)
         add_range(text, row);
     } else if (row->unit != NULL) {
         struct command_device dev = command_test_device();
-        struct command_result result;
         char line[256];
         snprintf(line, sizeof line, "%s 1e19", row->header);
-        command_execute(&dev, 1, line, &result);
-        const char *allowed = strstr(result.reply, "allowed ");
+        const char *allowed = strstr(say(&dev, 1, line), "allowed ");
         assert_non_null(allowed);
         add(text, "%.*s", (int)strcspn(allowed + 8, "\""), allowed + 8);
     }

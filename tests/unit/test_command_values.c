@@ -1,45 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Numbers, ranges, control and effects of the command set. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <cmocka.h>
-
 #include "tests/unit/command_device.h"
-
-#define N_OF(array) (sizeof(array) / sizeof(array)[0])
-
-static struct command_result result;
-
-static const char *say(struct command_device *dev, uint32_t session, const char *line)
-{
-    command_execute(dev, session, line, &result);
-    return result.reply;
-}
-
-static void expect(struct command_device *dev, const char *line, const char *reply)
-{
-    const char *got = say(dev, 1, line);
-    if (strcmp(got, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, got, reply);
-}
-
-static void expect_error(struct command_device *dev, uint32_t session, const char *line, int number, const char *part)
-{
-    const struct head_settings before = dev->settings;
-    const uint32_t control = dev->control, queued = dev->queue.count;
-    say(dev, session, line);
-    if (result.error != number || strstr(result.reply, part) == NULL)
-        fail_msg("'%s' gives '%s', not %d with '%s'", line, result.reply, number, part);
-    assert_int_equal(dev->queue.count, queued + 1);
-    assert_int_equal(dev->control, control);
-    assert_int_equal(result.effect, COMMAND_NONE);
-    assert_false(result.took_control || result.changes);
-    assert_memory_equal(&before, &dev->settings, sizeof before);
-}
 
 static void numbers_in_nrf_forms_are_exact(void **ctx)
 {
@@ -317,6 +278,18 @@ static void numbers_may_have_blanks_in_their_exponents(void **ctx)
     assert_true(dev.settings.prr_uhz == 200000 * MICRO);
 }
 
+/* A client that goes to the end sends the length as it was told it, to 1e-6 s. */
+static void the_length_that_is_said_is_allowed(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.replay.length_s = 100.1234566;
+    dev.replay.position_s = 99.9999999;
+    expect(&dev, "SCAN:REPL?", "IDLE,99.999999,100.123456,1,OFF");
+    expect(&dev, "SCAN:REPL 100.123456", "OK");
+    expect_error(&dev, 1, "SCAN:REPL 100.123457", CMD_E_RANGE, "allowed 0 to 100.1234566");
+}
+
 /* A setting of words takes each in short and long form, and DEF, but no other word. */
 static void words(void **state)
 {
@@ -389,6 +362,7 @@ int main(void)
         cmocka_unit_test(a_station_stays_during_a_scan),
         cmocka_unit_test(steps_of_time),
         cmocka_unit_test(numbers_may_have_blanks_in_their_exponents),
+        cmocka_unit_test(the_length_that_is_said_is_allowed),
         cmocka_unit_test(words),
         cmocka_unit_test(fixed_rates_are_the_only_ones),
     };

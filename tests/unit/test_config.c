@@ -10,8 +10,9 @@
 /* Returns whether one of the errors begins with start and has the fragment. */
 static int is_told(const char *start, const char *fragment)
 {
-    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++)
-        if (strncmp(faults.fault[i].text, start, strlen(start)) == 0 && strstr(faults.fault[i].text, fragment) != NULL)
+    for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS; i++)
+        if (strncmp(diagnostics.err[i].text, start, strlen(start)) == 0 &&
+            strstr(diagnostics.err[i].text, fragment) != NULL)
             return 1;
     return 0;
 }
@@ -27,12 +28,12 @@ static void malformed_configurations_are_refused(void **state)
         if (code != SH_EINPUT || err.code != code) fail_msg("case %zu (%s): code %d", i, bad[i].with, code);
         if (!is_told(start, bad[i].fragment))
             fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start, bad[i].fragment);
-        for (uint32_t k = 0; k < faults.n; k++)
-            if (strpbrk(faults.fault[k].text, "\n\r") != NULL) fail_msg("case %zu: more than one line", i);
+        for (uint32_t k = 0; k < diagnostics.n; k++)
+            if (strpbrk(diagnostics.err[k].text, "\n\r") != NULL) fail_msg("case %zu: more than one line", i);
         /* There are no consequential errors. A file of its own has more of them, as much is missing. */
-        if (bad[i].old != NULL && faults.n != 1)
-            fail_msg("case %zu (%s): %u faults: %s, %s", i, bad[i].with, faults.n, faults.fault[0].text,
-                     faults.fault[1].text);
+        if (bad[i].old != NULL && diagnostics.n != 1)
+            fail_msg("case %zu (%s): %u faults: %s, %s", i, bad[i].with, diagnostics.n, diagnostics.err[0].text,
+                     diagnostics.err[1].text);
     }
 }
 
@@ -59,6 +60,9 @@ static void files_that_are_none_are_refused(void **state)
     assert_int_equal(config_load(long_path, NULL, 0, cfg, &err), SH_EINPUT);
     assert_says("path too long");
     assert_int_equal(config_load(long_path, NULL, 0, cfg, NULL), SH_EINPUT);
+    long_path[500] = '\0'; /* of 511 bytes that are allowed */
+    assert_int_equal(load_edited("cube.obj", long_path), SH_EINPUT);
+    assert_says("too long with the folder of its file; allowed a path of 1 to 511 bytes");
 }
 
 /* ---- numbers */
@@ -277,8 +281,9 @@ static void damaged_files_never_crash(void **state)
         int code = load_sets(NULL, 0);
         assert_true(code == SH_OK || code == SH_EINPUT);
         assert_int_equal(err.code, code);
-        for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++)
-            if (strpbrk(faults.fault[i].text, "\n\r") != NULL) fail_msg("round %d: %s", round, faults.fault[i].text);
+        for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS; i++)
+            if (strpbrk(diagnostics.err[i].text, "\n\r") != NULL)
+                fail_msg("round %d: %s", round, diagnostics.err[i].text);
     }
 }
 

@@ -2,24 +2,12 @@
 /* Faults that change the measurements. Heads that can't have them get the reason. */
 #include "tests/unit/config_rig.h"
 
-/* The cases are for a line head without noise and signal (base), with a list of faults, and for other heads. */
+/* Loads another head, or any-rate, with a list of faults. */
 static void assert_refused(const char *profile, const char *rest, const char *item, const char *says)
 {
     char with[512];
-    char *text;
-    snprintf(with, sizeof with, "%sfaults: [%s]\noutput:", rest, item);
-    text = edited("output:", with);
-    if (profile != NULL) {
-        char own[160], *was = strstr(text, "  prr_hz"), *end = strstr(was, "scene:");
-        char *whole = calloc(1, strlen(text) + sizeof own);
-        assert_non_null(whole);
-        snprintf(own, sizeof own, "head:\n  profile: %s\n", profile);
-        snprintf(whole, strlen(text) + sizeof own, "%s%s", own, end);
-        free(text);
-        text = whole;
-    }
-    load_text(text);
-    free(text);
+    snprintf(with, sizeof with, "%sfaults: [%s]\n", rest, item);
+    load_with_head(profile != NULL ? profile : "any-rate", "", with);
     if (says == NULL ? err.code != SH_OK : err.code != SH_EINPUT || strstr(err.text, says) == NULL)
         fail_msg("%s, %s: \"%s\", expected \"%s\"", profile != NULL ? profile : "any-rate", item, err.text,
                  says != NULL ? says : "nothing");

@@ -3,48 +3,23 @@
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
-/* Writes a shipped profile with its first `old` replaced, as heads/mine.yaml beside the configuration. */
-static int load_changed(const char *name, const char *old, const char *with)
-{
-    char path[128], text[8192], changed[8448];
-    snprintf(path, sizeof path, "config/heads/%s.yaml", name);
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    size_t len = fread(text, 1, sizeof text - 1, file);
-    fclose(file);
-    text[len] = '\0';
-    char *at = strstr(text, old);
-    if (at == NULL) fail_msg("%s has no %s", name, old);
-    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old));
-    write_in("heads/mine.yaml", changed);
-    return load_edited("any-rate\n" PRR LINES, "mine\n");
-}
-
-/* The same with further keys of the head's settings. */
-static int load_settings(const char *name, const char *settings)
-{
-    char head[256];
-    snprintf(head, sizeof head, "%s\n%s", name, settings);
-    return load_edited("any-rate\n" PRR LINES, head);
-}
-
 static void rates_and_angles_follow(void **state)
 {
     (void)state;
-    assert_loads(load_settings("hokuyo-ust-20lx", ""));
+    assert_loads(load_with_head("hokuyo-ust-20lx", "", ""));
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(1440) * 40 * 1000000);
     assert_int_equal(cfg->profile.fov_min_udeg, -135000000);
     assert_int_equal(cfg->profile.fov_max_udeg, 135000000);
     assert_int_equal(cfg->head.settings.line_start_udeg, -135000000);
     assert_string_equal(cfg->profile.firmware, "4.1.0b-A");
-    assert_loads(load_settings("hokuyo-urg-04lx", "  lines_hz: 9.25\n"));
+    assert_loads(load_with_head("hokuyo-urg-04lx", "  lines_hz: 9.25\n", ""));
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(1024) * 9250000);
     assert_int_equal(cfg->profile.fov_min_udeg, -119531250); /* (44 - 384) 360 / 1024 deg */
-    assert_loads(load_settings("hokuyo-urg-04lx", "  lines_hz: 9.25\n  prr_hz: 9472\n"));
-    assert_loads(load_settings("velodyne-vlp16", "  lines_hz: 10\n"));
+    assert_loads(load_with_head("hokuyo-urg-04lx", "  lines_hz: 9.25\n  prr_hz: 9472\n", ""));
+    assert_loads(load_with_head("velodyne-vlp16", "  lines_hz: 10\n", ""));
     assert_int_equal(cfg->head.settings.prr_uhz, 289351851852);
     assert_int_equal(cfg->profile.emitter.sequence_ticks, 24);
-    assert_loads(load_settings("riegl-vz400i", ""));
+    assert_loads(load_with_head("riegl-vz400i", "", ""));
     assert_int_equal(cfg->profile.emitter.kind, EMITTER_LINE);
     assert_string_equal(cfg->profile.firmware, "1.0.0");
 }
@@ -60,13 +35,13 @@ static void check_wrong(const struct wrong *w)
     if (load_changed(w->profile, w->old, w->with) != SH_EINPUT) fail_msg("%s was taken", w->with);
     snprintf(start, sizeof start, "%s/heads/mine.yaml:", dir);
     snprintf(key, sizeof key, ": %s: ", w->key);
-    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++) {
-        const char *text = faults.fault[i].text, *line = text + strlen(start);
+    for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS; i++) {
+        const char *text = diagnostics.err[i].text, *line = text + strlen(start);
         if (strncmp(text, start, strlen(start)) == 0 && *line > '0' && *line <= '9' && strstr(text, key) != NULL &&
             strstr(text, w->fragment) != NULL)
             return;
     }
-    fail_msg("%s: none of %u faults says so of %s; the first: %s", w->with, faults.n, w->key, err.text);
+    fail_msg("%s: none of %u faults says so of %s; the first: %s", w->with, diagnostics.n, w->key, err.text);
 }
 
 static void tables_that_do_not_fit_are_refused(void **state)
@@ -152,7 +127,7 @@ static void settings_that_do_not_fit_are_refused(void **state)
         {"velodyne-vlp16", "  ambiguity: folded\n", ":3: head.ambiguity: the pulses of head profile velodyne-vlp16"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        if (load_settings(wrong[i].profile, wrong[i].settings) != SH_EINPUT) fail_msg("%s", wrong[i].settings);
+        if (load_with_head(wrong[i].profile, wrong[i].settings, "") != SH_EINPUT) fail_msg("%s", wrong[i].settings);
         assert_says(wrong[i].says);
     }
     const char *const sets[] = {"head.profile=sick-lms111", "head.lines_hz=25", "head.prr_hz=36000",
@@ -171,15 +146,12 @@ static int load_list(const char *list)
     write_in("heads/list.txt", list);
     snprintf(text, sizeof text, "emitter: directions\ndirections: list.txt\n");
     /* in place of the beams */
-    char path[] = "config/heads/velodyne-vlp16.yaml", whole[8192], changed[8448];
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    whole[fread(whole, 1, sizeof whole - 1, file)] = '\0';
-    fclose(file);
+    char *whole = read_source("config/heads/velodyne-vlp16.yaml"), changed[8448];
     const char *from = strstr(whole, "emitter:"), *to = strstr(whole, "lines_min_hz:");
     snprintf(changed, sizeof changed, "%.*s%s%s", (int)(from - whole), whole, text, to);
     write_in("heads/mine.yaml", changed);
-    return load_settings("mine", "  lines_hz: 10\n");
+    free(whole);
+    return load_with_head("mine", "  lines_hz: 10\n", "");
 }
 
 static void lists_name_their_line(void **state)
@@ -248,25 +220,53 @@ static void spheres_go_to_their_limits(void **state)
 static void the_step_of_a_sphere_is_a_setting(void **state)
 {
     (void)state;
-    assert_loads(load_settings("sphere", ""));
+    assert_loads(load_with_head("sphere", "", ""));
     assert_int_equal(cfg->profile.emitter.steps, 360);
-    assert_loads(load_settings("sphere", "  step_deg: 0.1\n"));
+    assert_loads(load_with_head("sphere", "  step_deg: 0.1\n", ""));
     assert_int_equal(cfg->profile.emitter.steps, 3600);
     assert_int_equal(cfg->profile.emitter.rings, 1801);
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(3600000) * 1000000);
-    assert_loads(load_settings("sphere", "  step_deg: 0.01\n"));
+    assert_loads(load_with_head("sphere", "  step_deg: 0.01\n", ""));
     assert_int_equal(cfg->head.settings.lines_uhz, 277777777);
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(36000) * 277777777);
     assert_loads(
-        load_settings("sphere", "  step_deg: 2.2\n  lines_hz: 20\n  line_start_deg: 350\n  line_stop_deg: 10\n"));
+        load_with_head("sphere", "  step_deg: 2.2\n  lines_hz: 20\n  line_start_deg: 350\n  line_stop_deg: 10\n", ""));
     assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(164) * 20000000);
     assert_int_equal(cfg->profile.emitter.rings, 83);
+}
+
+/* Nothing else follows from it, also where it is not the list's first item. */
+static void a_bad_value_in_a_list_is_one_fault(void **state)
+{
+    (void)state;
+    static const struct wrong wrong[] = {
+        {"velodyne-vlp16", "offset_ns: 4608,", "offset_ns: x,", "beams[2].offset_ns", "not a number"},
+        {"sick-lms111", "lines_hz: 25, steps_per_turn: 1440", "lines_hz: 25, steps_per_turn: x",
+         "geometries[1].steps_per_turn", "not a number"},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        check_wrong(&wrong[i]);
+        if (diagnostics.n != 1) fail_msg("%s: also %s", wrong[i].key, diagnostics.err[1].text);
+    }
+}
+
+/* With 10^7 pulses a second, the most that a head has, 300 lines have 33,333 pulses each: steps of 0.0108 deg. */
+static void a_step_that_leaves_no_line_rate_is_refused(void **state)
+{
+    (void)state;
+    assert_int_equal(load_changed("sphere", "lines_min_hz: { value: 1,", "lines_min_hz: { value: 300,"), SH_OK);
+    assert_int_equal(load_with_head("mine", "  step_deg: 0.01\n", ""), SH_EINPUT);
+    assert_int_equal(diagnostics.n, 1);
+    assert_says(
+        ":3: head.step_deg: 0.01 makes more than 10000000 pulses/s at 300 lines/s, lines_min_hz of head profile "
+        "mine; allowed at least 0.0108 deg");
+    assert_loads(load_with_head("mine", "  step_deg: 0.0125\n", "")); /* the next that divides 180 deg */
 }
 
 /* Checks a line rate, and the steps of a turn at it. */
 static void expect_geometry(const char *settings, int lines_hz, uint32_t steps)
 {
-    assert_loads(load_settings("sick-lms111", settings));
+    assert_loads(load_with_head("sick-lms111", settings, ""));
     assert_int_equal(cfg->head.settings.lines_uhz, lines_hz * INT64_C(1000000));
     assert_int_equal(cfg->head.settings.prr_uhz, lines_hz * INT64_C(1000000) * steps);
     assert_int_equal(cfg->head.settings.step_udeg, 360000000 / steps);
@@ -295,11 +295,11 @@ static void a_planar_head_has_its_geometries(void **state)
     expect_geometry("  step_deg: 0.25\n", 25, 1440);
     expect_geometry("  step_deg: 0.5\n", 50, 720);
     expect_geometry("  lines_hz: 25\n  step_deg: 0.5\n", 25, 720);
-    assert_int_equal(load_settings(lms, "  lines_hz: 50\n  step_deg: 0.25\n"), SH_EINPUT);
+    assert_int_equal(load_with_head(lms, "  lines_hz: 50\n  step_deg: 0.25\n", ""), SH_EINPUT);
     assert_says(list);
-    assert_int_equal(load_settings(lms, "  lines_hz: 30\n"), SH_EINPUT);
+    assert_int_equal(load_with_head(lms, "  lines_hz: 30\n", ""), SH_EINPUT);
     assert_says(list);
-    assert_int_equal(load_settings(lms, "  ring_start_deg: 0\n"), SH_EINPUT);
+    assert_int_equal(load_with_head(lms, "  ring_start_deg: 0\n", ""), SH_EINPUT);
     assert_says("allowed only with emitter: sphere");
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
         check_wrong(&wrong[i]);
@@ -314,6 +314,8 @@ int main(void)
         cmocka_unit_test(lists_name_their_line),
         cmocka_unit_test(spheres_go_to_their_limits),
         cmocka_unit_test(the_step_of_a_sphere_is_a_setting),
+        cmocka_unit_test(a_bad_value_in_a_list_is_one_fault),
+        cmocka_unit_test(a_step_that_leaves_no_line_rate_is_refused),
         cmocka_unit_test(a_planar_head_has_its_geometries),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -8,8 +8,8 @@
 static void assert_faults(const char *const *starts, uint32_t n)
 {
     char want[256];
-    for (uint32_t i = 0; i < n || i < faults.n; i++) {
-        const char *got = i < faults.n ? faults.fault[i].text : "nothing";
+    for (uint32_t i = 0; i < n || i < diagnostics.n; i++) {
+        const char *got = i < diagnostics.n ? diagnostics.err[i].text : "nothing";
         const int of_file = i < n && starts[i][0] >= '0' && starts[i][0] <= '9';
         snprintf(want, sizeof want, "%s%s%s", of_file ? config_path : "", of_file ? ":" : "",
                  i < n ? starts[i] : "nothing");
@@ -40,7 +40,7 @@ static void all_faults_are_told_in_order(void **state)
     /* The shorter call returns the first. */
     struct sh_err first;
     assert_int_equal(config_load(config_path, sets, 2, cfg, &first), SH_EINPUT);
-    assert_string_equal(first.text, faults.fault[0].text);
+    assert_string_equal(first.text, diagnostics.err[0].text);
 }
 
 static void what_follows_from_a_fault_is_not_told(void **state)
@@ -54,7 +54,11 @@ static void what_follows_from_a_fault_is_not_told(void **state)
         {"stations:", "station:", "10: station: unknown key, did you mean stations?"},
         {"position_m", "positon_m", "11: stations[0].positon_m: unknown key"},
         {"  - position_m: [1, 2, 3]\n    heading_deg: 90\n", "  gate\n", "11: stations: here stands a single value"},
-        {"type: tcp", "type: tpc", "14: links[0].type: "},                    /* what has a port? */
+        {"type: tcp", "type: tpc", "14: links[0].type: "}, /* what has a port? */
+        {"    port: 0\n", "    port: 0\n  - {type: tcp, port: 0, protocol: colla}\nntp: {role: client}\n",
+         "16: links[1].protocol: "}, /* it may send dates */
+        {"    port: 0\n", "    port: 0\n  - {type: tcp, port: 0, protocol: colla}\nfaults: [{kind: window_soiled}]\n",
+         "16: links[1].protocol: "},
         {"any-rate", "riegl", "2: head.profile: "},                           /* what are its limits? */
         {LINES, "  lines_hz: 1e6\n", "4: head.lines_hz: 1000000 is outside"}, /* more than pulses */
         {LINES, "  line_start_deg: 99\n  line_stop_deg: 5\n", "4: head.line_start_deg: 99 is outside"},
@@ -71,14 +75,11 @@ static void what_follows_from_a_fault_is_not_told(void **state)
 static void faults_of_the_profile_come_last(void **state)
 {
     (void)state;
-    char text[8192], name[160];
-    FILE *file = fopen("config/heads/leica-rtc360.yaml", "rb");
-    size_t len = fread(text, 1, sizeof text - 1, file);
-    fclose(file);
-    text[len] = '\0';
+    char *text = read_source("config/heads/leica-rtc360.yaml"), name[160];
     memcpy(strstr(text, "value: 130,"), "value: a30,", 11);
     memcpy(strstr(text, "value: 0.5,"), "value: b.5,", 11);
     write_in("heads/mine.yaml", text);
+    free(text);
     snprintf(name, sizeof name, "%s/heads/mine.yaml:", dir);
     assert_int_equal(load_edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  frames: x"), SH_EINPUT);
     ASSERT_FAULTS("3: head.frames: ", name, name);
@@ -92,16 +93,16 @@ static void twenty_are_kept_and_all_are_counted(void **state)
     for (int i = 0; i < 60; i++)
         n += snprintf(text + n, sizeof text - (size_t)n, "  - {retro: -1}\n");
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_int_equal(faults.n, 60);
-    snprintf(want, sizeof want, "surfaces[%d]", CONFIG_MAX_FAULTS - 1);
-    assert_non_null(strstr(faults.fault[CONFIG_MAX_FAULTS - 1].text, want));
+    assert_int_equal(diagnostics.n, 60);
+    snprintf(want, sizeof want, "surfaces[%d]", CONFIG_MAX_DIAGNOSTICS - 1);
+    assert_non_null(strstr(diagnostics.err[CONFIG_MAX_DIAGNOSTICS - 1].text, want));
     /* An error that is found later and stands before the others takes its place before them. */
     char *first = strstr(text, "  prr_hz: 500000");
     memcpy(first, "  prr_hz: 999999", 16);
     memcpy(strstr(text, "lines_hz: 100"), "lines_hz: 2  ", 13); /* outside the profile: found after reading */
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_int_equal(faults.n, 61);
-    assert_non_null(strstr(faults.fault[0].text, ":4: head.lines_hz: 2 is outside"));
+    assert_int_equal(diagnostics.n, 61);
+    assert_non_null(strstr(diagnostics.err[0].text, ":4: head.lines_hz: 2 is outside"));
 }
 
 /* A hostile file: thousands of errors cost as much as reading. The only assertion on time is that it ends. */
@@ -114,7 +115,7 @@ static void many_faults_end(void **state)
     for (int i = 0; i < LINES_OF_IT; i++)
         at += sprintf(at, "k%05d: 1\n", i);
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_true(faults.n >= LINES_OF_IT);
+    assert_true(diagnostics.n >= LINES_OF_IT);
     free(text);
 }
 

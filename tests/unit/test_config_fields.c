@@ -3,18 +3,6 @@
 #include "drivers/protocol/cola_field.h"
 #include "tests/unit/config_rig.h"
 
-/* The configuration with another head and these fields. */
-static void load_fields(const char *profile, const char *fields)
-{
-    char *text = edited("output:", fields), *head = strstr(text, "  prr_hz"), *rest = strstr(text, "scene:");
-    char *whole = calloc(1, strlen(text) + 100);
-    assert_true(head != NULL && rest != NULL && whole != NULL);
-    snprintf(whole, strlen(text) + 100, "head: {profile: %s}\n%s", profile, rest);
-    load_text(whole);
-    free(whole);
-    free(text);
-}
-
 #define SEGMENT "number: 1, shape: segment, angles_deg: [0, 90], radii_m: [0, 1]"
 
 static void fields_that_say_nothing_are_refused(void **state)
@@ -62,8 +50,8 @@ static void fields_that_say_nothing_are_refused(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char with[300];
-        snprintf(with, sizeof with, "fields: [%s]\noutput:", cases[i].field);
-        load_fields(cases[i].profile, with);
+        snprintf(with, sizeof with, "fields: [%s]\n", cases[i].field);
+        load_with_head(cases[i].profile, "", with);
         if (cases[i].says == NULL ? err.code != SH_OK
                                   : err.code != SH_EINPUT || strstr(err.text, cases[i].says) == NULL)
             fail_msg("%s: \"%s\", expected \"%s\"", cases[i].field, err.text,
@@ -75,13 +63,12 @@ static void keys_make_shapes(void **state)
 {
     (void)state;
     static struct cola_fields made;
-    load_fields(
-        "sick-tim781",
+    load_with_head(
+        "sick-tim781", "",
         "fields:\n"
         "  - {number: 2, name: left, shape: polygon, points_m: [[-1, 0.5], [1.25, 0.5], [0, 2]], response_ms: 134}\n"
         "  - {number: 48, shape: segment, angles_deg: [350, 370.5], radii_m: [0.25, 3], blanking_m: 0.1}\n"
-        "  - {number: 5, shape: rectangle, corner_m: [1, 2], size_m: [3, 4], turn_deg: 90}\n"
-        "output:");
+        "  - {number: 5, shape: rectangle, corner_m: [1, 2], size_m: [3, 4], turn_deg: 90}\n");
     assert_int_equal(err.code, SH_OK);
     config_fill_fields(cfg, &made);
     const struct cola_field *f = &made.field[1];
@@ -106,8 +93,8 @@ static void points_can_be_set(void **state)
 {
     (void)state;
     const char *const sets[] = {"fields.0.points_m=[[0, 0], [2, 0], [2, 2]]"};
-    load_fields("sick-tim781",
-                "fields: [{number: 1, shape: polygon, points_m: [[0, 0], [1, 0], [1, 1], [0, 1]]}]\noutput:");
+    load_with_head("sick-tim781", "",
+                   "fields: [{number: 1, shape: polygon, points_m: [[0, 0], [1, 0], [1, 1], [0, 1]]}]\n");
     assert_int_equal(err.code, SH_OK);
     load_sets(sets, 1);
     assert_int_equal(err.code, SH_OK);

@@ -42,7 +42,7 @@ static void lists_of_lists_are_not_followed(void **state)
     }
     sprintf(p, "links: *a9\n");
     assert_int_equal(load_text(text), SH_EINPUT);
-    assert_true(faults.n <= 200); /* a line for each wrong element, not for each way to it */
+    assert_true(diagnostics.n <= 200); /* a line for each wrong element, not for each way to it */
 }
 
 static void a_document_within_itself_ends(void **state)

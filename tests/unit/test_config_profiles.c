@@ -45,20 +45,9 @@ static void profiles_give_their_figures(void **state)
     assert_string_equal(p->maker, "Leica");
 }
 
-/* Reads a shipped profile, replaces `old` by `with` and loads it as heads/mine.yaml beside the configuration. */
 static int load_profile(const char *old, const char *with)
 {
-    char text[8192];
-    FILE *file = fopen("config/heads/leica-rtc360.yaml", "rb");
-    assert_non_null(file);
-    size_t len = fread(text, 1, sizeof text - 1, file);
-    fclose(file);
-    text[len] = '\0';
-    char *at = strstr(text, old), changed[8448];
-    assert_non_null(at);
-    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old));
-    write_in("heads/mine.yaml", changed);
-    return load_edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine");
+    return load_changed("leica-rtc360", old, with);
 }
 
 #define FARTHEST "{ value: 130, from: quoted, source: \"a reseller's page\" }"
@@ -173,6 +162,10 @@ static void profiles_are_looked_up_in_order(void **state)
     assert_int_equal(load_edited("any-rate", "mine"), SH_EINPUT);
     assert_says("first/mine.yaml:1: model: missing"); /* the variable goes before heads/ */
     setenv("SCANHEAD_HEADS", env, 1);
+    write_in("first/.yaml", "maker: nameless\n");
+    assert_int_equal(load_edited("any-rate", "first/.yaml"), SH_EINPUT);
+    assert_says("the file's name is the name of the profile; allowed 1 to ");
+    remove(strcat(path, "/.yaml"));
 }
 
 static void an_error_without_profiles_says_where_to_look(void **state)

@@ -99,11 +99,11 @@ static void the_example_has_every_key(void **state)
     *to = '\0';
     write_file(config_path, text, strlen(text));
     free(text);
-    memset(&faults, 0, sizeof faults);
+    memset(&diagnostics, 0, sizeof diagnostics);
     memset(cfg, 0, sizeof *cfg);
-    cfg_reader_init(&rd, config_path, &cfg_config_table, cfg, &faults);
+    cfg_reader_init(&rd, config_path, &cfg_config_table, cfg, &diagnostics);
     assert_int_equal(cfg_read_file(&rd), SH_OK);
-    if (faults.n != 0) fail_msg("%s", faults.fault[0].text);
+    if (diagnostics.n != 0) fail_msg("%s", diagnostics.err[0].text);
     for (size_t i = 0; i < cfg_config_table.n; i++)
         if (rd.line[i][0] == 0) fail_msg("%s is not in the example", cfg_config_table.keys[i].path);
 }
@@ -160,8 +160,8 @@ static void an_unknown_key_gets_the_list_of_all(void **state)
     expect_all_keys(&cfg_config_table, "");
     write_in("heads/mine.yaml", "zzz: 1\n");
     assert_int_equal(load_edited("any-rate", "heads/mine.yaml"), SH_EINPUT);
-    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS && strstr(err.text, "zzz") == NULL; i++)
-        err = faults.fault[i];
+    for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS && strstr(err.text, "zzz") == NULL; i++)
+        err = diagnostics.err[i];
     expect_all_keys(&cfg_profile_table, "");
 }
 

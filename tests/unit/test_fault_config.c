@@ -245,7 +245,7 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
 {
     (void)state;
     char path[256];
-    struct config_faults wrong;
+    struct config_diagnostics wrong;
     assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, every: 7}\n  - {kind: echo}\noutput:"), SH_OK);
     assert_int_equal(cfg->faults.n, 2);
     assert_true(cfg->faults.fault[0].every == 7 && cfg->faults.fault[1].kind == FAULT_ECHO);
@@ -255,18 +255,18 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     assert_true(cfg->faults.n == 3 && cfg->faults.fault[2].n == 2 && cfg->faults.fault[2].until_pulse == UINT64_MAX);
     write_in("scenario.yaml", "faults:\n  - {kind: flip, m: 2}\n");
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
-    assert_non_null(strstr(wrong.fault[0].text, "scenario.yaml:2: faults[0].m: unknown key"));
+    assert_non_null(strstr(wrong.err[0].text, "scenario.yaml:2: faults[0].m: unknown key"));
     write_in("scenario.yaml", "head: {}\n");
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     write_in("scenario.yaml", "faults: []\n");
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
-    assert_non_null(strstr(wrong.fault[0].text, "allowed a list of 1 to 32 under faults:"));
+    assert_non_null(strstr(wrong.err[0].text, "allowed a list of 1 to 32 under faults:"));
     char many[4096] = "faults:\n";
     for (int i = 0; i < 30; i++)
         strcat(many, "  - {kind: drop}\n");
     write_in("scenario.yaml", many);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
-    assert_non_null(strstr(wrong.fault[0].text, "30 faults, and the configuration has 3; allowed 32 together"));
+    assert_non_null(strstr(wrong.err[0].text, "30 faults, and the configuration has 3; allowed 32 together"));
     assert_int_equal(cfg->faults.n, 3); /* the list is as it was */
     snprintf(path, sizeof path, "%s/none.yaml", dir);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);

@@ -45,13 +45,10 @@ static const char head[] = "maker: M\nmodel: H\n"                          /* 1 
 
 static int load_head(const char *old, const char *with, const char *settings)
 {
-    char text[8192], mine[128];
-    const char *at = strstr(head, old);
-    assert_non_null(at);
-    snprintf(text, sizeof text, "%.*s%s%s", (int)(at - head), head, with, at + strlen(old));
+    char *text = replaced(head, old, with);
     write_in("heads/mine.yaml", text);
-    snprintf(mine, sizeof mine, "  profile: mine\n%s", settings);
-    return load_edited("  profile: any-rate\n" PRR LINES, mine);
+    free(text);
+    return load_with_head("mine", settings, "");
 }
 
 static void what_the_file_leaves_out_is_the_heads(void **state)
@@ -144,12 +141,12 @@ static void tables_that_do_not_fit_are_refused(void **state)
         if (load_head(wrong[i].old, wrong[i].with, "") != SH_EINPUT) fail_msg("%s was taken", wrong[i].with);
         snprintf(start, sizeof start, "%s/heads/mine.yaml:%d: %s: ", dir, wrong[i].line, wrong[i].key);
         int found = 0;
-        for (uint32_t k = 0; k < faults.n && k < CONFIG_MAX_FAULTS; k++)
-            found |= (wrong[i].line == 0 || strncmp(faults.fault[k].text, start, strlen(start)) == 0) &&
-                     strstr(faults.fault[k].text, wrong[i].key) != NULL &&
-                     strstr(faults.fault[k].text, wrong[i].fragment) != NULL;
+        for (uint32_t k = 0; k < diagnostics.n && k < CONFIG_MAX_DIAGNOSTICS; k++)
+            found |= (wrong[i].line == 0 || strncmp(diagnostics.err[k].text, start, strlen(start)) == 0) &&
+                     strstr(diagnostics.err[k].text, wrong[i].key) != NULL &&
+                     strstr(diagnostics.err[k].text, wrong[i].fragment) != NULL;
         if (!found) fail_msg("%s: not \"%s...%s\" but %s", wrong[i].with, start, wrong[i].fragment, err.text);
-        if (wrong[i].line != 0 && faults.n != 1) fail_msg("%s: also %s", wrong[i].with, faults.fault[1].text);
+        if (wrong[i].line != 0 && diagnostics.n != 1) fail_msg("%s: also %s", wrong[i].with, diagnostics.err[1].text);
     }
 }
 
@@ -174,7 +171,7 @@ static void only_rates_of_programs_are_taken(void **state)
         char setting[64];
         snprintf(setting, sizeof setting, "  prr_hz: %s\n", rates[i]);
         assert_int_equal(load_head("maker", "maker", setting), SH_EINPUT);
-        assert_int_equal(faults.n, 1);
+        assert_int_equal(diagnostics.n, 1);
         assert_says(":3: head.prr_hz: ");
         assert_says(" is not a pulse rate of head profile mine; allowed 100000, 400000 Hz");
     }

@@ -173,7 +173,7 @@ static void wrong_ones_are_refused(void **state)
         assert_says(wrong[i].says);
         snprintf(place, sizeof place, ".yaml:%d: ", wrong[i].line);
         assert_says(place);
-        assert_int_equal(faults.n, 1);
+        assert_int_equal(diagnostics.n, 1);
     }
     const char *const sets[] = {"noise.angle=on"};
     assert_int_equal(load_second("{head: {profile: velodyne-vlp16}}", sets, 1), SH_EINPUT);
@@ -188,10 +188,10 @@ static void faults_of_all_are_told_once(void **state)
         "stations:\n  - {position_m: [0, 0, 1]}\n  - {position_m: [1, 0, 1], scanner: {beam: {mode: x}}}\n"
         "  - {position_m: [1, 1, 1], scanner: {cast: {sight: x}}}\n";
     assert_int_equal(load_text(with_scene(text)), SH_EINPUT);
-    assert_int_equal(faults.n, 3);
-    assert_non_null(strstr(faults.fault[0].text, ":1: head.lines_hz: "));
-    assert_non_null(strstr(faults.fault[1].text, ":4: stations[1].scanner.beam.mode: "));
-    assert_non_null(strstr(faults.fault[2].text, ":5: stations[2].scanner.cast.sight: "));
+    assert_int_equal(diagnostics.n, 3);
+    assert_non_null(strstr(diagnostics.err[0].text, ":1: head.lines_hz: "));
+    assert_non_null(strstr(diagnostics.err[1].text, ":4: stations[1].scanner.beam.mode: "));
+    assert_non_null(strstr(diagnostics.err[2].text, ":5: stations[2].scanner.cast.sight: "));
 }
 
 /* ---- sites */
@@ -214,7 +214,7 @@ static void each_has_the_faults(void **state)
         with_scene(HEAD REST STATIONS "    scanner: {head: {lines_hz: 20}}" THIRD "links: [{type: tcp}]\n"
                                       "faults: [{kind: stall, link: 1, for_ms: 5}]\n");
     assert_loads(load_text(whole));
-    assert_int_equal(config_add_scenario(cfg, scenario, &faults), SH_OK);
+    assert_int_equal(config_add_scenario(cfg, scenario, &diagnostics), SH_OK);
     for (uint32_t station = 1; station <= 3; station++) {
         load_own(station);
         assert_int_equal(own.faults.n, 3);
@@ -223,7 +223,7 @@ static void each_has_the_faults(void **state)
     }
     /* A fault that one of them can't have is reported when it is loaded. */
     assert_loads(load_second("{head: {profile: sphere}}", NULL, 0));
-    assert_int_equal(config_add_scenario(cfg, scenario, &faults), SH_OK);
+    assert_int_equal(config_add_scenario(cfg, scenario, &diagnostics), SH_OK);
     assert_int_equal(config_load_scanner(cfg, 2, &own, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "mirror_slow, but head profile sphere (sphere) has no mirror"));
     unlink(scenario);

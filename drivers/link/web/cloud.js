@@ -59,12 +59,12 @@ class Block {
 
   #span = {n: 0, from: Infinity, to: -Infinity};
 
-  constructor(first, batch, began_s) {
+  constructor(first, batch, from, began_s) {
     this.first = first; // this is the number of its first point since the cloud was cleared
     this.began_s = began_s; // its scan's start; times of points count from there
     this.scan = batch.scan;
     this.station = batch.station;
-    this.pulse0 = batch.n > 0 ? batch.pulse[0] : 0;
+    this.pulse0 = batch.pulse[from];
   }
 
   takes(batch, from) {
@@ -180,8 +180,7 @@ export class Cloud {
       let block = this.blocks.at(-1);
       if (!block?.takes(batch, from)) {
         if (block && !block.closed) block.close();
-        block = new Block(this.total, batch, this.#began(batch));
-        block.pulse0 = batch.pulse[from];
+        block = new Block(this.total, batch, from, this.#began(batch));
         this.blocks.push(block);
       }
       const k = block.append(batch, from, this.origin);

@@ -14,7 +14,7 @@ export class Keeper {
   #front = new Map(); // it maps a type to the last frame of it
   #parts = [];
   #waiting = 0; // bytes of the parts that are not in the Blob yet
-  #blob = null;
+  #blob = new Blob([]);
 
   /** Takes a frame of the Parser. */
   take(frame) {
@@ -41,7 +41,7 @@ export class Keeper {
     this.isOn = false;
     const blob = new Blob([this.#blob, ...this.#parts]);
     this.#parts = [];
-    this.#blob = null;
+    this.#blob = new Blob([]);
     return blob;
   }
 

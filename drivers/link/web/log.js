@@ -8,7 +8,7 @@ const MOST = 200; // so many entries are stored
 
 // These errors have no command as their cause (COMMANDS.md, *Errors*): their text says who or how many.
 const HEADS_OWN = {101: 'Client lost (101):', 102: 'Reader too slow (102):', 103: 'Pulses lost (103):', 104: 'Client refused (104):',
-  105: 'Incomplete command (105):', 106: 'Lines lost (106):'};
+  105: 'Incomplete command (105):', 106: 'Lines lost (106):', 107: 'Time server (107):'};
 
 const ns = (value) => Number(value);
 const seconds = (value) => `${(ns(value) / 1e9).toFixed(3)} s`;

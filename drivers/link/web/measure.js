@@ -54,7 +54,7 @@ export const sigmaAlong = ({error}, direction) =>
   (error ? Math.sqrt(error.reduce((sum, [variance, axis]) => sum + variance * dot(axis, direction) ** 2, 0)) : NaN);
 
 // Returns {value, error} of a function of places. The error is NaN where the error of any point is.
-export function figureOf(f, points) {
+function figureOf(f, points) {
   const places = points.map(placeOf);
   let variance = 0;
   points.forEach((point, i) => {

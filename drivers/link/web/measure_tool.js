@@ -138,7 +138,7 @@ export class MeasureTool {
       const eye = station ? [station.x_m, station.y_m, station.z_m] : camera.eye;
       const flat = flatnessOf(places, corners, cloud.origin, eye);
       if (flat === null) {
-        this.#picked = corners;
+        if (this.#kind === 'flatness' && this.#picked.length === 0 && this.#view.tool === this) this.#picked = corners;
         this.#show();
         return say(this.#says, 'There are fewer than four points in this outline, at that depth.');
       }

@@ -18,18 +18,6 @@ function walk(view, n_windows, each) {
   }
 }
 
-/** A whole frame: the fields of its head, and `windows`: [{pulse (in the scan), dt_ns, first, beam: [3 words], counts
- * (Uint16Array)}]. */
-export function readWaves(view) {
-  const head = readWavesHead(view), windows = [];
-  walk(view, head.n_windows, (at, n) => windows.push({
-    pulse: Number(head.pulse0) + view.getUint32(at, true), dt_ns: view.getUint32(at + 4, true),
-    first: view.getUint32(at + 8, true), beam: [16, 20, 24].map((k) => view.getUint32(at + k, true)),
-    counts: Uint16Array.from({length: n}, (_, k) => view.getUint16(at + RECORD + 2 * k, true)),
-  }));
-  return {...head, windows};
-}
-
 /** The waveforms of the last pulses of a scan. */
 export class Waves {
   #frames = []; // {view, from, to}: number of the first and of the last pulse, rising; #frames[#begin] is the oldest

@@ -96,7 +96,7 @@ export function countSeen(cells, seen, reach = null) {
 }
 
 // Returns the middle of each cell, x, y, z, x, y, z ..., relative to the cells' origin: that of its pieces.
-export function middlesOf({n, pieces, cell, corners}) {
+function middlesOf({n, pieces, cell, corners}) {
   const middles = new Float32Array(3 * n), parts = new Uint32Array(n);
   for (let i = 0; i < pieces; i++) {
     parts[cell[i]]++;

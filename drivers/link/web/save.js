@@ -23,6 +23,8 @@ export async function fetchSaved(as) {
     status = await (await get('/save')).json();
     if (status.file !== file || status.as !== as) throw new Error('The file is gone: another page began one. Save it again.');
   }
+  // The head says only once why it has no file. Another page may have had that answer.
+  if (status.state !== 'done') throw new Error('The head could not write the file.');
   const parts = [];
   for (let at = 0; at < status.bytes;) {
     const piece = await (await get(`/saved?file=${file}&from=${at}`)).arrayBuffer();

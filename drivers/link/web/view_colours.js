@@ -4,7 +4,7 @@
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
 // `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
-import {rampAt} from './view_ramps.js';
+import {parse, rampAt} from './view_ramps.js';
 
 export {rampAt};
 export const NONE = Math.fround(-1e30); // it replaces NaN in shaders, and is exact as a float
@@ -25,8 +25,6 @@ export const MODES = {
 };
 
 const ECHOES = [['only echo', '#5aa9e6'], ['first of several', '#f4a259'], ['between', '#b07bd6'], ['last of several', '#5fbf77']];
-
-const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
 // Hues are a golden angle apart, with lightness in four steps, so that neighbouring numbers differ most.
 function listColour(k) {
@@ -121,7 +119,11 @@ export function ticks([lo, hi], most = 6) {
   const step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= raw * (1 - 1e-9));
   const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const out = [];
-  for (let k = Math.ceil(lo / step - 1e-9); k * step <= hi + 1e-9 * step; k++) out.push({value: k * step, text: (k * step).toFixed(places)});
+  const first = Math.ceil(lo / step - 1e-9);
+  for (let i = 0; i <= most && (first + i) * step <= hi + 1e-9 * step; i++) {
+    const value = (first + i) * step;
+    out.push({value, text: value.toFixed(Math.min(places, 100))}); // toFixed() takes no more
+  }
   return out;
 }
 

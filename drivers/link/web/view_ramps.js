@@ -24,7 +24,7 @@ const EVEN = {
 // A user may choose these; each has its name. `usual` is the mode's own.
 export const SCALES = [['usual', 'Usual'], ['even', 'Violet to yellow'], ['blue', 'Blue to yellow'], ['grey', 'Grey']];
 
-const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+export const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
 // Converts OKLab to linear light of sRGB, and that to its bytes (IEC 61966-2-1).
 function fromOklab(L, a, b) {

@@ -7,7 +7,7 @@ const HAS_WAVEFORMS = 4; // of a descriptor's content
 const WIDTH = 280, TOP = 4, BASE = 62, GAP = 8; // GAP is between two windows, whose ranges may be far apart
 
 // Returns the places of windows side by side: {scale: pixels per metre, at: [the x of each]}.
-export function layOut(windows) {
+function layOut(windows) {
   const lengths = windows.map(({stepM, samples}) => stepM * Math.max(1, samples.length - 1));
   const scale = (WIDTH - GAP * (windows.length - 1)) / lengths.reduce((a, b) => a + b, 0);
   let x = 0;
@@ -19,14 +19,14 @@ export function layOut(windows) {
 }
 
 // Returns the x of a range, or null if no window has it.
-export function placeOf(range_m, windows, {scale, at}) {
+function placeOf(range_m, windows, {scale, at}) {
   const i = windows.findIndex(({rangeM0, stepM, samples}) =>
     range_m >= rangeM0 - 0.5 * stepM && range_m <= rangeM0 + stepM * (samples.length - 0.5));
   return i < 0 ? null : at[i] + scale * Math.max(0, range_m - windows[i].rangeM0);
 }
 
 // Returns the ranges of all echoes of a point's pulse, as far as they are held.
-export function rangesOf(cloud, {pulse, scan, station}) {
+function rangesOf(cloud, {pulse, scan, station}) {
   const found = [];
   for (const block of cloud.blocks) {
     if (block.scan !== scan || block.station !== station) continue;

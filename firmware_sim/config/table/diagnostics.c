@@ -16,18 +16,18 @@
 #include "firmware_sim/config/table/value.h"
 
 /* Where the list is full, the last diagnostic makes room. */
-int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text)
+int cfg_add_diagnostic(struct config_diagnostics *diagnostics, uint64_t place, int code, const char *text)
 {
-    uint32_t at = faults->n < CONFIG_MAX_FAULTS ? faults->n : CONFIG_MAX_FAULTS;
-    faults->n++;
-    while (at > 0 && faults->place[at - 1] > place)
+    uint32_t at = diagnostics->n < CONFIG_MAX_DIAGNOSTICS ? diagnostics->n : CONFIG_MAX_DIAGNOSTICS;
+    diagnostics->n++;
+    while (at > 0 && diagnostics->place[at - 1] > place)
         at--;
-    if (at == CONFIG_MAX_FAULTS) return code;
-    const size_t after = CONFIG_MAX_FAULTS - 1 - at;
-    memmove(&faults->fault[at + 1], &faults->fault[at], after * sizeof faults->fault[0]);
-    memmove(&faults->place[at + 1], &faults->place[at], after * sizeof faults->place[0]);
-    faults->place[at] = place;
-    return sh_fail(&faults->fault[at], code, "%s", text);
+    if (at == CONFIG_MAX_DIAGNOSTICS) return code;
+    const size_t after = CONFIG_MAX_DIAGNOSTICS - 1 - at;
+    memmove(&diagnostics->err[at + 1], &diagnostics->err[at], after * sizeof diagnostics->err[0]);
+    memmove(&diagnostics->place[at + 1], &diagnostics->place[at], after * sizeof diagnostics->place[0]);
+    diagnostics->place[at] = place;
+    return sh_fail(&diagnostics->err[at], code, "%s", text);
 }
 
 static int diagnostics_add(struct cfg_reader *rd, int code, int line, const char *text)
@@ -35,12 +35,12 @@ static int diagnostics_add(struct cfg_reader *rd, int code, int line, const char
     const uint64_t source = line == CFG_FROM_SET || rd->set != NULL    ? 1
                             : rd->table.keys == cfg_profile_table.keys ? 2
                                                                        : 0;
-    return cfg_add_fault(rd->faults, source << 32 | (uint32_t)line, code, text);
+    return cfg_add_diagnostic(rd->diagnostics, source << 32 | (uint32_t)line, code, text);
 }
 
 static int diagnostics_fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
 {
-    char what[sizeof rd->faults->fault[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[48] = "";
+    char what[sizeof rd->diagnostics->err[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[48] = "";
     vsnprintf(what, sizeof what, fmt, ap);
     if (line > 0) snprintf(place, sizeof place, rd->set != NULL ? "character %d of the value: " : ":%d", line);
     if (rd->set != NULL && line != CFG_FROM_SET)
@@ -93,13 +93,14 @@ static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
     return 0;
 }
 
-/* Whether a key below the section is bad; in a list, a key of this item. */
+/* Whether a key below the section is bad. In a list as a whole this is a key of any item, and else of this one. */
 static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
 {
-    for (size_t i = 0; i < rd->table.n; i++) {
-        const char *path = rd->table.keys[i].path;
-        if (cfg_is_in(path, section) && rd->bad[i][strstr(path, "[]") != NULL ? item : 0]) return 1;
-    }
+    const int is_of_item = strstr(section, "[]") != NULL;
+    for (size_t i = 0; i < rd->table.n; i++)
+        if (cfg_is_in(rd->table.keys[i].path, section) &&
+            (is_of_item ? rd->bad[i][item] != 0 : memchr(rd->bad[i], 1, sizeof rd->bad[i]) != NULL))
+            return 1;
     return 0;
 }
 
@@ -170,7 +171,7 @@ static const struct cfg_key *suggest(const struct cfg_table *table, const char *
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word)
 {
     /* A hostile file may have far more diagnostics than are shown: don't search the table for each. */
-    if (rd->faults->n >= 10 * CONFIG_MAX_FAULTS) return cfg_fail(rd, line, "configuration", "unknown key");
+    if (rd->diagnostics->n >= 10 * CONFIG_MAX_DIAGNOSTICS) return cfg_fail(rd, line, "configuration", "unknown key");
     char section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[3 * CFG_PATH_MAX];
     char known[CFG_ALLOWED_MAX] = "", before[CFG_PATH_MAX] = "";
     if (rd->of != NULL) snprintf(before, sizeof before, "%s.", rd->of);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Diagnostics while a file is read. Each call adds one to the reader's list and returns its code, SH_EINPUT. Reading goes
- * on after it. (given.h has those of checks.) */
+/* Diagnostics while a file is read. Each call adds one to the reader's list and returns its code, SH_EINPUT. Reading
+ * goes on after it. (given.h has those of checks.) */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_DIAGNOSTICS_H
 #define FIRMWARE_SIM_CONFIG_TABLE_DIAGNOSTICS_H
 
@@ -9,7 +9,7 @@
 #include "firmware_sim/config/table/row.h"
 
 struct cfg_reader;
-struct config_faults;
+struct config_diagnostics;
 
 /* "FILE:LINE: text", without the line when it is 0. Within a value of --set: "--set KEY: character LINE of the value:
  * text". Returns code. */
@@ -25,6 +25,6 @@ int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
  * similar key is marked bad, so that it is not reported as missing, too. */
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
 /* Adds a diagnostic in the order of its place. */
-int cfg_add_fault(struct config_faults *faults, uint64_t place, int code, const char *text);
+int cfg_add_diagnostic(struct config_diagnostics *diagnostics, uint64_t place, int code, const char *text);
 
 #endif

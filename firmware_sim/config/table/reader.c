@@ -9,13 +9,13 @@
 #include <string.h>
 
 void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_table *table, void *base,
-                     struct config_faults *faults)
+                     struct config_diagnostics *diagnostics)
 {
     memset(rd, 0, sizeof *rd);
     rd->file = file;
     rd->table = *table;
     rd->base = base;
-    rd->faults = faults;
+    rd->diagnostics = diagnostics;
     rd->root_line = 1;
     rd->scanner = -1;
 }

@@ -8,7 +8,7 @@
 
 #include "firmware_sim/config/table/row.h"
 
-struct config_faults;
+struct config_diagnostics;
 struct config_profile;
 
 enum { CFG_FROM_SET = -1 };
@@ -23,7 +23,7 @@ struct cfg_reader {
     int profile_read;                                /* 1: the head profile was read without a diagnostic */
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
     unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
-    struct config_faults *faults;
+    struct config_diagnostics *diagnostics;
     const char *of;  /* the text before its keys in errors; NULL: none */
     const char *set; /* the key of --set whose value is being parsed as YAML; NULL: none */
     /* The scanner of a station (forget.h): */
@@ -34,7 +34,7 @@ struct cfg_reader {
 };
 
 void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_table *table, void *base,
-                     struct config_faults *faults);
+                     struct config_diagnostics *diagnostics);
 size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key);
 uint32_t *cfg_list_count(const struct cfg_reader *rd, const struct cfg_key *list);
 void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);

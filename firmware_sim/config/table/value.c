@@ -247,7 +247,8 @@ static int store_text(const struct place *at, char *dst, const char *text, const
     const char *before = "";
     if (at->key->type == CFG_PATH && text[0] != '/') before = base_dir;
     if (at->key->type == CFG_TEXT && !is_utf8(text)) return refuse(at, text, "not UTF-8");
-    if (strlen(before) + strlen(text) >= at->key->size) return refuse(at, text, "too long");
+    if (strlen(before) + strlen(text) >= at->key->size)
+        return refuse(at, text, before[0] != '\0' ? "too long with the folder of its file" : "too long");
     snprintf(dst, at->key->size, "%s%s", before, text);
     return SH_OK;
 }
