@@ -80,8 +80,15 @@ struct protocol_rig_run {
 };
 void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run);
 void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end);
-/* Feeds a whole turn of a planar head: shots of the steps first..last, in frames of `part` pulses, and the line end.
- * Then it calls time() with the turn's end. `line` counts from 0. */
+
+/* Of a planar head, whose turns `line` counts from 0. One frame of points: n shots, the first of which is of the step
+ * first_step + from. */
+void protocol_rig_part(struct protocol_rig *rig, uint32_t line, uint32_t from, uint32_t n,
+                       const struct protocol_rig_shot *shot);
+/* Feeds a turn's line end. Returns the device time of the turn's end. */
+int64_t protocol_rig_turn_end(struct protocol_rig *rig, uint32_t line, uint32_t status);
+/* Feeds a whole turn: shots of the steps first..last, in frames of `part` pulses, and the line end. Then it calls
+ * time() with the turn's end. */
 void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part);
 
 #endif

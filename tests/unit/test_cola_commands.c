@@ -2,13 +2,6 @@
 /* CoLa's commands: the sequences of real clients, both forms, log-in, errors, and bytes that are no telegram. */
 #include "tests/unit/cola_rig.h"
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* ---- start-up sequences of real clients, with the answers that they accept */
 
 static void sick_tim_starts(void **state)
@@ -69,7 +62,6 @@ static void no_ident_is_an_old_tim(void **state)
         char part[3];
         cola_open_tim(models[i]);
         assert_int_not_equal(sscanf(cola_ask("sRI0"), "sRA 0 6 TiM3%1s%1s", part, part + 1), 2);
-        cola_close();
     }
     cola_open_tim("Scanner of my own");
     cola.identity.firmware[0] = 0;
@@ -371,7 +363,7 @@ static void the_clock_can_be_set(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(sick_tim_starts),
         CASE(a_reboot_that_is_refused_ends_the_session),
