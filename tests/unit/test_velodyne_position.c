@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 
+#include "core/bytes.h"
 #include "tests/common/protocol_rig.h"
 
 static struct protocol_rig rig;
@@ -39,11 +40,6 @@ static int teardown(void **state)
     (void)state;
     protocol_rig_close(&rig);
     return 0;
-}
-
-static uint32_t u32(const uint8_t *p)
-{
-    return (uint32_t)(p[0] | p[1] << 8 | p[2] << 16) | (uint32_t)p[3] << 24;
 }
 
 static const uint8_t *packet(uint32_t i)
@@ -92,7 +88,7 @@ static void test_fields(void **state)
     want[0xc0] = 9;
     want[0xc4] = 1;
     const uint32_t us = (uint32_t)((4 * 60000000000 + t_ns) / 1000);
-    memcpy(want + 0xc6, (uint8_t[]){(uint8_t)us, (uint8_t)(us >> 8), (uint8_t)(us >> 16), (uint8_t)(us >> 24)}, 4);
+    le_put32(want + 0xc6, us);
     want[0xca] = 2;
     want[0xcd] = 25;
     memcpy(want + 0xce, p + 0xce, 128); /* below */
@@ -119,8 +115,7 @@ static void test_pulses_per_second(void **state)
         rig.ops->time(rig.protocol, 1);
         const uint8_t *p = packet(rig.n_units - 1);
         assert_int_equal(p[0xca], k);
-        const uint32_t us = p[0xc6] | (uint32_t)p[0xc7] << 8 | (uint32_t)p[0xc8] << 16 | (uint32_t)p[0xc9] << 24;
-        assert_int_equal(us, k == 0 ? 0 : 4 * 60000000);
+        assert_int_equal(le_get32(p + 0xc6), k == 0 ? 0 : 4 * 60000000);
     }
 }
 
@@ -134,12 +129,12 @@ static void test_rate(void **state)
     assert_int_equal(rig.ops->next_ns(rig.protocol), 108 * 18579456ll + 1);
     assert_int_equal(rig.n_units, 108); /* 2 s / 18.579456 ms = 107.6, and the one of 0 */
     for (uint32_t i = 0; i < rig.n_units; i++)
-        assert_int_equal(u32(packet(i) + 198), i * 18579456ull / 1000);
+        assert_int_equal(le_get32(packet(i) + 198), i * 18579456ull / 1000);
     protocol_rig_clear(&rig);
     open_again(1000000000);
     rig.ops->time(rig.protocol, 1003303624); /* 54 x 18.579456 ms = 1.003290624 s is the next */
     assert_int_equal(rig.n_units, 1);
-    assert_int_equal(u32(packet(0) + 198), 1003290);
+    assert_int_equal(le_get32(packet(0) + 198), 1003290);
 }
 
 /* Without UTC the time counts from power-up, PPS is absent, and there is no sentence. The time wraps with the hour. */
@@ -154,7 +149,7 @@ static void test_without_utc(void **state)
     rig.ops->open(rig.protocol, hour_ns);
     rig.ops->time(rig.protocol, first_ns + 1);
     assert_int_equal(rig.n_units, 1);
-    assert_int_equal(u32(packet(0) + 198), (first_ns - hour_ns) / 1000);
+    assert_int_equal(le_get32(packet(0) + 198), (first_ns - hour_ns) / 1000);
     assert_int_equal(packet(0)[202], 0);
     for (int i = 206; i < 512; i++)
         assert_int_equal(packet(0)[i], 0);
@@ -168,7 +163,7 @@ static void test_after_power_cycle(void **state)
     open_again(rig.spec.power_ns);
     rig.ops->time(rig.protocol, INT64_C(7500000000)); /* the last packet before it is at 7.487521 s */
     assert_int_equal(packet(rig.n_units - 1)[0xc4], 1);
-    assert_int_equal(u32(packet(rig.n_units - 1) + 0xc0), 2);
+    assert_int_equal(le_get32(packet(rig.n_units - 1) + 0xc0), 2);
 }
 
 /* UTC is known, but the receiver gives no position: locked, without a sentence. */
@@ -217,7 +212,7 @@ static void test_after_a_long_silence(void **state)
     rig.ops->time(rig.protocol, t_ns); /* due: 0 .. 999 */
     assert_int_equal(rig.n_units, 64);
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1000 - 64);
-    assert_int_equal(u32(packet(63) + 198), 999 * 18579456ull / 1000);
+    assert_int_equal(le_get32(packet(63) + 198), 999 * 18579456ull / 1000);
     rig.ops->time(rig.protocol, t_ns + 1);
     assert_int_equal(rig.n_units, 65);
 }
