@@ -58,6 +58,8 @@ static void test_broken_requests(void **state)
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\n folded\r\n\r\n", 400, 1},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\x01\r\n\r\n", 400, 1},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nExpect: tea\r\n\r\n", 417, 1},
+        {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nExpect: tea\r\nExpect: 100-continue\r\n\r\n", 417, 1},
+        {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nOrigin: http://y\r\nOrigin: http://x\r\n\r\n", 400, 1},
         {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\nrpm=600", 411, 1},
         {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n7\r\nrpm=600\r\n0\r\n\r\n", 411,
          1},
