@@ -195,8 +195,9 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = self->started = self->wants_scan = 0;
-    cola_ports_select(self); /* results of before would hide that nothing is watched */
+    self->measures = self->started = 0;
+    self->wants_scan = self->n_waiting != 0; /* a poll is answered also where nothing is measured */
+    cola_ports_select(self);                 /* results of before would hide that nothing is watched */
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }

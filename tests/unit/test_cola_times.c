@@ -269,7 +269,16 @@ static void a_waiting_poll_starts_the_head_again(void **state)
     protocol_rig_clear(&cola);
     cola.ops->time(cola.protocol, 9000000000);
     assert_int_equal(cola.n_lines, 0);
-    cola_close();
+    cola_open_lms(); /* the poll waits, too, of a session that has stopped its measurement meanwhile */
+    cola_head_state("boot");
+    cola_authorise();
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    cola_head_state("idle");
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 1000000000);
+    assert_int_equal(cola.n_lines, 2);
+    assert_string_equal(cola.line[1], "SCAN:START");
     cola_open_lms();
     cola.replies = refused;
     cola_expect("sRN LMDscandata", "sFA 4");
