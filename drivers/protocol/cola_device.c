@@ -180,13 +180,14 @@ int cola_start_scan(struct cola *self)
     return !self->wants_scan;
 }
 
-/* u8 0: measures */
+/* u8 0: measures; 1: not allowed, and all is as before */
 enum cola_error cola_start(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = self->started = 1;
-    cola_put_u(out, 1, (uint32_t)cola_start_scan(self));
+    const int refused = cola_start_scan(self);
+    if (!refused) self->measures = self->started = 1;
+    cola_put_u(out, 1, (uint32_t)refused);
     return COLA_OK;
 }
 

@@ -188,7 +188,9 @@ static void a_resting_head_is_started(void **state)
     assert_int_equal(cola.n_lines, 0);
     cola_head_state("fault");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
-    cola_head_state("spin-down"); /* it stops as soon as it can */
+    cola_head_state("scanning");
+    assert_int_equal(cola_ask("sRN STlms")[10], '6'); /* the session is stopped, as before */
+    cola_head_state("spin-down");                     /* it stops as soon as it can */
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 200000000);
