@@ -295,6 +295,7 @@ static void errors_have_their_numbers(void **state)
     assert_int_equal(cola.count[PROTOCOL_WRONG], sizeof cases / sizeof cases[0]);
     cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 9C4 FFF92230 225510"); /* nothing has changed */
     EXPECT_B("sRN NoSuchVariable", "sFA\0\3");
+    EXPECT_B("sWN FREchoFilter \2 ", "sFA\0\7"); /* a blank is a byte, too */
 }
 
 static void a_geometry_that_the_head_has_not_is_refused(void **state)
