@@ -228,14 +228,14 @@ static const struct talk_kind talk_scip = {.name = "SCIP",
 /* Two letters are no proof: what follows a name is its first digit, or the end of a command without digits. */
 static int is_scip(const uint8_t *bytes, size_t len)
 {
-    static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "SCIP2.0"};
-    static const char *const counted[] = {"TM", "SS", "CR", "HS", "GD", "GS", "GE",
+    static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "%SL", "%ST", "SCIP2.0"};
+    static const char *const counted[] = {"TM", "SS", "CR", "HS", "DB", "GD", "GS", "GE",
                                           "MD", "MS", "ME", "HD", "HE", "ND", "NE"};
-    if (len != 0 && bytes[0] == '%') bytes++, len--;
     for (size_t i = 0; i < sizeof bare / sizeof *bare; i++) {
         const size_t n = strlen(bare[i]);
         if (len > n && memcmp(bytes, bare[i], n) == 0 && memchr("\n\r;", bytes[n], 3) != NULL) return 1;
     }
+    if (len != 0 && bytes[0] == '%') bytes++, len--;
     for (size_t i = 0; i < sizeof counted / sizeof *counted; i++)
         if (len > 2 && memcmp(bytes, counted[i], 2) == 0 && bytes[2] >= '0' && bytes[2] <= '9') return 1;
     return 0;

@@ -21,11 +21,15 @@ static const char *kind_of(const char *first)
 static void test_kinds(void **state)
 {
     (void)state;
-    static const char *const scip[] = {"BM\n",      "VV;abc\r\n", "MD0044072501000\n", "%MD0044072501000\n",
-                                       "SCIP2.0\n", "TM0\n",      "GE00000000\n",      "SS019200\n"};
-    static const char *const lines[] = {"MEAS:VOLT?\n", "HEAD:STORe\n", "SSH-2.0-x\r\n", "PPS\n", "RST\n", "GET x\n"};
+    static const char *const scip[] = {"BM\n",  "VV;abc\r\n", "MD0044072501000\n", "%MD0044072501000\n",
+                                       "TM0\n", "SCIP2.0\n",  "SS019200\n",        "GE00000000\n"},
+                             *const simulation[] = {"%ST\n", "%SL\r\n", "DB02\n"};
+    static const char *const lines[] = {"MEAS:VOLT?\n", "HEAD:STORe\n", "SSH-2.0-x\r\n", "PPS\n",
+                                        "RST\n",        "GET x\n",      "ST\n",          "%VV\n"};
     for (size_t i = 0; i < sizeof scip / sizeof *scip; i++)
         assert_string_equal(kind_of(scip[i]), "SCIP");
+    for (size_t i = 0; i < sizeof simulation / sizeof *simulation; i++)
+        assert_string_equal(kind_of(simulation[i]), "SCIP");
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         assert_string_equal(kind_of(lines[i]), "lines");
     assert_string_equal(kind_of("GET / HTTP/1.1\r\nHost: x\r\n\r\n"), "bytes");
