@@ -685,12 +685,10 @@ local function absorb(flow, h, bytes, at, m)
   m.wrong = wrong_payload(h, bytes, at, m.has_deviations) or false
   if m.wrong or m.notice == REPEATED or m.notice == LATE then return end
   if ABSORB[h.type] then ABSORB[h.type](flow, h, bytes, at, m) end
-  if h.type == POINTS then
-    m.descriptor, m.anchor, m.emitter = flow.descriptor, flow.anchor, flow.emitter
-  elseif h.type == ATTRIBUTES or h.type == COLOURS then
+  m.descriptor, m.anchor, m.emitter = flow.descriptor, flow.anchor, flow.emitter
+  if h.type == ATTRIBUTES or h.type == COLOURS then
     m.points_in = is_of_points(flow, h, bytes, at) and flow.points.packet
   elseif h.type == WAVES then
-    m.descriptor = flow.descriptor
     m.points_in = is_wave_of_points(flow, h, bytes, at) and flow.points.packet
   end
 end
@@ -813,12 +811,16 @@ local function put_geo(item, wanted, m, tvb, at, a, b, c)
   return string.format(anchor.crs == 3 and "%.8f° %.8f° %.4f m" or "%.4f %.4f %.4f m", x, y, z)
 end
 
+local function angles_of(m, b, c)
+  local d = m.descriptor
+  local mirror, pan = b / d.mirror_counts, c / d.pan_counts
+  return 360 * (mirror - floor(mirror - (m.emitter and 0 or d.middle) + 0.5)), 360 * (pan - floor(pan))
+end
+
 -- The line angle is that of the turn around the middle of the line; of other heads it is an elevation.
 local function put_polar(item, wanted, m, tvb, at, a, b, c, has_echo)
   local d, words = m.descriptor, "no echo"
-  local mirror, pan = b / d.mirror_counts, c / d.pan_counts
-  local line_deg = 360 * (mirror - floor(mirror - (m.emitter and 0 or d.middle) + 0.5))
-  local pan_deg = 360 * (pan - floor(pan))
+  local line_deg, pan_deg = angles_of(m, b, c)
   if has_echo then
     local range, pan_rad, line_rad = d.range_scale * a, math.rad(pan_deg), math.rad(line_deg)
     local flat = range * math.cos(line_rad)
@@ -910,8 +912,9 @@ local function put_beam(item, m, tvb, from)
     end
   elseif d then
     local line, pan = tvb(from + 20, 4), tvb(from + 24, 4)
-    put_real(item, F["wave.line_deg"], line, 360 * line:le_uint() / d.mirror_counts)
-    put_real(item, F["wave.pan_deg"], pan, 360 * pan:le_uint() / d.pan_counts)
+    local line_deg, pan_deg = angles_of(m, line:le_uint(), pan:le_uint())
+    put_real(item, F["wave.line_deg"], line, line_deg)
+    put_real(item, F["wave.pan_deg"], pan, pan_deg)
   end
 end
 
