@@ -201,7 +201,11 @@ struct protocol_ops {
     int64_t (*next_ns)(const void *protocol);
 };
 
-/* From the one list, in protocol.c. NULL for an unknown id, or one that is not built in. */
+/* protocol_ops.input of a protocol that takes no bytes: counts them as lost. Its session begins with its struct
+ * protocol_host. */
+void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
+
+/* From the one list, in protocol.c. NULL for an unknown id. */
 const struct protocol_ops *protocol_ops_get(enum protocol_id id);
 
 #endif

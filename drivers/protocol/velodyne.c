@@ -312,14 +312,6 @@ static void nothing_at(void *protocol, int64_t t_ns)
     (void)t_ns;
 }
 
-/* A UDP link has no input. On another link, bytes that come are no part of this protocol. */
-static void input(void *protocol, const uint8_t *bytes, size_t len)
-{
-    const struct velodyne *v = protocol;
-    (void)bytes;
-    v->host.count(v->host.ctx, PROTOCOL_INPUT_LOST, len);
-}
-
 static int64_t never(const void *protocol)
 {
     (void)protocol;
@@ -348,6 +340,6 @@ const struct protocol_ops protocol_velodyne = {
     .frame = frame,
     .gap = gap,
     .time = nothing_at,
-    .input = input,
+    .input = protocol_lose_input,
     .next_ns = never,
 };
