@@ -184,10 +184,8 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
  * anew. */
 static void reboot(struct cola *self)
 {
-    char reply[512];
-    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
-    struct sh_err err; /* unused: what is stored was accepted before */
-    cola_power_up(self, &err);
+    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", NULL, 0) != 0;
+    cola_power_up(self, NULL); /* what is stored was accepted before */
     if (refused) self->host.hang_up(self->host.ctx);
 }
 

@@ -6,7 +6,7 @@
 #include "drivers/protocol/cola.h"
 #include "drivers/protocol/cola_clock.h"
 
-enum { MAX_REPLY = 512, MOST_LOCATION = 16 };
+enum { MOST_LOCATION = 16 };
 
 /* ---- identity */
 
@@ -59,7 +59,7 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 enum cola_head_state cola_ask_state(struct cola *self)
 {
     static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
-    char state[MAX_REPLY] = "";
+    char state[PROTOCOL_REPLY] = "";
     if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return COLA_HEAD_UNKNOWN;
     for (int i = COLA_HEAD_OFF; i <= COLA_HEAD_FAULT; i++)
         if (strcmp(names[i], state) == 0) return (enum cola_head_state)i;
@@ -169,10 +169,9 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 
 int cola_start_scan(struct cola *self)
 {
-    char reply[MAX_REPLY];
     const enum cola_head_state head = cola_ask_state(self);
     if (head == COLA_HEAD_IDLE) {
-        const int refused = self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
+        const int refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
         self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before */
         return refused;
     }

@@ -8,7 +8,7 @@
 #include "drivers/protocol/cola.h"
 #include "drivers/protocol/cola_clock.h"
 
-enum { MAX_REPLY = 512, N_ROLES = 3, N_INTERFACES = 2, ZONE_0 = 12, N_ZONES = 25 };
+enum { N_ROLES = 3, N_INTERFACES = 2, ZONE_0 = 12, N_ZONES = 25 };
 
 /* ---- the clock */
 
@@ -32,14 +32,14 @@ void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
 /* 1: the clock shows that time now. */
 static int set_clock(struct cola *self, int64_t ns)
 {
-    char line[48], reply[MAX_REPLY];
+    char line[48], reply[PROTOCOL_REPLY];
     int64_t shift_ns;
     if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%" SCNd64, &shift_ns) != 1)
         return 0;
     shift_ns += ns - cola_clock_ns(self, self->now_ns);
     snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
-    return self->host.command(self->host.ctx, line, reply, sizeof reply) == 0;
+    return self->host.command(self->host.ctx, line, NULL, 0) == 0;
 }
 
 /* ---- the time server */
@@ -62,7 +62,7 @@ static uint32_t cola_time_word_of(const char *const words[], uint32_t n, const c
 
 static enum cola_error get_server(struct cola *self, struct cola_server *s)
 {
-    char reply[MAX_REPLY], role[8], interface[4];
+    char reply[PROTOCOL_REPLY], role[8], interface[4];
     uint32_t *const a = s->address;
     int zone_h;
     if (self->host.command(self->host.ctx, "TIME:SERVer?", reply, sizeof reply) != 0 ||
@@ -77,12 +77,12 @@ static enum cola_error get_server(struct cola *self, struct cola_server *s)
 
 static enum cola_error put_server(struct cola *self, const struct cola_server *s)
 {
-    char line[96], reply[MAX_REPLY];
+    char line[96];
     const uint32_t *const a = s->address;
     if (s->role >= N_ROLES || s->interface >= N_INTERFACES || s->zone >= N_ZONES) return COLA_INVALID_DATA;
     snprintf(line, sizeof line, "TIME:SERVer %s,%u.%u.%u.%u,%u,%d,%s", roles[s->role], a[0], a[1], a[2], a[3],
              s->update_s, (int)s->zone - ZONE_0, interfaces[s->interface]);
-    const int error = self->host.command(self->host.ctx, line, reply, sizeof reply);
+    const int error = self->host.command(self->host.ctx, line, NULL, 0);
     return error == 0 ? COLA_OK : error == -221 ? COLA_CONDITION : COLA_INVALID_DATA;
 }
 
@@ -151,7 +151,7 @@ enum cola_error cola_write_time_address(struct cola *self, struct cola_args *arg
 /* One of the times, in ns, of TIME:SERVer? STATe: 0 the limit, 1 the offset, 2 the delay. float, s */
 static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
 {
-    char reply[MAX_REPLY];
+    char reply[PROTOCOL_REPLY];
     int64_t ns[3];
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;

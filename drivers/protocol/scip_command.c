@@ -41,10 +41,9 @@ static void quit(struct scip *s, const char *line, size_t len)
 /* The speed is the sensor's: another session, which is over by now, may have changed it. */
 static void reset_speed(struct scip *s)
 {
-    char reply[512];
     if ((s->features & SCIP_MOTOR_SPEED) != 0 &&
         scip_lines_uhz(s, "HEAD:LINES?") != scip_lines_uhz(s, "HEAD:LINES? DEF"))
-        s->host.command(s->host.ctx, "HEAD:LINES DEF", reply, sizeof reply);
+        s->host.command(s->host.ctx, "HEAD:LINES DEF", NULL, 0);
 }
 
 /* RT: RS without the timer and the bit rate. */
@@ -126,7 +125,7 @@ static void bit_rate(struct scip *s, const char *line, size_t len)
 /* Level 1 to 10: 1 to 10 percent slower. 0 and 99: the default. */
 static const char *motor_speed(struct scip *s, int32_t level)
 {
-    char command[48], reply[512];
+    char command[48];
     if ((s->features & SCIP_MOTOR_SPEED) == 0) return "04";
     if (level < 0) return "01";
     if (level > 10 && level != 99) return "02";
@@ -135,7 +134,7 @@ static const char *motor_speed(struct scip *s, int32_t level)
     if (wanted_uhz == now_uhz) return "03";
     snprintf(command, sizeof command, "HEAD:LINES %llu.%06llu", (unsigned long long)(wanted_uhz / 1000000),
              (unsigned long long)(wanted_uhz % 1000000));
-    const int error = s->host.command(s->host.ctx, command, reply, sizeof reply);
+    const int error = s->host.command(s->host.ctx, command, NULL, 0);
     if (error != 0) return error == -222 || error == -221 ? "04" : "10";
     return "00";
 }

@@ -9,7 +9,7 @@
 
 uint64_t scip_lines_uhz(struct scip *s, const char *query)
 {
-    char reply[512], *end;
+    char reply[PROTOCOL_REPLY], *end;
     if (s->host.command(s->host.ctx, query, reply, sizeof reply) != 0) return s->scan.head.lines_uhz;
     const double hz = strtod(reply, &end);
     return end == reply || !(hz > 0 && hz < 1e6) ? s->scan.head.lines_uhz : (uint64_t)llround(hz * 1e6);
@@ -65,7 +65,7 @@ void scip_info_parameters(struct scip *s, const char *line, size_t len)
 
 enum scip_head scip_head_state(struct scip *s)
 {
-    char reply[512];
+    char reply[PROTOCOL_REPLY];
     if (s->host.command(s->host.ctx, "HEAD:STATE?", reply, sizeof reply) != 0) return SCIP_HEAD_WORKS;
     if (strcmp(reply, "fault") == 0) return SCIP_HEAD_HAS_FAILED;
     if (strcmp(reply, "boot") == 0 || strcmp(reply, "off") == 0) return SCIP_HEAD_BOOTS;
