@@ -75,17 +75,8 @@ static const struct command {
 };
 
 /* field000 and on */
-static enum cola_error read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    return cola_read_field(self, self->field, args, out);
-}
-static enum cola_error write_field(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    (void)out;
-    return cola_write_field(self, self->field, args);
-}
-static const struct command any_field = {"field", 'R', COLA_RUN, read_field},
-                            set_field = {"field", 'W', COLA_CLIENT, write_field};
+static const struct command any_field = {"field", 'R', COLA_RUN, cola_read_field},
+                            set_field = {"field", 'W', COLA_CLIENT, cola_write_field};
 
 enum cola_error cola_read_switch(struct cola_args *args, int *on)
 {
