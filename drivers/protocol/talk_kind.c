@@ -267,10 +267,9 @@ void talk_name(const struct talk_kind *kind, const uint8_t *request, size_t len,
     struct telegram t = {(const char *)request, len};
     if (kind == &talk_cola) t = cola_inside(request, len);
     size_t n = kind == &talk_scip ? 2 + (size_t)(len != 0 && request[0] == '%') : words_len(&t, kind->n_words);
-    if (kind->n_words != 0)
-        n = n < scip_line((const uint8_t *)t.text, t.len) ? n : scip_line((const uint8_t *)t.text, t.len);
+    const size_t line = scip_line((const uint8_t *)t.text, t.len);
     if (kind->n_words != 0) {
-        snprintf(name, TALK_NAME_LEN, "%.*s", n < TALK_NAME_LEN ? (int)n : TALK_NAME_LEN - 1, t.text);
+        snprintf(name, TALK_NAME_LEN, "%.*s", (int)(n < line ? n : line), t.text);
         return;
     }
     name[0] = '\0';
