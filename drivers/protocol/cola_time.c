@@ -86,67 +86,46 @@ static enum cola_error put_server(struct cola *self, const struct cola_server *s
     return error == 0 ? COLA_OK : error == -221 ? COLA_CONDITION : COLA_INVALID_DATA;
 }
 
-/* The variables that have one number: a member of struct cola_server, and its bytes. */
-static enum cola_error read_number(struct cola *self, size_t member, unsigned bytes, struct cola_args *args,
-                                   struct cola_out *out)
+/* The variables of one number, or of four: a member of struct cola_server, how many it has, and the bytes of each. */
+static enum cola_error read_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args,
+                                    struct cola_out *out)
 {
     struct cola_server s;
     enum cola_error error = cola_args_end(args);
     if (error == COLA_OK) error = get_server(self, &s);
-    if (error == COLA_OK) cola_put_u(out, bytes, *(const uint32_t *)((const char *)&s + member));
+    for (int i = 0; i < n && error == COLA_OK; i++)
+        cola_put_u(out, bytes, ((const uint32_t *)((const char *)&s + member))[i]);
     return error;
 }
 
-static enum cola_error write_number(struct cola *self, size_t member, unsigned bytes, struct cola_args *args)
+static enum cola_error write_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args)
 {
     struct cola_server s;
-    const uint32_t value = cola_arg_u(args, bytes);
+    uint32_t value[4];
+    for (int i = 0; i < n; i++)
+        value[i] = cola_arg_u(args, bytes);
     enum cola_error error = cola_args_end(args);
     if (error == COLA_OK) error = get_server(self, &s);
     if (error != COLA_OK) return error;
-    *(uint32_t *)((char *)&s + member) = value;
+    memcpy((char *)&s + member, value, (size_t)n * sizeof value[0]);
     return put_server(self, &s);
 }
 
-#define NUMBER(name, member, bytes)                                                                    \
+#define NUMBERS(name, member, n, bytes)                                                                \
     enum cola_error cola_read_##name(struct cola *self, struct cola_args *args, struct cola_out *out)  \
     {                                                                                                  \
-        return read_number(self, offsetof(struct cola_server, member), bytes, args, out);              \
+        return read_numbers(self, offsetof(struct cola_server, member), n, bytes, args, out);          \
     }                                                                                                  \
     enum cola_error cola_write_##name(struct cola *self, struct cola_args *args, struct cola_out *out) \
     {                                                                                                  \
         (void)out;                                                                                     \
-        return write_number(self, offsetof(struct cola_server, member), bytes, args);                  \
+        return write_numbers(self, offsetof(struct cola_server, member), n, bytes, args);              \
     }
-NUMBER(time_role, role, 1)
-NUMBER(time_interface, interface, 1)
-NUMBER(time_zone, zone, 1)
-NUMBER(time_update, update_s, 4)
-
-/* 4 x u8 */
-enum cola_error cola_read_time_address(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    struct cola_server s;
-    enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) error = get_server(self, &s);
-    for (int i = 0; i < 4 && error == COLA_OK; i++)
-        cola_put_u(out, 1, s.address[i]);
-    return error;
-}
-
-enum cola_error cola_write_time_address(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    struct cola_server s;
-    uint32_t address[4];
-    (void)out;
-    for (int i = 0; i < 4; i++)
-        address[i] = cola_arg_u(args, 1);
-    enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) error = get_server(self, &s);
-    if (error != COLA_OK) return error;
-    memcpy(s.address, address, sizeof s.address);
-    return put_server(self, &s);
-}
+NUMBERS(time_role, role, 1, 1)
+NUMBERS(time_interface, interface, 1, 1)
+NUMBERS(time_zone, zone, 1, 1)
+NUMBERS(time_update, update_s, 1, 4)
+NUMBERS(time_address, address, 4, 1)
 
 /* One of the times, in ns, of TIME:SERVer? STATe: 0 the limit, 1 the offset, 2 the delay. float, s */
 static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
