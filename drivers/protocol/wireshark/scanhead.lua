@@ -677,7 +677,10 @@ local function absorb(flow, h, bytes, at, m)
     flow.lost = flow.lost + m.lost
     flow.line.whole = false
   end
-  if m.notice == RESTARTED then flow.scan, flow.line = nil, {pulses = 0, whole = false} end
+  if m.notice == RESTARTED then
+    forget(flow)
+    flow.scan, flow.final, flow.last_pulse0, flow.line = nil, nil, nil, {pulses = 0, whole = false}
+  end
   if m.notice then m.lost_so_far = flow.lost end
   if h.version ~= 1 then return end
   m.has_deviations = flow.descriptor and floor(flow.descriptor.content / 8) % 2 == 1
