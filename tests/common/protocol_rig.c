@@ -94,6 +94,24 @@ static int store(void *ctx, const char *lines)
     return !rig->spec.keeps;
 }
 
+const struct nmea_fix protocol_rig_fix = {.talker = {'G', 'N'},
+                                          .year = 2026,
+                                          .month = 1,
+                                          .day = 2,
+                                          .hour = 3,
+                                          .minute = 4,
+                                          .second = 5,
+                                          .lat_deg = -33.8567844,
+                                          .lon_deg = 151.2152967,
+                                          .altitude_m = 87.6543,
+                                          .geoid_separation_m = 22.4321,
+                                          .quality = 4,
+                                          .satellites = 12,
+                                          .hdop = 0.9,
+                                          .speed_m_s = 1.0,
+                                          .course_deg = 90.0,
+                                          .sigma_m = {0.01, 0.01, 0.02}};
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;

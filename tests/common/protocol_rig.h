@@ -46,6 +46,9 @@ struct protocol_rig {
     uint32_t seq;
 };
 
+/* RTK fixed at 2026-01-02 03:04:05, 33.8567844 degrees south and 151.2152967 east; all else has a value, too. */
+extern const struct nmea_fix protocol_rig_fix;
+
 /* `model` is the profile's. The rig is large: allocate it, or make it static. It asserts that the protocol opens. */
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model);
 void protocol_rig_close(struct protocol_rig *rig);

@@ -9,23 +9,7 @@
 static void open_rig(enum protocol_id id)
 {
     protocol_rig_open(&rig, id, "Velodyne", "VLP-16");
-    rig.fix = (struct nmea_fix){.talker = {'G', 'N'},
-                                .year = 2026,
-                                .month = 1,
-                                .day = 2,
-                                .hour = 3,
-                                .minute = 4,
-                                .second = 5,
-                                .lat_deg = -33.8567844,
-                                .lon_deg = 151.2152967,
-                                .altitude_m = 87.6543,
-                                .geoid_separation_m = 22.4321,
-                                .quality = 4,
-                                .satellites = 12,
-                                .hdop = 0.9,
-                                .speed_m_s = 1.0,
-                                .course_deg = 90.0,
-                                .sigma_m = {0.01, 0.01, 0.02}};
+    rig.fix = protocol_rig_fix;
     rig.ops->open(rig.protocol, 0);
     rig.ops->time(rig.protocol, 1000000);
     assert_int_equal(rig.n_units, 1);

@@ -61,18 +61,13 @@ static void part(uint32_t line, int from, int to)
     protocol_rig_part(&rig, line, (uint32_t)from, (uint32_t)(to - from) + 1, shot + from);
 }
 
-static void line_end(uint32_t line, uint32_t status)
-{
-    protocol_rig_turn_end(&rig, line, status);
-}
-
 /* Feeds three frames and the end. */
 static void turn(uint32_t line)
 {
     part(line, 0, 3);
     part(line, 4, 7);
     part(line, 8, N - 1);
-    line_end(line, 0);
+    protocol_rig_turn_end(&rig, line, 0);
 }
 
 /* The rig looks to the right by turn * (step - 6) / 16 of a turn. To the left of the head, counter-clockwise, numbers
@@ -244,8 +239,8 @@ static void turns_are_missing(void **state)
     (void)state;
     open_head(-1, 0);
     turn(0);
-    line_end(1, 0); /* all its points */
-    turn(5);        /* 2, 3, 4 */
+    protocol_rig_turn_end(&rig, 1, 0); /* all its points */
+    turn(5);                           /* 2, 3, 4 */
     expect(3, 2, 4);
     part(6, 0, 3);
     turn(9); /* the rest of 6; 7, 8 */
@@ -262,18 +257,18 @@ static void what_is_no_loss(void **state)
     open_head(-1, 0);
     part(3, 4, 7); /* the client came within it */
     part(3, 8, N - 1);
-    line_end(3, 0);
+    protocol_rig_turn_end(&rig, 3, 0);
     expect(1, 0, 0);
     part(4, 0, 3);
-    line_end(4, LINE_PARTIAL); /* the scan was stopped within it */
+    protocol_rig_turn_end(&rig, 4, LINE_PARTIAL); /* the scan was stopped within it */
     expect(1, 0, 0);
     open_head(-1, 0);
-    line_end(8, 0);
+    protocol_rig_turn_end(&rig, 8, 0);
     turn(9);
     expect(2, 1, 0);
     open_head(-1, 0);
     part(0, 0, 3); /* from its first step on, so it is the client's */
-    line_end(0, 0);
+    protocol_rig_turn_end(&rig, 0, 0);
     expect(1, 0, 1);
 }
 
@@ -286,12 +281,12 @@ static void parts_of_two_turns_make_none(void **state)
     part(1, 4, 7);
     rig.scan_t0_ns += 60000000000; /* a turn of that number in another scan */
     part(1, 8, N - 1);
-    line_end(1, 0);
+    protocol_rig_turn_end(&rig, 1, 0);
     expect(3, 1, 3); /* both, and turn 0 of that scan */
     part(2, 0, 3);
     part(2, 0, 3); /* twice the same */
     part(2, 4, 7);
-    line_end(2, 0);
+    protocol_rig_turn_end(&rig, 2, 0);
     expect(1, 0, 1);
     for (int i = 0; i < N; i++)
         shot[i].n = 2;
@@ -364,7 +359,7 @@ static void heads_that_it_can_t_read(void **state)
             assert_int_equal(rows[i].known, 1);
         rig.emitter = good; /* whose points come all the same */
         part(0, 0, 3);
-        line_end(0, 0);
+        protocol_rig_turn_end(&rig, 0, 0);
         if (!rows[i].known) expect(0, 0, 0);
         news = (struct planar_news){0, 0, 0};
     }

@@ -17,20 +17,7 @@ static int setup(void **state)
 {
     (void)state;
     protocol_rig_open(&rig, PROTOCOL_VELODYNE_POSITION, "Velodyne", "VLP-16");
-    rig.fix = (struct nmea_fix){.talker = "GN",
-                                .year = 2026,
-                                .month = 1,
-                                .day = 2,
-                                .hour = 3,
-                                .minute = 4,
-                                .second = 5,
-                                .lat_deg = 48.1,
-                                .lon_deg = -11.5,
-                                .quality = 4,
-                                .satellites = 12,
-                                .hdop = 0.9,
-                                .speed_m_s = 1.0,
-                                .course_deg = 90.0};
+    rig.fix = protocol_rig_fix;
     n_asked = 0;
     return 0;
 }
@@ -72,7 +59,7 @@ static void open_again(int64_t t_ns)
 static void test_fields(void **state)
 {
     (void)state;
-    static const char rmc[] = "$GPRMC,030405.00,A,4806.0000000,N,01130.0000000,W,1.944,90.00,020126,,,R*";
+    static const char rmc[] = "$GPRMC,030405.00,A,3351.4070640,S,15112.9178020,E,1.944,90.00,020126,,,R*";
     uint8_t want[512] = {0};
     rig.utc0_ns = INT64_C(1767323040000000000); /* 2026-01-02 03:04:00 */
     rig.ops->time(rig.protocol, 1);             /* the packet of device time 0 */
@@ -143,7 +130,6 @@ static void test_without_utc(void **state)
     (void)state;
     rig.fix.quality = 0; /* the rig has none then */
     const int64_t hour_ns = INT64_C(3600000000000), first_ns = (hour_ns / 18579456 + 1) * 18579456;
-    protocol_rig_clear(&rig);
     rig.ops->destroy(rig.protocol);
     assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, NULL), 0);
     rig.ops->open(rig.protocol, hour_ns);

@@ -158,6 +158,17 @@ static void ports_or_skip(void)
     skip();
 }
 
+/* Reads so many turns, and ends head and client. Returns how many packets the kernel threw away meanwhile. */
+static uint32_t read_turns(struct grabber *grabber, int n, struct head *head, struct rawlog *log)
+{
+    if (!grabber_wait(grabber, n)) fail_msg("rawlog-grabber complains:\n%s", grabber->said);
+    head_end(head, SIGTERM);
+    const uint32_t dropped = grabber_dropped_at(2368);
+    grabber_end(grabber);
+    rawlog_read(grabber, log);
+    return dropped;
+}
+
 static void test_turns(void **state)
 {
     struct wire *wire = *state;
@@ -171,11 +182,7 @@ static void test_turns(void **state)
     struct head head = head_start(wire, "config/velodyne.yaml", house_options(wire, "4", NULL));
     struct house *house = house_load(wire);
     assert_true(house_is_mark(house, mark, 0.0) && !house_is_mark(house, -mark, 0.0));
-    if (!grabber_wait(&grabber, TURNS + 2)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
-    head_end(&head, SIGTERM);
-    const uint32_t dropped = grabber_dropped_at(2368);
-    grabber_end(&grabber);
-    rawlog_read(&grabber, &log);
+    const uint32_t dropped = read_turns(&grabber, TURNS + 2, &head, &log);
     collect(&log, by_device_time, &all);
     check_times(&all, dropped);
     check_azimuths(&all);
@@ -307,11 +314,7 @@ static void test_lossy(void **state)
     ports_or_skip();
     grabber_start(wire, "LOSSY", "driver = CVelodyneScanner\nmodel = VLP16\n", &grabber);
     struct head head = start_lossy(wire);
-    if (!grabber_wait(&grabber, TURNS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
-    head_end(&head, SIGTERM);
-    const uint32_t dropped = grabber_dropped_at(2368);
-    grabber_end(&grabber);
-    rawlog_read(&grabber, &log);
+    const uint32_t dropped = read_turns(&grabber, TURNS, &head, &log);
     collect(&log, NULL, &all);
     read_truth(wire, &sent);
     check_lossy(&all, &sent, dropped);
