@@ -1516,15 +1516,11 @@ local function dissect_usb(tvb, pinfo, tree)
   dissect_joined(tvb, pinfo, tree, conn_of(key, true), is_down, true)
 end
 
-local function dissect_user0(tvb, pinfo, tree)
+function scanhead.dissector(tvb, pinfo, tree)
+  if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
   begin_packet(pinfo)
   run_search(tvb, pinfo, tree, conn_of("user0", false), false)
   return tvb:len()
-end
-
-function scanhead.dissector(tvb, pinfo, tree)
-  if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
-  return dissect_user0(tvb, pinfo, tree)
 end
 
 local web = Proto("scanhead.ws", "Scan head on WebSocket")
