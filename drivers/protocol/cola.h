@@ -208,7 +208,7 @@ enum cola_head_state {
     COLA_HEAD_FAULT
 };
 enum cola_head_state cola_ask_state(struct cola *self);
-/* Lets the head scan if it rests. */
+/* Lets the head scan if it rests. 1: it does not; then polls that wait are refused. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
     cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination, cola_log_in,

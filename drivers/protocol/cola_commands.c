@@ -98,13 +98,15 @@ static enum cola_error set_scan_event(struct cola *self, struct cola_args *args,
     return COLA_OK;
 }
 
+/* An answer may be under way in self->unit, where a poll of before is refused. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
 {
-    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
+    uint8_t unit[32];
+    struct cola_out out = {.buf = unit, .cap = sizeof unit};
     cola_begin(&out, form, "sFA");
     cola_put_u(&out, 2, (uint32_t)error);
     self->host.count(self->host.ctx, PROTOCOL_WRONG, 1);
-    self->host.send(self->host.ctx, self->unit, cola_end(&out));
+    self->host.send(self->host.ctx, unit, cola_end(&out));
 }
 
 /* A request cut into its parts. */

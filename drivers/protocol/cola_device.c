@@ -170,13 +170,14 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 int cola_start_scan(struct cola *self)
 {
     const enum cola_head_state head = cola_ask_state(self);
-    if (head == COLA_HEAD_IDLE) {
-        const int refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
-        self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before */
-        return refused;
-    }
-    self->wants_scan = head != COLA_HEAD_FAULT && head != COLA_HEAD_UNKNOWN; /* one that scans may be about to stop */
-    return !self->wants_scan;
+    int refused = head == COLA_HEAD_FAULT || head == COLA_HEAD_UNKNOWN;
+    if (head == COLA_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
+    self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before, or just now */
+    if (!refused) return 0;
+    for (uint32_t i = 0; i < self->n_waiting; i++)
+        cola_refuse(self, (enum cola_form)self->waiting_form[i], COLA_CONDITION);
+    self->n_waiting = 0;
+    return 1;
 }
 
 /* u8 0: measures; 1: not allowed, and all is as before */

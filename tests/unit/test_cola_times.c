@@ -211,6 +211,13 @@ static void a_client_that_does_not_read_loses_whole_scans(void **state)
 
 /* ---- polled, every second one, stopped */
 
+static void expect_bytes(const char *bytes)
+{
+    assert_int_equal(cola.len, strlen(bytes));
+    assert_memory_equal(cola.bytes, bytes, cola.len);
+    protocol_rig_clear(&cola);
+}
+
 static void a_poll_gets_the_last_scan(void **state)
 {
     (void)state;
@@ -243,16 +250,20 @@ static void a_poll_gets_the_last_scan(void **state)
     protocol_rig_input(&cola, "\2sRN LMDscandata\3");
     assert_string_equal(cola.line[1], "SCAN:START");
     cola_head_state("fault");
-    cola_expect("sRN LMDscandata", "sFA 4");
+    protocol_rig_clear(&cola);
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    expect_bytes("\2sFA 4\3\2sFA 4\3"); /* the one that has waited is refused, too */
 }
+
+/* Another session controls the head. */
+static const struct protocol_rig_reply refused[] = {
+    {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
 
 /* Somebody stops the head before the first scan has come: it is started again, since a poll waits. After that scan a
  * stop is meant. Where the start is refused, it is tried once. */
 static void a_waiting_poll_starts_the_head_again(void **state)
 {
     (void)state;
-    static const struct protocol_rig_reply refused[] = {
-        {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
     cola_open_lms();
     cola_head_state("idle");
     protocol_rig_input(&cola, "\2sRN LMDscandata\3");
@@ -285,6 +296,28 @@ static void a_waiting_poll_starts_the_head_again(void **state)
     protocol_rig_clear(&cola);
     cola.ops->time(cola.protocol, 1000000000);
     assert_int_equal(cola.n_lines, 0);
+}
+
+/* The head fails while a poll waits, or may not be started any more: the poll is refused, once. The answer to the
+ * request in which this shows comes after it. */
+static void a_waiting_poll_is_refused(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        cola_open_lms();
+        cola_head_state("boot");
+        cola_authorise();
+        protocol_rig_clear(&cola);
+        protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+        cola_head_state("fault");
+        if (i == 1) cola.replies = refused;
+        if (i == 2) protocol_rig_input(&cola, "\2sMN LMCstartmeas\3");
+        cola.ops->time(cola.protocol, 1000000000);
+        cola.ops->time(cola.protocol, 2000000000);
+        expect_bytes(i == 2 ? "\2sFA 4\3\2sAN LMCstartmeas 1\3" : "\2sFA 4\3");
+        cola_turn(41, 1.0);
+        assert_int_equal(cola.n_units, 0);
+    }
 }
 
 /* Two polls wait for the first scan: each answer has the form of its request. */
@@ -365,6 +398,7 @@ int main(void)
         CASE(a_client_that_does_not_read_loses_whole_scans),
         CASE(a_poll_gets_the_last_scan),
         CASE(a_waiting_poll_starts_the_head_again),
+        CASE(a_waiting_poll_is_refused),
         CASE(waiting_polls_keep_their_forms),
         CASE(every_nth_scan_on_request),
         CASE(the_stream_has_the_chosen_form),
