@@ -69,7 +69,7 @@ static void scip_take_line(struct scip *s)
     if (!s->foul && s->is_over)
         scip_answer(s, s->line, s->n_line, "0B");
     else if (!s->foul && s->n_line != 0)
-        scip_command(s, s->line, s->n_line);
+        scip_command(s);
     s->n_line = 0;
     s->is_over = s->foul = 0;
 }
