@@ -57,14 +57,9 @@ static const char *read_request(struct scip_request *q, const char *line, int st
     return NULL;
 }
 
-static int is_time_us(const char *line)
-{
-    return line[0] == '%';
-}
-
 static const char *scip_measure_begin(struct scip *s, struct scip_request *q, int streams)
 {
-    *q = (struct scip_request){.echo_len = s->n_line, .time_us = is_time_us(s->line)};
+    *q = (struct scip_request){.echo_len = s->n_line, .time_us = s->line[0] == '%'};
     memcpy(q->echo, s->line, s->n_line);
     const char *line = s->line + q->time_us;
     q->n_chars = line[1] == 'S' ? 2 : 3;
@@ -85,7 +80,7 @@ const char *scip_measure(struct scip *s)
 {
     enum { WAIT_NS = 2000000000 };
     struct scip_request request;
-    const int streams = is_time_us(s->line) || s->line[0] == 'M' || s->line[0] == 'N';
+    const int streams = strchr("%MN", s->line[0]) != NULL;
     const char *refused = scip_has_head(s) ? scip_measure_begin(s, &request, streams) : "0A";
     if (refused != NULL) return refused;
     if (!streams && s->single.active) return "0B";
