@@ -193,14 +193,14 @@ static int check_phase_input(const struct posted *p, const char *value, int appl
 /* A head without a place for settings takes it, too: clients expect that a device does. */
 static int save(const struct posted *p, const char *value, int apply)
 {
-    if (strcmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
+    if (strcasecmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
     return apply && p->spec->keeps ? command(p, "HEAD:STORE") : 200;
 }
 
 /* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
 static int reset(const struct posted *p, const char *value, int apply)
 {
-    if (strcmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
+    if (strcasecmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
     if (!apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
