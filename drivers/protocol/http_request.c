@@ -131,7 +131,8 @@ static int find_head(struct http_reader *r)
     if (empty != 0) forget(r, empty);
     const int result = http_scan_head(&r->scan, r->bytes, r->len < HTTP_MAX_HEAD ? r->len : HTTP_MAX_HEAD);
     const char *line_end = memchr(r->bytes, '\n', r->len);
-    const size_t line_len = line_end != NULL ? (size_t)(line_end - r->bytes) : r->len;
+    size_t line_len = line_end != NULL ? (size_t)(line_end - r->bytes) : r->len;
+    if (line_len != 0 && r->bytes[line_len - 1] == '\r') line_len--;
     if (line_len > HTTP_MAX_LINE) return 414;
     if (result == HTTP_SCAN_MORE) return r->len > HTTP_MAX_HEAD ? 431 : 0;
     if (result != HTTP_SCAN_WHOLE) return result;

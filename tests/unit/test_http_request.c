@@ -100,6 +100,25 @@ static void test_broken_requests(void **state)
     }
 }
 
+/* A line of 512 bytes without its end, and a head of 4096 bytes with its end, are the longest. */
+static void test_longest(void **state)
+{
+    (void)state;
+    static char text[8192];
+    for (int more = 0; more < 2; more++) {
+        http_renew();
+        snprintf(text, sizeof text, "GET /cgi/info.json?%0*d HTTP/1.1\r\nHost: x\r\n\r\n", 512 - 19 - 9 + more, 0);
+        http_send(text);
+        assert_int_equal(http_status(), more ? 414 : 200);
+        http_renew();
+        snprintf(text, sizeof text, "GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nX: %0*d\r\n\r\n",
+                 4096 - 29 - 9 - 3 - 4 + more, 0);
+        assert_int_equal(strlen(text), 4096 + more);
+        http_send(text);
+        assert_int_equal(http_status(), more ? 431 : 200);
+    }
+}
+
 /* HEAD answers as GET, without the body. */
 static void test_head_method(void **state)
 {
@@ -197,8 +216,13 @@ static void test_garbage(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_pieces),          TEST(test_broken_requests),      TEST(test_head_method),
-        TEST(test_expect_continue), TEST(test_pages_from_elsewhere), TEST(test_nothing_is_reflected),
+        TEST(test_pieces),
+        TEST(test_broken_requests),
+        TEST(test_head_method),
+        TEST(test_longest),
+        TEST(test_expect_continue),
+        TEST(test_pages_from_elsewhere),
+        TEST(test_nothing_is_reflected),
         TEST(test_garbage),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
