@@ -8,7 +8,7 @@
 
 enum { SEQUENCE_NS = 55296, FIRING_NS = 2304 };
 
-/* Of a VLP-16 at 10 turns a second that sends the strongest echo; from setup to teardown. */
+/* The session of a VLP-16 at 10 turns a second that sends the strongest echo; from setup to teardown. */
 extern struct protocol_rig rig;
 int velodyne_head_setup(void **state);
 int velodyne_head_teardown(void **state);

@@ -121,7 +121,7 @@ static void scanner_end(void)
     head_end(&head, SIGTERM);
 }
 
-/* Has it ask the server. Returns T1 of its first request. */
+/* Lets the scanner ask the server. Returns T1 of its first request. */
 static double ask_first(void)
 {
     cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
